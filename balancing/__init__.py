@@ -1,0 +1,1 @@
+"""Balancing of rotors: from known eccentric masses and from measured vibration."""

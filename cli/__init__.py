@@ -1,0 +1,1 @@
+"""The `dalembert` command: reads tables, calls the three packages, shows the result."""

@@ -1,0 +1,86 @@
+"""The front door: the names of the commands; each command's file is loaded when it is called."""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib import import_module
+
+import typer
+
+from cli.errors import DataError
+
+# name -> (module with a function `run`, the line shown by `dalembert --help`)
+COMMANDS = {
+    "balance": ("cli.commands.balance", "Balance rotors from a table of known eccentric masses."),
+    "examples": ("cli.commands.examples", "List the worked examples, or write one into the current folder."),
+}
+
+
+def _version(show: bool) -> None:
+    if show:
+        from importlib.metadata import version
+
+        typer.echo(f"dalembert {version('dalembert')}")
+        raise typer.Exit
+
+
+def _front(
+    version: bool = typer.Option(
+        False, "--version", callback=_version, is_eager=True, help="Show the version and exit."
+    ),
+) -> None:
+    """Balancing of rotors and mechanics of mechanisms, by d'Alembert's principle."""
+
+
+def _elsewhere() -> None:
+    """Stand in for a command that was not called: its file is not loaded."""
+
+
+def build(called: str | None) -> typer.Typer:
+    """Build the command line with only the called command's file loaded."""
+    app = typer.Typer(
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        add_completion=False,
+        no_args_is_help=True,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback()(_front)
+    for name, (module, line) in COMMANDS.items():
+        run = import_module(module).run if name == called else _elsewhere
+        app.command(name, short_help=line)(run)
+    return app
+
+
+def main() -> None:
+    """Run the command; a data error is one line on standard error and status 1, never a traceback."""
+    # Small matrices only: a pool of BLAS threads costs more to start than it gives. The user's word goes first.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    called = next((word for word in sys.argv[1:] if not word.startswith("-")), None)
+    try:
+        build(called)(prog_name="dalembert")
+    except DataError as error:
+        sys.exit(_fail(str(error)))
+    except BrokenPipeError:
+        # The reader of the pipe has gone (`| head`): nothing more to say, and no complaint at shutdown.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except MemoryError:
+        sys.exit(_fail("not enough memory for this input"))
+    except Exception as error:
+        if os.environ.get("DALEMBERT_TRACEBACK"):
+            raise
+        sys.exit(
+            _fail(
+                f"internal error ({type(error).__name__}: {error}); this is a fault of dalembert, please "
+                "report it; DALEMBERT_TRACEBACK=1 shows where"
+            )
+        )
+
+
+def _fail(message: str) -> int:
+    print("dalembert: " + " ".join(message.split()), file=sys.stderr)
+    return 1

@@ -1,0 +1,31 @@
+"""What a user's data can do wrong, in one line each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class DataError(Exception):
+    """Bad data: shown as one line, status 1."""
+
+
+def cell_error(file: str, row: int, line: int, column: str, found: str, expected: str) -> DataError:
+    """Name file, row, column, the value found and what was expected.
+
+    `row` counts the data rows from 1; `line` is the file's own line, header and blank lines included.
+    """
+    return DataError(f"{file}: row {row} (line {line}), column {column}: found {quote(found)}, expected {expected}")
+
+
+def quote(found: str) -> str:
+    """Show a value from a file on one line, whatever it holds."""
+    text = ascii(found) if not found.isprintable() else f"'{found}'"
+    return text if len(text) <= 60 else text[:57] + "...'"
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """Suggest the nearest known name: `; did you mean 'mm'?`, or nothing."""
+    from difflib import get_close_matches
+
+    close = get_close_matches(word, list(known), n=1, cutoff=0.4)
+    return f"; did you mean '{close[0]}'?" if close else ""

@@ -1,0 +1,1 @@
+"""Rigid bodies in space: inertia, angular momentum, shafts, rotation in time."""

@@ -1,0 +1,1 @@
+"""Planar mechanisms: kinematics, and equilibrium at rest and in motion by virtual work."""
