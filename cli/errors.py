@@ -14,7 +14,9 @@ def cell_error(file: str, row: int, line: int, column: str, found: str, expected
 
     `row` counts the data rows from 1; `line` is the file's own line, header and blank lines included.
     """
-    return DataError(f"{file}: row {row} (line {line}), column {column}: found {quote(found)}, expected {expected}")
+    return DataError(
+        f"{file}: row {row} (line {line}), column {column}: found {quote(found)}, expected {expected}"
+    )
 
 
 def quote(found: str) -> str:

@@ -1,0 +1,243 @@
+"""Known unbalances -> the corrections in one, two or more planes that balance them.
+
+With U the unbalances at z and W the corrections in the planes at z_p, balance asks that
+
+    Σ U + Σ W = 0           (force; Riul eq. 9, 12)
+    Σ U z + Σ W z_p = 0     (moment; Riul eq. 13)
+
+In one plane only the force can vanish. In two planes W_B = -M_A/(z_B - z_A), the moment about plane A over
+the distance (eqs. 15-18). In more planes the corrections of least Σ|W|² are, with M_q = Σ U (z - z_q) the
+moment about plane q,
+
+    W_p = -Σ_q (z_p - z_q) M_q / Σ_{q<r} (z_q - z_r)²,
+
+which for two planes is the line above. Only differences of given positions stand in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from balancing.summation import exact_sum, two_product, two_sum
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class CoincidentPlanes(ValueError):
+    """All correction planes of a rotor lie at one place: they cannot correct a couple."""
+
+    def __init__(self, rotors: NDArray[np.bool_]) -> None:
+        self.rotors = rotors
+        super().__init__(
+            "the correction planes lie at the same place, so that they cannot correct a couple: "
+            "expected planes apart, or a single plane for static balancing"
+        )
+
+
+class Unbalances(NamedTuple):
+    """The static unbalance (kg·m) and the couple unbalance (kg·m²), complex."""
+
+    static: Complex
+    couple: Complex
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Corrections of rotors with known unbalances; see `correct`."""
+
+    moment: Complex
+    """The unbalances m·r·e^{iθ}, (..., k), kg·m."""
+    z: Real
+    """Their axial positions, (..., k), m."""
+    planes: Real
+    """The axial positions of the correction planes, (..., p), m."""
+
+    @cached_property
+    def _static(self) -> tuple[Real, Real]:
+        """Σ U as a pair (rounded, rest), each (..., 2): real and imaginary part."""
+        return exact_sum(_parts(self.moment), axis=-2)
+
+    @cached_property
+    def _moment(self) -> tuple[Real, Real]:
+        """Σ U z as a pair."""
+        product, error = two_product(_parts(self.moment), self.z[..., None])
+        total, rest = exact_sum(product, axis=-2)
+        return two_sum(total, rest + error.sum(axis=-2))
+
+    def _about(self, z: Real) -> Real:
+        """Σ U (z_i - z) for positions z (..., q): (..., q, 2), rounded once."""
+        (s, s_rest), (m, m_rest) = self._static, self._moment
+        at = z[..., None]
+        product, error = two_product(at, s[..., None, :])
+        total, rest = two_sum(m[..., None, :], -product)
+        return total + (rest + (m_rest[..., None, :] - error - at * s_rest[..., None, :]))
+
+    @property
+    def static(self) -> Complex:
+        """The static unbalance Σ U before correction, (...), kg·m."""
+        return _complex(self._static[0])
+
+    def couple(self, about: ArrayLike) -> Complex:
+        """Return the couple unbalance Σ U (z - about) before correction, (...), kg·m²."""
+        at = np.broadcast_to(np.asarray(about, dtype=float), self.static.shape)
+        return _complex(self._about(at[..., None]))[..., 0]
+
+    @cached_property
+    def unbalance(self) -> Complex:
+        """The unbalance to ADD in each plane, (..., p), kg·m."""
+        if self.planes.shape[-1] == 1:
+            return -self.static[..., None]
+        apart, square = self._distances
+        moments = _complex(self._about(self.planes))
+        return np.asarray(-np.einsum("...pq,...q->...p", apart, moments) / square[..., None])
+
+    @cached_property
+    def _distances(self) -> tuple[Real, Real]:
+        """z_p - z_q, and Σ_{q<r} (z_q - z_r)²."""
+        apart = self.planes[..., :, None] - self.planes[..., None, :]
+        return apart, np.asarray(np.square(apart).sum(axis=(-1, -2)) / 2)
+
+    @cached_property
+    def amplification(self) -> Real:
+        """The factor by which an error in an unbalance can grow in the corrections, (...); 1 between two planes.
+
+        The largest Σ_p |∂W_p/∂U| over the given unbalances: it grows as the planes approach each other.
+        """
+        if self.planes.shape[-1] == 1:
+            return np.ones(self.static.shape)
+        apart, square = self._distances
+        levers = self.z[..., :, None] - self.planes[..., None, :]
+        weights = np.einsum("...pq,...kq->...kp", apart, levers) / square[..., None, None]
+        return np.asarray(np.abs(weights).sum(axis=-1).max(axis=-1, initial=1.0, where=self.moment != 0))
+
+    @cached_property
+    def residual(self) -> Unbalances:
+        """What is left when the corrections are made exactly: rounding, and in one plane the couple about it."""
+        return self.residual_of(self.unbalance)
+
+    def residual_of(self, unbalance: ArrayLike, about: ArrayLike | None = None) -> Unbalances:
+        """Return what corrections as really made (..., p) leave: static, and couple about a plane (default: the first)."""
+        made = np.asarray(unbalance, dtype=complex)
+        made = np.broadcast_to(made, np.broadcast_shapes(made.shape, self.static.shape + made.shape[-1:]))
+        at = np.broadcast_to(
+            self.planes[..., 0] if about is None else np.asarray(about, dtype=float), made.shape[:-1]
+        )
+        planes = np.broadcast_to(self.planes, made.shape)
+        moment = np.concatenate(
+            [np.broadcast_to(self.moment, made.shape[:-1] + self.moment.shape[-1:]), made], axis=-1
+        )
+        z = np.concatenate([np.broadcast_to(self.z, made.shape[:-1] + self.z.shape[-1:]), planes], axis=-1)
+        left = Correction(moment, z, planes)
+        return Unbalances(left.static, left.couple(at))
+
+    def mass(self, radius: ArrayLike) -> Real:
+        """Return the masses to add at the radius (m) of each plane, (..., p), kg."""
+        return np.asarray(np.abs(self.unbalance) / radius)
+
+    @property
+    def angle(self) -> Real:
+        """The angles of the corrections to add, (..., p), rad in [0, 2π)."""
+        angle = np.angle(self.unbalance) % (2 * np.pi)
+        return np.where(angle >= 2 * np.pi, 0.0, angle)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with a row per rotor and plane: z_m, unbalance_kg_m, angle_deg."""
+        import pandas as pd
+
+        planes = np.broadcast_to(self.planes, self.unbalance.shape)
+        index = pd.MultiIndex.from_product(
+            [range(n) for n in self.unbalance.shape[:-1]] + [range(planes.shape[-1])]
+        )
+        return pd.DataFrame(
+            {
+                "z_m": planes.ravel(),
+                "unbalance_kg_m": np.abs(self.unbalance).ravel(),
+                "angle_deg": np.degrees(self.angle).ravel(),
+            },
+            index=index.set_names([*(f"rotor{i}" for i in range(index.nlevels - 1)), "plane"]),
+        )
+
+    def _repr_html_(self) -> str:
+        html: str = self.to_frame().to_html(max_rows=20)
+        return html
+
+    def __repr__(self) -> str:
+        rotors = self.static.size
+        return f"<Correction of {rotors} rotor{'s' * (rotors != 1)} in {self.planes.shape[-1]} plane(s): unbalance {self.unbalance}>"
+
+
+def correct(moment: ArrayLike, z: ArrayLike = 0.0, planes: ArrayLike = (0.0,)) -> Correction:
+    """Find the corrections that balance rotors whose unbalances are known.
+
+    Parameters
+    ----------
+    moment
+        Unbalances m·r·e^{iθ}, complex, (..., k), kg·m; leading axes are rotors.
+    z
+        Their axial positions, (..., k) or broadcastable, m.
+    planes
+        Axial positions of the correction planes, (p,) or (..., p), m: one plane for static balancing, two for
+        dynamic balancing; with more, the corrections of least Σ|W|².
+
+    Returns
+    -------
+    Correction
+        `.unbalance` (..., p) complex, to ADD, kg·m; `.residual`; `.mass(radius)`, `.angle`; `.static`, `.couple(about)`.
+
+    Raises
+    ------
+    CoincidentPlanes
+        All planes of a rotor at one place.
+    ValueError
+        Not finite, or shapes that do not fit.
+
+    Notes
+    -----
+    J. A. Riul, Dinâmica das Máquinas II, eqs. (6)-(21); the sums are compensated (`balancing.summation`).
+
+    Examples
+    --------
+    Riul's example 2: 9 kg at 30 mm, 60° and 6 kg at 50 mm, 210°, corrected at 20 mm in planes 90 mm apart.
+
+    >>> import numpy as np
+    >>> moment = np.array([9 * 0.030, 6 * 0.050]) * np.exp(1j * np.radians([60, 210]))
+    >>> fix = correct(moment, z=[0.020, 0.065], planes=[0, 0.090])
+    >>> fix.mass(radius=0.020).round(4)
+    array([7.1996, 8.3708])
+    >>> np.degrees(fix.angle).round(2)
+    array([256.82,  19.68])
+    """
+    u = np.atleast_1d(np.asarray(moment, dtype=complex))
+    at = np.asarray(z, dtype=float)
+    p = np.atleast_1d(np.asarray(planes, dtype=float))
+    if not (np.isfinite(u).all() and np.isfinite(at).all() and np.isfinite(p).all()):
+        raise ValueError("moment, z and planes must be finite")
+    shape = np.broadcast_shapes(u.shape, at.shape)
+    lead = np.broadcast_shapes(shape[:-1], p.shape[:-1])
+    fix = Correction(
+        np.broadcast_to(u, lead + shape[-1:]),
+        np.broadcast_to(at, lead + shape[-1:]),
+        np.broadcast_to(p, lead + p.shape[-1:]),
+    )
+    if p.shape[-1] > 1:
+        together = fix._distances[1] == 0
+        if together.any():
+            raise CoincidentPlanes(together)
+    return fix
+
+
+def _parts(z: Complex) -> Real:
+    return np.stack([z.real, z.imag], axis=-1)
+
+
+def _complex(parts: Real) -> Complex:
+    return np.ascontiguousarray(parts).view(complex)[..., 0]

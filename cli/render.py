@@ -1,0 +1,202 @@
+"""Results out: an aligned table, CSV, JSON, a picture; never a partly written file."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cli.errors import DataError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def _suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
+    def check(path: Path | None) -> Path | None:
+        if path is not None and path.suffix.lower() not in suffixes:
+            raise typer.BadParameter(f"'{path}' has no known suffix: expected {', '.join(suffixes)}")
+        return path
+
+    return check
+
+
+# The options that every command shares.
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, SI units, full precision.")]
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="Write the result to FILE (.csv or .json).",
+        callback=_suffix_among(".csv", ".json"),
+    ),
+]
+Plot = Annotated[
+    Path | None,
+    typer.Option(
+        "--plot",
+        metavar="FILE",
+        help="Write a picture to FILE (.svg, .png or .pdf).",
+        callback=_suffix_among(".svg", ".png", ".pdf"),
+    ),
+]
+Expect = Annotated[
+    Path | None,
+    typer.Option(
+        "--expect",
+        metavar="FILE.csv",
+        help="Check the result against expected values under the same column names.",
+    ),
+]
+Rtol = Annotated[
+    float, typer.Option("--rtol", min=0.0, help="Relative tolerance of --expect (for angles: radians).")
+]
+Text = Annotated[bool, typer.Option("--text", help="Print the aligned table even into a pipe.")]
+
+Columns = Mapping[str, Sequence[Any]]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A result in every form it can be shown in."""
+
+    document: Callable[[], dict[str, Any]]
+    """The JSON document, without its warnings; built only when asked for."""
+    columns: Columns
+    """The CSV: column name -> values, all of one length; strings are keys, None an empty cell."""
+    keys: Sequence[str] = ()
+    """The columns that name a row."""
+    notes: Callable[[], str] = lambda: ""
+    """What the terminal shows above the table."""
+    afterword: Callable[[], str] = lambda: ""
+    """What the terminal shows below the table."""
+    figure: Callable[[], Figure] | None = None
+    warnings: list[str] = field(default_factory=list)
+
+
+def show(
+    shown: Shown,
+    *,
+    json: bool = False,
+    output: Path | None = None,
+    plot: Path | None = None,
+    expect: Path | None = None,
+    rtol: float = 1e-3,
+    text: bool = False,
+) -> None:
+    """Write the files asked for, print the result, end with status 1 if an expectation is not met."""
+    report = None
+    if expect is not None:
+        from cli.expect import compare
+
+        report = compare(shown, str(expect), rtol)
+    if plot is not None and shown.figure is not None:
+        write(plot, _picture(shown.figure, plot.suffix.lower()[1:]))
+    if output is not None:
+        write(
+            output, (_json(shown) if output.suffix.lower() == ".json" else csv_text(shown.columns)).encode()
+        )
+    for warning in shown.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    if json:
+        sys.stdout.write(_json(shown))
+        if report is not None:
+            print(report.text, file=sys.stderr)
+    elif report is not None:
+        print(report.text)
+    elif text or (sys.stdout.isatty() and output is None):
+        sys.stdout.write(_paragraphs(shown.notes(), table_text(shown.columns), shown.afterword()))
+    elif output is None:
+        sys.stdout.write(csv_text(shown.columns))
+    sys.stdout.flush()
+    if report is not None and not report.passed:
+        raise typer.Exit(1)
+
+
+def write(path: Path, data: bytes) -> None:
+    """Write a file whole or not at all."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        try:
+            partial.write_bytes(data)
+            os.replace(partial, path)
+        finally:
+            partial.unlink(missing_ok=True)
+    except OSError as error:
+        raise DataError(f"{path}: cannot write: {error.strerror or error}") from None
+
+
+def csv_text(columns: Columns) -> str:
+    """Return CSV with every digit of every number."""
+    rows = len(next(iter(columns.values()), ()))
+    if rows >= 10_000:
+        import pandas as pd
+
+        text: str = pd.DataFrame(dict(columns)).to_csv(index=False, lineterminator="\n")
+        return text
+    import csv
+
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*([_plain(value) for value in column] for column in columns.values()), strict=True))
+    return stream.getvalue()
+
+
+def _plain(value: Any) -> Any:
+    """Return a cell as CSV writes it: numpy's numbers as Python's, yes and no as JSON spells them."""
+    value = value.item() if hasattr(value, "item") else value
+    if value is None or value != value:
+        return ""
+    return str(value).lower() if isinstance(value, bool) else value
+
+
+def table_text(columns: Columns) -> str:
+    """Return an aligned table, numbers to 6 significant digits and to the right, names to the left."""
+    printed = []
+    for name, column in columns.items():
+        values = [_plain(value) for value in column]
+        cells = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in values]
+        width = max(map(len, [name, *cells]))
+        left = any(isinstance(value, str) and value for value in values)
+        printed.append([cell.ljust(width) if left else cell.rjust(width) for cell in [name, *cells]])
+    return "".join("  ".join(row).rstrip() + "\n" for row in zip(*printed, strict=True))
+
+
+def _paragraphs(*parts: str) -> str:
+    return "\n".join(part.rstrip("\n") + "\n" for part in parts if part)
+
+
+def _json(shown: Shown) -> str:
+    import json
+
+    document = {**shown.document(), "warnings": shown.warnings}
+    return (
+        json.dumps(
+            document, ensure_ascii=False, indent=1, allow_nan=False, default=lambda array: array.tolist()
+        )
+        + "\n"
+    )
+
+
+def _picture(draw: Callable[[], Figure], suffix: str) -> bytes:
+    try:
+        import matplotlib
+    except ImportError:
+        raise DataError(
+            "--plot needs matplotlib: install dalembert with its extra, dalembert[plot]"
+        ) from None
+    matplotlib.use("Agg")
+    matplotlib.rcParams["svg.hashsalt"] = "dalembert"  # the same picture is the same file
+    stream = io.BytesIO()
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix)
+    draw().savefig(stream, format=suffix, dpi=150, metadata=metadata)
+    return stream.getvalue()

@@ -1,0 +1,180 @@
+"""Units: the suffix of a column's name, the unit of an option's value. Inside, everything is SI and radians.
+
+A unit is a pair (numerator, denominator): a value times the one over the other is SI. Decimal units
+keep an integer denominator, because 20/1000 is the correctly rounded 0.02 and 20*0.001 need not be.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, Any
+
+from cli.errors import nearest
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+Unit = tuple[float, float]
+
+_LENGTH: dict[str, Unit] = {"m": (1, 1), "mm": (1, 1000), "cm": (1, 100), "um": (1, 10**6), "in": (127, 5000)}
+_LB = (45359237, 10**8)
+_OZ = (45359237, 16 * 10**8)
+_G0 = 9.80665
+_TURN = (math.pi, 180)
+
+UNITS: dict[str, dict[str, Unit]] = {
+    "number": {"": (1, 1)},
+    "length": _LENGTH,
+    "mass": {"kg": (1, 1), "g": (1, 1000), "mg": (1, 10**6), "lb": _LB, "oz": _OZ},
+    "force": {"N": (1, 1), "kN": (1000, 1), "lbf": (_LB[0] * _G0, _LB[1])},
+    "angle": {"deg": _TURN, "rad": (1, 1)},
+    "unbalance": {
+        "kg_m": (1, 1),
+        "kg_mm": (1, 1000),
+        "g_m": (1, 1000),
+        "g_mm": (1, 10**6),
+        "g_cm": (1, 10**5),
+        "oz_in": (_OZ[0] * 127, _OZ[1] * 5000),
+        "g_in": (127, 5 * 10**6),
+        "lb_in": (_LB[0] * 127, _LB[1] * 5000),
+    },
+    "inertia": {
+        "kg_m2": (1, 1),
+        "kg_mm2": (1, 10**6),
+        "g_mm2": (1, 10**9),
+        "lb_in2": (_LB[0] * 127**2, _LB[1] * 5000**2),
+    },
+    "speed": {"rad_s": (1, 1), "rpm": (math.pi, 30), "Hz": (2 * math.pi, 1), "deg_s": _TURN},
+    "angular acceleration": {"rad_s2": (1, 1), "deg_s2": _TURN, "rpm_s": (math.pi, 30)},
+    "velocity": {"m_s": (1, 1), "mm_s": (1, 1000), "in_s": (127, 5000)},
+    "acceleration": {"m_s2": (1, 1), "mm_s2": (1, 1000), "in_s2": (127, 5000)},
+    "torque": {
+        "N_m": (1, 1),
+        "N_mm": (1, 1000),
+        "kN_m": (1000, 1),
+        "lbf_in": (_LB[0] * _G0 * 127, _LB[1] * 5000),
+    },
+    "density": {"kg_m3": (1, 1), "g_cm3": (1000, 1)},
+    "time": {"s": (1, 1), "ms": (1, 1000)},
+}
+"""Dimension -> suffix -> unit. The first suffix of each dimension is SI."""
+
+# A vibration is a displacement, a velocity or an acceleration; it keeps its unit, and the units do not mix.
+AMPLITUDES: dict[str, Unit] = {
+    "um": (1, 10**6),
+    "mm": (1, 1000),
+    "m": (1, 1),
+    "mil": (127, 5 * 10**6),
+    "in": (127, 5000),
+    "mm_s": (1, 1000),
+    "m_s": (1, 1),
+    "in_s": (127, 5000),
+    "mm_s2": (1, 1000),
+    "m_s2": (1, 1),
+    "g": (_G0, 1),
+}
+UNITS["amplitude"] = AMPLITUDES
+
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII)
+
+
+def find_unit(dimension: str, suffix: str) -> str | None:
+    """Return the unit of this dimension whose name is `suffix`, in any case of letters; None if there is none."""
+    units = UNITS[dimension]
+    if suffix in units:
+        return suffix
+    return next((unit for unit in units if unit.lower() == suffix.lower()), None)
+
+
+def to_si(value: Any, dimension: str, unit: str) -> Any:
+    """Convert a number or an array from `unit` to SI."""
+    numerator, denominator = UNITS[dimension][unit]
+    return value * numerator / denominator
+
+
+def from_si(value: Any, dimension: str, unit: str) -> Any:
+    """Convert a number or an array from SI to `unit`."""
+    numerator, denominator = UNITS[dimension][unit]
+    return value * denominator / numerator
+
+
+def parse_number(text: str) -> float:
+    """Read a finite decimal number; ValueError otherwise (NaN, inf, `1_000` and `0x10` included)."""
+    text = text.strip()
+    if not text.isascii() or "_" in text:
+        raise ValueError(text)
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
+def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
+    """Read an option's value such as `3000rpm` or `30 g_mm`: the number and the unit it was given in.
+
+    Raises ValueError with a sentence that says what is wrong and which units there are.
+    """
+    known = ", ".join(UNITS[dimension])
+    match = _QUANTITY.match(text)
+    if match is None:
+        raise ValueError(f"'{text}' is not a number with a unit (units: {known})")
+    number, suffix = match.groups()
+    suffix = suffix.replace("*", "_").replace("·", "_").replace(" ", "_").replace("/", "_").replace("^", "")
+    unit = find_unit(dimension, suffix)
+    if unit is None:
+        if not suffix:
+            raise ValueError(f"'{text}' has no unit (units: {known})")
+        raise ValueError(
+            f"'{text}' has the unknown {dimension} unit '{suffix}' (units: {known}){nearest(suffix, UNITS[dimension])}"
+        )
+    value = float(number)
+    if not math.isfinite(value):
+        raise ValueError(f"'{text}' is not a finite number")
+    return value, unit
+
+
+def quantity(text: str, dimension: str) -> float:
+    """Read an option's value with its unit, as SI."""
+    value, unit = parse_quantity(text, dimension)
+    return float(to_si(value, dimension, unit))
+
+
+def cosine_sine(angle: NDArray[np.float64], unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return cos and sin of angles in `deg` or `rad`; degrees are reduced first, so that 90° has cosine 0.
+
+    The reduction to within 45° of a quarter turn is exact in degrees, where 360 is a number.
+    """
+    import numpy as np
+
+    angle = np.asarray(angle, dtype=float)
+    if unit != "deg":
+        angle = to_si(angle, "angle", unit)
+        return np.cos(angle), np.sin(angle)
+    turn = np.fmod(angle, 360.0)
+    quarter = np.rint(turn / 90.0)
+    rest = (turn - 90.0 * quarter) * (math.pi / 180)
+    c, s = np.cos(rest), np.sin(rest)
+    q = quarter.astype(np.int64) % 4
+    # + 0.0 turns -0.0 into 0.0
+    return np.choose(q, [c, -s, -c, s]) + 0.0, np.choose(q, [s, c, -s, -c]) + 0.0
+
+
+def phasor(magnitude: NDArray[np.float64], angle: NDArray[np.float64], unit: str) -> NDArray[np.complex128]:
+    """Return magnitude·e^{i·angle} for an angle in `deg` or `rad`."""
+    import numpy as np
+
+    c, s = cosine_sine(angle, unit)
+    z = np.empty(np.broadcast(magnitude, c).shape, dtype=complex)
+    z.real, z.imag = magnitude * c, magnitude * s
+    return z
+
+
+def degrees(z: Any) -> Any:
+    """Return the angle of a complex number, or of each in an array, in degrees in [0, 360); 0 for zero."""
+    import numpy as np
+
+    angle = np.degrees(np.arctan2(np.imag(z), np.real(z))) % 360.0
+    # a tiny negative angle plus 360 rounds to 360 itself
+    return np.where(angle >= 360.0, 0.0, angle)[()]
