@@ -1,0 +1,1 @@
+"""Pictures; matplotlib is loaded only when one is asked for."""
