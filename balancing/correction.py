@@ -73,13 +73,13 @@ class Correction:
         total, rest = exact_sum(product, axis=-2)
         return two_sum(total, rest + error.sum(axis=-2))
 
-    def _about(self, z: Real) -> Real:
-        """Σ U (z_i - z) for positions z (..., q): (..., q, 2), rounded once."""
+    def _about(self, z: Real) -> tuple[Real, Real]:
+        """Σ U (z_i - z) for positions z (..., q), as a pair, each (..., q, 2)."""
         (s, s_rest), (m, m_rest) = self._static, self._moment
         at = z[..., None]
         product, error = two_product(at, s[..., None, :])
         total, rest = two_sum(m[..., None, :], -product)
-        return total + (rest + (m_rest[..., None, :] - error - at * s_rest[..., None, :]))
+        return two_sum(total, rest + (m_rest[..., None, :] - error - at * s_rest[..., None, :]))
 
     @property
     def static(self) -> Complex:
@@ -89,7 +89,7 @@ class Correction:
     def couple(self, about: ArrayLike) -> Complex:
         """Return the couple unbalance Σ U (z - about) before correction, (...), kg·m²."""
         at = np.broadcast_to(np.asarray(about, dtype=float), self.static.shape)
-        return _complex(self._about(at[..., None]))[..., 0]
+        return _complex(self._about(at[..., None])[0])[..., 0]
 
     @cached_property
     def unbalance(self) -> Complex:
@@ -97,7 +97,7 @@ class Correction:
         if self.planes.shape[-1] == 1:
             return -self.static[..., None]
         apart, square = self._distances
-        moments = _complex(self._about(self.planes))
+        moments = _complex(self._about(self.planes)[0])
         return np.asarray(-np.einsum("...pq,...q->...p", apart, moments) / square[..., None])
 
     @cached_property
@@ -115,9 +115,16 @@ class Correction:
         if self.planes.shape[-1] == 1:
             return np.ones(self.static.shape)
         apart, square = self._distances
-        levers = self.z[..., :, None] - self.planes[..., None, :]
-        weights = np.einsum("...pq,...kq->...kp", apart, levers) / square[..., None, None]
-        return np.asarray(np.abs(weights).sum(axis=-1).max(axis=-1, initial=1.0, where=self.moment != 0))
+        # Σ_p |w_p(z)| is convex in z: its largest value lies at the first or the last mass
+        loaded = self.moment != 0
+        ends = [
+            self.z.min(axis=-1, initial=np.inf, where=loaded),
+            self.z.max(axis=-1, initial=-np.inf, where=loaded),
+        ]
+        z = np.stack(ends, axis=-1)
+        z = np.where(np.isfinite(z), z, self.planes[..., :1])
+        weights = np.einsum("...pq,...kq->...kp", apart, z[..., :, None] - self.planes[..., None, :])
+        return np.asarray((np.abs(weights) / square[..., None, None]).sum(axis=-1).max(axis=-1))
 
     @cached_property
     def residual(self) -> Unbalances:
@@ -127,17 +134,18 @@ class Correction:
     def residual_of(self, unbalance: ArrayLike, about: ArrayLike | None = None) -> Unbalances:
         """Return what corrections as really made (..., p) leave: static, and couple about a plane (default: the first)."""
         made = np.asarray(unbalance, dtype=complex)
-        made = np.broadcast_to(made, np.broadcast_shapes(made.shape, self.static.shape + made.shape[-1:]))
-        at = np.broadcast_to(
-            self.planes[..., 0] if about is None else np.asarray(about, dtype=float), made.shape[:-1]
+        lead = np.broadcast_shapes(made.shape[:-1], self.static.shape)
+        made = np.broadcast_to(made, lead + made.shape[-1:])
+        at = np.broadcast_to(self.planes[..., 0] if about is None else np.asarray(about, dtype=float), lead)
+        parts = _parts(made)
+        lever, lever_error = (term[..., None] for term in two_sum(self.planes, -at[..., None]))
+        product, error = two_product(np.broadcast_to(lever, parts.shape), parts)
+        static = [term[..., None, :] for term in self._static]
+        couple = self._about(at[..., None])
+        return Unbalances(
+            _complex(exact_sum(_joined([*static, parts]), axis=-2)[0]),
+            _complex(exact_sum(_joined([*couple, product, error + lever_error * parts]), axis=-2)[0]),
         )
-        planes = np.broadcast_to(self.planes, made.shape)
-        moment = np.concatenate(
-            [np.broadcast_to(self.moment, made.shape[:-1] + self.moment.shape[-1:]), made], axis=-1
-        )
-        z = np.concatenate([np.broadcast_to(self.z, made.shape[:-1] + self.z.shape[-1:]), planes], axis=-1)
-        left = Correction(moment, z, planes)
-        return Unbalances(left.static, left.couple(at))
 
     def mass(self, radius: ArrayLike) -> Real:
         """Return the masses to add at the radius (m) of each plane, (..., p), kg."""
@@ -241,3 +249,9 @@ def _parts(z: Complex) -> Real:
 
 def _complex(parts: Real) -> Complex:
     return np.ascontiguousarray(parts).view(complex)[..., 0]
+
+
+def _joined(terms: list[Real]) -> Real:
+    """Put terms (..., j, 2) behind each other along the axis to be summed."""
+    lead = np.broadcast_shapes(*(term.shape[:-2] for term in terms))
+    return np.concatenate([np.broadcast_to(term, lead + term.shape[-2:]) for term in terms], axis=-2)

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+BLOCK = 16384  # masses in one pass: its temporaries stay in the cache
+
 
 def by_size(rotor: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     """Yield groups of rotors of nearly equal numbers of masses, for one vectorised pass over each group.
@@ -20,7 +22,8 @@ def by_size(rotor: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], NDArray
     ------
     rotors, masses
         The numbers of the group's rotors (g,), and the places of their masses (g, k), where -1 fills up rows:
-        k is a power of two, so that there are few groups and less than half of each is filling.
+        k is a power of two, so that there are few groups and less than half of each is filling. A group holds
+        some 16 000 masses at the most (or one rotor), so that what is computed of it stays in the cache.
 
     Examples
     --------
@@ -36,7 +39,9 @@ def by_size(rotor: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], NDArray
     width = np.maximum(count, 1)
     exponent = np.frexp(width - 0.5)[1]  # ⌈log₂ width⌉
     for e in np.unique(exponent):
-        rotors = np.flatnonzero(exponent == e)
-        step = np.arange(2 ** int(e))
-        inside = step < count[rotors, None]
-        yield rotors, np.where(inside, order[np.minimum(start[rotors, None] + step, len(order) - 1)], -1)
+        size = 2 ** int(e)
+        alike = np.flatnonzero(exponent == e)
+        step = np.arange(size)
+        for rotors in np.split(alike, np.arange(max(BLOCK // size, 1), len(alike), max(BLOCK // size, 1))):
+            inside = step < count[rotors, None]
+            yield rotors, np.where(inside, order[np.minimum(start[rotors, None] + step, len(order) - 1)], -1)

@@ -41,7 +41,6 @@ class Rotors:
     table: Table
     names: list[str]
     rotor: NDArray[np.intp]
-    mass_names: list[str]
     moment: Complex
     z: Real | None
     mass_unit: str
@@ -96,7 +95,6 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         table,
         names,
         rotor,
-        table.texts.get("name") or [str(i + 1) for i in range(table.rows)],
         phasor(size, angle.values, angle.unit),
         None if z is None else to_si(z.values, "length", z.unit),
         given.unit if amount == "mass" else "kg" if amount == "weight" else given.unit.split("_")[0],
@@ -172,8 +170,8 @@ class _Balanced:
         self.made = np.empty(len(self.rotor_of_row), dtype=complex)
         self.before: Complex = np.empty(shape, dtype=complex)  # in the tolerance planes
         self.after: Complex = np.empty(shape, dtype=complex)
-        groups = list(self._groups())
-        for group, masses, rows in groups:
+        solved = []
+        for group, masses, rows in self._groups():
             u = np.where(masses >= 0, rotors.moment[masses], 0)
             at = np.where(masses >= 0, z[masses], 0)
             try:
@@ -185,18 +183,17 @@ class _Balanced:
             self.couple[group] = fix.couple(self.about[group])
             self.ideal[rows] = fix.unbalance
             self.growth[group] = fix.amplification
+            solved.append((group, rows, fix))
         self._round()
-        for group, masses, rows in groups:
-            u = np.where(masses >= 0, rotors.moment[masses], 0)
-            at = np.where(masses >= 0, z[masses], 0)
-            fix = correct(u, at, plane_z[self.plane_of_row[rows]])
+        for group, rows, fix in solved:
             left = fix.residual_of(self.made[rows], self.about[group])
             self.residual_static[group], self.residual_couple[group] = left
             if bearings is not None:
-                self.before[group] = -correct(u, at, bearings).unbalance
-                corrected = np.concatenate([u, self.made[rows]], axis=-1)
-                places = np.concatenate([at, plane_z[self.plane_of_row[rows]]], axis=-1)
-                self.after[group] = -correct(corrected, places, bearings).unbalance
+                self.before[group] = -correct(fix.moment, fix.z, bearings).unbalance
+                corrected = np.concatenate([fix.moment, self.made[rows]], axis=-1)
+                self.after[group] = -correct(
+                    corrected, np.concatenate([fix.z, fix.planes], axis=-1), bearings
+                ).unbalance
             else:
                 self.before[rows] = -self.ideal[rows]
                 self.after[rows] = self.made[rows] - self.ideal[rows]
@@ -410,6 +407,9 @@ class _Balanced:
 
         shown = range(min(len(self.rotors.names), 4))
         panels = []
+        mass_names = self.rotors.table.texts.get("name") or [
+            str(i + 1) for i in range(self.rotors.table.rows)
+        ]
         for r in shown:
             mine = np.flatnonzero(self.rotors.rotor == r)
             rows = slice(self.start[r], self.start[r] + self.count[r])
@@ -421,7 +421,7 @@ class _Balanced:
             panels.append(
                 (
                     self.rotors.names[r] if len(self.rotors.names) > 1 else "",
-                    [self.rotors.mass_names[i] for i in mine],
+                    [mass_names[i] for i in mine],
                     [self.planes.name[p] for p in here],
                     from_si(shares, "unbalance", self.rotors.unbalance_unit),
                     from_si(self.made[rows], "unbalance", self.rotors.unbalance_unit),

@@ -151,6 +151,9 @@ def read(
     return table
 
 
+_LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
+
+
 @dataclass
 class _Source:
     """The text of a file and how its cells are told apart."""
@@ -164,7 +167,8 @@ class _Source:
 
     def records(self) -> Iterator[tuple[int, list[str]]]:
         """Yield (line, cells) of the header and of every row that is not blank."""
-        reader = csv.reader(io.StringIO(self.text, newline=""), delimiter=self.delimiter, strict=True)
+        lines = (match.group() for match in _LINE.finditer(self.text))
+        reader = csv.reader(lines, delimiter=self.delimiter, strict=True)
         line = 1
         try:
             for record in reader:
@@ -328,13 +332,17 @@ def _read_large(source: _Source, table: Table, plan: _Plan) -> bool:
 
     def read(decimal: str) -> pd.DataFrame:
         return pd.read_csv(
-            io.StringIO(source.text),
+            io.BytesIO(source.text.encode()),
             sep=source.delimiter,
             header=0,
             names=range(len(source.header)),
             index_col=False,
             dtype={
-                index: float if kind == "number" and not may_be_blank else str
+                index: float
+                if kind == "number" and not may_be_blank
+                else "category"
+                if kind == "text"
+                else str
                 for _, index, _, kind, may_be_blank in plan
             },
             usecols=[index for _, index, *_ in plan] if plan else None,
@@ -365,12 +373,13 @@ def _read_large(source: _Source, table: Table, plan: _Plan) -> bool:
                 values = np.where(empty, "0", text).astype(float)
             except ValueError:
                 return False
+        elif kind == "text":
+            column = frame[index].cat
+            named = np.array([str(category).strip() for category in column.categories], dtype=object)
+            table.texts[name] = named[column.codes].tolist()
+            continue
         else:
-            text = frame[index].str.strip().tolist()
-            if kind == "text":
-                table.texts[name] = text
-            else:
-                table.cells[name] = Cells(source.header[index], unit, text)
+            table.cells[name] = Cells(source.header[index], unit, frame[index].str.strip().tolist())
             continue
         if not np.isfinite(values).all():
             return False
