@@ -154,7 +154,7 @@ class Correction:
     @property
     def angle(self) -> Real:
         """The angles of the corrections to add, (..., p), rad in [0, 2π)."""
-        angle = np.angle(self.unbalance) % (2 * np.pi)
+        angle = np.angle(self.unbalance + 0.0) % (2 * np.pi)  # + 0.0: the angle of -0 is 0
         return np.where(angle >= 2 * np.pi, 0.0, angle)
 
     def to_frame(self) -> pd.DataFrame:

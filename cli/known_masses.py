@@ -85,8 +85,6 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         size = size * to_si(radius.values, "length", radius.unit)
         if amount == "weight":
             size = size / gravity
-    if not np.isfinite(size).all():
-        table.reject(~np.isfinite(size), amount, "a number of a size that can be computed with")
     angle = table.require("angle", "angle")
     z = table.require("z", "length") if needs_z else table.numbers.get("z")
     names, rotor = _number(table.texts.get("rotor") or ["1"] * table.rows)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.errors import DataError, cell_error, nearest, quote
-from cli.units import UNITS, find_unit, parse_number
+from cli.units import LARGEST, UNITS, find_unit, parse_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -381,7 +381,7 @@ def _read_large(source: _Source, table: Table, plan: _Plan) -> bool:
         else:
             table.cells[name] = Cells(source.header[index], unit, frame[index].str.strip().tolist())
             continue
-        if not np.isfinite(values).all():
+        if not (np.abs(values) <= LARGEST).all():
             return False
         if may_be_blank:
             values[empty] = np.nan

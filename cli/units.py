@@ -100,13 +100,16 @@ def from_si(value: Any, dimension: str, unit: str) -> Any:
     return value * denominator / numerator
 
 
+LARGEST = 1e60  # no quantity of a machine is larger, and no product of five of them overflows
+
+
 def parse_number(text: str) -> float:
-    """Read a finite decimal number; ValueError otherwise (NaN, inf, `1_000` and `0x10` included)."""
+    """Read a finite decimal number; ValueError otherwise (NaN, inf, `1_000`, `0x10`, above 1e60)."""
     text = text.strip()
     if not text.isascii() or "_" in text:
         raise ValueError(text)
     value = float(text)
-    if not math.isfinite(value):
+    if not abs(value) <= LARGEST:
         raise ValueError(text)
     return value
 
@@ -130,8 +133,8 @@ def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
             f"'{text}' has the unknown {dimension} unit '{suffix}' (units: {known}){nearest(suffix, UNITS[dimension])}"
         )
     value = float(number)
-    if not math.isfinite(value):
-        raise ValueError(f"'{text}' is not a finite number")
+    if not abs(value) <= LARGEST:
+        raise ValueError(f"'{text}' is too large a number")
     return value, unit
 
 
@@ -175,6 +178,6 @@ def degrees(z: Any) -> Any:
     """Return the angle of a complex number, or of each in an array, in degrees in [0, 360); 0 for zero."""
     import numpy as np
 
-    angle = np.degrees(np.arctan2(np.imag(z), np.real(z))) % 360.0
-    # a tiny negative angle plus 360 rounds to 360 itself
+    # + 0.0: the angle of -0 is 0, not 180; and a tiny negative angle plus 360 rounds to 360 itself
+    angle = np.degrees(np.arctan2(np.imag(z) + 0.0, np.real(z) + 0.0)) % 360.0
     return np.where(angle >= 360.0, 0.0, angle)[()]

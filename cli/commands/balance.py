@@ -72,8 +72,8 @@ def run(
 
     if (plane is None) == (planes is None):
         raise options.bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
-    if not 0 < gravity < float("inf"):
-        raise options.bad("--gravity", "expected a positive number")
+    if not 1e-9 < gravity < 1e9:
+        raise options.bad("--gravity", f"'{gravity:g}': expected a positive number of m/s²")
     wanted = job.Wanted(
         gravity=gravity,
         remove=remove,
