@@ -253,9 +253,9 @@ def test_random_tables_never_break_the_command(
     )
     command = typer.main.get_command(build("balance"))
     for planes in (["--plane", "A:20mm"], list(TWO)):
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            with contextlib.suppress(DataError):
-                assert command.main(["balance", str(path), "--json", *planes], standalone_mode=False) in (
-                    0,
-                    None,
-                )
+        with (
+            contextlib.redirect_stdout(io.StringIO()),
+            contextlib.redirect_stderr(io.StringIO()),
+            contextlib.suppress(DataError),
+        ):
+            assert command.main(["balance", str(path), "--json", *planes], standalone_mode=False) in (0, None)
