@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from cli.errors import DataError, nearest
-from cli.render import Shown, table_text
 from cli.tables import read
 from cli.units import parse_number
 
 
+Columns = Mapping[str, Sequence[Any]]
+
+
 @dataclass(frozen=True)
 class Report:
-    """A line for each expected cell, and whether all hold."""
+    """A row for each expected cell, and whether all hold."""
 
-    text: str
+    columns: Columns
+    summary: str
     passed: bool
 
 
-def compare(shown: Shown, file: str, rtol: float) -> Report:
+def compare(columns: Columns, keys: Sequence[str], file: str, rtol: float) -> Report:
     """Compare a result with a file of expected values, cell by cell.
 
     Rows are matched by the key columns that the file has, else by their order. A number holds where its
@@ -33,25 +36,25 @@ def compare(shown: Shown, file: str, rtol: float) -> Report:
     expected = read(file, texts=None)
     header = list(expected.texts)
     for name in header:
-        if name not in shown.columns:
+        if name not in columns:
             raise DataError(
                 f"{file}: the result has no column '{name}': expected some of "
-                f"{', '.join(shown.columns)}{nearest(name, shown.columns)}"
+                f"{', '.join(columns)}{nearest(name, columns)}"
             )
-    keys = [name for name in header if name in shown.keys]
-    rows = list(_match(shown, file, expected.texts, keys, expected.rows))
+    matched = [name for name in header if name in keys]
+    rows = list(_match(columns, file, expected.texts, matched, expected.rows))
     lines: dict[str, list[Any]] = {
         name: [] for name in ("row", "column", "value", "expected", "error", "verdict")
     }
     for index, row in enumerate(rows):
         for name in header:
             wanted = expected.texts[name][index]
-            if name in keys or not wanted:
+            if name in matched or not wanted:
                 continue
-            value = shown.columns[name][row]
-            number, error = _error(name, value, wanted, shown.columns[name])
+            value = columns[name][row]
+            number, error = _error(name, value, wanted, columns[name])
             holds = error <= rtol
-            label = "/".join(str(shown.columns[key][row]) for key in shown.keys) or str(row + 1)
+            label = "/".join(str(columns[key][row]) for key in keys) or str(row + 1)
             for key, item in zip(
                 lines, (label, name, value, number, error, "ok" if holds else "WRONG"), strict=True
             ):
@@ -60,15 +63,14 @@ def compare(shown: Shown, file: str, rtol: float) -> Report:
     total = len(lines["verdict"])
     if not total:
         raise DataError(f"{file}: no expected value in it: nothing would be checked")
-    summary = f"{total - wrong} of {total} values within {rtol:g}\n"
-    return Report(table_text(lines) + "\n" + summary.rstrip("\n"), wrong == 0)
+    return Report(lines, f"{total - wrong} of {total} values within {rtol:g}", wrong == 0)
 
 
 def _match(
-    shown: Shown, file: str, expected: dict[str, list[str]], keys: list[str], rows: int
+    columns: Columns, file: str, expected: dict[str, list[str]], keys: list[str], rows: int
 ) -> Iterator[int]:
     """Yield for each expected row the result's row."""
-    length = len(next(iter(shown.columns.values())))
+    length = len(next(iter(columns.values())))
     if not keys:
         if rows > length:
             raise DataError(
@@ -78,7 +80,7 @@ def _match(
         return
     places: dict[tuple[str, ...], list[int]] = {}
     for row in range(length):
-        places.setdefault(tuple(str(shown.columns[key][row]) for key in keys), []).append(row)
+        places.setdefault(tuple(str(columns[key][row]) for key in keys), []).append(row)
     for index in range(rows):
         key = tuple(expected[name][index] for name in keys)
         if not places.get(key):

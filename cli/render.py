@@ -97,7 +97,8 @@ def show(
     if expect is not None:
         from cli.expect import compare
 
-        report = compare(shown, str(expect), rtol)
+        report = compare(shown.columns, shown.keys, str(expect), rtol)
+        checked = f"{table_text(report.columns)}\n{report.summary}"
     if plot is not None and shown.figure is not None:
         write(plot, _picture(shown.figure, plot.suffix.lower()[1:]))
     if output is not None:
@@ -109,9 +110,9 @@ def show(
     if json:
         sys.stdout.write(_json(shown))
         if report is not None:
-            print(report.text, file=sys.stderr)
+            print(checked, file=sys.stderr)
     elif report is not None:
-        print(report.text)
+        print(checked)
     elif text or (sys.stdout.isatty() and output is None):
         sys.stdout.write(_paragraphs(shown.notes(), table_text(shown.columns), shown.afterword()))
     elif output is None:
