@@ -147,6 +147,20 @@ class Correction:
             _complex(exact_sum(_joined([*couple, product, error + lever_error * parts]), axis=-2)[0]),
         )
 
+    def error_estimate(self) -> Real:
+        """Return a bound of the rounding error of `unbalance`, (..., p), kg·m, the given data taken as exact.
+
+        The moments are rounded once, each product, sum and quotient once more; a sum that cancels between
+        planes keeps the error of its terms.
+        """
+        u = np.finfo(float).eps / 2
+        if self.planes.shape[-1] == 1:
+            return np.asarray(2 * u * np.abs(self.unbalance))
+        apart, square = self._distances
+        moments = np.abs(_complex(self._about(self.planes)[0]))
+        terms = np.einsum("...pq,...q->...p", np.abs(apart), moments) / square[..., None]
+        return np.asarray((self.planes.shape[-1] + 6) * u * terms)
+
     def mass(self, radius: ArrayLike) -> Real:
         """Return the masses to add at the radius (m) of each plane, (..., p), kg."""
         return np.asarray(np.abs(self.unbalance) / radius)

@@ -13,7 +13,6 @@ from cli.errors import DataError, nearest
 from cli.tables import read
 from cli.units import parse_number
 
-
 Columns = Mapping[str, Sequence[Any]]
 
 

@@ -124,6 +124,7 @@ def balance(rotors: Rotors, planes: Planes, wanted: Wanted) -> Shown:
         notes=result.notes,
         afterword=result.verdicts,
         figure=result.figure,
+        errors=result.errors,
         warnings=[*rotors.table.warnings, *result.warnings],
     )
 
@@ -166,6 +167,7 @@ class _Balanced:
         shape = (n, 2) if bearings is not None else len(self.rotor_of_row)
         self.ideal = np.empty(len(self.rotor_of_row), dtype=complex)
         self.made = np.empty(len(self.rotor_of_row), dtype=complex)
+        self.rounding = np.empty(len(self.rotor_of_row))
         self.before: Complex = np.empty(shape, dtype=complex)  # in the tolerance planes
         self.after: Complex = np.empty(shape, dtype=complex)
         solved = []
@@ -181,6 +183,7 @@ class _Balanced:
             self.couple[group] = fix.couple(self.about[group])
             self.ideal[rows] = fix.unbalance
             self.growth[group] = fix.amplification
+            self.rounding[rows] = fix.error_estimate()
             solved.append((group, rows, fix))
         self._round()
         for group, rows, fix in solved:
@@ -265,6 +268,21 @@ class _Balanced:
             columns["weight_N"] = self._mass_kg * self.wanted.gravity
         columns["angle_deg"] = self.angle_deg
         return columns
+
+    def errors(self) -> dict[str, Any]:
+        """Bounds of the rounding errors of the corrections: of the solution, and of the masses' own vectors."""
+        rotors, row = self.rotors, self.rotor_of_row
+        size = np.bincount(rotors.rotor, np.abs(rotors.moment))
+        bound = self.rounding + 2 * np.finfo(float).eps * (size * self.growth)[row]
+        amount = np.abs(self.ideal)
+        return {
+            f"unbalance_{rotors.unbalance_unit}": from_si(bound, "unbalance", rotors.unbalance_unit),
+            f"mass_{rotors.mass_unit}": from_si(
+                bound / self.planes.radius[self.plane_of_row], "mass", rotors.mass_unit
+            ),
+            "weight_N": bound / self.planes.radius[self.plane_of_row] * self.wanted.gravity,
+            "angle_deg": np.degrees(np.divide(bound, amount, out=np.zeros_like(bound), where=amount > 0)),
+        }
 
     @property
     def _mass_kg(self) -> Real:

@@ -6,7 +6,7 @@ import io
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -61,6 +61,10 @@ Rtol = Annotated[
 ]
 Text = Annotated[bool, typer.Option("--text", help="Print the aligned table even into a pipe.")]
 
+Digits = Annotated[
+    bool, typer.Option("--digits", help="In tables and CSV print only the digits that hold against rounding.")
+]
+
 Columns = Mapping[str, Sequence[Any]]
 
 
@@ -79,6 +83,8 @@ class Shown:
     afterword: Callable[[], str] = lambda: ""
     """What the terminal shows below the table."""
     figure: Callable[[], Figure] | None = None
+    errors: Callable[[], Columns] = dict
+    """Bounds of the rounding errors of the columns of computed numbers, in their units."""
     warnings: list[str] = field(default_factory=list)
 
 
@@ -91,6 +97,7 @@ def show(
     expect: Path | None = None,
     rtol: float = 1e-3,
     text: bool = False,
+    digits: bool = False,
 ) -> None:
     """Write the files asked for, print the result, end with status 1 if an expectation is not met."""
     report = None
@@ -99,6 +106,8 @@ def show(
 
         report = compare(shown.columns, shown.keys, str(expect), rtol)
         checked = f"{table_text(report.columns)}\n{report.summary}"
+    if digits:
+        shown = replace(shown, columns=digits_that_hold(shown.columns, shown.errors()))
     if plot is not None and shown.figure is not None:
         write(plot, _picture(shown.figure, plot.suffix.lower()[1:]))
     if output is not None:
@@ -161,6 +170,25 @@ def _plain(value: Any) -> Any:
     if value is None or value != value:
         return ""
     return str(value).lower() if isinstance(value, bool) else value
+
+
+def digits_that_hold(columns: Columns, errors: Columns) -> Columns:
+    """Return columns with each number that has an error cut to the digits before it."""
+    return {
+        name: [_cut(value, error) for value, error in zip(column, errors[name], strict=True)]
+        if name in errors
+        else column
+        for name, column in columns.items()
+    }
+
+
+def _cut(value: Any, error: float) -> Any:
+    if value is None or not value or not error > 0:
+        return value
+    from math import floor, log10
+
+    digits = floor(log10(abs(value) / error)) if error < abs(value) else 0
+    return float(f"{value:.{min(digits, 17) - 1}e}") if digits > 0 else 0.0
 
 
 def table_text(columns: Columns) -> str:

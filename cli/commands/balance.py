@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cli import options
-from cli.render import Expect, Json, Output, Plot, Rtol, Text, show
+from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Text, show
 
 
 def run(
@@ -60,6 +60,7 @@ def run(
     expect: Expect = None,
     rtol: Rtol = 1e-3,
     text: Text = False,
+    digits: Digits = False,
 ) -> None:
     """Balance rotors from a table of known eccentric masses, in one, two or more planes.
 
@@ -86,7 +87,7 @@ def run(
 
     chosen = from_table(planes) if planes is not None else from_options(plane or [])
     shown = job.balance(job.read_rotors(table, wanted.gravity, needs_z=chosen.several), chosen, wanted)
-    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text)
+    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)
 
 
 def _tolerance(

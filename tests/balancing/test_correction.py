@@ -65,6 +65,23 @@ def test_random_rotors_against_rational_arithmetic(planes: int, scale: float) ->
                 assert math.hypot(Fraction(w.real) - x, Fraction(w.imag) - y) <= 2e-14 * largest
 
 
+@pytest.mark.parametrize("planes", [1, 2, 3, 6])
+def test_the_error_estimate_bounds_the_error_and_is_not_idle(planes: int) -> None:
+    rng = np.random.default_rng(31)
+    ratios = []
+    for _ in range(150):
+        k = int(rng.integers(1, 12))
+        u = (rng.normal(size=k) + 1j * rng.normal(size=k)) * 10.0 ** rng.uniform(-6, 6)
+        z, p = rng.uniform(-1, 2, k), rng.uniform(0, 1, planes) * 10.0 ** rng.uniform(-4, 0)
+        fix = correct(u, z, p)
+        for w, (x, y), bound in zip(
+            fix.unbalance.tolist(), exact(u, z, p), fix.error_estimate(), strict=True
+        ):
+            ratios.append(math.hypot(Fraction(w.real) - x, Fraction(w.imag) - y) / bound)
+    assert max(ratios) <= 1
+    assert np.median(ratios) >= 0.01
+
+
 def test_a_nearly_balanced_rotor_keeps_its_digits() -> None:
     """10⁶ masses cancel to 1e-15 of their sum; the naive sum has lost everything by then."""
     rng = np.random.default_rng(4)

@@ -392,3 +392,19 @@ def test_a_closed_pipe_is_no_fault(rotor: Path) -> None:
     line = f"{command} balance {rotor} {' '.join(TWO)} --json | head -c 1"
     done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False)
     assert done.stderr == ""
+
+
+def test_digits_that_hold(dalembert: Dalembert) -> None:
+    """Two masses that nearly cancel, and planes 1e-6 apart: few digits are left, and only they are printed."""
+    table = "mass_g,radius_mm,angle_deg,z_mm\n5,20,30,90\n5,20,210.0000001,90\n"
+    near = ("--plane", "A:0mm:20mm", "--plane", "B:0.001mm:20mm")
+    full = rows(dalembert("balance", "-", *near, stdin=table).stdout)[0]
+    held = rows(dalembert("balance", "-", *near, "--digits", stdin=table).stdout)[0]
+    assert 2 <= len(held["mass_g"].lstrip("0.").replace(".", "")) <= 9
+    # both vectors have the direction of 120°; the difference in length is 5·(1e-7 in radians)
+    true = 5 * math.radians(1e-7) * 90 / 0.001
+    last = 10.0 ** -len(held["mass_g"].split(".")[1])
+    assert abs(float(held["mass_g"]) - true) <= last
+    assert len(full["mass_g"]) > len(held["mass_g"]) + 5
+    plain = rows(dalembert("balance", "-", *TWO, "--digits", stdin=ROTOR).stdout)[0]
+    assert 13 <= len(plain["mass_kg"].replace(".", "")) <= 16
