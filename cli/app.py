@@ -13,6 +13,7 @@ from cli.errors import DataError
 # name -> (module with a function `run`, the line shown by `dalembert --help`)
 COMMANDS = {
     "balance": ("cli.commands.balance", "Balance rotors from a table of known eccentric masses."),
+    "bench": ("cli.commands.bench", "Measure run time against error."),
     "examples": ("cli.commands.examples", "List the worked examples, or write one into the current folder."),
 }
 
