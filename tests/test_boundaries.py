@@ -57,7 +57,9 @@ def modules_after(*arguments: str) -> set[str]:
     return set(json.loads(done.stderr.splitlines()[-1]))
 
 
-@pytest.mark.parametrize("arguments", [("--help",), ("--version",), ("examples",), ("balance", "--help"), ("bench", "--help")])
+@pytest.mark.parametrize(
+    "arguments", [("--help",), ("--version",), ("examples",), ("balance", "--help"), ("bench", "--help")]
+)
 def test_help_loads_nothing_heavy(arguments: tuple[str, ...]) -> None:
     loaded = modules_after(*arguments)
     assert "typer" in loaded

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterator
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cli import options
 from cli.errors import nearest
 from cli.render import Json, Output, Plot, Shown, Text, show
 
@@ -26,6 +29,13 @@ def run(
         list[str] | None, typer.Argument(metavar="[NAME]...", help=f"Domains: {', '.join(DOMAINS)}.")
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Smaller sizes.")] = False,
+    stress: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", help="Run the random campaigns for this long instead, such as 10min."),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="With --stress: replay this one case of each campaign.")
+    ] = None,
     json: Json = False,
     output: Output = None,
     plot: Plot = None,
@@ -37,6 +47,15 @@ def run(
     √(x² + y²) over 4096 doubles), so that results from different machines compare. Errors are against answers of
     extended precision.
     """
+    if stress is not None or seed is not None:
+        _stress(
+            name or [],
+            options.quantity("--stress", stress, "time", positive=True) or 0.0,
+            seed,
+            text=text,
+            output=output,
+        )
+        return
     for domain in name or ():
         if domain not in DOMAINS:
             raise typer.BadParameter(
@@ -77,3 +96,47 @@ def _measure(domains: list[str], quick: bool) -> Iterator[Measurement]:
         module, line = DOMAINS[domain]
         print(f"measuring {domain}: {line}", file=sys.stderr)
         yield from import_module(module).measure(quick)
+
+
+def _stress(names: list[str], seconds: float, seed: int | None, *, text: bool, output: Path | None) -> None:
+    """Run campaigns with a progress bar; status 1 if an error lies beyond the program's own estimate too often."""
+    from cli.bench.stress import Tally, campaigns, run
+
+    known = campaigns()
+    for name in names:
+        if name not in known:
+            raise typer.BadParameter(f"'{name}': expected some of {', '.join(known)}{nearest(name, known)}")
+    chosen = names or list(known)
+    tallies: list[Tally] = []
+    for name in chosen:
+        with typer.progressbar(length=1000, label=name, file=sys.stderr) as bar:
+            if seed is not None:
+                tallies.append(next(run(name, 0.0, seed)))
+                continue
+            share, start = seconds / len(chosen), time.monotonic()
+            for tally in run(name, share):  # noqa: B007 the last tally is the campaign's
+                bar.update(int(1000 * min(1.0, (time.monotonic() - start) / share)) - bar.pos)
+            tallies.append(tally)
+    columns: dict[str, list[Any]] = {
+        "campaign": [t.name for t in tallies],
+        "trials": [t.trials for t in tallies],
+        "answers": [len(t.ratios) for t in tallies],
+        "worst_error_over_estimate": [t.worst for t in tallies],
+        "worst_seed": [t.seed for t in tallies],
+        "share_bounded": [t.bounded for t in tallies],
+        "median_slack": [t.slack for t in tallies],
+    }
+    show(
+        Shown(
+            lambda: {
+                "campaigns": [
+                    dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)
+                ]
+            },
+            columns,
+        ),
+        text=text,
+        output=output,
+    )
+    if any(t.bounded < 0.999 for t in tallies):
+        raise typer.Exit(1)

@@ -12,29 +12,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from balancing import CoincidentPlanes, by_size, correct
+from cli.bench.rotors import exact_corrections as exact
 
 Complex = NDArray[np.complex128]
-
-
-def exact(
-    moment: Complex, z: NDArray[np.float64], planes: NDArray[np.float64]
-) -> list[tuple[Fraction, Fraction]]:
-    """Solve min Σ|W|² under Σ U + Σ W = 0, Σ U z + Σ W z_p = 0 in rational numbers (one plane: the first only)."""
-    p = [Fraction(x) for x in planes.tolist()]
-    result = []
-    for part in (moment.real, moment.imag):
-        u = [Fraction(x) for x in part.tolist()]
-        force = sum(u)
-        if len(p) == 1:
-            result.append([-force])
-            continue
-        couple = sum(a * Fraction(b) for a, b in zip(u, z.tolist(), strict=True))
-        # multipliers of the two constraints: W_p = a + b z_p
-        n, s, q = Fraction(len(p)), sum(p), sum(x * x for x in p)
-        a = (-force * q + couple * s) / (n * q - s * s)
-        b = (-couple * n + force * s) / (n * q - s * s)
-        result.append([a + b * x for x in p])
-    return list(zip(*result, strict=True))
 
 
 def relative_error(found: Complex, true: list[tuple[Fraction, Fraction]]) -> float:
