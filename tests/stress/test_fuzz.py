@@ -1,0 +1,21 @@
+"""Damaged examples, short: never an exception, a warning of numpy's, or a long wait."""
+
+from __future__ import annotations
+
+import time
+
+from cli.bench.fuzz import trial
+
+
+def test_damaged_examples_are_handled() -> None:
+    end = time.monotonic() + 12
+    faults = []
+    for seed in range(100_000):
+        outcome = trial(seed)
+        if outcome.fault:
+            faults.append((seed, outcome))
+        if time.monotonic() > end:
+            break
+    print(f"{seed + 1} damaged examples")
+    assert seed >= 50
+    assert not faults, faults[:5]
