@@ -34,7 +34,7 @@ def permissible_unbalance(grade: ArrayLike, speed: ArrayLike, mass: ArrayLike) -
     """Return the permissible residual unbalance U_per = (e_per·Ω)·m/Ω, kg·m.
 
     Parameters are e_per·Ω in m/s (`grade_value`), the highest service speed Ω in rad/s and the rotor's mass
-    in kg; they broadcast. ISO 21940-11:2016, eqs. (4)-(6).
+    in kg; they broadcast. ISO 21940-11:2016, clause 6 (permissible residual unbalance from the quality grade).
 
     >>> round(float(permissible_unbalance(0.0025, 3000 * np.pi / 30, 10.0)) * 1e6, 2)  # g·mm
     79.58
@@ -50,7 +50,7 @@ def allocate(permissible: ArrayLike, center: float, plane_a: float, plane_b: flo
 
     Each plane's share goes with the distance of the centre of mass from the other plane, within limits: 0.3 to
     0.7 of the whole where the centre lies between the planes, 0.3 to 1.3 where it lies outside them
-    (ISO 21940-11:2016, 7.2, and its limitations for inboard and outboard rotors).
+    (ISO 21940-11:2016, allocation to the tolerance planes, with its limitations for inboard and outboard rotors).
 
     >>> (allocate(28648.0, center=1.5, plane_a=0.0, plane_b=2.4)).round(0)
     array([10743., 17905.])
