@@ -34,7 +34,7 @@ def permissible_unbalance(grade: ArrayLike, speed: ArrayLike, mass: ArrayLike) -
     """Return the permissible residual unbalance U_per = (e_per·Ω)·m/Ω, kg·m.
 
     Parameters are e_per·Ω in m/s (`grade_value`), the highest service speed Ω in rad/s and the rotor's mass
-    in kg; they broadcast. ISO 21940-11:2016, clause 6 (permissible residual unbalance from the quality grade).
+    in kg; they broadcast. ISO 21940-11:2016, permissible residual unbalance from the quality grade.
 
     >>> round(float(permissible_unbalance(0.0025, 3000 * np.pi / 30, 10.0)) * 1e6, 2)  # g·mm
     79.58
