@@ -34,11 +34,19 @@ def run(
             continue
         here = Path(file.name)
         data = file.read_bytes()
-        if here.exists() and (not here.is_file() or here.read_bytes() != data):
+        if here.exists() and not _is_an_examples(here):
             raise DataError(f"{file.name}: there is another file of this name here: nothing was overwritten")
         write(here, data)
         print(f"wrote {file.name}")
     print(f"source: {described['source']}\nrun:\n  {described['command']}")
+
+
+def _is_an_examples(here: Path) -> bool:
+    """Whether a file is as some example wrote it, so that nothing of the user's is lost by writing over it."""
+    return here.is_file() and any(
+        folder.joinpath(here.name).is_file() and folder.joinpath(here.name).read_bytes() == here.read_bytes()
+        for folder in EXAMPLES.iterdir()
+    )
 
 
 def names() -> list[str]:

@@ -48,6 +48,11 @@ def test_an_example_runs(name: str, dalembert: Dalembert, tmp_path: Path) -> Non
     assert (tmp_path / written).read_text() == "mine"
 
 
+def test_one_example_after_another_in_one_folder(dalembert: Dalembert) -> None:
+    for name in names():
+        assert dalembert("examples", name).returncode == 0
+
+
 def test_an_unknown_example(dalembert: Dalembert) -> None:
     done = dalembert("examples", "riul-roto")
     assert done.returncode == 1
