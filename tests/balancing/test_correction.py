@@ -237,3 +237,27 @@ def test_by_size_holds_every_mass_once(numbers: list[int]) -> None:
             assert (np.diff(mine) > 0).all()
             seen += mine.tolist()
     assert sorted(seen) == list(range(len(numbers)))
+
+
+def test_the_couple_about_the_masses_own_place_is_zero() -> None:
+    """Σ U z - z Σ U cancels to the last of the doubled digits, wherever the plane lies."""
+    rng = np.random.default_rng(12)
+    for place in (0.1, 1 / 3, 1e5 / 7):
+        u = rng.normal(size=7) + 1j * rng.normal(size=7)
+        fix = correct(u, place, [0.0, 1.0])
+        assert abs(fix.couple(place)) <= 1e-30 * np.abs(u).sum() * place
+        # and a plane a little off sees the lever alone
+        off = place * (1 + 1e-12)
+        lever = float(Fraction(place) - Fraction(off))
+        assert abs(fix.couple(off) / (fix.static * lever) - 1) <= 1e-15
+        # a mass in plane A leaves nothing to plane B
+        assert np.abs(correct(u, place, [place, place + 1]).unbalance[1]) <= 1e-30 * np.abs(u).sum() * place
+
+
+def test_rotors_with_planes_of_their_own() -> None:
+    planes = np.array([[0.0, 1.0], [0.0, 2.0], [-1.0, 1.0]])
+    fix = correct([1.0, 2.0], [0.5, 0.25], planes)
+    assert fix.unbalance.shape == (3, 2)
+    np.testing.assert_allclose(fix.unbalance[:, 1].real, [-1.0, -0.5, -(1.5 + 2.5) / 2], rtol=1e-15)
+    assert correct([[1.0], [2.0]], 0.0, [0.0]).unbalance.tolist() == [[-1], [-2]]
+    assert "1 rotor in 2 plane(s)" in repr(correct([1.0], 0.5, [0.0, 1.0]))
