@@ -1,0 +1,435 @@
+"""An assembly of a mechanism: the order of solution, and on which branch each group closes.
+
+The guess picks each group's sign once. What a pose at another input looks like follows from the branch alone (no
+marching): the sign of each closed form, turned over at each change point on the way (`virtualwork.track`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, plan
+from virtualwork.dyads import Number, cross, dot
+from virtualwork.errors import AssemblyError, MobilityError
+from virtualwork.mechanism import GROUND
+from virtualwork.newton import newton, write_unknowns
+from virtualwork.state import Case, State, place
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from virtualwork.mechanism import Mechanism
+    from virtualwork.track import Track
+
+TIE = 1e-9  # two assemblies nearer than this, relative to the mechanism's size, are one
+
+
+class Assembly:
+    """A mechanism put together in one way.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    plan : Plan
+        The order of solution.
+    signs : dict of group name to ±1
+    starts : dict of group name to the unknowns of a Newton group at the guess's input
+    number : int
+        1 for the guess's assembly; others count on.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        plan_: Plan,
+        signs: Mapping[str, int],
+        starts: Mapping[str, Any],
+        number: int = 1,
+        warnings: tuple[str, ...] = (),
+    ) -> None:
+        self.mechanism, self.plan = mechanism, plan_
+        self.signs, self.starts, self.number = dict(signs), dict(starts), number
+        self.warnings = warnings
+        self.cases = {g.name: Case(g, dict(plan_.directions)) for g in plan_.groups if g.kind != "Newton"}
+        self._needed: dict[frozenset[str], tuple[Step, ...]] = {}
+
+    @classmethod
+    def from_guess(cls, m: Mechanism) -> Assembly:
+        """The assembly that the guess chooses.
+
+        Raises
+        ------
+        AssemblyError
+            Where the guess is missing and there is more than one: the choices are listed.
+        """
+        return _Chooser(m).choose()
+
+    @cached_property
+    def track(self) -> Track:
+        """Change points and limits along the input, found when first needed."""
+        from virtualwork.track import Track
+
+        return Track(self)
+
+    def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
+        """The steps that targets hang on; worked out once for each set of targets."""
+        key = frozenset(targets)
+        if key not in self._needed:
+            self._needed[key] = self.plan.needed(key)
+        return self._needed[key]
+
+    def run(self, steps: Iterable[Step], st: State, tracked: bool = True) -> None:
+        """Work out positions, step by step."""
+        for step in steps:
+            if isinstance(step, Place):
+                place(step, st)
+            elif isinstance(step, Group):
+                self.close(step, st, tracked)
+            elif isinstance(step, Turn):
+                self.turn(step, st)
+            else:
+                st.slide[step.guide] = st.inputs[step.input]
+
+    def turn(self, step: Turn, st: State) -> None:
+        """A body's rotation; its angle too, where a gear's ratio will need it."""
+        st.turn[step.body] = st.rotate(step.angle)
+        angle = st.affine(step.angle)
+        for base, r in step.angle.bases:
+            if base not in st.angle:
+                return
+            angle = angle + r * st.angle[base]
+        st.angle[step.body] = angle
+
+    def close(self, group: Group, st: State, tracked: bool = True) -> None:
+        """Close the loops of one group."""
+        if group.kind == "Newton":
+            self.track.close_newton(group, st)
+            return
+        case = self.cases[group.name]
+        if not tracked or not self.track.active:
+            case.solve(st, self.signs[group.name], self.mechanism.size)
+            return
+        case.solve(st, self.track.sign(group, st.inputs[0]), self.mechanism.size)
+        self.track.mend(group, st)
+
+    def state(self, inputs: tuple[float, ...], targets: Iterable[str] | None = None, tracked: bool = True) -> State:
+        """Positions of one pose, as Python numbers."""
+        st = State(list(inputs), many=False)
+        steps = self.plan.steps if targets is None else self.needed(targets)
+        try:
+            self.run(steps, st, tracked)
+        except ZeroDivisionError:
+            st = State([np.array([q]) for q in inputs], many=True)
+            with np.errstate(all="ignore"):
+                self.run(steps, st, tracked)
+        return st
+
+
+class _Chooser:
+    """Reads the guess and picks each group's assembly in the order of solution."""
+
+    def __init__(self, m: Mechanism) -> None:
+        self.m = m
+        self.plan = plan(m)
+        if not m.inputs:
+            raise MobilityError("[input]: missing")
+        self.angles, self.points = known_by_guess(m)
+        self.warnings: list[str] = []
+
+    def choose(self) -> Assembly:
+        st = State(list(self.m.at), many=False)
+        signs: dict[str, int] = {}
+        starts: dict[str, Any] = {}
+        steps: list[Step] = []
+        helper = Assembly(self.m, self.plan, {}, {})
+        for step in self.plan.steps:
+            if isinstance(step, Turn) and step.angle.phase is not None:
+                step = self._phase(step, st)
+            steps.append(step)
+            if isinstance(step, Group):
+                if step.kind == "Newton":
+                    starts[step.name] = self._newton(step, st)
+                else:
+                    signs[step.name] = self._sign(step, helper.cases[step.name], st)
+            elif isinstance(step, Place):
+                place(step, st)
+            elif isinstance(step, Slide):
+                st.slide[step.guide] = st.inputs[step.input]
+            else:
+                helper.turn(step, st)
+        done = replace(self.plan, steps=tuple(steps))
+        return Assembly(self.m, done, signs, starts, 1, tuple(self.warnings))
+
+    def _phase(self, step: Turn, st: State) -> Turn:
+        """A gear whose phase hangs on a group: its link stands at its guess."""
+        e = st.rotate(step.angle)
+        const = float(step.angle.phase or 0.0) - float(np.angle(e))
+        return Turn(step.body, replace(step.angle, const=step.angle.const + const, phase=None))
+
+    def solutions(self, group: Group, case: Case, st: State) -> list[tuple[int, State]]:
+        found = []
+        for sign in (1, -1):
+            trial = State(list(st.inputs), many=False)
+            trial.turn, trial.point, trial.slide = dict(st.turn), dict(st.point), dict(st.slide)
+            trial.angle = dict(st.angle)
+            try:
+                case.solve(trial, sign, self.m.size)
+            except ZeroDivisionError:
+                continue
+            if all(_finite(trial.turn[b]) for b in group.members) and all(
+                _finite(trial.slide[g]) for g in group.slides
+            ):
+                found.append((sign, trial))
+        return found
+
+    def _sign(self, group: Group, case: Case, st: State) -> int:
+        if group.kind == "PRP":
+            case.solve(st, 1, self.m.size)
+            return 1
+        found = self.solutions(group, case, st)
+        if not found:
+            st.turn.update({b: complex(np.nan, np.nan) for b in group.members})
+            st.slide.update({g: np.nan for g in group.slides})
+            return self._sign_of_guess(group, case, st)
+        distances = [self._distance(group, trial) for _, trial in found]
+        if len(found) == 2 and abs(found[0][1].margin[group.name]) < 1e-14:
+            self.warnings.append(
+                f"[guess] at: {group.name} stands at a change point or a limit there, where its two assemblies "
+                "meet; give another `at` to choose between them"
+            )
+        elif len(found) == 2 and not self._informed(group):
+            raise AssemblyError(self._choices(group, [t for _, t in found]))
+        best = int(np.argmin(distances))
+        sign, chosen = found[best]
+        for name in ("turn", "point", "slide", "angle"):
+            getattr(st, name).update(getattr(chosen, name))
+        return sign
+
+    def _informed(self, group: Group) -> bool:
+        """Does the guess say anything about the links of this group?"""
+        return any(b in self.angles for b in group.links) or any(
+            p in self.points for b in group.links for p in self.m.links[b].points if p not in self.m.ground
+        )
+
+    def _choices(self, group: Group, states: list[State]) -> str:
+        texts = []
+        for st in states:
+            parts = [f"{b} = {np.degrees(np.angle(st.turn[b])):.4g} deg" for b in group.members]
+            parts += [f"{self.m.guides[g].point} at {st.slide[g]:.4g} m" for g in group.slides]
+            texts.append(", ".join(parts))
+        return f"[guess]: {group.name} can be assembled in {len(texts)} ways; choose one: " + "; or ".join(texts)
+
+    def _distance(self, group: Group, st: State) -> float:
+        """How far an assembly is from the guess: chords of the unit circle, and points relative to the size."""
+        total = 0.0
+        for body in group.links:
+            if body in self.angles and body in st.turn:
+                total += abs(complex(st.turn[body]) - np.exp(1j * self.angles[body])) ** 2
+            base, terms = self.plan.anchors[body]
+            if base in st.point and body in st.turn:
+                for name, z in self.m.links[body].points.items():
+                    if name in self.points:
+                        here = st.point[base] + st.sum(terms) + z * st.turn[body]
+                        total += abs(here - self.points[name]) ** 2 / self.m.size**2
+        return total
+
+    def _sign_of_guess(self, group: Group, case: Case, st: State) -> int:
+        """Not assembled at the guess: the sign that the guessed angles would have."""
+        self.warnings.append(f"[guess] at: {group.name} cannot be assembled there; its branch is that of the guessed angles")
+        e = [np.exp(1j * self.angles[b]) if b in self.angles else None for b in group.angles]
+        try:
+            if group.kind == "RRR" and e[0] is not None and e[1] is not None:
+                return 1 if cross(case.arm(0, st) * e[0], case.arm(1, st) * e[1]) >= 0 else -1
+            if group.kind == "RRP" and e[0] is not None:
+                z, body = case.rails[0]
+                return 1 if dot(case.arm(0, st) * e[0], z * st.turn[body]) >= 0 else -1
+        except (KeyError, TypeError):
+            pass
+        return 1
+
+    # --- groups with no closed form ------------------------------------------------------------------------
+    def _newton(self, group: Group, st: State) -> Any:
+        many = State([np.array([q]) for q in st.inputs], many=True)
+        many.turn, many.point, many.slide = dict(st.turn), dict(st.point), dict(st.slide)
+        many.angle = dict(st.angle)
+        start = guessed_unknowns(group, many, self.angles, self.points, self.m, self.plan)
+        if start is not None:
+            x, closed = newton(group, many, self.plan, start, self.m.size)
+            if closed[0]:
+                self._take(group, st, x)
+                return x[0]
+        found = every_solution(group, many, self.plan, self.m.size)
+        if len(found) == 0:
+            raise AssemblyError(
+                f"[guess] at: {group.name} cannot be assembled there (Newton-Raphson from many starts finds no "
+                "closed loop); give an `at` where it can, or check the lengths"
+            )
+        states = []
+        for x in found:
+            trial = State(list(st.inputs), many=False)
+            trial.turn, trial.point, trial.slide = dict(st.turn), dict(st.point), dict(st.slide)
+            trial.angle = dict(st.angle)
+            write_unknowns(group, trial, x[None])
+            states.append(trial)
+        if len(found) > 1 and not self._informed(group):
+            raise AssemblyError(self._choices(group, states))
+        best = int(np.argmin([self._distance(group, trial) for trial in states]))
+        self._take(group, st, found[best][None])
+        return found[best]
+
+    def _take(self, group: Group, st: State, x: Any) -> None:
+        write_unknowns(group, st, x)
+
+
+def known_by_guess(m: Mechanism) -> tuple[dict[str, float], dict[str, complex]]:
+    """Rough link angles and point positions from the guess, the ground and the inputs, as far as they reach."""
+    angles = dict(m.guess.angles)
+    points = dict(m.ground) | dict(m.guess.points)
+    for j, e in enumerate(m.inputs):
+        if e.link is not None and e.on == GROUND:
+            angles[e.link] = m.at[j]
+    for g in m.guides:
+        if g.turned is not None and g.on == GROUND:
+            angles.setdefault(g.link, g.angle + g.turned)
+    for _ in range(len(m.links) + 1):
+        for name, link in m.links.items():
+            here = [p for p in link.points if p in points]
+            if name not in angles and len(here) >= 2:
+                ends = max(((a, b) for a in here for b in here), key=lambda ab: abs(link.points[ab[1]] - link.points[ab[0]]))
+                local = link.points[ends[1]] - link.points[ends[0]]
+                seen = points[ends[1]] - points[ends[0]]
+                if local and seen:
+                    angles[name] = float(np.angle(seen / local))
+            if name in angles and here:
+                turn = np.exp(1j * angles[name])
+                for p, z in link.points.items():
+                    points.setdefault(p, complex(points[here[0]] + (z - link.points[here[0]]) * turn))
+    return angles, points
+
+
+def guessed_unknowns(
+    group: Group,
+    st: State,
+    angles: Mapping[str, float],
+    points: Mapping[str, complex],
+    m: Mechanism,
+    plan_: Plan,
+) -> Any:
+    """A Newton group's unknowns from the guess, or None where an angle is not known; slides by projection."""
+    if any(b not in angles for b in group.angles):
+        return None
+    x = np.zeros((1, len(group.angles) + len(group.slides)))
+    x[0, : len(group.angles)] = [angles[b] for b in group.angles]
+    write_unknowns(group, st, x)
+    for j, g in enumerate(group.slides, len(group.angles)):
+        guide = m.guides[g]
+        through = guide.through if not isinstance(guide.through, str) else m.bodies[guide.on][guide.through]
+        on = complex(np.ravel(st.turn[guide.on])[0])
+        origin = _origin(guide.on, through, on, points, m)
+        if guide.point in points and origin is not None:
+            x[0, j] = dot(points[guide.point] - origin, plan_.directions[g] * on)
+    write_unknowns(group, st, x)
+    return x
+
+
+def _origin(body: str, z: complex, turn: complex, points: Mapping[str, complex], m: Mechanism) -> complex | None:
+    if body == GROUND:
+        return z
+    for name, local in m.links[body].points.items():
+        if name in points:
+            return points[name] + (z - local) * turn
+    return None
+
+
+def every_solution(group: Group, st: State, plan_: Plan, size: float) -> Any:
+    """Every assembly of a Newton group at one input, by damped Newton from many starts spread evenly.
+
+    A systematic multi-start (Kronecker sequence of the generalised golden ratio): it finds what it finds, and does
+    not prove that there is no other.
+    """
+    n = len(group.angles) + len(group.slides)
+    starts = min(4096, 128 * n)
+    g = 1.0
+    for _ in range(64):
+        g = (1 + g) ** (1 / (n + 1))
+    u = (0.5 + np.outer(np.arange(1, starts + 1), g ** -np.arange(1.0, n + 1))) % 1.0
+    x0 = np.empty((starts, n))
+    na = len(group.angles)
+    x0[:, :na] = u[:, :na] * 2 * np.pi
+    x0[:, na:] = (2 * u[:, na:] - 1) * size
+    many = State([np.full(starts, np.ravel(q)[0]) for q in st.inputs], many=True)
+    many.turn, many.point, many.slide, many.angle = dict(st.turn), dict(st.point), dict(st.slide), dict(st.angle)
+    with np.errstate(all="ignore"):
+        x, closed = newton(group, many, plan_, x0, size)
+    x = x[closed]
+    if not len(x):
+        return x
+    x[:, :na] = (x[:, :na] + np.pi) % (2 * np.pi) - np.pi
+    keep: list[Any] = []
+    for row in x:
+        for other in keep:
+            d = row - other
+            d[:na] = np.abs(np.exp(1j * row[:na]) - np.exp(1j * other[:na]))
+            d[na:] /= size
+            if np.abs(d).max() < 1e-6:
+                break
+        else:
+            keep.append(row)
+    return np.array(keep)
+
+
+def all_assemblies(m: Mechanism) -> tuple[Assembly, ...]:
+    """Every assembly at the guess's input: all signs of the closed forms, all solutions found for the others."""
+    chosen = m.assembly
+    found = [chosen]
+    for signs, starts in _combinations(chosen):
+        if signs != chosen.signs or any(
+            np.abs(np.exp(1j * np.asarray(starts[k])) - np.exp(1j * np.asarray(chosen.starts[k]))).max() > 1e-6
+            for k in starts
+        ):
+            found.append(Assembly(m, chosen.plan, signs, starts, len(found) + 1))
+    return tuple(found)
+
+
+def _combinations(chosen: Assembly) -> list[tuple[dict[str, int], dict[str, Any]]]:
+    """Walk the steps at the guess's input and fork wherever a group closes in more than one way."""
+    m = chosen.mechanism
+    fronts: list[tuple[State, dict[str, int], dict[str, Any]]] = [(State(list(m.at), many=False), {}, {})]
+    for step in chosen.plan.steps:
+        after: list[tuple[State, dict[str, int], dict[str, Any]]] = []
+        for st, signs, starts in fronts:
+            if not isinstance(step, Group):
+                chosen.run([step], st, tracked=False)
+                after.append((st, signs, starts))
+            elif step.kind == "Newton":
+                for x in every_solution(step, st, chosen.plan, m.size):
+                    trial = _copy(st)
+                    write_unknowns(step, trial, x[None])
+                    after.append((trial, signs, starts | {step.name: x}))
+            else:
+                for sign in (1,) if step.kind == "PRP" else (1, -1):
+                    trial = _copy(st)
+                    try:
+                        chosen.cases[step.name].solve(trial, sign, m.size)
+                    except ZeroDivisionError:
+                        continue
+                    if trial.margin[step.name] >= 0:
+                        after.append((trial, signs | {step.name: sign}, starts))
+        fronts = after
+    return [(signs, starts) for _, signs, starts in fronts]
+
+
+def _copy(st: State) -> State:
+    trial = State(list(st.inputs), st.many)
+    for name in ("turn", "point", "slide", "angle", "margin"):
+        setattr(trial, name, dict(getattr(st, name)))
+    return trial
+
+
+def _finite(value: Number) -> bool:
+    return bool(np.isfinite(value))

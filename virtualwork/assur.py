@@ -1,0 +1,567 @@
+"""The order of solution of a mechanism: its Assur groups, as a flat list of steps that is plain data.
+
+The equations of the joints and the coordinates they hold form a bipartite graph. Its Dulmage-Mendelsohn
+decomposition (A. L. Dulmage, N. S. Mendelsohn, Can. J. Math. 10 (1958) 517) is unique; its irreducible blocks, in
+order, are the Assur groups: each is solved when what it hangs on is known. Angles tied by sliders, gears and
+inputs are linear relations and are eliminated before anything else; what remains of a block is its loop closure
+R_1 e^{iθ1} + R_2 e^{iθ2} + ... = 0 (000 eq. 1.3.1; 003) in its own few angles and slides.
+
+The list of steps
+-----------------
+`Turn`   the angle of a body from the inputs and from angles already known
+`Slide`  a slide that is an input
+`Place`  a point from a point already known:  P = P_base + Σ z·s·e^{iθ}
+`Group`  the angles and slides of an Assur group from its loop closures
+
+Every position in the mechanism is a `base` point and a sum of `Term`s, each a constant z in the axes of one body,
+perhaps times a slide. That is all that derivatives, virtual displacements and reactions need to know.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
+
+from virtualwork.errors import MobilityError
+from virtualwork.graph import Blocks, decompose
+from virtualwork.mechanism import GROUND
+
+if TYPE_CHECKING:
+    from virtualwork.mechanism import Mechanism
+
+Variable = tuple[str, str]  # ("angle", link), ("x", link), ("y", link), ("px", pin), ("py", pin), ("slide", guide)
+
+
+@dataclass(frozen=True)
+class Term:
+    """One vector of a loop: z, constant in the axes of `body`, times the slide of guide `slide` (None: 1)."""
+
+    z: complex
+    body: str
+    slide: int | None = None
+
+
+@dataclass(frozen=True)
+class Angle:
+    """θ = const + Σ k·input + Σ r·θ_base. `phase`: const is such that θ takes this value at the guess."""
+
+    const: float = 0.0
+    inputs: tuple[tuple[int, float], ...] = ()
+    bases: tuple[tuple[str, float], ...] = ()
+    phase: float | None = None
+
+    def at(self, inputs: tuple[float, ...]) -> float | None:
+        """The angle at given inputs, or None where it hangs on other angles."""
+        if self.bases or self.phase is not None:
+            return None
+        return self.const + sum(k * inputs[j] for j, k in self.inputs)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """The angle of a body follows from inputs and known angles."""
+
+    body: str
+    angle: Angle
+
+
+@dataclass(frozen=True)
+class Slide:
+    """The slide of a guide is an input."""
+
+    guide: int
+    input: int
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point from a known one: P = P[base] + Σ terms; base None is the ground's origin."""
+
+    node: str
+    base: str | None
+    terms: tuple[Term, ...]
+
+
+@dataclass(frozen=True)
+class Closure:
+    """A loop that closes: P[start] + Σ terms − P[end] = 0; made by cutting `joint` on link `body`."""
+
+    start: str | None
+    end: str | None
+    terms: tuple[Term, ...]
+    joint: str
+    body: str
+    guide: int | None = None
+
+
+Kind = Literal["RRR", "RRP", "RPR", "PRP", "Newton"]
+
+
+@dataclass(frozen=True)
+class Group:
+    """An Assur group: its links, its own unknown angles and slides, its loops.
+
+    `kind` is the case of the planar vector equation (M. A. Chace, J. Eng. Ind. 85 (1963) 289): RRR two angles,
+    RRP an angle and a slide of known direction, RPR an angle and a slide that turns with it, PRP two slides;
+    'Newton' for everything larger.
+    """
+
+    name: str
+    links: tuple[str, ...]
+    kind: Kind
+    angles: tuple[str, ...]
+    slides: tuple[int, ...]
+    closures: tuple[Closure, ...]
+    ties: tuple[Turn, ...] = ()  # bodies of the group whose angle hangs on the group's own
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """The bodies whose angle is an unknown of the group or tied to one."""
+        return (*self.angles, *(t.body for t in self.ties))
+
+
+Step = Turn | Slide | Place | Group
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The order of solution: the steps, and where each body stands once they are done.
+
+    `anchors[body] = (node, terms)`: the point z of that body lies at P[node] + Σ terms + z·e^{iθ}.
+    `angles[body]` is the body's angle in terms of inputs and of the groups' free angles.
+    """
+
+    steps: tuple[Step, ...]
+    anchors: Mapping[str, tuple[str | None, tuple[Term, ...]]]
+    angles: Mapping[str, Angle]
+    directions: Mapping[int, complex]
+    blocks: Blocks
+    guide_nodes: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """The Assur groups in their order of solution."""
+        return tuple(step for step in self.steps if isinstance(step, Group))
+
+    def reads(self, step: Step) -> set[str]:
+        """What a step reads: `angle:BODY`, `point:NODE`, `slide:GUIDE`."""
+        if isinstance(step, Turn):
+            return {f"angle:{base}" for base, _ in step.angle.bases}
+        if isinstance(step, Slide):
+            return set()
+        if isinstance(step, Place):
+            return _term_reads(step.terms) | _node(step.base)
+        own = {f"angle:{body}" for body in step.members} | {f"slide:{g}" for g in step.slides}
+        needs: set[str] = set()
+        for closure in step.closures:
+            needs |= _term_reads(closure.terms) | _node(closure.start) | _node(closure.end)
+        for tie in step.ties:
+            needs |= {f"angle:{base}" for base, _ in tie.angle.bases}
+        return needs - own
+
+    def writes(self, step: Step) -> tuple[str, ...]:
+        """What a step makes known."""
+        if isinstance(step, Turn):
+            return (f"angle:{step.body}",)
+        if isinstance(step, Slide):
+            return (f"slide:{step.guide}",)
+        if isinstance(step, Place):
+            return (f"point:{step.node}",)
+        return (*(f"angle:{body}" for body in step.members), *(f"slide:{g}" for g in step.slides))
+
+    def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
+        """The steps that the targets hang on, in order; nothing more."""
+        wanted, chosen = set(targets), []
+        for step in reversed(self.steps):
+            if wanted.intersection(self.writes(step)):
+                chosen.append(step)
+                wanted |= self.reads(step)
+        return tuple(reversed(chosen))
+
+
+def _term_reads(terms: tuple[Term, ...]) -> set[str]:
+    return {f"angle:{t.body}" for t in terms if t.body != GROUND} | {
+        f"slide:{t.slide}" for t in terms if t.slide is not None
+    }
+
+
+def _node(name: str | None) -> set[str]:
+    return set() if name is None else {f"point:{name}"}
+
+
+def combined(terms: Iterable[Term]) -> tuple[Term, ...]:
+    """Add terms of the same body and slide; drop those that cancel."""
+    sums: dict[tuple[str, int | None], complex] = {}
+    for t in terms:
+        sums[t.body, t.slide] = sums.get((t.body, t.slide), 0j) + t.z
+    return tuple(Term(z, body, slide) for (body, slide), z in sums.items() if z != 0)
+
+
+def direction(angle: float) -> complex:
+    """e^{i·angle}, exact at the quarter turns, so that a guide at 90° is not tilted by a rounding.
+
+    >>> direction(math.pi / 2)
+    1j
+    """
+    quarter = angle / (math.pi / 2)
+    if abs(quarter - round(quarter)) <= 1e-15 * max(1.0, abs(quarter)):
+        return (1 + 0j, 1j, -1 + 0j, -1j)[round(quarter) % 4]
+    return complex(math.cos(angle), math.sin(angle))
+
+
+def plan(m: Mechanism, *, merged: bool = False) -> Plan:
+    """The order of solution of a mechanism.
+
+    Parameters
+    ----------
+    m : Mechanism
+    merged : bool
+        All loops at once in one group (the Newton-Raphson of 003) instead of group by group.
+
+    Raises
+    ------
+    MobilityError
+        A free degree of freedom, too many inputs.
+    """
+    return _Planner(m, merged).run()
+
+
+class _Planner:
+    """Walks the blocks in order and writes the steps."""
+
+    def __init__(self, m: Mechanism, merged: bool) -> None:
+        self.m, self.merged = m, merged
+        self.steps: list[Step] = []
+        self.angles: dict[str, Angle] = {GROUND: Angle()}
+        self.anchors: dict[str, tuple[str | None, tuple[Term, ...]]] = {GROUND: (None, ())}
+        self.nodes: set[str] = set()
+        self.slides_known: set[int] = set()
+        self.directions = {i: direction(g.angle) for i, g in enumerate(m.guides)}
+        self.guide_nodes: dict[int, str] = {}
+        self.used: set[tuple[str, str]] = set()  # (joint, body) already spent to place a body or to close a loop
+
+    def run(self) -> Plan:
+        self.blocks = decompose(self.m)
+        for body_point, z in self.m.ground.items():
+            self._place(body_point, GROUND, z)
+        pending = [b for b in self.blocks.order]
+        if self.merged:
+            pending = [tuple(v for block in pending for v in block)]
+        for block in pending:
+            self._block(block)
+        for body, points in self.m.bodies.items():
+            for name, z in points.items():
+                self._place(name, body, z)
+        for i in range(len(self.m.guides)):
+            self._guide_node(i)
+        return Plan(
+            tuple(self.steps), self.anchors, self.angles, self.directions, self.blocks, self.guide_nodes
+        )
+
+    # --- points -------------------------------------------------------------------------------------------
+    def _place(self, node: str, body: str, z: complex) -> str:
+        if node not in self.nodes and body in self.anchors:
+            base, terms = self.anchors[body]
+            self.steps.append(Place(node, base, combined((*terms, Term(z, body)))))
+            self.nodes.add(node)
+            self.used.add((node, body))
+        return node
+
+    def _guide_node(self, i: int) -> str:
+        """The point of guide i's link that runs in it: `link.point`."""
+        g = self.m.guides[i]
+        self.guide_nodes[i] = g.point
+        return self._place(g.point, g.link, self.m.links[g.link].points[g.point])
+
+    def _through(self, i: int) -> complex:
+        g = self.m.guides[i]
+        return self.m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
+
+    # --- one block ----------------------------------------------------------------------------------------
+    def _block(self, block: tuple[Variable, ...]) -> None:
+        fresh = [name for kind, name in block if kind == "angle"]
+        slides = sorted(int(name) for kind, name in block if kind == "slide")
+        driven = {self._driven_guide(j): j for j, e in enumerate(self.m.inputs) if e.is_slide}
+        for i in slides:
+            if i in driven:
+                self.steps.append(Slide(i, driven[i]))
+                self.slides_known.add(i)
+        free, ties = self._eliminate(fresh)
+        for tie in ties:
+            if not any(base in free for base, _ in tie.angle.bases):
+                self.steps.append(tie)
+        own = tuple(tie for tie in ties if any(base in free for base, _ in tie.angle.bases))
+        self._settle()
+        moving = {name for kind, name in block if kind in "xy"} - set(self.anchors)
+        closures, trees = self._loops(moving, set(free) | {t.body for t in own})
+        unknown = tuple(i for i in slides if i not in self.slides_known)
+        if closures or free or unknown:
+            links = tuple(b for b in self.m.links if b in free or b in {t.body for t in own} or b in moving)
+            group = Group(
+                " + ".join(links), links, "Newton", tuple(free), unknown, tuple(closures), own
+            )
+            self.steps.append(replace(group, kind=self._kind(group)))
+            self.slides_known.update(unknown)
+        self.anchors.update(trees)
+        self._settle()
+
+    def _driven_guide(self, j: int) -> int:
+        return next(i for i, g in enumerate(self.m.guides) if g.point == self.m.inputs[j].slider)
+
+    def _kind(self, group: Group) -> Kind:
+        """Chace's case, where the group is one loop with two unknowns that turn or slide simply."""
+        if len(group.closures) != 1 or len(group.angles) + len(group.slides) != 2:
+            return "Newton"
+        own = {body: body for body in group.angles}
+        for tie in group.ties:
+            bases = [(b, r) for b, r in tie.angle.bases if b in group.angles]
+            if len(bases) != 1 or len(tie.angle.bases) != 1 or bases[0][1] != 1.0 or tie.angle.phase is not None:
+                return "Newton"
+            own[tie.body] = bases[0][0]
+        terms = group.closures[0].terms
+        turning = {own.get(t.body) for t in terms if t.slide in group.slides and t.slide is not None}
+        if len(group.angles) == 2:
+            return "RRR"
+        if len(group.angles) == 1:
+            return "RRP" if turning == {None} else "RPR"
+        return "PRP"
+
+    # --- angles: sliders, gears and inputs are linear relations ----------------------------------------------
+    def _relations(self, fresh: list[str]) -> list[tuple[dict[str, float], dict[int, float], float | None]]:
+        """Σ c·θ = Σ k·input + const, for every relation all of whose angles are known once this block is."""
+        rows: list[tuple[dict[str, float], dict[int, float], float | None]] = []
+        seen = set(self.angles) | set(fresh)
+
+        def add(c: dict[str, float], k: dict[int, float], const: float | None) -> None:
+            if set(c) & set(fresh) and set(c) <= seen:
+                rows.append((c, k, const))
+
+        for j, e in enumerate(self.m.inputs):
+            if e.link is not None:
+                add({e.link: 1.0, e.on: -1.0}, {j: 1.0}, 0.0)
+        for g in self.m.guides:
+            if g.turned is not None:
+                add({g.link: 1.0, g.on: -1.0}, {}, g.angle + g.turned)
+        for gear in self.m.gears:
+            a, b = gear.links
+            add({b: 1.0, a: -gear.ratio, gear.arm: gear.ratio - 1.0}, {}, None)
+        return rows
+
+    def _eliminate(self, fresh: list[str]) -> tuple[list[str], list[Turn]]:
+        """Gauss-Jordan on the linear relations: which angles stay free, and what the others are."""
+        at, guess = self.m.at, self.m.guess.angles
+        rows: list[tuple[dict[str, float], Angle]] = []
+        for c, k, const in self._relations(fresh):
+            known = Angle(const or 0.0, tuple(k.items()))
+            for body, factor in c.items():
+                if body not in fresh:
+                    known = _plus(known, self.angles[body], -factor)
+            unknown = {body: factor for body, factor in c.items() if body in fresh}
+            if const is None:  # a gear: its phase is the one of the guess
+                stands = sum(factor * guess.get(body, 0.0) for body, factor in unknown.items())
+                value = known.at(at)
+                known = replace(known, phase=stands) if value is None else _plus(known, Angle(stands - value), 1.0)
+            rows.append((unknown, known))
+        solved: dict[str, tuple[dict[str, float], Angle]] = {}
+        for unknown, known in rows:
+            for body, (others, value) in solved.items():
+                if body in unknown:
+                    f = unknown.pop(body)
+                    known = _plus(known, value, -f)
+                    for other, o in others.items():
+                        unknown[other] = unknown.get(other, 0.0) + f * o
+            unknown = {b: f for b, f in unknown.items() if abs(f) > 1e-13}
+            if not unknown:
+                continue
+            pivot = max(unknown, key=lambda b: (abs(abs(unknown[b]) - 1) < 1e-12, fresh.index(b)))
+            p = unknown.pop(pivot)
+            others = {b: -f / p for b, f in unknown.items()}
+            value = _times(known, 1 / p)
+            for body, (was, val) in list(solved.items()):
+                if pivot in was:
+                    f = was.pop(pivot)
+                    for other, o in others.items():
+                        was[other] = was.get(other, 0.0) + f * o
+                    solved[body] = (was, _plus(val, value, f))
+            solved[pivot] = (others, value)
+        free = [b for b in fresh if b not in solved]
+        for b in free:
+            self.angles[b] = Angle(bases=((b, 1.0),))
+        turns = []
+        for b, (others, value) in solved.items():
+            angle = value
+            for other, f in others.items():
+                angle = _plus(angle, Angle(bases=((other, 1.0),)), f)
+            self.angles[b] = angle if angle.phase is None else Angle(bases=((b, 1.0),))
+            turns.append(Turn(b, angle))
+        return free, turns
+
+    # --- positions ------------------------------------------------------------------------------------------
+    def _settle(self) -> None:
+        """Place every body whose angle is known and that a joint ties to a placed one."""
+        progress = True
+        while progress:
+            progress = False
+            for body in self.m.links:
+                if body not in self.anchors and body in self.angles and self._known(body):
+                    found = self._attach(body, set(self.anchors), lambda b, z: self._chain(b, z, self.anchors))
+                    if found is not None:
+                        self.anchors[body] = found
+                        progress = True
+            for body in list(self.anchors):
+                for name, z in self.m.bodies[body].items():
+                    if name in self.m.pins:
+                        self._place(name, body, z)
+
+    def _known(self, body: str) -> bool:
+        """Is the angle of the body solved by the steps written so far?"""
+        done: set[str] = set()
+        for step in self.steps:
+            if isinstance(step, Turn):
+                done.add(step.body)
+            elif isinstance(step, Group):
+                done.update(step.members)
+        return body in done
+
+    def _chain(
+        self, body: str, z: complex, anchors: Mapping[str, tuple[str | None, tuple[Term, ...]]]
+    ) -> tuple[str | None, tuple[Term, ...]]:
+        base, terms = anchors[body]
+        return base, combined((*terms, Term(z, body)))
+
+    def _attach(self, body, placed, chain):  # type: ignore[no-untyped-def]
+        """The first joint that ties a body to the placed ones: pins first, then guides whose slide is known."""
+        points = self.m.bodies[body]
+        for name, z in points.items():
+            if name in self.nodes:
+                self.used.add((name, body))
+                return name, combined([Term(-z, body)])
+        for i, g in enumerate(self.m.guides):
+            if i not in self.slides_known or (f"guide {i}", "") in self.used:
+                continue
+            found = self._by_guide(i, body, placed, chain)
+            if found is not None:
+                return found
+        return None
+
+    def _by_guide(self, i, body, placed, chain):  # type: ignore[no-untyped-def]
+        g, d = self.m.guides[i], self.directions[i]
+        if g.link == body and g.on in placed:
+            base, terms = chain(g.on, self._through(i))
+            found = base, combined((*terms, Term(d, g.on, i), Term(-self.m.links[body].points[g.point], body)))
+        elif g.on == body and g.link in placed:
+            base, terms = chain(g.link, self.m.links[g.link].points[g.point])
+            found = base, combined((*terms, Term(-self._through(i), body), Term(-d, body, i)))
+        else:
+            return None
+        self.used.add((f"guide {i}", ""))
+        return found
+
+    def _loops(
+        self, moving: set[str], turning: set[str]
+    ) -> tuple[list[Closure], dict[str, tuple[str | None, tuple[Term, ...]]]]:
+        """A tree over the block's bodies from what is placed; every joint outside the tree closes a loop."""
+        anchors = dict(self.anchors)
+        nodes: dict[str, tuple[str | None, tuple[Term, ...]]] = {name: (name, ()) for name in self.nodes}
+        closures: list[Closure] = []
+        # all loops at once: the driven links last, so that loops close over the passive side, as 003 writes them
+        last = {str(e.link) for e in self.m.inputs} if self.merged else set()
+        queue = list(anchors)
+        guides = [i for i in range(len(self.m.guides)) if (f"guide {i}", "") not in self.used]
+
+        def chain(body: str, z: complex) -> tuple[str | None, tuple[Term, ...]]:
+            return self._chain(body, z, anchors)
+
+        def join(body: str, name: str) -> None:
+            """Enter a body at pin `name`, or close the loop there where it already stands."""
+            z = self.m.bodies[body][name]
+            if (name, body) in self.used:
+                return
+            if body in anchors:
+                if name in nodes:
+                    base, terms = chain(body, z)
+                    if base == name and not terms:
+                        return
+                    self.used.add((name, body))
+                    self._close(closures, (base, terms), nodes[name], name, body, None)
+                else:
+                    nodes[name] = chain(body, z)
+                    self.used.add((name, body))
+            else:
+                base, terms = nodes[name]
+                anchors[body] = base, combined((*terms, Term(-z, body)))
+                self.used.add((name, body))
+                queue.append(body)
+
+        visited: set[str] = set()
+        while True:
+            while queue:
+                body = next((b for b in queue if b not in last), queue[0])
+                queue.remove(body)
+                if body in visited:
+                    continue
+                visited.add(body)
+                for name, z in self.m.bodies[body].items():
+                    if name not in self.m.pins:
+                        continue
+                    if name not in nodes:
+                        nodes[name] = chain(body, z)
+                        self.used.add((name, body))
+                    for other in self.m.pins[name]:
+                        if other in moving or other in anchors:
+                            join(other, name)
+            # pins first: a guide carries a slide and is a poorer branch of the tree
+            found = False
+            for i in list(guides):
+                g = self.m.guides[i]
+                for body in (g.link, g.on):
+                    if body in moving and body not in anchors and not found:
+                        entry = self._by_guide(i, body, set(anchors), chain)
+                        if entry is not None:
+                            anchors[body] = entry
+                            queue.append(body)
+                            guides.remove(i)
+                            found = True
+            if not found:
+                break
+        for i in guides:
+            g = self.m.guides[i]
+            if g.link in anchors and g.on in anchors and (f"guide {i}", "") not in self.used:
+                base, terms = chain(g.on, self._through(i))
+                line = base, combined((*terms, Term(self.directions[i], g.on, i)))
+                self.used.add((f"guide {i}", ""))
+                self._close(closures, chain(g.link, self.m.links[g.link].points[g.point]), line, g.point, g.link, i)
+        return closures, {b: a for b, a in anchors.items() if b not in self.anchors}
+
+    def _close(self, closures, there, here, joint, body, guide):  # type: ignore[no-untyped-def]
+        (start, plus), (end, minus) = there, here
+        terms = combined((*plus, *(Term(-t.z, t.body, t.slide) for t in minus)))
+        closures.append(Closure(start, end, terms, joint, body, guide))
+
+
+def _plus(a: Angle, b: Angle, factor: float) -> Angle:
+    """a + factor·b."""
+    inputs, bases = dict(a.inputs), dict(a.bases)
+    for j, k in b.inputs:
+        inputs[j] = inputs.get(j, 0.0) + factor * k
+    for body, r in b.bases:
+        bases[body] = bases.get(body, 0.0) + factor * r
+    phase = a.phase if a.phase is not None else b.phase
+    return Angle(
+        a.const + factor * b.const,
+        tuple((j, k) for j, k in inputs.items() if k != 0),
+        tuple((body, r) for body, r in bases.items() if r != 0),
+        phase,
+    )
+
+
+def _times(a: Angle, factor: float) -> Angle:
+    phase = None if a.phase is None else a.phase * factor
+    return replace(_plus(Angle(), a, factor), phase=phase)
+
+
+def mobility_error(text: str) -> MobilityError:
+    """One line, always with the same opening, for parts that do not make a mechanism."""
+    return MobilityError("mobility: " + text)

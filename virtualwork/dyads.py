@@ -1,0 +1,184 @@
+"""Closed forms of the two-unknown groups: the planar vector equation, on one pose or on a block of poses.
+
+M. A. Chace, J. Eng. Ind. 85 (1963) 289, distinguishes four cases of  W + ... = 0  with two unknowns: two angles,
+an angle and a length (two kinds), two lengths. Each is a pure function of complex numbers and returns its unknowns
+and the radicand under its root: negative, there is no assembly; zero, the Jacobian is singular. The root itself is
+the Jacobian (up to a constant factor), so that it costs nothing.
+
+`xp` is `ONE` for Python numbers or `MANY` for arrays; there is one source for both.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+Number = Any  # complex or float, or an array of them
+
+
+class One:
+    """Root and assembly of complex numbers for a single pose."""
+
+    @staticmethod
+    def sqrt(x: float) -> float:
+        return math.sqrt(x) if x >= 0 else math.nan
+
+    @staticmethod
+    def join(re: float, im: float) -> complex:
+        return complex(re, im)
+
+
+class Many:
+    """The same on arrays of poses."""
+
+    sqrt = staticmethod(np.sqrt)
+
+    @staticmethod
+    def join(re: Number, im: Number) -> Number:
+        shape = np.broadcast_shapes(np.shape(re), np.shape(im))
+        z = np.empty(shape, complex)
+        z.real = re
+        z.imag = im
+        return z
+
+
+ONE, MANY = One(), Many()
+Engine = One | Many
+
+
+def square(z: Number) -> Number:
+    """|z|², without the root."""
+    return z.real * z.real + z.imag * z.imag
+
+
+def cross(a: Number, b: Number) -> Number:
+    """The plane's vector product a_x·b_y − a_y·b_x.
+
+    >>> cross(1 + 0j, 1j)
+    1.0
+    """
+    return a.real * b.imag - a.imag * b.real
+
+
+def dot(a: Number, b: Number) -> Number:
+    """The scalar product a_x·b_x + a_y·b_y."""
+    return a.real * b.real + a.imag * b.imag
+
+
+def two_angles(
+    w: Number, v1: Number, v2: Number, sign: Number, xp: Engine = ONE
+) -> tuple[Number, Number, Number]:
+    """Solve W + V1·e^{iφ1} + V2·e^{iφ2} = 0 for the two rotations (RRR: two circles cut).
+
+    With d² = |W|², r = |V|: the apex is −(a + ih)W, a = (d² + r1² − r2²)/2d² and
+    h = ±√[((r1 + r2)² − d²)(d² − (r1 − r2)²)]/2d². Half that root is r1·r2·sin(φ2 − φ1), the Jacobian.
+
+    Parameters
+    ----------
+    w, v1, v2 : complex
+    sign : ±1
+        +1: V2·e^{iφ2} is counter-clockwise from V1·e^{iφ1} (their vector product is positive).
+
+    Returns
+    -------
+    e1, e2 : complex
+        e^{iφ1}, e^{iφ2}.
+    margin : float
+        sin²(φ2 − φ1): the square of the sine of the transmission angle, negative where nothing closes.
+
+    Examples
+    --------
+    >>> e1, e2, margin = two_angles(-5 + 0j, 3 + 0j, 4 + 0j, 1)
+    >>> abs(-5 + 3 * e1 + 4 * e2) < 1e-15, round(margin, 15)
+    (True, 1.0)
+    """
+    d2 = square(w)
+    r1, r2 = abs(v1), abs(v2)
+    outer, inner = r1 + r2, r1 - r2
+    radicand = (outer * outer - d2) * (d2 - inner * inner)
+    half = 0.5 / d2
+    # the apex lies at a − ih from the start: seen from V1, the turn to V2 has the sign asked for
+    t = xp.join((d2 + outer * inner) * half, xp.sqrt(radicand) * (half * -sign))
+    arm = t * w
+    return arm * (-1 / v1), (arm - w) * (1 / v2), radicand * (0.25 / (r1 * r2) / (r1 * r2))
+
+
+def angle_and_slide(
+    w: Number, v: Number, u: Number, sign: Number, xp: Engine = ONE
+) -> tuple[Number, Number, Number]:
+    """Solve W + V·e^{iφ} + s·U = 0 for the rotation and the slide (RRP: a circle and a line, |U| = 1).
+
+    In axes along U, V·e^{iφ} is x + iy with y = −Im(W·Ū), x = ±√(r² − y²), and s = −Re(W·Ū) − x.
+    sign is that of x = V·e^{iφ}·U (000 §1.11: the two solution sets of the crank, rod and piston).
+
+    Returns
+    -------
+    e, s : the rotation e^{iφ}, the slide
+    margin : (r² − y²)/r², the squared cosine of the rod's angle to the line
+
+    Examples
+    --------
+    >>> e, s, _ = angle_and_slide(3j, 5 + 0j, 1 + 0j, -1)
+    >>> e, s
+    ((-0.8-0.6j), 4.0)
+    """
+    seen = w * u.conjugate()
+    r, y = abs(v), -seen.imag
+    radicand = (r - y) * (r + y)
+    x = sign * xp.sqrt(radicand)
+    return xp.join(x, y) * u / v, -seen.real - x, radicand / (r * r)
+
+
+def turning_slide(
+    w: Number, v: Number, u: Number, sign: Number, length: float, xp: Engine = ONE
+) -> tuple[Number, Number, Number]:
+    """Solve W + (V + s·U)·e^{iφ} = 0 for the rotation and the slide that turns with it (RPR, |U| = 1).
+
+    With V·Ū = p + iq: |p + s + iq| = |W|, so p + s = ±√(|W|² − q²); sign is that of p + s.
+
+    Returns
+    -------
+    e, s : the rotation e^{iφ}, the slide
+    margin : (p + s)²/length², with `length` the mechanism's size
+
+    Examples
+    --------
+    >>> e, s, _ = turning_slide(-5 + 0j, 3j, 1 + 0j, 1, 1.0)
+    >>> e, s
+    ((0.8-0.6j), 4.0)
+    """
+    seen = v * u.conjugate()
+    p, q = seen.real, seen.imag
+    radicand = square(w) - q * q
+    x = sign * xp.sqrt(radicand)
+    return -w / (xp.join(x, q) * u), x - p, radicand / (length * length)
+
+
+def two_slides(w: Number, u1: Number, u2: Number) -> tuple[Number, Number, Number]:
+    """Solve W + s1·U1 + s2·U2 = 0 for the two slides (PRP: two lines cut).
+
+    Returns
+    -------
+    s1, s2 : the slides
+    margin : (U1 × U2)², zero where the guides are parallel
+
+    Examples
+    --------
+    >>> two_slides(-3 - 4j, 1 + 0j, 1j)
+    (3.0, 4.0, 1.0)
+    """
+    s1, s2, det = two_columns(w, u1, u2)
+    return s1, s2, det * det
+
+
+def two_columns(w: Number, c1: Number, c2: Number) -> tuple[Number, Number, Number]:
+    """Solve W + x1·C1 + x2·C2 = 0 for real x1, x2 (Cramer in the plane), with the determinant C1 × C2.
+
+    >>> two_columns(-3 - 4j, 1 + 0j, 1j)
+    (3.0, 4.0, 1.0)
+    """
+    det = cross(c1, c2)
+    inverse = -1 / det
+    return cross(w, c2) * inverse, cross(c1, w) * inverse, det

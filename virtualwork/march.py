@@ -1,0 +1,176 @@
+"""Following a group with no closed form along the input: tangent prediction, Newton-Raphson correction.
+
+The march lays down nodes (unknowns and their rate) once; any pose starts from the cubic between two nodes and is
+corrected by Newton-Raphson on all poses together, so that no error accumulates.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from virtualwork.newton import newton, solve, stack, stack_rows, write_unknowns
+from virtualwork.state import Jets, State, columns
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from virtualwork.assembly import Assembly
+    from virtualwork.assur import Group
+    from virtualwork.track import Track
+
+    Reals = NDArray[np.float64]
+
+NODES = 120  # of one turn
+FINEST = 1e-7  # of one turn: a step this short has met a limit
+
+
+class March:
+    """The nodes of one group's branch, from the guess outwards."""
+
+    def __init__(self, track: Track, group: Group) -> None:
+        self.track, self.group = track, group
+        self.assembly = track.assembly
+        self.size = self.assembly.mechanism.size
+        self.before = [
+            s for s in self.assembly.needed(self.assembly.plan.writes(group)) if s is not group
+        ]
+        self.ends: list[tuple[float, int]] = []
+        self.crossings: list[float] = []
+        x = np.asarray(self.assembly.starts[group.name], dtype=float)
+        q = track.start
+        rate, det = self._rate(q, x)
+        self.q, self.x, self.rate, self.det = [q], [x], [rate], [det]
+        self.stopped = {1: False, -1: False}
+
+    def _state(self, q: float) -> State:
+        st = State([np.array([q])], many=True)
+        with np.errstate(all="ignore"):
+            self.assembly.run(self.before, st)
+        return st
+
+    def _rate(self, q: float, x: Reals) -> tuple[Reals, float]:
+        """dx/dq and the determinant (its sign is the branch)."""
+        st = self._state(q)
+        write_unknowns(self.group, st, x[None])
+        d = Jets(self.assembly.plan, st, [[1.0]], self.track)
+        for s in self.before:
+            d.step(s, 1)
+        jacobian = stack(columns(self.group, st, self.assembly.plan), 1)
+        right = stack_rows(d.right_side(self.group, 1), 1)
+        rate = solve(jacobian, -right)[0]
+        square = jacobian[0] if jacobian.shape[1] == jacobian.shape[2] else np.linalg.qr(jacobian[0])[1]
+        return rate, float(np.linalg.det(square))
+
+    def extend(self, a: float, b: float) -> None:
+        """March until the nodes cover a to b."""
+        h = self.track.length / NODES
+        while not self.stopped[1] and self.q[-1] < b + h:
+            self._advance(1, h)
+        while not self.stopped[-1] and self.q[0] > a - h:
+            self._advance(-1, h)
+
+    def _advance(self, side: int, h: float) -> None:
+        end = -1 if side > 0 else 0
+        q, x, rate = self.q[end], self.x[end], self.rate[end]
+        if not np.isfinite(rate).all():
+            self.stopped[side] = True
+            return
+        step = h
+        while step > FINEST * self.track.length:
+            to = q + side * step
+            guess = x + side * step * rate
+            st = self._state(to)
+            with np.errstate(all="ignore"):
+                found, closed = newton(self.group, st, self.assembly.plan, guess[None], self.size, limit=12)
+            if closed[0]:
+                new, det = self._rate(to, found[0])
+                scale = np.array([1.0] * len(self.group.angles) + [self.size] * len(self.group.slides))
+                # the cubic's own defect: what the two rates say of the step, against what it was
+                defect = np.abs((found[0] - x - side * step * 0.5 * (rate + new)) / scale).max()
+                change = np.abs((found[0] - x) / scale).max()
+                if np.isfinite(new).all() and defect <= 0.05 * max(change, 1e-6) and change < 0.5:
+                    if np.sign(det) != np.sign(self.det[end]):
+                        self.crossings.append(to - side * step * abs(det) / (abs(det) + abs(self.det[end])))
+                    for nodes, value in ((self.q, to), (self.x, found[0]), (self.rate, new), (self.det, det)):
+                        nodes.insert(len(nodes) if side > 0 else 0, value)  # type: ignore[attr-defined]
+                    return
+            step /= 2
+        self.stopped[side] = True
+        self.ends.append((self._limit(side), -side))
+
+    def _limit(self, side: int) -> float:
+        """The limit itself: det² is smooth in the input there and goes to zero; extrapolated from the last nodes."""
+        order = slice(-6, None) if side > 0 else slice(0, 6)
+        q, d2 = np.array(self.q[order]), np.array(self.det[order]) ** 2
+        keep = np.flatnonzero(np.diff(np.concatenate([[np.nan], d2])) != 0)
+        q, d2 = q[keep], d2[keep]
+        near = q[-1] if side > 0 else q[0]
+        if len(q) < 2:
+            return float(near)
+        d2 = d2 / np.abs(d2).max()
+        # inverse interpolation: q as a polynomial of det², at det² = 0
+        total = 0.0
+        for i in range(len(q)):
+            weight = 1.0
+            for j in range(len(q)):
+                if j != i:
+                    weight *= -d2[j] / (d2[i] - d2[j])
+            total += weight * (q[i] - near)
+        return float(near + total)
+
+    def close(self, st: State) -> None:
+        """Close the group at a state's poses."""
+        q = np.atleast_1d(np.asarray(st.inputs[0], dtype=float))
+        nodes, x, rate = np.array(self.q), np.array(self.x), np.array(self.rate)
+        if len(nodes) == 1:
+            start = x[0] + np.outer(q - nodes[0], np.nan_to_num(rate[0]))
+            inside = np.ones(len(q), dtype=bool)
+        else:
+            i = np.clip(np.searchsorted(nodes, q) - 1, 0, len(nodes) - 2)
+            h = nodes[i + 1] - nodes[i]
+            t = ((q - nodes[i]) / h)[:, None]
+            inside = (q >= nodes[0] - 1e-9) & (q <= nodes[-1] + 1e-9)
+            a, b, h = x[i], x[i + 1], h[:, None]
+            start = (
+                a * (1 + 2 * t) * (1 - t) ** 2
+                + b * t * t * (3 - 2 * t)
+                + h * (rate[i] * t * (1 - t) ** 2 - rate[i + 1] * t * t * (1 - t))
+            )
+        many = st
+        if not st.many:
+            many = State([q], many=True)
+            for name in ("turn", "point", "slide", "angle"):
+                setattr(many, name, getattr(st, name))
+        with np.errstate(all="ignore"):
+            found, closed = newton(self.group, many, self.assembly.plan, start, self.size)
+        found[~(closed & inside)] = np.nan
+        write_unknowns(self.group, st, found)
+        st.margin[self.group.name] = np.where(closed & inside, 1.0, -1.0) if st.many else (1.0 if closed[0] else -1.0)
+
+
+def march_along(assembly: Assembly, group: Group, st: State) -> None:
+    """With several inputs: every pose on its own straight line of inputs from the guess, all poses together."""
+    m = assembly.mechanism
+    q = [np.atleast_1d(np.asarray(v, dtype=float)) for v in st.inputs]
+    n = max(len(v) for v in q)
+    at = m.at
+    before = [s for s in assembly.needed(assembly.plan.writes(group)) if s is not group]
+    far = max(float(np.abs(v - at[j]).max()) for j, v in enumerate(q))
+    steps = max(1, int(np.ceil(far / (2 * np.pi / NODES))))
+    x: Any = np.tile(np.asarray(assembly.starts[group.name], dtype=float), (n, 1))
+    closed = np.ones(n, dtype=bool)
+    last: Any = None
+    for i in range(1, steps + 1):
+        t = i / steps
+        trial = State([at[j] + t * (np.broadcast_to(v, n) - at[j]) for j, v in enumerate(q)], many=True)
+        with np.errstate(all="ignore"):
+            assembly.run(before, trial)
+            start = x if last is None else 2 * x - last
+            found, ok = newton(group, trial, assembly.plan, start, m.size)
+        closed &= ok
+        last, x = x, np.where(ok[:, None], found, x)
+    x[~closed] = np.nan
+    write_unknowns(group, st, x)
+    st.margin[group.name] = np.where(closed, 1.0, -1.0) if st.many else (1.0 if closed[0] else -1.0)

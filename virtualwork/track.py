@@ -1,0 +1,371 @@
+"""Along the input: change points, limits, and the branch between them.
+
+A closed form's Jacobian is ± the root of its radicand. Where the radicand touches zero without crossing it, two
+branches meet (a change point: the parallelogram at 0° and 180°, the folded kite); turning steadily through it, the
+Jacobian changes its sign. Where the radicand crosses zero the input can go no further (a limit). Both are found
+once, by sampling a turn of the input, and then to full precision. A pose's branch follows from the number of change
+points between the guess and it: nothing is marched in angle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import factorial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from virtualwork.assur import Group, Turn
+from virtualwork.dyads import Number
+from virtualwork.errors import MechanismError
+from virtualwork.series import branches
+from virtualwork.state import Jets, State
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from virtualwork.assembly import Assembly
+
+    Reals = NDArray[np.float64]
+
+EPS = float(np.finfo(float).eps)
+SAMPLES = 720  # of one turn, or of one mechanism's size of slide
+ORDER = 12  # of the series through a change point
+REACH = 0.03  # of its radius of convergence, within which it replaces the closed form
+DIP = 0.05  # a radicand below this may touch zero between two samples
+
+
+@dataclass(frozen=True)
+class ChangePoint:
+    """Where a group's two branches cross: the input, the unknowns there, and their derivatives.
+
+    `turn` and `slide` are the unknowns at the point; `rates[k−1]` their k-th derivatives along the branch taken.
+    """
+
+    group: str
+    input: float
+    turn: tuple[complex, ...]
+    slide: tuple[float, ...]
+    rates: Any
+    reach: float
+
+    def unknown(self, delta: Number, order: int) -> Any:
+        """The unknowns' derivatives of one order at a distance from the point (order 0: their change)."""
+        n = len(self.rates)
+        total = 0.0
+        for j in range(n - order, -1, -1):
+            k = order + j
+            if k == 0:
+                continue
+            total = total + np.multiply.outer(delta**j, self.rates[k - 1]) / factorial(j)
+        return total
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Where the input can go no further, because a group's radicand crosses zero; `side` is where it is assembled."""
+
+    group: str
+    input: float
+    side: int
+
+
+class Track:
+    """What happens to an assembly along its one input."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        self.assembly = assembly
+        m = assembly.mechanism
+        self.plan = assembly.plan
+        self.active = len(m.inputs) == 1
+        self.start = m.at[0]
+        self.low = self.high = self.start
+        slide = m.inputs[0].is_slide
+        self.length = m.size if slide else 2 * np.pi
+        self.flips: dict[str, Reals] = {}
+        self.changes: dict[str, list[ChangePoint]] = {}
+        self._brackets: list[tuple[str, float, float]] = []
+        self._marched: dict[str, Any] = {}
+        # one turn says it all where every turn of a body is a whole number of turns of the input
+        whole = all(
+            float(k).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, k in s.angle.inputs
+        ) and all(float(r).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, r in s.angle.bases)
+        self._repeats = whole and not slide and all(g.kind != "Newton" for g in self.plan.groups)
+        self.settled = False  # no change point anywhere, however far the input turns
+
+    # --- what poses ask ---------------------------------------------------------------------------------------
+    def cover(self, low: float, high: float) -> None:
+        """Look for change points and limits over the inputs from low to high."""
+        if self.settled or not self.active:
+            return
+        if not (np.isfinite(low) and np.isfinite(high)):
+            return
+        low, high = min(low, self.start), max(high, self.start)
+        first = self.low == self.high
+        if first and low == high:
+            high = low + 1e-3 * self.length
+        if max(self.high - low, high - self.low) > 20000 * self.length:
+            raise MechanismError(
+                f"the input is asked {abs(high - low) / self.length:.3g} turns away from the guess; give `at` nearer"
+            )
+        with np.errstate(all="ignore"):
+            while self.high < high:
+                self._scan(self.high, self.high + self.length)
+                self.high += self.length
+                if first and self._repeats and not any(len(f) for f in self.flips.values()):
+                    self.settled = True
+                    return
+                first = False
+            while self.low > low:
+                self._scan(self.low - self.length, self.low)
+                self.low -= self.length
+
+    def sign(self, group: Group, q: Number) -> Number:
+        """The sign of the group's Jacobian at inputs q."""
+        base = self.assembly.signs[group.name]
+        flips = self.flips.get(group.name)
+        if flips is None or not len(flips):
+            return base
+        passed = np.searchsorted(flips, q) - np.searchsorted(flips, self.start)
+        return base * (1 - 2 * (passed & 1))
+
+    def mend(self, group: Group, st: State) -> None:
+        """Replace positions close to a change point by the series through it."""
+        for change, near, delta in self._near(group, st.inputs[0]):
+            move = change.unknown(delta, 0)
+            for j, body in enumerate(group.angles):
+                _put(st.turn, body, near, change.turn[j] * np.exp(1j * move[..., j]))
+            for j, g in enumerate(group.slides):
+                _put(st.slide, g, near, change.slide[j] + move[..., len(group.angles) + j])
+            _put(st.margin, group.name, near, np.zeros(np.shape(delta)))
+            for tie in group.ties:
+                st.turn[tie.body] = st.rotate(tie.angle)
+
+    def mend_rates(self, group: Group, q: Number, k: int, x: list[Number]) -> list[Number]:
+        """The same for the unknowns' k-th derivatives."""
+        for change, near, delta in self._near(group, q):
+            rate = change.unknown(delta, k)
+            for j in range(len(x)):
+                if near is None:
+                    x[j] = float(rate[..., j])
+                else:
+                    x[j] = np.array(np.broadcast_to(x[j], np.shape(q)))
+                    x[j][near] = rate[..., j]
+        return x
+
+    def _near(self, group: Group, q: Number):  # type: ignore[no-untyped-def]
+        for change in self.changes.get(group.name, ()):
+            if np.ndim(q) == 0:
+                if abs(q - change.input) < change.reach:
+                    yield change, None, q - change.input
+            else:
+                near = np.abs(q - change.input) < change.reach
+                if near.any():
+                    yield change, near, q[near] - change.input
+
+    # --- looking ahead ------------------------------------------------------------------------------------------
+    def margin(self, group: Group, q: Reals) -> Reals:
+        """The group's radicand at inputs q, on the branch known so far."""
+        st = State([q], many=True)
+        with np.errstate(all="ignore"):
+            self.assembly.run(self.assembly.needed(self.plan.writes(group)), st)
+        return np.broadcast_to(st.margin[group.name], q.shape).astype(float)
+
+    def _scan(self, a: float, b: float) -> None:
+        step = (b - a) / SAMPLES
+        q = a + step * (np.arange(-1, SAMPLES + 1) + 0.5)
+        st = State([q], many=True)
+        for s in self.plan.steps:
+            if isinstance(s, Group) and s.kind != "Newton":
+                self.assembly.close(s, st)
+                if s.kind == "PRP":
+                    self._note_poles(s, st, q)
+                    continue
+                m = np.broadcast_to(st.margin[s.name], q.shape)
+                if self._look(s, q, m, a, b):
+                    self.assembly.close(s, st)
+            elif isinstance(s, Group):
+                self._march(s, a, b)
+                self.assembly.close(s, st)
+            else:
+                self.assembly.run([s], st)
+
+    def _note_poles(self, group: Group, st: State, q: Reals) -> None:
+        """Two guides that become parallel on the way: the slides run off to infinity there."""
+
+    def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
+        """Find where the radicand crosses or touches zero; say whether a change point was found."""
+        inside = (q >= a) & (q < b)
+        crossing = np.flatnonzero((m[:-1] >= 0) != (m[1:] >= 0))
+        for i in crossing:
+            if np.isfinite(m[i]) and np.isfinite(m[i + 1]) and inside[i] | inside[i + 1]:
+                self._brackets.append((group.name, float(q[i]), float(q[i + 1])))
+        dips = 1 + np.flatnonzero((m[1:-1] <= m[:-2]) & (m[1:-1] < m[2:]) & (np.abs(m[1:-1]) < DIP))
+        changed = False
+        for i in dips:
+            found = self._bottom(group, float(q[i - 1]), float(q[i + 1]))
+            if found is None:
+                continue
+            where, depth, noise = found
+            if depth < -noise and m[i] > 0:  # the gap is narrower than the samples
+                self._brackets += [(group.name, float(q[i - 1]), where), (group.name, where, float(q[i + 1]))]
+            if abs(depth) <= noise and a <= where < b:
+                known = self.flips.setdefault(group.name, np.empty(0))
+                if not len(known) or np.abs(known - where).min() > 1e-6 * self.length:
+                    self._brackets = [
+                        x for x in self._brackets if not (x[0] == group.name and x[1] <= where <= x[2])
+                    ]
+                    self.flips[group.name] = np.sort(np.append(known, where))
+                    self.changes.setdefault(group.name, []).append(self._through(group, where))
+                    changed = True
+        return changed
+
+    def _bottom(self, group: Group, a: float, b: float) -> tuple[float, float, float] | None:
+        """The lowest point of a radicand near a sampled dip: where, how low, and the rounding in that depth.
+
+        The radicand is smooth: it is fitted at Chebyshev points, and its slope's root is free of cancellation.
+        """
+        centre, half = (a + b) / 2, (b - a) / 2
+        for widen in (1.0, 4.0):
+            nodes = np.cos(np.pi * (np.arange(14) + 0.5) / 14)
+            m = self.margin(group, centre + widen * half * nodes)
+            if not np.isfinite(m).all():
+                if widen == 1.0:
+                    return None
+                break
+            fit = np.polynomial.Chebyshev.fit(nodes, m, 11, domain=[-1, 1])
+            roots = fit.deriv().roots()
+            real = np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= 1.2)])
+            if not len(real):
+                return None
+            best = real[np.argmin(np.abs(fit(real)))]
+            where, depth = centre + widen * half * float(best), float(fit(best))
+            level = float(np.abs(m).max())
+            centre = where
+        size, r = self.assembly.mechanism.size, self._radii(group)
+        noise = 256 * EPS * (1 + (size / r) ** 2 if r else 1) + 1e-9 * EPS * level
+        return where, depth, noise
+
+    def _radii(self, group: Group) -> float:
+        arms = [abs(a) for a in self.assembly.cases[group.name].arms if a]
+        return min(arms, default=self.assembly.mechanism.size)
+
+    def _through(self, group: Group, q0: float) -> ChangePoint:
+        """The exact branch through a change point."""
+        nodes = 0.02 * np.cos(np.pi * (np.arange(12) + 0.5) / 12) * self.length / (2 * np.pi)
+        st = State([q0 + nodes], many=True)
+        self.assembly.run(self.assembly.needed(self.plan.writes(group)), st)
+        weights = _at_centre(nodes)
+        turn, slide = [], []
+        for body in group.angles:
+            e = complex(np.sum(weights * st.turn[body]))
+            turn.append(e / abs(e))
+        for g in group.slides:
+            slide.append(float(np.sum(weights * st.slide[g])))
+        before = [s for s in self.assembly.needed(self.plan.writes(group)) if s is not group]
+
+        def jets() -> Jets:
+            at = State([q0], many=False)
+            self.assembly.run(before, at)
+            for j, body in enumerate(group.angles):
+                at.turn[body] = turn[j]
+            for j, g in enumerate(group.slides):
+                at.slide[g] = slide[j]
+            for tie in group.ties:
+                at.turn[tie.body] = at.rotate(tie.angle)
+            d = Jets(self.plan, at, [[1.0]], self)
+            for k in range(1, ORDER + 2):
+                for s in before:
+                    d.step(s, k)
+            return d
+
+        found = branches(group, jets, ORDER)
+        best, nearest = None, np.inf
+        probe = int(np.argmax(nodes))
+        for rates in found:
+            change = ChangePoint(group.name, q0, tuple(turn), tuple(slide), np.array(rates), 0.0)
+            move = change.unknown(nodes[probe], 0)
+            miss = sum(
+                abs(turn[j] * np.exp(1j * move[j]) - st.turn[body][probe]) for j, body in enumerate(group.angles)
+            ) + sum(
+                abs(slide[j] + move[len(turn) + j] - st.slide[g][probe]) for j, g in enumerate(group.slides)
+            ) / self.assembly.mechanism.size
+            if miss < nearest:
+                best, nearest = rates, miss
+        if best is None or not np.isfinite(best).all():
+            rates = np.full((ORDER, len(turn) + len(slide)), np.nan)
+            return ChangePoint(group.name, q0, tuple(turn), tuple(slide), rates, 0.0)
+        scale = np.array([1.0] * len(turn) + [self.assembly.mechanism.size] * len(slide))
+        terms = [float(np.abs(r / scale).max()) / factorial(k) for k, r in enumerate(best, 1)]
+        radius = min(t ** (-1 / k) for k, t in enumerate(terms, 1) if t > 0 and k >= 3) if max(terms[2:]) > 0 else 1.0
+        reach = REACH * min(radius, 1.0 if self.length > 6 else self.length)
+        return ChangePoint(group.name, q0, tuple(turn), tuple(slide), np.array(best), reach)
+
+    # --- limits ---------------------------------------------------------------------------------------------------
+    def limits(self) -> list[Limit]:
+        """Where the input can go no further, in what was covered, to full precision."""
+        self.cover(self.start, self.start + self.length)
+        by_name = {g.name: g for g in self.plan.groups}
+        found = [self._root(by_name[name], a, b) for name, a, b in self._brackets]
+        for name, marched in self._marched.items():
+            found += [Limit(name, q, side) for q, side in marched.ends]
+        unique: list[Limit] = []
+        for limit in sorted(found, key=lambda x: x.input):
+            if not unique or abs(limit.input - unique[-1].input) > 1e-10 * self.length:
+                unique.append(limit)
+        return unique
+
+    def _root(self, group: Group, a: float, b: float) -> Limit:
+        """The radicand's crossing between a and b: regula falsi (Illinois), then the last bits by bisection."""
+        fa, fb = (float(self.margin(group, np.array([q]))[0]) for q in (a, b))
+        side = -1 if fa >= 0 else 1
+        for _ in range(200):
+            if fa == 0 or fb == 0 or abs(b - a) <= 2 * EPS * max(abs(a), abs(b)):
+                break
+            q = b - fb * (b - a) / (fb - fa)
+            if not min(a, b) < q < max(a, b):
+                q = (a + b) / 2
+                if q in (a, b):
+                    break
+            f = float(self.margin(group, np.array([q]))[0])
+            if (f >= 0) != (fb >= 0):
+                a, fa = b, fb
+            else:
+                fa *= 0.5
+            b, fb = q, f
+        return Limit(group.name, a if abs(fa) < abs(fb) else b, side)
+
+    # --- groups with no closed form ------------------------------------------------------------------------------
+    def _march(self, group: Group, a: float, b: float) -> None:
+        from virtualwork.march import March
+
+        if group.name not in self._marched:
+            self._marched[group.name] = March(self, group)
+        self._marched[group.name].extend(a, b)
+
+    def close_newton(self, group: Group, st: State) -> None:
+        """Close a Newton group at the state's poses, from the marched branch."""
+        from virtualwork.march import March, march_along
+
+        if not self.active:
+            march_along(self.assembly, group, st)
+            return
+        if group.name not in self._marched:
+            self._marched[group.name] = March(self, group)
+        self._marched[group.name].close(st)
+
+
+def _at_centre(nodes: Reals) -> Reals:
+    """Weights of polynomial interpolation from the nodes to 0 (barycentric, second form)."""
+    w = np.array([1 / np.prod(x - np.delete(nodes, i)) for i, x in enumerate(nodes)])
+    w = w / -nodes
+    return np.asarray(w / w.sum())
+
+
+def _put(store: dict[Any, Any], key: Any, near: Any, value: Any) -> None:
+    if near is None:
+        store[key] = complex(value) if np.iscomplexobj(value) else float(value)
+        return
+    whole = np.array(np.broadcast_to(store[key], near.shape))
+    whole[near] = value
+    store[key] = whole
