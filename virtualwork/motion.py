@@ -3,6 +3,21 @@
 Poses run in blocks small enough to stay in cache; a block keeps what it has solved. With one input, derivatives are
 taken once with respect to the input (the velocity coefficients K = dx/dq, L = d²x/dq², M = d³x/dq³), so that
 ẋ = K·q̇,  ẍ = K·q̈ + L·q̇²,  x⃛ = K·q⃛ + 3L·q̇·q̈ + M·q̇³.  With several inputs they are taken along the inputs' rates.
+
+What virtual work stands on (the plane as complex numbers, arrays over the n poses)
+----------------------------------------------------------------------------------
+- `motion.at(link, z).complex(k)`: any point of a link (z in its axes), k = 0 position ... 3 jerk; `motion.link(...)`
+  `.omega`, `.alpha`; `motion.angle(link)`.
+- Virtual displacements: `motion.at(link, z).coefficient(j)` is dP/dq_j, `motion.link(name).coefficient(j)` dθ/dq_j,
+  `motion.slide_coefficient(guide, j)` ds/dq_j. Second order (one input): `point_coefficient(..., order=2)`,
+  `angle_coefficient(..., order=2)`. A force F at P does the virtual work Re(conj(F)·dP/dq_j).
+- Reactions: `motion.assembly.plan.groups` are the Assur groups in their order of solution. Each `Group` has `links`,
+  its unknown `angles` and `slides`, and its `closures`; a `Closure` is a loop cut at `joint` on link `body` (guide:
+  `guide`), whose `terms` say which links the loop runs through. `motion.columns(group)[loop][unknown]` is the complex
+  column of the Jacobian for that loop and unknown (angles first, then slides): the force λ_l at cut l enters the
+  equation of unknown u with Re(conj(λ_l)·column), so the multipliers solve the transposed system, groups in reverse
+  order. `plan.anchors[body] = (node, terms)` says from which point each body hangs in the tree.
+- `motion.assembled` masks poses; a singular pose shows in `assembly.track.limits()` and `.flips` (change points).
 """
 
 from __future__ import annotations
