@@ -76,6 +76,16 @@ class Assembly:
 
         return Track(self)
 
+    @cached_property
+    def merged(self) -> tuple[Plan, Group | None]:
+        """All loops at once: one plan with one group of every unknown; None where there is no loop."""
+        whole = plan(self.mechanism, merged=True)
+        group = next(iter(whole.groups), None)
+        if group is not None and any(t.angle.phase is not None for t in group.ties):
+            phased = {s.body: s for s in self.plan.steps if isinstance(s, Turn)}
+            group = replace(group, ties=tuple(phased.get(t.body, t) for t in group.ties))
+        return whole, group
+
     def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
         """The steps that targets hang on; worked out once for each set of targets."""
         key = frozenset(targets)

@@ -31,7 +31,8 @@ from virtualwork.assur import Group, Step, Term
 from virtualwork.dyads import Number
 from virtualwork.errors import DescriptionError
 from virtualwork.mechanism import GROUND, Point, as_point
-from virtualwork.state import Jets, State
+from virtualwork.newton import inverse_norm, stack
+from virtualwork.state import Jets, State, columns
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -262,6 +263,27 @@ class Motion:
                 for s in g.slides:
                     whole[rows] &= np.isfinite(st.slide[s])
         return whole & np.isfinite(self.inputs).all(axis=1)
+
+    @property
+    def condition(self) -> Reals:
+        """(n,): ‖J⁻¹‖∞ of the constraint Jacobian of all loops, lengths divided by the mechanism's size.
+
+        A relative error ε in the lengths or the input moves the pose by some ε·condition.
+        """
+        merged, group = self.assembly.merged
+        if group is None:
+            return np.where(self.assembled, 1.0, np.nan)
+        plan = self.assembly.plan
+        self._solve([key for s in plan.steps for key in plan.writes(s)], 0)
+        size = self.mechanism.size
+        whole = np.empty(self.n)
+        for rows, st in self._rows():
+            length = rows.stop - rows.start
+            with np.errstate(all="ignore"):
+                jacobian = stack(columns(group, st, merged), length)
+                jacobian[:, :, : len(group.angles)] /= size
+                whole[rows] = inverse_norm(jacobian)
+        return whole
 
     # --- solving ----------------------------------------------------------------------------------------------
     def _states(self) -> list[State]:

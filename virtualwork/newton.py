@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from virtualwork.dyads import Number
+from virtualwork.errors import AssemblyError
 from virtualwork.state import State, columns, loop
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from virtualwork.assembly import Assembly
     from virtualwork.assur import Group, Plan
 
     Reals = NDArray[np.float64]
@@ -60,6 +62,27 @@ def solve(jacobian: Reals, right: Reals) -> Reals:
                 out[i] = np.linalg.solve(jacobian[i], right[i])
             except np.linalg.LinAlgError:
                 continue
+    return out
+
+
+def inverse_norm(jacobian: Reals) -> Reals:
+    """‖J⁻¹‖∞ of each pose (of the pseudo-inverse, with redundant loops); inf where singular, NaN where unknown."""
+    out = np.full(len(jacobian), np.nan)
+    good = np.isfinite(jacobian).all(axis=(1, 2))
+    some = jacobian[good]
+    if some.shape[-2] != some.shape[-1]:
+        inverse = np.linalg.pinv(some)
+    else:
+        try:
+            inverse = np.linalg.inv(some)
+        except np.linalg.LinAlgError:
+            inverse = np.full_like(some, np.inf)
+            for i, j in enumerate(some):
+                try:
+                    inverse[i] = np.linalg.inv(j)
+                except np.linalg.LinAlgError:
+                    continue
+    out[good] = np.abs(inverse).sum(axis=2).max(axis=1, initial=0.0)
     return out
 
 
@@ -138,7 +161,6 @@ def newton(
         table.append(Iterate(1, x[0].copy(), float(norm[0])))
     done = ~np.isfinite(norm)
     scale = np.array([1.0] * len(group.angles) + [size] * len(group.slides))
-    settled = np.zeros(n, dtype=int)
     for k in range(2, limit + 2):
         if done.all():
             break
@@ -162,8 +184,81 @@ def newton(
         if table is not None:
             table.append(Iterate(k, x[0].copy(), float(norm[0])))
         small = (norm <= 64 * EPS * size) & (big <= 1e-7)
-        settled = np.where(small, settled + 1, 0)
-        done = done | (settled >= 1) | ~np.isfinite(norm)
+        done = done | small | ~np.isfinite(norm)
     write_unknowns(group, st, x)
     closed = np.isfinite(norm) & (norm <= 1e-12 * size)
     return x, closed
+
+
+@dataclass(frozen=True)
+class AllAtOnce:
+    """Newton-Raphson on all loops of a mechanism together, as 003 does it.
+
+    Attributes
+    ----------
+    unknowns : tuple of str
+        The links whose angle is unknown, then the points whose slide is.
+    iterates : tuple of Iterate
+        x1 is the guess; angles in rad as the iteration leaves them (not wrapped), slides in m.
+    jacobian : array
+        Φ at the guess: two rows (x, y) for each loop, one column for each unknown, m/rad or 1.
+    closed : bool
+        Did it converge?
+    difference : float
+        Largest difference of an angle to the assembly solved group by group, rad.
+    """
+
+    unknowns: tuple[str, ...]
+    angles: int
+    iterates: tuple[Iterate, ...]
+    jacobian: Reals
+    closed: bool
+    difference: float
+
+
+def all_at_once(assembly: Assembly, inputs: tuple[float, ...], limit: int = 50) -> AllAtOnce:
+    """Solve all loops of a mechanism at once by Newton-Raphson from its guess, undamped, with the table of iterates.
+
+    x_{k+1} = x_k − Φ(x_k)⁻¹·f(x_k) (003).
+
+    Raises
+    ------
+    AssemblyError
+        Where the guess does not give every unknown angle.
+    """
+    from virtualwork.assembly import guessed_unknowns, known_by_guess
+    from virtualwork.assur import Turn
+
+    m = assembly.mechanism
+    merged, group = assembly.merged
+    if group is None:
+        raise AssemblyError("newton: the mechanism has no loop to close")
+    st = State([np.array([q]) for q in inputs], many=True)
+    for step in merged.steps:
+        if step is group:
+            break
+        if isinstance(step, Turn):
+            assembly.turn(step, st)
+        else:
+            assembly.run([step], st)
+    angles, points = known_by_guess(m)
+    for body in group.angles:
+        if body not in angles:
+            raise AssemblyError(f"[guess]: newton starts from the guess, and the angle of '{body}' is missing there")
+    start = guessed_unknowns(group, st, angles, points, m, merged)
+    assert start is not None
+    write_unknowns(group, st, start)
+    jacobian = stack(columns(group, st, merged), 1)[0]
+    table: list[Iterate] = []
+    with np.errstate(all="ignore"):
+        x, closed = newton(group, st, merged, start, m.size, limit, table, damped=False)
+    exact = assembly.state(inputs)
+    difference = max(
+        (
+            abs(float(np.angle(np.exp(1j * x[0, j]) / np.ravel(exact.turn[body])[0])))
+            for j, body in enumerate(group.angles)
+        ),
+        default=0.0,
+    )
+    names = (*group.angles, *(m.guides[g].point for g in group.slides))
+    return AllAtOnce(names, len(group.angles), tuple(table), jacobian, bool(closed[0]), difference)

@@ -48,6 +48,7 @@ class ChangePoint:
     slide: tuple[float, ...]
     rates: Any
     reach: float
+    other: Any = None  # first rates of the branch not taken
 
     def unknown(self, delta: Number, order: int) -> Any:
         """The unknowns' derivatives of one order at a distance from the point (order 0: their change)."""
@@ -299,12 +300,21 @@ class Track:
         terms = [float(np.abs(r / scale).max()) / factorial(k) for k, r in enumerate(best, 1)]
         radius = min(t ** (-1 / k) for k, t in enumerate(terms, 1) if t > 0 and k >= 3) if max(terms[2:]) > 0 else 1.0
         reach = REACH * min(radius, 1.0 if self.length > 6 else self.length)
-        return ChangePoint(group.name, q0, tuple(turn), tuple(slide), np.array(best), reach)
+        others = [rates[0] for rates in found if rates is not best]
+        return ChangePoint(
+            group.name, q0, tuple(turn), tuple(slide), np.array(best), reach, others[0] if others else None
+        )
+
+    @property
+    def has_limits(self) -> bool:
+        """Was any limit met in what was covered?"""
+        return bool(self._brackets) or any(march.ends for march in self._marched.values())
 
     # --- limits ---------------------------------------------------------------------------------------------------
     def limits(self) -> list[Limit]:
         """Where the input can go no further, in what was covered, to full precision."""
-        self.cover(self.start, self.start + self.length)
+        back = self.length if self.assembly.mechanism.inputs[0].is_slide or not self._repeats else 0.0
+        self.cover(self.start - back, self.start + self.length)
         by_name = {g.name: g for g in self.plan.groups}
         found = [self._root(by_name[name], a, b) for name, a, b in self._brackets]
         for name, marched in self._marched.items():

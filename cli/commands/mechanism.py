@@ -1,0 +1,142 @@
+"""`dalembert mechanism`: position, velocity, acceleration and jerk of a planar mechanism."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cli import options
+from cli.render import Expect, Json, Output, Plot, Rtol, Shown, Text, show
+
+if TYPE_CHECKING:
+    from cli.mechanism.job import Job
+
+
+def run(
+    file: Annotated[str, typer.Argument(metavar="FILE.toml", help="The mechanism; - is standard input.")],
+    at: Annotated[
+        list[str] | None,
+        typer.Option(metavar="INPUT", help="A pose, such as 60deg, 20mm or crank=60deg,arm=30deg; repeatable."),
+    ] = None,
+    sweep: Annotated[
+        str | None, typer.Option(metavar="START:STOP:STEP", help="Such as 0deg:360deg:1deg or 0deg:360deg/3600.")
+    ] = None,
+    inputs: Annotated[
+        str | None, typer.Option(metavar="FILE.csv", help="The inputs as a table: crank_deg, ..., perhaps time_s.")
+    ] = None,
+    only: Annotated[
+        str | None, typer.Option(metavar="NAME,...", help="These links and points; nothing else is computed.")
+    ] = None,
+    order: Annotated[
+        str | None, typer.Option(help="position, velocity, acceleration or jerk (default: what the file's input gives).")
+    ] = None,
+    branch: Annotated[str | None, typer.Option(metavar="all|NUMBER", help="Every assembly, or one of them.")] = None,
+    newton: Annotated[
+        bool, typer.Option("--newton", help="All loops at once by Newton-Raphson from the guess, with its iterates.")
+    ] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="Mobility, Grashof classes, limits, dead and change points, groups.")
+    ] = False,
+    explain: Annotated[bool, typer.Option("--explain", help="The order of solution, and what was skipped.")] = False,
+    graph: Annotated[
+        str | None,
+        typer.Option(metavar="NAME.QUANTITY,...", help="--plot draws these against the input, such as H.x,coupler.omega."),
+    ] = None,
+    json: Json = False,
+    output: Output = None,
+    plot: Plot = None,
+    expect: Expect = None,
+    rtol: Rtol = 1e-3,
+    text: Text = False,
+) -> None:
+    """Solve a planar mechanism: positions, velocities, accelerations, its limits and its assemblies.
+
+    FILE.toml describes ground, links, slots, sliders, gears, input and guess. Without --only the table has a row
+    for each pose and link (what `dalembert work` reads); with --only a row for each pose.
+    """
+    from cli.mechanism.job import ORDERS
+
+    if order is not None and order not in ORDERS:
+        raise options.bad("--order", f"'{order}': expected {', '.join(ORDERS)}")
+    if branch is not None and branch != "all" and not (branch.isdecimal() and int(branch) > 0):
+        raise options.bad("--branch", f"'{branch}': expected all, or the number of an assembly")
+    names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
+    if names == []:
+        raise options.bad("--only", "expected names of links or points")
+    from virtualwork import MechanismError
+
+    try:
+        job = _job(file, at, sweep, inputs, names, order, branch)
+        shown = _shown(job, newton=newton, check=check, explain=explain, graph=graph)
+        show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text)
+    except MechanismError as error:
+        from cli.errors import DataError
+
+        raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
+    if not any(job.assembled(motion).any() for motion in job.motions):
+        raise typer.Exit(1)
+
+
+def _job(
+    file: str,
+    at: list[str] | None,
+    sweep: str | None,
+    inputs: str | None,
+    only: list[str] | None,
+    order: str | None,
+    branch: str | None,
+) -> Job:
+    from cli.mechanism.inputs import wanted
+    from cli.mechanism.job import ORDERS, Job, load
+
+    m = load(file)
+    q = wanted(m, at, sweep, inputs)
+    given = 0
+    for k, name in enumerate(("speed", "acceleration", "jerk"), 1):
+        if any(getattr(e, name) is not None for e in m.inputs) or getattr(q, name, None) is not None:
+            given = k
+    job = Job(file, m, q, ORDERS.index(order) if order is not None else given, only, branch)
+    job.check_names()
+    return job
+
+
+def _shown(job: Job, *, newton: bool, check: bool, explain: bool, graph: str | None) -> Shown:
+    from cli.mechanism import checking, poses, states
+
+    columns = states.table(job) if job.only is None else poses.wide_table(job)
+    extra: dict[str, Any] = {}
+    after: list[str] = []
+    if newton:
+        _, part = checking.newton_tables(job)
+        extra |= part
+        after.append(checking.newton_text(part))
+    if check:
+        extra["check"] = checking.check_document(job)
+        after.append(checking.check_text(extra["check"]))
+    warnings = job.warnings + checking.limit_warnings(job)
+
+    def document() -> dict[str, Any]:
+        return {"name": job.mechanism.name, "poses": poses.document(job), **extra}
+
+    def afterword() -> str:
+        return "\n\n".join([*after, *([checking.explain_text(job)] if explain else [])])
+
+    def figure() -> Any:
+        from cli.plots import mechanism as pictures
+
+        return pictures.graphs(job, graph) if graph else pictures.draw(job)
+
+    if graph:
+        from cli.mechanism.graphs import quantities
+
+        quantities(job, graph)  # a bad name is an error before anything is written
+    return Shown(
+        document=document,
+        columns=columns,
+        keys=[key for key in ("step", "branch", "link") if key in columns],
+        notes=lambda: job.mechanism.name,
+        afterword=afterword,
+        figure=figure,
+        warnings=warnings,
+    )

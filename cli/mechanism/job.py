@@ -1,0 +1,115 @@
+"""What a call of `dalembert mechanism` works on: the mechanism, its assemblies, their motions, what is asked."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cli.errors import DataError, nearest
+from cli.mechanism.inputs import Inputs
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from virtualwork import Mechanism
+    from virtualwork.assembly import Assembly
+    from virtualwork.motion import Motion
+
+ORDERS = ("position", "velocity", "acceleration", "jerk")
+
+
+def load(path: str) -> Mechanism:
+    """Read a description; - is standard input."""
+    from virtualwork.description import loads, read
+
+    file = "standard input" if path == "-" else path
+    try:
+        if path == "-":
+            return loads(sys.stdin.buffer.read().decode("utf-8-sig"), file)
+        return read(Path(path))
+    except UnicodeDecodeError:
+        raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
+    except (OSError, ValueError) as error:
+        if isinstance(error, OSError):
+            raise DataError(f"{file}: {error.strerror or error}") from None
+        raise DataError(str(error)) from None
+
+
+@dataclass
+class Job:
+    """One call: lazily the assemblies and their motions."""
+
+    file: str
+    mechanism: Mechanism
+    inputs: Inputs
+    order: int
+    only: Sequence[str] | None = None
+    branch: str | None = None
+    warnings: list[str] = field(default_factory=list)
+
+    @cached_property
+    def assemblies(self) -> tuple[Assembly, ...]:
+        """The guess's assembly, or those that --branch asks for."""
+        if self.branch is None:
+            return (self.mechanism.assembly,)
+        every = self.mechanism.assemblies()
+        if any(g.kind == "Newton" for g in every[0].plan.groups):
+            self.warnings.append(
+                "--branch: groups without a closed form were searched from many starts; an assembly may be missing"
+            )
+        if self.branch == "all":
+            return every
+        number = int(self.branch)
+        if number > len(every):
+            raise DataError(f"--branch {number}: the mechanism has {len(every)} assemblies at the guess's input")
+        return (every[number - 1],)
+
+    @cached_property
+    def motions(self) -> tuple[Motion, ...]:
+        """The motion of each assembly."""
+        from virtualwork.motion import Motion
+
+        q = self.inputs
+        return tuple(Motion(a, q.values, q.speed, q.acceleration) for a in self.assemblies)
+
+    @cached_property
+    def links(self) -> tuple[str, ...]:
+        """The links asked for."""
+        return tuple(n for n in self.mechanism.links if self.only is None or n in self.only)
+
+    @cached_property
+    def points(self) -> tuple[str, ...]:
+        """The points asked for, in the order of the file."""
+        named = dict.fromkeys(p for body in self.mechanism.bodies.values() for p in body)
+        return tuple(n for n in named if self.only is None or n in self.only)
+
+    @cached_property
+    def slides(self) -> tuple[str, ...]:
+        """The guides asked for, by their point; the points themselves tell where they are."""
+        return tuple(g.point for g in self.mechanism.guides if self.only is None or g.point in self.only)
+
+    def check_names(self) -> None:
+        """Refuse names that --only cannot find."""
+        known = {*self.mechanism.links, *(p for body in self.mechanism.bodies.values() for p in body)}
+        for name in self.only or ():
+            if name not in known:
+                raise DataError(
+                    f"{self.file}: --only: no link or point is named '{name}'{nearest(name, known)}"
+                )
+
+    def assembled(self, motion: Motion) -> NDArray[np.bool_]:
+        """Which poses are assembled, as far as what is asked for goes: with --only the rest is not solved."""
+        if self.only is None:
+            return motion.assembled
+        whole = np.ones(motion.n, dtype=bool)
+        for name in self.points:
+            whole &= np.isfinite(motion.point(name).complex(0))
+        for name in self.links:
+            whole &= np.isfinite(motion.angle(name))
+        return whole

@@ -1,0 +1,328 @@
+"""What kind of mechanism this is: mobility, redundant constraints, Grashof classes, limits, dead and change points."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from virtualwork.errors import AssemblyError
+from virtualwork.mechanism import GROUND
+from virtualwork.state import State
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from virtualwork.assembly import Assembly
+    from virtualwork.mechanism import Mechanism
+
+    Reals = NDArray[np.float64]
+
+EQUAL = 1e-12  # two sums of lengths nearer than this, relative, are equal
+
+
+@dataclass(frozen=True)
+class FourBar:
+    """A closed chain of four pinned bodies.
+
+    `grashof`: crank-rocker, double-crank, double-rocker, triple-rocker (no link turns fully), change-point; for a
+    chain that does not hold the ground, as seen from its first body. `transmission`: the least and the largest
+    angle between its coupler and follower, rad.
+    """
+
+    links: tuple[str, ...]
+    lengths: tuple[float, float, float, float]
+    grashof: str
+    transmission: tuple[float, float]
+
+
+class Check:
+    """A mechanism's character; every part is worked out when first read.
+
+    Examples
+    --------
+    >>> from virtualwork import Guess, Input, Link, Mechanism
+    >>> m = Mechanism(ground={"A": (0, 0), "D": (4, 0)},
+    ...               links={"crank": Link({"A": (0, 0), "B": (2, 0)}),
+    ...                      "coupler": Link({"B": (0, 0), "C": (5, 0)}),
+    ...                      "rocker": Link({"D": (0, 0), "C": (2, 0)})},
+    ...               inputs=Input(link="crank"),
+    ...               guess=Guess(at=3.14, angles={"coupler": 0.3, "rocker": 2.0}))
+    >>> check = Check(m.assembly)
+    >>> check.four_bars[0].grashof, [round(math.degrees(q), 6) for q in check.input_limits]
+    ('triple-rocker', [46.567463, 313.432537])
+    """
+
+    def __init__(self, assembly: Assembly) -> None:
+        self.assembly = assembly
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """What is checked."""
+        return self.assembly.mechanism
+
+    @property
+    def mobility(self) -> int:
+        """Grübler's count: three for each link, less what the joints take."""
+        return self.assembly.plan.blocks.mobility
+
+    @cached_property
+    def _rank(self) -> tuple[int, tuple[str, ...]]:
+        labels, jacobian = constraint_jacobian(self.mechanism, self._typical())
+        if not len(labels):
+            return 0, ()
+        u, s, _ = np.linalg.svd(jacobian)
+        rank = int((s > 1e-9 * s[0]).sum())
+        left = u[:, rank:]
+        dependent = [label for label, row in zip(labels, left, strict=True) if np.abs(row).max(initial=0) > 1e-6]
+        return rank, tuple(dict.fromkeys(dependent))
+
+    @property
+    def mobility_by_rank(self) -> int:
+        """The degrees of freedom that the Jacobian of the joints leaves, at a pose that is not singular."""
+        return 3 * len(self.mechanism.links) - self._rank[0]
+
+    @property
+    def redundant(self) -> tuple[str, ...]:
+        """The joints whose constraints depend on each other, so that some of them could be left out."""
+        return self._rank[1]
+
+    def _typical(self) -> State:
+        """A pose away from the singular ones."""
+        m, track = self.mechanism, self.assembly.track
+        low, high = self._span()
+        qs = [m.at[0] + (high - low) * f for f in (0.0, 0.0137, 0.0511, -0.0271, 0.113)] if track.active else [m.at[0]]
+        best, chosen = np.inf, None
+        for q in qs:
+            inputs = (q, *m.at[1:])
+            motion = _motion(self.assembly, inputs)
+            condition = float(motion.condition[0])
+            if condition < best:
+                best, chosen = condition, inputs
+        if chosen is None:
+            raise AssemblyError("check: the mechanism cannot be assembled near its guess")
+        return self.assembly.state(chosen)
+
+    # --- along the input ------------------------------------------------------------------------------------
+    def _span(self) -> tuple[float, float]:
+        track = self.assembly.track
+        if not track.active:
+            return 0.0, 0.0
+        if self.mechanism.inputs[0].is_slide:
+            return track.start - track.length, track.start + track.length
+        return track.start, track.start + track.length
+
+    @cached_property
+    def input_limits(self) -> tuple[float, float] | None:
+        """The ends of the input's range around the guess, rad or m; None where it goes on for ever."""
+        track = self.assembly.track
+        if not track.active:
+            return None
+        slide = self.mechanism.inputs[0].is_slide
+        limits = track.limits()
+        if not limits:
+            return None
+        turns = (0.0,) if slide else (-track.length, 0.0, track.length)
+        every = sorted((limit.input + t, limit.side) for limit in limits for t in turns)
+        above = [q for q, side in every if q > track.start and side < 0]
+        below = [q for q, side in every if q < track.start and side > 0]
+        if slide and (not above or not below):
+            return (below[-1] if below else -math.inf, above[0] if above else math.inf)
+        if not above or not below:
+            return None
+        return below[-1], above[0]
+
+    @cached_property
+    def dead_points(self) -> tuple[float, ...]:
+        """Inputs at which the linkage locks, every end of a range of the input, rad in one turn, or m."""
+        return self._in_turn([limit.input for limit in self.assembly.track.limits()] if self.assembly.track.active else [])
+
+    @cached_property
+    def change_points(self) -> tuple[float, ...]:
+        """Inputs at which two branches cross, rad in one turn, or m."""
+        track = self.assembly.track
+        if not track.active:
+            return ()
+        track.cover(*self._span())
+        found = [float(q) for flips in track.flips.values() for q in flips]
+        found += [float(q) for march in track._marched.values() for q in march.crossings]
+        return self._in_turn(found)
+
+    def _in_turn(self, found: list[float]) -> tuple[float, ...]:
+        if self.mechanism.inputs and self.mechanism.inputs[0].is_slide:
+            return tuple(sorted(found))
+        unique: list[float] = []
+        for q in sorted(q % (2 * math.pi) for q in found):
+            # an input of −1e-15 is 0, not a whole turn
+            q = 0.0 if 2 * math.pi - q < 1e-9 or q < 1e-9 else q
+            if all(abs(q - other) > 1e-8 for other in unique):
+                unique.append(q)
+        return tuple(sorted(unique))
+
+    # --- parts ------------------------------------------------------------------------------------------------
+    @property
+    def groups(self) -> tuple[dict[str, Any], ...]:
+        """The Assur groups in their order of solution, each with its links, its kind and its method."""
+        return tuple(
+            {
+                "links": list(g.links),
+                "kind": g.kind if g.kind != "Newton" else f"{len(g.angles) + len(g.slides)} unknowns",
+                "method": "Newton-Raphson" if g.kind == "Newton" else "closed form",
+            }
+            for g in self.assembly.plan.groups
+        )
+
+    @cached_property
+    def four_bars(self) -> tuple[FourBar, ...]:
+        """Every closed chain of four pinned bodies, with its Grashof class."""
+        m = self.mechanism
+        pins: dict[frozenset[str], list[str]] = {}
+        for point, bodies in m.pins.items():
+            for a, b in combinations(bodies, 2):
+                pins.setdefault(frozenset((a, b)), []).append(point)
+        driven = [str(e.link) for e in m.inputs if e.link is not None]
+        order = [GROUND, *driven, *(b for b in m.links if b not in driven)]
+        found = []
+        for a, b, c, d in _cycles(order, pins):
+            corners = [pins[frozenset(pair)][0] for pair in ((a, b), (b, c), (c, d), (d, a))]
+            if len(set(corners)) < 4:
+                continue
+            lengths = tuple(
+                abs(m.bodies[body][p] - m.bodies[body][q])
+                for body, p, q in zip((a, b, c, d), (corners[-1], *corners[:-1]), corners, strict=True)
+            )
+            found.append(self._four_bar((a, b, c, d), corners, lengths))  # type: ignore[arg-type]
+        return tuple(found)
+
+    def _four_bar(
+        self, bodies: tuple[str, str, str, str], corners: list[str], lengths: tuple[float, float, float, float]
+    ) -> FourBar:
+        ground, crank, coupler, rocker = lengths
+        links = bodies[1:] if bodies[0] == GROUND else bodies
+        if bodies[0] == GROUND and any(e.link == bodies[1] and e.on == GROUND for e in self.mechanism.inputs):
+            reach = [abs(ground - crank), ground + crank]
+            ends = [min(max(r, abs(coupler - rocker)), coupler + rocker) for r in reach]
+            angles = sorted(_angle(coupler, rocker, r) for r in ends)
+        else:
+            angles = self._seen(bodies, corners)
+        return FourBar(links, lengths, grashof_class(*lengths), (angles[0], angles[-1]))
+
+    def _seen(self, bodies: tuple[str, ...], corners: list[str]) -> list[float]:
+        """The transmission angle over the motion, sampled, for chains that are not driven at their own crank."""
+        from virtualwork.motion import Motion
+
+        low, high = self._span()
+        q = np.linspace(low, high, 1441)
+        inputs = q if self.assembly.track.active else np.array([self.mechanism.at])
+        motion = Motion(self.assembly, inputs)
+        b, c, d = (motion.point(p).complex(0) for p in corners[1:])
+        mu = np.abs(np.angle((b - c) / (d - c)))
+        mu = mu[np.isfinite(mu)]
+        return [float(mu.min()), float(mu.max())] if len(mu) else [math.nan, math.nan]
+
+
+def grashof_class(ground: float, crank: float, coupler: float, rocker: float) -> str:
+    """The class of a four-bar by its lengths (F. Grashof, 1883; names as in Norton, Design of Machinery, §2.13).
+
+    Examples
+    --------
+    >>> grashof_class(100, 40, 120, 80), grashof_class(4, 2, 5, 2), grashof_class(5, 2, 5, 2)
+    ('crank-rocker', 'triple-rocker', 'change-point')
+    """
+    shortest, p, q, longest = sorted((ground, crank, coupler, rocker))
+    difference = (shortest + longest) - (p + q)
+    if abs(difference) <= EQUAL * longest:
+        return "change-point"
+    if difference > 0:
+        return "triple-rocker"
+    if shortest == ground:
+        return "double-crank"
+    return "double-rocker" if shortest == coupler else "crank-rocker"
+
+
+def _angle(a: float, b: float, opposite: float) -> float:
+    """The angle between sides a and b of a triangle, by its half: no cancellation near 0 and π."""
+    up = (opposite - (a - b)) * (opposite + (a - b))
+    down = (a + b - opposite) * (a + b + opposite)
+    return 2 * math.atan2(math.sqrt(max(up, 0.0)), math.sqrt(max(down, 0.0)))
+
+
+def _cycles(order: list[str], pins: dict[frozenset[str], list[str]]) -> list[tuple[str, str, str, str]]:
+    """Every ring of four bodies once, beginning with the earliest, the earlier neighbour next."""
+    found = []
+    rank = {body: i for i, body in enumerate(order)}
+    beside = {b: [o for o in order if frozenset((b, o)) in pins and o != b] for b in order}
+    for a in order:
+        for b in beside[a]:
+            for c in beside[b]:
+                for d in beside[c]:
+                    if len({a, b, c, d}) == 4 and a in beside[d] and rank[a] < min(rank[b], rank[c], rank[d]) and rank[b] < rank[d]:
+                        found.append((a, b, c, d))
+    return found
+
+
+def constraint_jacobian(m: Mechanism, st: State) -> tuple[list[str], Reals]:
+    """The Jacobian of every joint's constraints in the coordinates (θ, x, y) of each link, lengths over the size.
+
+    Returns
+    -------
+    labels : list of str
+        The joint of each row.
+    jacobian : array (constraints, 3·links)
+    """
+    column = {link: 3 * i for i, link in enumerate(m.links)}
+    size = m.size
+    labels: list[str] = []
+    rows: list[Reals] = []
+
+    def vector(body: str, z: complex) -> tuple[complex, complex, complex]:
+        """Derivatives of a point of a body along its θ, x, y."""
+        return 1j * z * complex(np.ravel(st.turn[body])[0]) / size, 1.0, 1j
+
+    def add(label: str, parts: list[tuple[str, complex, float]], normal: complex | None = None) -> None:
+        """Σ sign·point = 0, in x and y, or along a normal only."""
+        both = [1.0 + 0j, 1j] if normal is None else [normal]
+        for n in both:
+            row = np.zeros(3 * len(column))
+            for body, z, sign in parts:
+                if body != GROUND:
+                    for k, v in enumerate(vector(body, z)):
+                        row[column[body] + k] += sign * (v.real * n.real + v.imag * n.imag)
+            labels.append(label)
+            rows.append(row)
+
+    def turn(label: str, parts: list[tuple[str, float]]) -> None:
+        row = np.zeros(3 * len(column))
+        for body, factor in parts:
+            if body != GROUND:
+                row[column[body]] += factor
+        labels.append(label)
+        rows.append(row)
+
+    for pin, bodies in m.pins.items():
+        first = bodies[0]
+        for other in bodies[1:]:
+            add(f"pin {pin}", [(first, m.bodies[first][pin], 1.0), (other, m.bodies[other][pin], -1.0)])
+    for i, g in enumerate(m.guides):
+        label = f"{'slider' if g.is_slider else 'slot'} {g.point}"
+        through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
+        d = complex(math.cos(g.angle), math.sin(g.angle))
+        on = complex(np.ravel(st.turn[g.on])[0])
+        slide = float(np.ravel(st.slide[i])[0])
+        add(label, [(g.link, m.links[g.link].points[g.point], 1.0), (g.on, through + slide * d, -1.0)], 1j * d * on)
+        if g.is_slider:
+            turn(label, [(g.link, 1.0), (g.on, -1.0)])
+    for gear in m.gears:
+        a, b = gear.links
+        turn(f"gear {a}-{b}", [(b, 1.0), (a, -gear.ratio), (gear.arm, gear.ratio - 1.0)])
+    return labels, np.array(rows) if rows else np.zeros((0, 3 * len(column)))
+
+
+def _motion(assembly: Assembly, inputs: tuple[float, ...]) -> Any:
+    from virtualwork.motion import Motion
+
+    return Motion(assembly, np.array([inputs]))
