@@ -220,7 +220,7 @@ class Check:
         inputs = q if self.assembly.track.active else np.array([self.mechanism.at])
         motion = Motion(self.assembly, inputs)
         b, c, d = (motion.point(p).complex(0) for p in corners[1:])
-        mu = np.abs(np.angle((b - c) / (d - c)))
+        mu = np.abs(np.angle((b - c) * np.conj(d - c)))
         mu = mu[np.isfinite(mu)]
         return [float(mu.min()), float(mu.max())] if len(mu) else [math.nan, math.nan]
 

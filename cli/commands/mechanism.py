@@ -68,7 +68,9 @@ def run(
 
     try:
         job = _job(file, at, sweep, inputs, names, order, branch)
-        shown = _shown(job, newton=newton, check=check, explain=explain, graph=graph)
+        # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
+        table = not json or expect is not None or output is not None
+        shown = _shown(job, table=table, newton=newton, check=check, explain=explain, graph=graph)
         show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text)
     except MechanismError as error:
         from cli.errors import DataError
@@ -101,10 +103,12 @@ def _job(
     return job
 
 
-def _shown(job: Job, *, newton: bool, check: bool, explain: bool, graph: str | None) -> Shown:
+def _shown(job: Job, *, table: bool, newton: bool, check: bool, explain: bool, graph: str | None) -> Shown:
     from cli.mechanism import checking, poses, states
 
-    columns = states.table(job) if job.only is None else poses.wide_table(job)
+    columns: dict[str, list[Any]] = {}
+    if table:
+        columns = states.table(job) if job.only is None else poses.wide_table(job)
     extra: dict[str, Any] = {}
     after: list[str] = []
     if newton:

@@ -185,7 +185,7 @@ def _branch_lines(job: Job, motion: Any) -> list[str]:
         names = [*group.angles, *(job.mechanism.guides[g].point for g in group.slides)]
 
         def rates(values: Any, names: list[str] = names) -> str:
-            return ", ".join(f"d{n}/dq = {v:.6g}" for n, v in zip(names, values, strict=True))
+            return ", ".join(f"d{n}/dq = {round(float(v), 12) + 0.0:.6g}" for n, v in zip(names, values, strict=True))
 
         text = f"change point at {', '.join(f'{v:.10g}' for v in at)} {'m' if slide else 'deg'}: the branches of {c.group} cross; "
         text += f"the motion goes on along its tangent ({rates(c.rates[0])})"
