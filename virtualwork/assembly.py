@@ -86,6 +86,17 @@ class Assembly:
             group = replace(group, ties=tuple(phased.get(t.body, t) for t in group.ties))
         return whole, group
 
+    @cached_property
+    def geared(self) -> set[str]:
+        """Bodies of which a gear of fractional ratio needs the angle itself, with its whole turns."""
+        return {
+            base
+            for step in self.plan.steps
+            if isinstance(step, Turn)
+            for base, r in step.angle.bases
+            if not float(r).is_integer()
+        }
+
     def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
         """The steps that targets hang on; worked out once for each set of targets."""
         key = frozenset(targets)
@@ -123,9 +134,11 @@ class Assembly:
         case = self.cases[group.name]
         if not tracked or not self.track.active:
             case.solve(st, self.signs[group.name], self.mechanism.size)
-            return
-        case.solve(st, self.track.sign(group, st.inputs[0]), self.mechanism.size)
-        self.track.mend(group, st)
+        else:
+            case.solve(st, self.track.sign(group, st.inputs[0]), self.mechanism.size)
+            self.track.mend(group, st)
+        for body in self.geared.intersection(group.members):
+            st.angle[body] = self.track.unwound(body, st.inputs[0], np.angle(st.turn[body]), tracked)
 
     def state(self, inputs: tuple[float, ...], targets: Iterable[str] | None = None, tracked: bool = True) -> State:
         """Positions of one pose, as Python numbers."""
@@ -166,6 +179,7 @@ class _Chooser:
                     starts[step.name] = self._newton(step, st)
                 else:
                     signs[step.name] = self._sign(step, helper.cases[step.name], st)
+                    st.angle.update({b: float(np.angle(st.turn[b])) for b in step.members})
             elif isinstance(step, Place):
                 place(step, st)
             elif isinstance(step, Slide):
@@ -173,7 +187,23 @@ class _Chooser:
             else:
                 helper.turn(step, st)
         done = replace(self.plan, steps=tuple(steps))
+        if done.blocks.redundant:
+            self._refuse_overdriven(done, st)
         return Assembly(self.m, done, signs, starts, 1, tuple(self.warnings))
+
+    def _refuse_overdriven(self, done: Plan, st: State) -> None:
+        """Constraints that depend on each other may leave less motion than there are inputs."""
+        from virtualwork.check import constraint_jacobian
+
+        labels, jacobian = constraint_jacobian(self.m, st)
+        s = np.linalg.svd(jacobian, compute_uv=False)
+        left = 3 * len(self.m.links) - int((s > 1e-9 * s[0]).sum())
+        counted = done.blocks.mobility
+        if left < len(self.m.inputs) or 1 <= counted < len(self.m.inputs):
+            left = min(left, counted) if counted >= 1 else left
+            names = ", ".join(e.name for e in self.m.inputs)
+            what = "the joints leave no motion, it is a structure" if left == 0 else f"mobility {left}"
+            raise MobilityError(f"[input]: {len(self.m.inputs)} input(s) ({names}), but {what}")
 
     def _phase(self, step: Turn, st: State) -> Turn:
         """A gear whose phase hangs on a group: its link stands at its guess."""
@@ -222,8 +252,9 @@ class _Chooser:
 
     def _informed(self, group: Group) -> bool:
         """Does the guess say anything about the links of this group?"""
-        return any(b in self.angles for b in group.links) or any(
-            p in self.points for b in group.links for p in self.m.links[b].points if p not in self.m.ground
+        given = self.m.guess
+        return any(b in given.angles for b in group.links) or any(
+            p in given.points for b in group.links for p in self.m.links[b].points
         )
 
     def _choices(self, group: Group, states: list[State]) -> str:
@@ -274,6 +305,11 @@ class _Chooser:
                 self._take(group, st, x)
                 return x[0]
         found = every_solution(group, many, self.plan, self.m.size)
+        if len(found) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
+            raise MobilityError(
+                f"{group.name}: more constraints than unknowns, and they contradict each other: a structure, or lengths "
+                f"that do not fit (look at {', '.join(self.plan.blocks.redundant)})"
+            )
         if len(found) == 0:
             raise AssemblyError(
                 f"[guess] at: {group.name} cannot be assembled there (Newton-Raphson from many starts finds no "

@@ -37,7 +37,8 @@ class March:
             s for s in self.assembly.needed(self.assembly.plan.writes(group)) if s is not group
         ]
         self.ends: list[tuple[float, int]] = []
-        self.crossings: list[float] = []
+        self._crossed: list[tuple[float, float]] = []
+        self._found: dict[tuple[float, float], float] = {}
         x = np.asarray(self.assembly.starts[group.name], dtype=float)
         q = track.start
         rate, det = self._rate(q, x)
@@ -60,8 +61,9 @@ class March:
         jacobian = stack(columns(self.group, st, self.assembly.plan), 1)
         right = stack_rows(d.right_side(self.group, 1), 1)
         rate = solve(jacobian, -right)[0]
-        square = jacobian[0] if jacobian.shape[1] == jacobian.shape[2] else np.linalg.qr(jacobian[0])[1]
-        return rate, float(np.linalg.det(square))
+        if jacobian.shape[1] == jacobian.shape[2]:
+            return rate, float(np.linalg.det(jacobian[0]))
+        return rate, float(np.prod(np.linalg.svd(jacobian[0], compute_uv=False)))
 
     def extend(self, a: float, b: float) -> None:
         """March until the nodes cover a to b."""
@@ -78,6 +80,7 @@ class March:
             self.stopped[side] = True
             return
         step = h
+        crossed: list[tuple[float, float]] = []
         while step > FINEST * self.track.length:
             to = q + side * step
             guess = x + side * step * rate
@@ -92,13 +95,51 @@ class March:
                 change = np.abs((found[0] - x) / scale).max()
                 if np.isfinite(new).all() and defect <= 0.05 * max(change, 1e-6) and change < 0.5:
                     if np.sign(det) != np.sign(self.det[end]):
-                        self.crossings.append(to - side * step * abs(det) / (abs(det) + abs(self.det[end])))
+                        crossed.append((min(q, to), max(q, to)))
                     for nodes, value in ((self.q, to), (self.x, found[0]), (self.rate, new), (self.det, det)):
                         nodes.insert(len(nodes) if side > 0 else 0, value)  # type: ignore[attr-defined]
+                    self._crossed += crossed
                     return
             step /= 2
         self.stopped[side] = True
         self.ends.append((self._limit(side), -side))
+
+    @property
+    def crossings(self) -> list[float]:
+        """The change points met: where the determinant goes through zero and the branch goes on."""
+        for a, b in self._crossed:
+            if (a, b) not in self._found:
+                centre, half = (a + b) / 2, (b - a) / 2
+                nodes = np.cos(np.pi * (np.arange(12) + 0.5) / 12)
+                x = self.unknowns(centre + half * nodes)
+                det = [self._rate(q, row)[1] for q, row in zip(centre + half * nodes, x, strict=True)]
+                roots = np.polynomial.Chebyshev.fit(nodes, det, 10, domain=[-1, 1]).roots()
+                real = np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= 1.1)])
+                self._found[a, b] = centre + half * float(real[np.argmin(np.abs(real))]) if len(real) else centre
+        return [self._found[pair] for pair in self._crossed]
+
+    def unknowns(self, q: Reals) -> Reals:
+        """The group's unknowns at inputs q, (n, unknowns)."""
+        st = State([q], many=True)
+        with np.errstate(all="ignore"):
+            self.assembly.run(self.before, st)
+            self.close(st)
+        rows = [st.angle[b] for b in self.group.angles] + [st.slide[g] for g in self.group.slides]
+        return np.stack([np.broadcast_to(r, q.shape) for r in rows], axis=1)
+
+    def bridge(self, q: float, order: int) -> Reals:
+        """The unknowns' derivative across a removable singularity of the Jacobian: of the polynomial through poses
+        on both sides of it (Chebyshev points, so that it holds some 12 digits of a velocity)."""
+        half = 0.06 * self.track.length / (2 * np.pi)
+        nodes = np.cos(np.pi * (np.arange(14) + 0.5) / 14)
+        self.extend(q - half, q + half)
+        x = self.unknowns(q + half * nodes)
+        out = np.full(x.shape[1], np.nan)
+        if np.isfinite(x).all():
+            for j in range(x.shape[1]):
+                fit = np.polynomial.Chebyshev.fit(nodes, x[:, j], 13, domain=[-1, 1])
+                out[j] = fit.deriv(order)(0.0) / half**order
+        return out
 
     def _limit(self, side: int) -> float:
         """The limit itself: det² is smooth in the input there and goes to zero; extrapolated from the last nodes."""

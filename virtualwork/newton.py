@@ -86,6 +86,19 @@ def inverse_norm(jacobian: Reals) -> Reals:
     return out
 
 
+def singular_poses(cols: list[list[Number]], angles: int, n: int) -> NDArray[np.bool_]:
+    """Which poses have a Jacobian whose smallest singular value is below 1e-6 of its largest."""
+    jacobian = stack(cols, n)
+    size = np.abs(jacobian[:, :, :angles]).max(initial=0.0)
+    if angles and size > 0:
+        jacobian[:, :, :angles] /= size
+    good = np.isfinite(jacobian).all(axis=(1, 2))
+    out = np.zeros(n, dtype=bool)
+    s = np.linalg.svd(jacobian[good], compute_uv=False)
+    out[good] = s[:, -1] < 1e-6 * s[:, 0]
+    return out
+
+
 def solve_columns(cols: list[list[Number]], right: list[Number]) -> list[Number]:
     """Solve Σ column·x + right = 0 for the unknowns' derivatives."""
     shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(w) for w in right))

@@ -92,6 +92,8 @@ class State:
                 factor = e
             elif r == -1.0:
                 factor = e.conjugate()
+            elif r.is_integer():
+                factor = self.exp(r * np.angle(e))
             else:
                 factor = self.exp(r * self.angle[base])
             value = factor if value is None else value * factor
@@ -359,9 +361,13 @@ class Jets:
             inverse = -1 / cross(c1, c2)
             x: list[Number] = [cross(w, c2) * inverse, cross(c1, w) * inverse]
         else:
-            from virtualwork.newton import solve_columns
+            from virtualwork.newton import singular_poses, solve_columns
 
             x = solve_columns(cols, right)
+            if self.track is not None:
+                bad = singular_poses(cols, len(group.angles), np.size(self.st.inputs[0]))
+                if bad.any():
+                    x = self.track.bridge_rates(group, self.st.inputs[0], k, x, bad)
         if self.track is not None and self.track.changes:
             x = self.track.mend_rates(group, self.st.inputs[0], k, x)
         self.write(group, k, x)

@@ -87,6 +87,7 @@ class Track:
         self.changes: dict[str, list[ChangePoint]] = {}
         self._brackets: list[tuple[str, float, float]] = []
         self._marched: dict[str, Any] = {}
+        self._wound: dict[str, tuple[Reals, Reals]] = {}
         # one turn says it all where every turn of a body is a whole number of turns of the input
         whole = all(
             float(k).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, k in s.angle.inputs
@@ -154,6 +155,42 @@ class Track:
                     x[j][near] = rate[..., j]
         return x
 
+    def bridge_rates(self, group: Group, q: Number, k: int, x: list[Number], singular: Any) -> list[Number]:
+        """Derivatives of a Newton group at poses where its Jacobian is singular though the branch goes on."""
+        if not self.active or group.name not in self._marched:
+            return x
+        for i in np.flatnonzero(singular):
+            rate = self._marched[group.name].bridge(float(np.atleast_1d(q)[i]), k)
+            for j in range(len(x)):
+                if np.ndim(q) == 0:
+                    x[j] = float(rate[j])
+                else:
+                    x[j] = np.array(np.broadcast_to(x[j], np.shape(q)))
+                    x[j][i] = rate[j]
+        return x
+
+    def unwound(self, body: str, q: Number, angle: Number, tracked: bool = True) -> Number:
+        """An angle with its whole turns, counted from the guess."""
+        if not tracked or not self.active or body not in self._wound:
+            return angle
+        nodes, turns = self._wound[body]
+        good = np.isfinite(turns)
+        near = np.interp(q, nodes[good], turns[good])
+        whole = angle + 2 * np.pi * np.round((near - angle) / (2 * np.pi))
+        return whole if np.ndim(q) else float(whole)
+
+    def _wind(self, body: str, q: Reals, angle: Reals) -> None:
+        """Add samples of an angle and count its turns from the guess."""
+        nodes, angles = self._wound.get(body, (np.empty(0), np.empty(0)))
+        nodes, first = np.unique(np.append(nodes, q), return_index=True)
+        angles = np.append(angles, np.broadcast_to(angle, q.shape))[first]
+        good = np.isfinite(angles)
+        if good.any():
+            angles[good] = np.unwrap(angles[good])
+            here = np.interp(self.start, nodes[good], angles[good])
+            angles = angles - 2 * np.pi * np.round(here / (2 * np.pi))
+            self._wound[body] = nodes, angles
+
     def _near(self, group: Group, q: Number):  # type: ignore[no-untyped-def]
         for change in self.changes.get(group.name, ()):
             if np.ndim(q) == 0:
@@ -185,6 +222,9 @@ class Track:
                 m = np.broadcast_to(st.margin[s.name], q.shape)
                 if self._look(s, q, m, a, b):
                     self.assembly.close(s, st)
+                for body in self.assembly.geared.intersection(s.members):
+                    self._wind(body, q, np.angle(st.turn[body]))
+                    st.angle[body] = self.unwound(body, q, np.angle(st.turn[body]))
             elif isinstance(s, Group):
                 self._march(s, a, b)
                 self.assembly.close(s, st)
