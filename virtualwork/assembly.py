@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -140,7 +139,9 @@ class Assembly:
         for body in self.geared.intersection(group.members):
             st.angle[body] = self.track.unwound(body, st.inputs[0], np.angle(st.turn[body]), tracked)
 
-    def state(self, inputs: tuple[float, ...], targets: Iterable[str] | None = None, tracked: bool = True) -> State:
+    def state(
+        self, inputs: tuple[float, ...], targets: Iterable[str] | None = None, tracked: bool = True
+    ) -> State:
         """Positions of one pose, as Python numbers."""
         st = State(list(inputs), many=False)
         steps = self.plan.steps if targets is None else self.needed(targets)
@@ -195,7 +196,7 @@ class _Chooser:
         """Constraints that depend on each other may leave less motion than there are inputs."""
         from virtualwork.check import constraint_jacobian
 
-        labels, jacobian = constraint_jacobian(self.m, st)
+        _, jacobian = constraint_jacobian(self.m, st)
         s = np.linalg.svd(jacobian, compute_uv=False)
         left = 3 * len(self.m.links) - int((s > 1e-9 * s[0]).sum())
         counted = done.blocks.mobility
@@ -234,7 +235,7 @@ class _Chooser:
         found = self.solutions(group, case, st)
         if not found:
             st.turn.update({b: complex(np.nan, np.nan) for b in group.members})
-            st.slide.update({g: np.nan for g in group.slides})
+            st.slide.update(dict.fromkeys(group.slides, np.nan))
             return self._sign_of_guess(group, case, st)
         distances = [self._distance(group, trial) for _, trial in found]
         if len(found) == 2 and abs(found[0][1].margin[group.name]) < 1e-14:
@@ -263,7 +264,9 @@ class _Chooser:
             parts = [f"{b} = {np.degrees(np.angle(st.turn[b])):.4g} deg" for b in group.members]
             parts += [f"{self.m.guides[g].point} at {st.slide[g]:.4g} m" for g in group.slides]
             texts.append(", ".join(parts))
-        return f"[guess]: {group.name} can be assembled in {len(texts)} ways; choose one: " + "; or ".join(texts)
+        return f"[guess]: {group.name} can be assembled in {len(texts)} ways; choose one: " + "; or ".join(
+            texts
+        )
 
     def _distance(self, group: Group, st: State) -> float:
         """How far an assembly is from the guess: chords of the unit circle, and points relative to the size."""
@@ -281,7 +284,9 @@ class _Chooser:
 
     def _sign_of_guess(self, group: Group, case: Case, st: State) -> int:
         """Not assembled at the guess: the sign that the guessed angles would have."""
-        self.warnings.append(f"[guess] at: {group.name} cannot be assembled there; its branch is that of the guessed angles")
+        self.warnings.append(
+            f"[guess] at: {group.name} cannot be assembled there; its branch is that of the guessed angles"
+        )
         e = [np.exp(1j * self.angles[b]) if b in self.angles else None for b in group.angles]
         try:
             if group.kind == "RRR" and e[0] is not None and e[1] is not None:
@@ -346,7 +351,10 @@ def known_by_guess(m: Mechanism) -> tuple[dict[str, float], dict[str, complex]]:
         for name, link in m.links.items():
             here = [p for p in link.points if p in points]
             if name not in angles and len(here) >= 2:
-                ends = max(((a, b) for a in here for b in here), key=lambda ab: abs(link.points[ab[1]] - link.points[ab[0]]))
+                ends = max(
+                    ((a, b) for a in here for b in here),
+                    key=lambda ab: abs(link.points[ab[1]] - link.points[ab[0]]),
+                )
                 local = link.points[ends[1]] - link.points[ends[0]]
                 seen = points[ends[1]] - points[ends[0]]
                 if local and seen:
@@ -383,7 +391,9 @@ def guessed_unknowns(
     return x
 
 
-def _origin(body: str, z: complex, turn: complex, points: Mapping[str, complex], m: Mechanism) -> complex | None:
+def _origin(
+    body: str, z: complex, turn: complex, points: Mapping[str, complex], m: Mechanism
+) -> complex | None:
     if body == GROUND:
         return z
     for name, local in m.links[body].points.items():
@@ -409,7 +419,12 @@ def every_solution(group: Group, st: State, plan_: Plan, size: float) -> Any:
     x0[:, :na] = u[:, :na] * 2 * np.pi
     x0[:, na:] = (2 * u[:, na:] - 1) * size
     many = State([np.full(starts, np.ravel(q)[0]) for q in st.inputs], many=True)
-    many.turn, many.point, many.slide, many.angle = dict(st.turn), dict(st.point), dict(st.slide), dict(st.angle)
+    many.turn, many.point, many.slide, many.angle = (
+        dict(st.turn),
+        dict(st.point),
+        dict(st.slide),
+        dict(st.angle),
+    )
     with np.errstate(all="ignore"):
         x, closed = newton(group, many, plan_, x0, size)
     x = x[closed]
@@ -435,7 +450,8 @@ def all_assemblies(m: Mechanism) -> tuple[Assembly, ...]:
     found = [chosen]
     for signs, starts in _combinations(chosen):
         if signs != chosen.signs or any(
-            np.abs(np.exp(1j * np.asarray(starts[k])) - np.exp(1j * np.asarray(chosen.starts[k]))).max() > 1e-6
+            np.abs(np.exp(1j * np.asarray(starts[k])) - np.exp(1j * np.asarray(chosen.starts[k]))).max()
+            > 1e-6
             for k in starts
         ):
             found.append(Assembly(m, chosen.plan, signs, starts, len(found) + 1))

@@ -5,198 +5,38 @@ decomposition (A. L. Dulmage, N. S. Mendelsohn, Can. J. Math. 10 (1958) 517) is 
 order, are the Assur groups: each is solved when what it hangs on is known. Angles tied by sliders, gears and
 inputs are linear relations and are eliminated before anything else; what remains of a block is its loop closure
 R_1 e^{iθ1} + R_2 e^{iθ2} + ... = 0 (000 eq. 1.3.1; 003) in its own few angles and slides.
-
-The list of steps
------------------
-`Turn`   the angle of a body from the inputs and from angles already known
-`Slide`  a slide that is an input
-`Place`  a point from a point already known:  P = P_base + Σ z·s·e^{iθ}
-`Group`  the angles and slides of an Assur group from its loop closures
-
-Every position in the mechanism is a `base` point and a sum of `Term`s, each a constant z in the axes of one body,
-perhaps times a slide. That is all that derivatives, virtual displacements and reactions need to know.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from virtualwork.errors import MobilityError
-from virtualwork.graph import Blocks, decompose
+from virtualwork.graph import Variable, decompose
 from virtualwork.mechanism import GROUND
+from virtualwork.steps import (
+    Angle,
+    Closure,
+    Group,
+    Kind,
+    Place,
+    Plan,
+    Slide,
+    Step,
+    Term,
+    Turn,
+    combined,
+)
 
 if TYPE_CHECKING:
     from virtualwork.mechanism import Mechanism
 
-Variable = tuple[str, str]  # ("angle", link), ("x", link), ("y", link), ("px", pin), ("py", pin), ("slide", guide)
+# the position of a point: a known node, and what is added to it
+Chain = tuple[str | None, tuple[Term, ...]]
 
-
-@dataclass(frozen=True)
-class Term:
-    """One vector of a loop: z, constant in the axes of `body`, times the slide of guide `slide` (None: 1)."""
-
-    z: complex
-    body: str
-    slide: int | None = None
-
-
-@dataclass(frozen=True)
-class Angle:
-    """θ = const + Σ k·input + Σ r·θ_base. `phase`: const is such that θ takes this value at the guess."""
-
-    const: float = 0.0
-    inputs: tuple[tuple[int, float], ...] = ()
-    bases: tuple[tuple[str, float], ...] = ()
-    phase: float | None = None
-
-    def at(self, inputs: tuple[float, ...]) -> float | None:
-        """The angle at given inputs, or None where it hangs on other angles."""
-        if self.bases or self.phase is not None:
-            return None
-        return self.const + sum(k * inputs[j] for j, k in self.inputs)
-
-
-@dataclass(frozen=True)
-class Turn:
-    """The angle of a body follows from inputs and known angles."""
-
-    body: str
-    angle: Angle
-
-
-@dataclass(frozen=True)
-class Slide:
-    """The slide of a guide is an input."""
-
-    guide: int
-    input: int
-
-
-@dataclass(frozen=True)
-class Place:
-    """A point from a known one: P = P[base] + Σ terms; base None is the ground's origin."""
-
-    node: str
-    base: str | None
-    terms: tuple[Term, ...]
-
-
-@dataclass(frozen=True)
-class Closure:
-    """A loop that closes: P[start] + Σ terms − P[end] = 0; made by cutting `joint` on link `body`."""
-
-    start: str | None
-    end: str | None
-    terms: tuple[Term, ...]
-    joint: str
-    body: str
-    guide: int | None = None
-
-
-Kind = Literal["RRR", "RRP", "RPR", "PRP", "Newton"]
-
-
-@dataclass(frozen=True)
-class Group:
-    """An Assur group: its links, its own unknown angles and slides, its loops.
-
-    `kind` is the case of the planar vector equation (M. A. Chace, J. Eng. Ind. 85 (1963) 289): RRR two angles,
-    RRP an angle and a slide of known direction, RPR an angle and a slide that turns with it, PRP two slides;
-    'Newton' for everything larger.
-    """
-
-    name: str
-    links: tuple[str, ...]
-    kind: Kind
-    angles: tuple[str, ...]
-    slides: tuple[int, ...]
-    closures: tuple[Closure, ...]
-    ties: tuple[Turn, ...] = ()  # bodies of the group whose angle hangs on the group's own
-
-    @property
-    def members(self) -> tuple[str, ...]:
-        """The bodies whose angle is an unknown of the group or tied to one."""
-        return (*self.angles, *(t.body for t in self.ties))
-
-
-Step = Turn | Slide | Place | Group
-
-
-@dataclass(frozen=True)
-class Plan:
-    """The order of solution: the steps, and where each body stands once they are done.
-
-    `anchors[body] = (node, terms)`: the point z of that body lies at P[node] + Σ terms + z·e^{iθ}.
-    `angles[body]` is the body's angle in terms of inputs and of the groups' free angles.
-    """
-
-    steps: tuple[Step, ...]
-    anchors: Mapping[str, tuple[str | None, tuple[Term, ...]]]
-    angles: Mapping[str, Angle]
-    directions: Mapping[int, complex]
-    blocks: Blocks
-    guide_nodes: Mapping[int, str] = field(default_factory=dict)
-
-    @property
-    def groups(self) -> tuple[Group, ...]:
-        """The Assur groups in their order of solution."""
-        return tuple(step for step in self.steps if isinstance(step, Group))
-
-    def reads(self, step: Step) -> set[str]:
-        """What a step reads: `angle:BODY`, `point:NODE`, `slide:GUIDE`."""
-        if isinstance(step, Turn):
-            return {f"angle:{base}" for base, _ in step.angle.bases}
-        if isinstance(step, Slide):
-            return set()
-        if isinstance(step, Place):
-            return _term_reads(step.terms) | _node(step.base)
-        own = {f"angle:{body}" for body in step.members} | {f"slide:{g}" for g in step.slides}
-        needs: set[str] = set()
-        for closure in step.closures:
-            needs |= _term_reads(closure.terms) | _node(closure.start) | _node(closure.end)
-        for tie in step.ties:
-            needs |= {f"angle:{base}" for base, _ in tie.angle.bases}
-        return needs - own
-
-    def writes(self, step: Step) -> tuple[str, ...]:
-        """What a step makes known."""
-        if isinstance(step, Turn):
-            return (f"angle:{step.body}",)
-        if isinstance(step, Slide):
-            return (f"slide:{step.guide}",)
-        if isinstance(step, Place):
-            return (f"point:{step.node}",)
-        return (*(f"angle:{body}" for body in step.members), *(f"slide:{g}" for g in step.slides))
-
-    def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
-        """The steps that the targets hang on, in order; nothing more."""
-        wanted, chosen = set(targets), []
-        for step in reversed(self.steps):
-            if wanted.intersection(self.writes(step)):
-                chosen.append(step)
-                wanted |= self.reads(step)
-        return tuple(reversed(chosen))
-
-
-def _term_reads(terms: tuple[Term, ...]) -> set[str]:
-    return {f"angle:{t.body}" for t in terms if t.body != GROUND} | {
-        f"slide:{t.slide}" for t in terms if t.slide is not None
-    }
-
-
-def _node(name: str | None) -> set[str]:
-    return set() if name is None else {f"point:{name}"}
-
-
-def combined(terms: Iterable[Term]) -> tuple[Term, ...]:
-    """Add terms of the same body and slide; drop those that cancel."""
-    sums: dict[tuple[str, int | None], complex] = {}
-    for t in terms:
-        sums[t.body, t.slide] = sums.get((t.body, t.slide), 0j) + t.z
-    return tuple(Term(z, body, slide) for (body, slide), z in sums.items() if z != 0)
+__all__ = ["Angle", "Closure", "Group", "Place", "Plan", "Slide", "Step", "Term", "Turn", "direction", "plan"]
 
 
 def direction(angle: float) -> complex:
@@ -235,18 +75,20 @@ class _Planner:
         self.m, self.merged = m, merged
         self.steps: list[Step] = []
         self.angles: dict[str, Angle] = {GROUND: Angle()}
-        self.anchors: dict[str, tuple[str | None, tuple[Term, ...]]] = {GROUND: (None, ())}
+        self.anchors: dict[str, Chain] = {GROUND: (None, ())}
         self.nodes: set[str] = set()
         self.slides_known: set[int] = set()
         self.directions = {i: direction(g.angle) for i, g in enumerate(m.guides)}
         self.guide_nodes: dict[int, str] = {}
-        self.used: set[tuple[str, str]] = set()  # (joint, body) already spent to place a body or to close a loop
+        self.used: set[tuple[str, str]] = (
+            set()
+        )  # (joint, body) already spent to place a body or to close a loop
 
     def run(self) -> Plan:
         self.blocks = decompose(self.m)
         for body_point, z in self.m.ground.items():
             self._place(body_point, GROUND, z)
-        pending = [b for b in self.blocks.order]
+        pending = list(self.blocks.order)
         if self.merged:
             pending = [tuple(v for block in pending for v in block)]
         for block in pending:
@@ -299,9 +141,7 @@ class _Planner:
         unknown = tuple(i for i in slides if i not in self.slides_known)
         if closures or free or unknown:
             links = tuple(b for b in self.m.links if b in free or b in {t.body for t in own} or b in moving)
-            group = Group(
-                " + ".join(links), links, "Newton", tuple(free), unknown, tuple(closures), own
-            )
+            group = Group(" + ".join(links), links, "Newton", tuple(free), unknown, tuple(closures), own)
             self.steps.append(replace(group, kind=self._kind(group)))
             self.slides_known.update(unknown)
         self.anchors.update(trees)
@@ -317,7 +157,12 @@ class _Planner:
         own = {body: body for body in group.angles}
         for tie in group.ties:
             bases = [(b, r) for b, r in tie.angle.bases if b in group.angles]
-            if len(bases) != 1 or len(tie.angle.bases) != 1 or bases[0][1] != 1.0 or tie.angle.phase is not None:
+            if (
+                len(bases) != 1
+                or len(tie.angle.bases) != 1
+                or bases[0][1] != 1.0
+                or tie.angle.phase is not None
+            ):
                 return "Newton"
             own[tie.body] = bases[0][0]
         terms = group.closures[0].terms
@@ -361,8 +206,12 @@ class _Planner:
             unknown = {body: factor for body, factor in c.items() if body in fresh}
             if const is None:  # a gear: its phase is the one of the guess
                 stands = sum(factor * guess.get(body, 0.0) for body, factor in unknown.items())
-                value = known.at(at)
-                known = replace(known, phase=stands) if value is None else _plus(known, Angle(stands - value), 1.0)
+                there = known.at(at)
+                known = (
+                    replace(known, phase=stands)
+                    if there is None
+                    else _plus(known, Angle(stands - there), 1.0)
+                )
             rows.append((unknown, known))
         solved: dict[str, tuple[dict[str, float], Angle]] = {}
         for unknown, known in rows:
@@ -406,7 +255,9 @@ class _Planner:
             progress = False
             for body in self.m.links:
                 if body not in self.anchors and body in self.angles and self._known(body):
-                    found = self._attach(body, set(self.anchors), lambda b, z: self._chain(b, z, self.anchors))
+                    found = self._attach(
+                        body, set(self.anchors), lambda b, z: self._chain(b, z, self.anchors)
+                    )
                     if found is not None:
                         self.anchors[body] = found
                         progress = True
@@ -425,20 +276,20 @@ class _Planner:
                 done.update(step.members)
         return body in done
 
-    def _chain(
-        self, body: str, z: complex, anchors: Mapping[str, tuple[str | None, tuple[Term, ...]]]
-    ) -> tuple[str | None, tuple[Term, ...]]:
+    def _chain(self, body: str, z: complex, anchors: Mapping[str, Chain]) -> Chain:
         base, terms = anchors[body]
         return base, combined((*terms, Term(z, body)))
 
-    def _attach(self, body, placed, chain):  # type: ignore[no-untyped-def]
+    def _attach(
+        self, body: str, placed: Collection[str], chain: Callable[[str, complex], Chain]
+    ) -> Chain | None:
         """The first joint that ties a body to the placed ones: pins first, then guides whose slide is known."""
         points = self.m.bodies[body]
         for name, z in points.items():
             if name in self.nodes:
                 self.used.add((name, body))
                 return name, combined([Term(-z, body)])
-        for i, g in enumerate(self.m.guides):
+        for i in range(len(self.m.guides)):
             if i not in self.slides_known or (f"guide {i}", "") in self.used:
                 continue
             found = self._by_guide(i, body, placed, chain)
@@ -446,11 +297,16 @@ class _Planner:
                 return found
         return None
 
-    def _by_guide(self, i, body, placed, chain):  # type: ignore[no-untyped-def]
+    def _by_guide(
+        self, i: int, body: str, placed: Collection[str], chain: Callable[[str, complex], Chain]
+    ) -> Chain | None:
         g, d = self.m.guides[i], self.directions[i]
         if g.link == body and g.on in placed:
             base, terms = chain(g.on, self._through(i))
-            found = base, combined((*terms, Term(d, g.on, i), Term(-self.m.links[body].points[g.point], body)))
+            found = (
+                base,
+                combined((*terms, Term(d, g.on, i), Term(-self.m.links[body].points[g.point], body))),
+            )
         elif g.on == body and g.link in placed:
             base, terms = chain(g.link, self.m.links[g.link].points[g.point])
             found = base, combined((*terms, Term(-self._through(i), body), Term(-d, body, i)))
@@ -459,19 +315,17 @@ class _Planner:
         self.used.add((f"guide {i}", ""))
         return found
 
-    def _loops(
-        self, moving: set[str], turning: set[str]
-    ) -> tuple[list[Closure], dict[str, tuple[str | None, tuple[Term, ...]]]]:
+    def _loops(self, moving: set[str], turning: set[str]) -> tuple[list[Closure], dict[str, Chain]]:
         """A tree over the block's bodies from what is placed; every joint outside the tree closes a loop."""
         anchors = dict(self.anchors)
-        nodes: dict[str, tuple[str | None, tuple[Term, ...]]] = {name: (name, ()) for name in self.nodes}
+        nodes: dict[str, Chain] = {name: (name, ()) for name in self.nodes}
         closures: list[Closure] = []
         # all loops at once: the driven links last, so that loops close over the passive side, as 003 writes them
         last = {str(e.link) for e in self.m.inputs} if self.merged else set()
         queue = list(anchors)
         guides = [i for i in range(len(self.m.guides)) if (f"guide {i}", "") not in self.used]
 
-        def chain(body: str, z: complex) -> tuple[str | None, tuple[Term, ...]]:
+        def chain(body: str, z: complex) -> Chain:
             return self._chain(body, z, anchors)
 
         def join(body: str, name: str) -> None:
@@ -532,10 +386,14 @@ class _Planner:
                 base, terms = chain(g.on, self._through(i))
                 line = base, combined((*terms, Term(self.directions[i], g.on, i)))
                 self.used.add((f"guide {i}", ""))
-                self._close(closures, chain(g.link, self.m.links[g.link].points[g.point]), line, g.point, g.link, i)
+                self._close(
+                    closures, chain(g.link, self.m.links[g.link].points[g.point]), line, g.point, g.link, i
+                )
         return closures, {b: a for b, a in anchors.items() if b not in self.anchors}
 
-    def _close(self, closures, there, here, joint, body, guide):  # type: ignore[no-untyped-def]
+    def _close(
+        self, closures: list[Closure], there: Chain, here: Chain, joint: str, body: str, guide: int | None
+    ) -> None:
         (start, plus), (end, minus) = there, here
         terms = combined((*plus, *(Term(-t.z, t.body, t.slide) for t in minus)))
         closures.append(Closure(start, end, terms, joint, body, guide))
@@ -560,8 +418,3 @@ def _plus(a: Angle, b: Angle, factor: float) -> Angle:
 def _times(a: Angle, factor: float) -> Angle:
     phase = None if a.phase is None else a.phase * factor
     return replace(_plus(Angle(), a, factor), phase=phase)
-
-
-def mobility_error(text: str) -> MobilityError:
-    """One line, always with the same opening, for parts that do not make a mechanism."""
-    return MobilityError("mobility: " + text)

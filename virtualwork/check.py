@@ -78,7 +78,9 @@ class Check:
         u, s, _ = np.linalg.svd(jacobian)
         rank = int((s > 1e-9 * s[0]).sum())
         left = u[:, rank:]
-        dependent = [label for label, row in zip(labels, left, strict=True) if np.abs(row).max(initial=0) > 1e-6]
+        dependent = [
+            label for label, row in zip(labels, left, strict=True) if np.abs(row).max(initial=0) > 1e-6
+        ]
         return rank, tuple(dict.fromkeys(dependent))
 
     @property
@@ -95,7 +97,11 @@ class Check:
         """A pose away from the singular ones."""
         m, track = self.mechanism, self.assembly.track
         low, high = self._span()
-        qs = [m.at[0] + (high - low) * f for f in (0.0, 0.0137, 0.0511, -0.0271, 0.113)] if track.active else [m.at[0]]
+        qs = (
+            [m.at[0] + (high - low) * f for f in (0.0, 0.0137, 0.0511, -0.0271, 0.113)]
+            if track.active
+            else [m.at[0]]
+        )
         best, chosen = np.inf, None
         for q in qs:
             inputs = (q, *m.at[1:])
@@ -139,7 +145,9 @@ class Check:
     @cached_property
     def dead_points(self) -> tuple[float, ...]:
         """Inputs at which the linkage locks, every end of a range of the input, rad in one turn, or m."""
-        return self._in_turn([limit.input for limit in self.assembly.track.limits()] if self.assembly.track.active else [])
+        return self._in_turn(
+            [limit.input for limit in self.assembly.track.limits()] if self.assembly.track.active else []
+        )
 
     @cached_property
     def change_points(self) -> tuple[float, ...]:
@@ -199,7 +207,10 @@ class Check:
         return tuple(found)
 
     def _four_bar(
-        self, bodies: tuple[str, str, str, str], corners: list[str], lengths: tuple[float, float, float, float]
+        self,
+        bodies: tuple[str, str, str, str],
+        corners: list[str],
+        lengths: tuple[float, float, float, float],
     ) -> FourBar:
         ground, crank, coupler, rocker = lengths
         links = bodies[1:] if bodies[0] == GROUND else bodies
@@ -260,7 +271,12 @@ def _cycles(order: list[str], pins: dict[frozenset[str], list[str]]) -> list[tup
         for b in beside[a]:
             for c in beside[b]:
                 for d in beside[c]:
-                    if len({a, b, c, d}) == 4 and a in beside[d] and rank[a] < min(rank[b], rank[c], rank[d]) and rank[b] < rank[d]:
+                    if (
+                        len({a, b, c, d}) == 4
+                        and a in beside[d]
+                        and rank[a] < min(rank[b], rank[c], rank[d])
+                        and rank[b] < rank[d]
+                    ):
                         found.append((a, b, c, d))
     return found
 
@@ -313,7 +329,11 @@ def constraint_jacobian(m: Mechanism, st: State) -> tuple[list[str], Reals]:
         d = complex(math.cos(g.angle), math.sin(g.angle))
         on = complex(np.ravel(st.turn[g.on])[0])
         slide = float(np.ravel(st.slide[i])[0])
-        add(label, [(g.link, m.links[g.link].points[g.point], 1.0), (g.on, through + slide * d, -1.0)], 1j * d * on)
+        add(
+            label,
+            [(g.link, m.links[g.link].points[g.point], 1.0), (g.on, through + slide * d, -1.0)],
+            1j * d * on,
+        )
         if g.is_slider:
             turn(label, [(g.link, 1.0), (g.on, -1.0)])
     for gear in m.gears:

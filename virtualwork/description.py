@@ -98,9 +98,13 @@ class _Reader:
         return complex(*(self.number(v, kind, where) for v in value))
 
     def mechanism(self) -> Mechanism:
-        ground = {name: self.pair(v, "length", f"[ground] {name}") for name, v in self.table("ground").items()}
+        ground = {
+            name: self.pair(v, "length", f"[ground] {name}") for name, v in self.table("ground").items()
+        }
         self.links = {name: self.link(name, entry) for name, entry in self.table("links").items()}
-        self.bodies: dict[str, Mapping[str, complex]] = {GROUND: ground} | {n: k.points for n, k in self.links.items()}
+        self.bodies: dict[str, Mapping[str, complex]] = {GROUND: ground} | {
+            n: k.points for n, k in self.links.items()
+        }
         guides = [self.guide(e, i, "slots") for i, e in self.rows("slots")]
         guides += [self.guide(e, i, "sliders") for i, e in self.rows("sliders")]
         inputs = self.inputs()
@@ -152,7 +156,9 @@ class _Reader:
                 p, v = next(iter(waiting.items()))
                 start = v.get("from")
                 if start not in waiting:
-                    raise DescriptionError(f"{where} points.{p} from: unknown point '{start}'{_hint(start, given)}")
+                    raise DescriptionError(
+                        f"{where} points.{p} from: unknown point '{start}'{_hint(start, given)}"
+                    )
                 raise DescriptionError(f"{where} points.{p} from: '{start}' hangs on '{p}' itself")
             for p in ready:
                 v, at = waiting.pop(p), f"{where} points.{p}"
@@ -176,21 +182,30 @@ class _Reader:
 
     def guide(self, entry: dict[str, Any], i: int, table: str) -> Guide:
         where = f"[[{table}]] {i}"
-        _known(entry, {"point", "link", "on", "through", "angle"} | ({"turned"} if table == "sliders" else set()), where, "key")
+        _known(
+            entry,
+            {"point", "link", "on", "through", "angle"} | ({"turned"} if table == "sliders" else set()),
+            where,
+            "key",
+        )
         _need(entry, ("point",), where)
         point = str(entry["point"])
         link = entry.get("link")
         if link is None:
             holders = [n for n, b in self.links.items() if point in b.points and n != entry.get("on")]
             if len(holders) != 1:
-                raise DescriptionError(f"{where} link: missing; expected the link whose point {point} is guided")
+                raise DescriptionError(
+                    f"{where} link: missing; expected the link whose point {point} is guided"
+                )
             link = holders[0]
         on = str(entry.get("on", GROUND))
         through = entry.get("through", [0, 0])
         if not isinstance(through, str):
             through = self.pair(through, "length", f"{where} through")
         elif on in self.bodies and through not in self.bodies[on]:
-            raise DescriptionError(f"{where} through: unknown point '{through}' of {on}{_hint(through, self.bodies[on])}")
+            raise DescriptionError(
+                f"{where} through: unknown point '{through}' of {on}{_hint(through, self.bodies[on])}"
+            )
         angle = self.number(entry.get("angle", 0.0), "angle", f"{where} angle")
         turned = None
         if table == "sliders":
@@ -204,7 +219,11 @@ class _Reader:
         links = entry["links"]
         if not isinstance(links, list) or len(links) != 2:
             raise _wrong(f"{where} links", links, "two links")
-        return Gear((str(links[0]), str(links[1])), self.number(entry["ratio"], "number", f"{where} ratio"), str(entry.get("arm", GROUND)))
+        return Gear(
+            (str(links[0]), str(links[1])),
+            self.number(entry["ratio"], "number", f"{where} ratio"),
+            str(entry.get("arm", GROUND)),
+        )
 
     def inputs(self) -> list[Input]:
         found = []
@@ -231,7 +250,9 @@ class _Reader:
                     link=None if slide else str(entry["link"]),
                     on=str(entry.get("on", GROUND)),
                     slider=str(entry["slider"]) if slide else None,
-                    value=None if value is None else self.number(value, "length" if slide else "angle", where),
+                    value=None
+                    if value is None
+                    else self.number(value, "length" if slide else "angle", where),
                     history=self.history(entry["law"], where, slide) if "law" in entry else None,
                     **rates,
                 )
@@ -242,7 +263,11 @@ class _Reader:
         """A law of motion: a CSV of time_s and angle_deg (angle_rad, position_m, position_mm)."""
         import csv
 
-        kinds = {"position_m": 1.0, "position_mm": 1e-3} if slide else {"angle_rad": 1.0, "angle_deg": math.pi / 180}
+        kinds = (
+            {"position_m": 1.0, "position_mm": 1e-3}
+            if slide
+            else {"angle_rad": 1.0, "angle_deg": math.pi / 180}
+        )
         path = self.folder / str(law)
         try:
             with path.open(newline="", encoding="utf-8-sig") as stream:
@@ -272,7 +297,11 @@ class _Reader:
             if len(values) != len(inputs):
                 raise _wrong("[guess] at", table["at"], f"{len(inputs)} value(s), one for each input")
             at = [
-                v if isinstance(v, float) and v == e.value and isinstance(table["at"], dict) and e.name not in table["at"]
+                v
+                if isinstance(v, float)
+                and v == e.value
+                and isinstance(table["at"], dict)
+                and e.name not in table["at"]
                 else self.number(v, kind, "[guess] at")
                 for v, kind, e in zip(values, kinds, inputs, strict=True)
             ]
@@ -307,7 +336,9 @@ class _Reader:
         """A point of a link: its name, or [x, y] in the link's axes."""
         if isinstance(value, str):
             if value not in self.bodies[link]:
-                raise DescriptionError(f"{where}: unknown point '{value}' of {link}{_hint(value, self.bodies[link])}")
+                raise DescriptionError(
+                    f"{where}: unknown point '{value}' of {link}{_hint(value, self.bodies[link])}"
+                )
             return self.bodies[link][value]
         return self.pair(value, "length", where)
 
@@ -322,7 +353,11 @@ class _Reader:
         _known(entry, {"link", "point", "force", "frame"}, where, "key")
         _need(entry, ("link", "force"), where)
         link = self.body(entry["link"], f"{where} link", ground=False)
-        point = self.place(link, entry["point"], f"{where} point") if "point" in entry else self.links[link].center
+        point = (
+            self.place(link, entry["point"], f"{where} point")
+            if "point" in entry
+            else self.links[link].center
+        )
         frame = entry.get("frame", "ground")
         if frame not in ("ground", "link"):
             raise _wrong(f"{where} frame", frame, "'ground' or 'link'")
@@ -332,7 +367,10 @@ class _Reader:
         where = f"[[torques]] {i}"
         _known(entry, {"link", "torque"}, where, "key")
         _need(entry, ("link", "torque"), where)
-        return Torque(self.body(entry["link"], f"{where} link", ground=False), self.number(entry["torque"], "torque", f"{where} torque"))
+        return Torque(
+            self.body(entry["link"], f"{where} link", ground=False),
+            self.number(entry["torque"], "torque", f"{where} torque"),
+        )
 
     def spring(self, entry: dict[str, Any], i: int) -> Spring:
         where = f"[[springs]] {i}"

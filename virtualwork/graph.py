@@ -11,6 +11,7 @@ from virtualwork.mechanism import GROUND
 if TYPE_CHECKING:
     from virtualwork.mechanism import Mechanism
 
+# ("angle", link), ("x", link), ("y", link), ("px", pin), ("py", pin), ("slide", guide)
 Variable = tuple[str, str]
 
 
@@ -106,7 +107,9 @@ def decompose(m: Mechanism) -> Blocks:
         ring = sorted(over, key=variables.index)
         for a, b in zip(ring, ring[1:] + ring[:1], strict=True):
             after[a] = [*after[a], b]
-    return Blocks(tuple(_components(variables, after)), tuple(dict.fromkeys(rows[i].label for i in spare)), mobility)
+    return Blocks(
+        tuple(_components(variables, after)), tuple(dict.fromkeys(rows[i].label for i in spare)), mobility
+    )
 
 
 def _match(rows: list[Equation]) -> dict[Variable, int]:
@@ -128,7 +131,11 @@ def _match(rows: list[Equation]) -> dict[Variable, int]:
 
 
 def _refuse_free(
-    m: Mechanism, variables: list[Variable], rows: list[Equation], of_variable: dict[Variable, int], mobility: int
+    m: Mechanism,
+    variables: list[Variable],
+    rows: list[Equation],
+    of_variable: dict[Variable, int],
+    mobility: int,
 ) -> None:
     free = {v for v in variables if v not in of_variable}
     if not free:
@@ -140,7 +147,9 @@ def _refuse_free(
             if v not in free and free.intersection(rows[i].variables):
                 free.add(v)
                 grown = True
-    links = [link for link in m.links if any(name == link for kind, name in free if kind in ("angle", "x", "y"))]
+    links = [
+        link for link in m.links if any(name == link for kind, name in free if kind in ("angle", "x", "y"))
+    ]
     if not m.inputs:
         raise MobilityError(f"[input]: missing; the mechanism has mobility {mobility} and nothing drives it")
     raise MobilityError(
@@ -149,7 +158,9 @@ def _refuse_free(
     )
 
 
-def _components(variables: list[Variable], after: dict[Variable, list[Variable]]) -> list[tuple[Variable, ...]]:
+def _components(
+    variables: list[Variable], after: dict[Variable, list[Variable]]
+) -> list[tuple[Variable, ...]]:
     """Strongly connected components, what is needed first (R. Tarjan, SIAM J. Comput. 1 (1972) 146)."""
     index: dict[Variable, int] = {}
     low: dict[Variable, int] = {}

@@ -33,9 +33,7 @@ class March:
         self.track, self.group = track, group
         self.assembly = track.assembly
         self.size = self.assembly.mechanism.size
-        self.before = [
-            s for s in self.assembly.needed(self.assembly.plan.writes(group)) if s is not group
-        ]
+        self.before = [s for s in self.assembly.needed(self.assembly.plan.writes(group)) if s is not group]
         self.ends: list[tuple[float, int]] = []
         self._crossed: list[tuple[float, float]] = []
         self._found: dict[tuple[float, float], float] = {}
@@ -96,8 +94,11 @@ class March:
                 if np.isfinite(new).all() and defect <= 0.05 * max(change, 1e-6) and change < 0.5:
                     if np.sign(det) != np.sign(self.det[end]):
                         crossed.append((min(q, to), max(q, to)))
-                    for nodes, value in ((self.q, to), (self.x, found[0]), (self.rate, new), (self.det, det)):
-                        nodes.insert(len(nodes) if side > 0 else 0, value)  # type: ignore[attr-defined]
+                    place = len(self.q) if side > 0 else 0
+                    self.q.insert(place, to)
+                    self.x.insert(place, found[0])
+                    self.rate.insert(place, new)
+                    self.det.insert(place, det)
                     self._crossed += crossed
                     return
             step /= 2
@@ -115,7 +116,9 @@ class March:
                 det = [self._rate(q, row)[1] for q, row in zip(centre + half * nodes, x, strict=True)]
                 roots = np.polynomial.Chebyshev.fit(nodes, det, 10, domain=[-1, 1]).roots()
                 real = np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= 1.1)])
-                self._found[a, b] = centre + half * float(real[np.argmin(np.abs(real))]) if len(real) else centre
+                self._found[a, b] = (
+                    centre + half * float(real[np.argmin(np.abs(real))]) if len(real) else centre
+                )
         return [self._found[pair] for pair in self._crossed]
 
     def unknowns(self, q: Reals) -> Reals:
@@ -188,7 +191,9 @@ class March:
             found, closed = newton(self.group, many, self.assembly.plan, start, self.size)
         found[~(closed & inside)] = np.nan
         write_unknowns(self.group, st, found)
-        st.margin[self.group.name] = np.where(closed & inside, 1.0, -1.0) if st.many else (1.0 if closed[0] else -1.0)
+        st.margin[self.group.name] = (
+            np.where(closed & inside, 1.0, -1.0) if st.many else (1.0 if closed[0] else -1.0)
+        )
 
 
 def march_along(assembly: Assembly, group: Group, st: State) -> None:

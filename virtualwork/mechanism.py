@@ -144,7 +144,9 @@ class Guess:
         angles: Mapping[str, float] | None = None,
         points: Mapping[str, Point] | None = None,
     ) -> None:
-        values = None if at is None else (float(at),) if isinstance(at, (int, float)) else tuple(map(float, at))
+        values = (
+            None if at is None else (float(at),) if isinstance(at, (int, float)) else tuple(map(float, at))
+        )
         object.__setattr__(self, "at", values)
         object.__setattr__(self, "angles", MappingProxyType(dict(angles or {})))
         object.__setattr__(self, "points", _points(points or {}))
@@ -402,7 +404,9 @@ def _validate(m: Mechanism) -> None:
         seen: dict[complex, str] = {}
         for point, z in link.points.items():
             if not (abs(z) < float("inf")):
-                raise DescriptionError(f"[links.{name}] points.{point}: found {z}, expected finite coordinates")
+                raise DescriptionError(
+                    f"[links.{name}] points.{point}: found {z}, expected finite coordinates"
+                )
             shared = point in m.pins or any(g.point == point and g.link == name for g in m.guides)
             if z in seen and shared and seen[z] in m.pins:
                 raise DescriptionError(
@@ -428,7 +432,9 @@ def _validate(m: Mechanism) -> None:
         for body in (*gear.links, gear.arm):
             known(body, bodies, where, "link")
         if gear.ratio == 0 or len({*gear.links, gear.arm}) < 3:
-            raise DescriptionError(f"{where}: expected two links, an arm that is neither, and a ratio other than 0")
+            raise DescriptionError(
+                f"{where}: expected two links, an arm that is neither, and a ratio other than 0"
+            )
     for i, entry in enumerate(m.inputs):
         where = "[input]" if len(m.inputs) == 1 else f"[[input]] {i + 1}"
         if (entry.link is None) == (entry.slider is None):
@@ -441,9 +447,12 @@ def _validate(m: Mechanism) -> None:
             known(str(entry.link), m.links, where + " link", "link")
             known(entry.on, bodies, where + " on", "link")
     if m.guess.at is not None and len(m.guess.at) != len(m.inputs):
-        raise DescriptionError(f"[guess] at: found {len(m.guess.at)} values, expected one for each of {len(m.inputs)} inputs")
+        raise DescriptionError(
+            f"[guess] at: found {len(m.guess.at)} values, expected one for each of {len(m.inputs)} inputs"
+        )
     for name in m.guess.angles:
         known(name, m.links, f"[guess] {name}", "link or point")
-    for key, entries in (("forces", m.forces), ("torques", m.torques)):
-        for i, load in enumerate(entries):
-            known(load.link, m.links, f"[[{key}]] {i + 1} link", "link")
+    for i, force in enumerate(m.forces):
+        known(force.link, m.links, f"[[forces]] {i + 1} link", "link")
+    for i, torque in enumerate(m.torques):
+        known(torque.link, m.links, f"[[torques]] {i + 1} link", "link")

@@ -262,7 +262,7 @@ class Motion:
                     whole[rows] &= np.isfinite(st.turn[body])
                 for s in g.slides:
                     whole[rows] &= np.isfinite(st.slide[s])
-        return whole & np.isfinite(self.inputs).all(axis=1)
+        return np.asarray(whole & np.isfinite(self.inputs).all(axis=1))
 
     @property
     def condition(self) -> Reals:
@@ -334,7 +334,7 @@ class Motion:
                     states[i] = State([np.array([q]) for q in st.inputs], many=True)
                     self._jets = {w: [self._jet(s, b, w) for b, s in enumerate(states)] for w in self._jets}
                     for step, k in self.solved:
-                        for w in (list(self._jets) if k else [-2]):
+                        for w in list(self._jets) if k else [-2]:
                             if (id(step), k, w) in self._done:
                                 self._advance(i, w, [(k, [step])])
                 if many and order:
@@ -374,11 +374,14 @@ class Motion:
     def _join(self, parts: list[Number], kind: type) -> Any:
         """The blocks' values as one array (n,)."""
         if len(parts) == 1:
-            value = np.asarray(parts[0], dtype=kind)
+            value: Any = np.asarray(parts[0], dtype=kind)
             return value.copy() if value.shape == (self.n,) else np.full(self.n, value)
         states = self._states()
         return np.concatenate(
-            [np.broadcast_to(np.asarray(p, dtype=kind), np.shape(st.inputs[0])) for p, st in zip(parts, states, strict=True)]
+            [
+                np.broadcast_to(np.asarray(p, dtype=kind), np.shape(st.inputs[0]))
+                for p, st in zip(parts, states, strict=True)
+            ]
         )
 
     def _of_rates(self, order: int, get: Any, kind: type) -> Any:
@@ -389,7 +392,9 @@ class Motion:
         v, a, j = (rate[0] for rate in self._rates)
         parts = []
         for rows, st, i in ((r, s, i) for i, (r, s) in enumerate(self._rows())):
-            q1, q2, q3 = (x if isinstance(x, float) else (x[rows] if st.many else float(x[0])) for x in (v, a, j))
+            q1, q2, q3 = (
+                x if isinstance(x, float) else (x[rows] if st.many else float(x[0])) for x in (v, a, j)
+            )
             total: Number = None
             if order == 1:
                 total = _weigh(get(i, 1), q1)
@@ -405,7 +410,7 @@ class Motion:
     def angle(self, body: str) -> Reals:
         """A link's angle, (n,) rad."""
         self._solve((f"angle:{body}",), 0)
-        return self._join([np.angle(st.turn[body]) for st in self._states()], float)
+        return np.asarray(self._join([np.angle(st.turn[body]) for st in self._states()], float))
 
     def angle_derivative(self, body: str, order: int) -> Reals:
         """A link's ω, α or angular jerk, (n,)."""
@@ -421,10 +426,14 @@ class Motion:
         which = -1 if len(self.mechanism.inputs) == 1 else j
         jets = self._solve((f"angle:{body}",), order, which)
         return np.asarray(
-            self._join([_none(jets[i].angle[body][order - 1], st) for i, st in enumerate(self._states())], float)
+            self._join(
+                [_none(jets[i].angle[body][order - 1], st) for i, st in enumerate(self._states())], float
+            )
         )
 
-    def _reads(self, body: str, z: complex, node: str | None) -> tuple[tuple[str, ...], str | None, tuple[Term, ...]]:
+    def _reads(
+        self, body: str, z: complex, node: str | None
+    ) -> tuple[tuple[str, ...], str | None, tuple[Term, ...]]:
         if node is not None:
             return (f"point:{node}",), node, ()
         base, terms = self.assembly.plan.anchors[body]
@@ -452,7 +461,10 @@ class Motion:
         which = -1 if len(self.mechanism.inputs) == 1 else j
         jets = self._solve(keys, order, which)
         return np.asarray(
-            self._join([_none(jets[i].vector(base, terms, order), st) for i, st in enumerate(self._states())], complex)
+            self._join(
+                [_none(jets[i].vector(base, terms, order), st) for i, st in enumerate(self._states())],
+                complex,
+            )
         )
 
     def slide_derivative(self, guide: int, order: int) -> Reals:

@@ -257,7 +257,9 @@ def all_at_once(assembly: Assembly, inputs: tuple[float, ...], limit: int = 50) 
     angles, points = known_by_guess(m)
     for body in group.angles:
         if body not in angles:
-            raise AssemblyError(f"[guess]: newton starts from the guess, and the angle of '{body}' is missing there")
+            raise AssemblyError(
+                f"[guess]: newton starts from the guess, and the angle of '{body}' is missing there"
+            )
     start = guessed_unknowns(group, st, angles, points, m, merged)
     assert start is not None
     write_unknowns(group, st, start)

@@ -114,7 +114,9 @@ def parse(text: str, kind: str) -> float | None:
     factor, dimension = found
     wanted = EXPECTED[kind][1]
     # rad is a pure number: a torque may be N m/rad, but a length is never an angle
-    same = dimension == wanted or (dimension[:3] == wanted[:3] and wanted[:3] != (0, 0, 0) and 0 in (dimension[3], wanted[3]))
+    same = dimension == wanted or (
+        dimension[:3] == wanted[:3] and wanted[:3] != (0, 0, 0) and 0 in (dimension[3], wanted[3])
+    )
     if kind in ("speed", "acceleration", "jerk") and dimension != wanted:
         same = False
     return scaled(match[1], factor) if same else None

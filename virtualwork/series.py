@@ -46,10 +46,10 @@ def branches(group: Group, jets: Callable[[], Jets], order: int) -> list[list[Re
 
     def particular(right: Reals) -> Reals:
         """The solution of Φ·x = −right without a component along the null vector."""
-        return vt[:span].T @ ((u[:, :span].T @ -right) / s[:span])
+        return np.asarray(vt[:span].T @ ((u[:, :span].T @ -right) / s[:span]))
 
     def gap(d: Jets, k: int) -> Reals:
-        return stack_rows(d.right_side(group, k), 1)[0]
+        return np.asarray(stack_rows(d.right_side(group, k), 1)[0])
 
     base = particular(gap(d, 1))
 

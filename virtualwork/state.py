@@ -128,7 +128,9 @@ class Case:
         members = set(owner)
         self.closure, self.group = closure, group
         self.known = tuple(
-            t for t in closure.terms if t.body not in members and (t.slide is None or t.slide not in group.slides)
+            t
+            for t in closure.terms
+            if t.body not in members and (t.slide is None or t.slide not in group.slides)
         )
         self.arms: list[complex | None] = []
         self.bent: list[list[tuple[Term, Angle]]] = []
@@ -176,7 +178,9 @@ class Case:
         elif group.kind == "RRP":
             (a,), (g,) = group.angles, group.slides
             z, body = self.rails[0]
-            st.turn[a], st.slide[g], margin = angle_and_slide(w, self.arm(0, st), z * st.turn[body], sign, st.xp)
+            st.turn[a], st.slide[g], margin = angle_and_slide(
+                w, self.arm(0, st), z * st.turn[body], sign, st.xp
+            )
         elif group.kind == "RPR":
             (a,), (g,) = group.angles, group.slides
             st.turn[a], st.slide[g], margin = turning_slide(
@@ -310,7 +314,9 @@ class Jets:
                 value = _add(value, _scale(r, self.angle[base][k - 1]))
         return value
 
-    def _term(self, t: Term, k: int, tops: dict[str, Number] | None = None, unknown: tuple[int, ...] = ()) -> Number:
+    def _term(
+        self, t: Term, k: int, tops: dict[str, Number] | None = None, unknown: tuple[int, ...] = ()
+    ) -> Number:
         """(z·s·e^{iθ})⁽ᵏ⁾; `tops` stand for (e^{iθ})⁽ᵏ⁾, and an unknown slide's k-th derivative is left out."""
         highest = tops[t.body] if tops and t.body in tops else self.turn(t.body, k)
         if t.slide is None:

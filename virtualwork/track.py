@@ -91,7 +91,9 @@ class Track:
         # one turn says it all where every turn of a body is a whole number of turns of the input
         whole = all(
             float(k).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, k in s.angle.inputs
-        ) and all(float(r).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, r in s.angle.bases)
+        ) and all(
+            float(r).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, r in s.angle.bases
+        )
         self._repeats = whole and not slide and all(g.kind != "Newton" for g in self.plan.groups)
         self.settled = False  # no change point anywhere, however far the input turns
 
@@ -211,13 +213,12 @@ class Track:
 
     def _scan(self, a: float, b: float) -> None:
         step = (b - a) / SAMPLES
-        q = a + step * (np.arange(-1, SAMPLES + 1) + 0.5)
+        q: Reals = a + step * (np.arange(-1, SAMPLES + 1, dtype=float) + 0.5)
         st = State([q], many=True)
         for s in self.plan.steps:
             if isinstance(s, Group) and s.kind != "Newton":
                 self.assembly.close(s, st)
                 if s.kind == "PRP":
-                    self._note_poles(s, st, q)
                     continue
                 m = np.broadcast_to(st.margin[s.name], q.shape)
                 if self._look(s, q, m, a, b):
@@ -230,9 +231,6 @@ class Track:
                 self.assembly.close(s, st)
             else:
                 self.assembly.run([s], st)
-
-    def _note_poles(self, group: Group, st: State, q: Reals) -> None:
-        """Two guides that become parallel on the way: the slides run off to infinity there."""
 
     def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
         """Find where the radicand crosses or touches zero; say whether a change point was found."""
@@ -326,19 +324,29 @@ class Track:
         for rates in found:
             change = ChangePoint(group.name, q0, tuple(turn), tuple(slide), np.array(rates), 0.0)
             move = change.unknown(nodes[probe], 0)
-            miss = sum(
-                abs(turn[j] * np.exp(1j * move[j]) - st.turn[body][probe]) for j, body in enumerate(group.angles)
-            ) + sum(
-                abs(slide[j] + move[len(turn) + j] - st.slide[g][probe]) for j, g in enumerate(group.slides)
-            ) / self.assembly.mechanism.size
+            miss = (
+                sum(
+                    abs(turn[j] * np.exp(1j * move[j]) - st.turn[body][probe])
+                    for j, body in enumerate(group.angles)
+                )
+                + sum(
+                    abs(slide[j] + move[len(turn) + j] - st.slide[g][probe])
+                    for j, g in enumerate(group.slides)
+                )
+                / self.assembly.mechanism.size
+            )
             if miss < nearest:
                 best, nearest = rates, miss
         if best is None or not np.isfinite(best).all():
-            rates = np.full((ORDER, len(turn) + len(slide)), np.nan)
-            return ChangePoint(group.name, q0, tuple(turn), tuple(slide), rates, 0.0)
+            unknown = np.full((ORDER, len(turn) + len(slide)), np.nan)
+            return ChangePoint(group.name, q0, tuple(turn), tuple(slide), unknown, 0.0)
         scale = np.array([1.0] * len(turn) + [self.assembly.mechanism.size] * len(slide))
         terms = [float(np.abs(r / scale).max()) / factorial(k) for k, r in enumerate(best, 1)]
-        radius = min(t ** (-1 / k) for k, t in enumerate(terms, 1) if t > 0 and k >= 3) if max(terms[2:]) > 0 else 1.0
+        radius = (
+            min(t ** (-1 / k) for k, t in enumerate(terms, 1) if t > 0 and k >= 3)
+            if max(terms[2:]) > 0
+            else 1.0
+        )
         reach = REACH * min(radius, 1.0 if self.length > 6 else self.length)
         others = [rates[0] for rates in found if rates is not best]
         return ChangePoint(

@@ -17,31 +17,47 @@ def run(
     file: Annotated[str, typer.Argument(metavar="FILE.toml", help="The mechanism; - is standard input.")],
     at: Annotated[
         list[str] | None,
-        typer.Option(metavar="INPUT", help="A pose, such as 60deg, 20mm or crank=60deg,arm=30deg; repeatable."),
+        typer.Option(
+            metavar="INPUT", help="A pose, such as 60deg, 20mm or crank=60deg,arm=30deg; repeatable."
+        ),
     ] = None,
     sweep: Annotated[
-        str | None, typer.Option(metavar="START:STOP:STEP", help="Such as 0deg:360deg:1deg or 0deg:360deg/3600.")
+        str | None,
+        typer.Option(metavar="START:STOP:STEP", help="Such as 0deg:360deg:1deg or 0deg:360deg/3600."),
     ] = None,
     inputs: Annotated[
-        str | None, typer.Option(metavar="FILE.csv", help="The inputs as a table: crank_deg, ..., perhaps time_s.")
+        str | None,
+        typer.Option(metavar="FILE.csv", help="The inputs as a table: crank_deg, ..., perhaps time_s."),
     ] = None,
     only: Annotated[
         str | None, typer.Option(metavar="NAME,...", help="These links and points; nothing else is computed.")
     ] = None,
     order: Annotated[
-        str | None, typer.Option(help="position, velocity, acceleration or jerk (default: what the file's input gives).")
+        str | None,
+        typer.Option(help="position, velocity, acceleration or jerk (default: what the file's input gives)."),
     ] = None,
-    branch: Annotated[str | None, typer.Option(metavar="all|NUMBER", help="Every assembly, or one of them.")] = None,
+    branch: Annotated[
+        str | None, typer.Option(metavar="all|NUMBER", help="Every assembly, or one of them.")
+    ] = None,
     newton: Annotated[
-        bool, typer.Option("--newton", help="All loops at once by Newton-Raphson from the guess, with its iterates.")
+        bool,
+        typer.Option(
+            "--newton", help="All loops at once by Newton-Raphson from the guess, with its iterates."
+        ),
     ] = False,
     check: Annotated[
-        bool, typer.Option("--check", help="Mobility, Grashof classes, limits, dead and change points, groups.")
+        bool,
+        typer.Option("--check", help="Mobility, Grashof classes, limits, dead and change points, groups."),
     ] = False,
-    explain: Annotated[bool, typer.Option("--explain", help="The order of solution, and what was skipped.")] = False,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="The order of solution, and what was skipped.")
+    ] = False,
     graph: Annotated[
         str | None,
-        typer.Option(metavar="NAME.QUANTITY,...", help="--plot draws these against the input, such as H.x,coupler.omega."),
+        typer.Option(
+            metavar="NAME.QUANTITY,...",
+            help="--plot draws these against the input, such as H.x,coupler.omega.",
+        ),
     ] = None,
     json: Json = False,
     output: Output = None,

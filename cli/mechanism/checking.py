@@ -10,7 +10,6 @@ import numpy as np
 from cli.mechanism.job import ORDERS, Job
 
 if TYPE_CHECKING:
-    from virtualwork.check import Check
     from virtualwork.newton import AllAtOnce
 
 
@@ -58,11 +57,17 @@ def check_text(document: dict[str, Any]) -> str:
         lines.append(f"group {' + '.join(g['links'])}: {g['kind']}, {g['method']}")
     for f in d["four_bars"]:
         low, high = (f"{v:.6g}" if v is not None else "?" for v in f["transmission_deg"])
-        lines.append(f"four-bar {', '.join(f['links'])}: {f['grashof']}, transmission angle {low} to {high} deg")
+        lines.append(
+            f"four-bar {', '.join(f['links'])}: {f['grashof']}, transmission angle {low} to {high} deg"
+        )
     for key in ("input_limits", "dead_points", "change_points"):
         unit = "deg" if f"{key}_deg" in d else "m"
         values = d[f"{key}_{unit}"]
-        text = "none" if not values else ", ".join("open" if v is None else f"{v:.12g}" for v in values) + f" {unit}"
+        text = (
+            "none"
+            if not values
+            else ", ".join("open" if v is None else f"{v:.12g}" for v in values) + f" {unit}"
+        )
         lines.append(f"{key.replace('_', ' ')}: {text}")
     return "\n".join(lines)
 
@@ -74,7 +79,10 @@ def newton_tables(job: Job) -> tuple[list[AllAtOnce], dict[str, Any]]:
     assembly = job.assemblies[0]
     done = [all_at_once(assembly, tuple(row)) for row in job.inputs.values.tolist()]
     first = done[0]
-    names = [*(f"{n}_deg" for n in first.unknowns[: first.angles]), *(f"{n}_m" for n in first.unknowns[first.angles :])]
+    names = [
+        *(f"{n}_deg" for n in first.unknowns[: first.angles]),
+        *(f"{n}_m" for n in first.unknowns[first.angles :]),
+    ]
     iterates = []
     for it in first.iterates:
         values = [*np.degrees(it.unknowns[: first.angles]).tolist(), *it.unknowns[first.angles :].tolist()]
@@ -100,7 +108,9 @@ def newton_text(document: dict[str, Any]) -> str:
     rows = document["iterates"]
     table = table_text({key: [row[key] for row in rows] for key in rows[0]})
     jacobian = document["jacobian"]
-    shown = table_text({name: [row[j] for row in jacobian["rows"]] for j, name in enumerate(jacobian["unknowns"])})
+    shown = table_text(
+        {name: [row[j] for row in jacobian["rows"]] for j, name in enumerate(jacobian["unknowns"])}
+    )
     difference = document["newton_difference_rad"]
     return (
         f"Newton-Raphson, all loops at once, from the guess:\n{table}\nJacobian at the guess (x and y of each loop):\n"
@@ -130,13 +140,20 @@ def explain_text(job: Job) -> str:
             assert isinstance(step, Group)
             how = "Newton-Raphson" if step.kind == "Newton" else f"{step.kind}, closed form"
             text = f"group {step.name}: {how}"
-        done = f"solved to {ORDERS[reached[id(step)]]}" if id(step) in reached else "skipped: nothing asked for hangs on it"
+        done = (
+            f"solved to {ORDERS[reached[id(step)]]}"
+            if id(step) in reached
+            else "skipped: nothing asked for hangs on it"
+        )
         lines.append(f"{i:4d}  {text}  [{done}]")
     return "\n".join(lines)
 
 
 def _angle_text(job: Job, step: Any) -> str:
-    parts = [f"{k:g}·input {job.mechanism.inputs[j].name}" if k != 1 else f"input {job.mechanism.inputs[j].name}" for j, k in step.angle.inputs]
+    parts = [
+        f"{k:g}·input {job.mechanism.inputs[j].name}" if k != 1 else f"input {job.mechanism.inputs[j].name}"
+        for j, k in step.angle.inputs
+    ]
     parts += [f"{r:g}·{base}" if r != 1 else base for base, r in step.angle.bases]
     if step.angle.const:
         parts.append(f"{math.degrees(step.angle.const):g} deg")
@@ -179,13 +196,20 @@ def _branch_lines(job: Job, motion: Any) -> list[str]:
         inside = [c for c in changes if low - 1e-12 <= c.input <= high + 1e-12]
         if not inside:
             continue
-        at = sorted({round(c.input if slide else math.degrees(c.input) % 360.0, 9) % (1e300 if slide else 360.0) for c in inside})
+        at = sorted(
+            {
+                round(c.input if slide else math.degrees(c.input) % 360.0, 9) % (1e300 if slide else 360.0)
+                for c in inside
+            }
+        )
         c = inside[0]
         group = next(g for g in motion.assembly.plan.groups if g.name == c.group)
         names = [*group.angles, *(job.mechanism.guides[g].point for g in group.slides)]
 
         def rates(values: Any, names: list[str] = names) -> str:
-            return ", ".join(f"d{n}/dq = {round(float(v), 12) + 0.0:.6g}" for n, v in zip(names, values, strict=True))
+            return ", ".join(
+                f"d{n}/dq = {round(float(v), 12) + 0.0:.6g}" for n, v in zip(names, values, strict=True)
+            )
 
         text = f"change point at {', '.join(f'{v:.10g}' for v in at)} {'m' if slide else 'deg'}: the branches of {c.group} cross; "
         text += f"the motion goes on along its tangent ({rates(c.rates[0])})"

@@ -40,7 +40,9 @@ def quantities(job: Job, text: str) -> list[Quantity]:
         name, _, what = word.rpartition(".")
         known = {*points, *m.links}
         if name not in known:
-            raise options.bad("--graph", f"'{word}': no link or point is named '{name}'{nearest(name, known)}")
+            raise options.bad(
+                "--graph", f"'{word}': no link or point is named '{name}'{nearest(name, known)}"
+            )
         if name in points and what in POINTS:
             order, part, unit = POINTS[what]
             z = motion.point(name).complex(order)
@@ -54,7 +56,11 @@ def quantities(job: Job, text: str) -> list[Quantity]:
             attribute, unit = SLIDES[what]
             values = getattr(motion.slide(name), attribute)
         else:
-            choices = [*(POINTS if name in points else ()), *(LINKS if name in m.links else ()), *(SLIDES if name in guides else ())]
+            choices = [
+                *(POINTS if name in points else ()),
+                *(LINKS if name in m.links else ()),
+                *(SLIDES if name in guides else ()),
+            ]
             raise options.bad("--graph", f"'{word}': expected {name}. with one of {', '.join(choices)}")
         found.append(Quantity(word, unit, np.asarray(values)))
     return found

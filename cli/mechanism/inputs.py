@@ -86,11 +86,14 @@ def _named(m: Mechanism, text: str, flag: str) -> dict[int, str]:
         name, equals, value = part.partition("=")
         if not equals:
             if len(names) > 1:
-                raise options.bad(flag, f"'{text}': expected a value for each input, such as {names[0]}=...,{names[1]}=...")
+                raise options.bad(
+                    flag, f"'{text}': expected a value for each input, such as {names[0]}=...,{names[1]}=..."
+                )
             name, value = names[0], part
         if name.strip() not in names:
             raise options.bad(
-                flag, f"'{text}': no input drives '{name.strip()}': expected {', '.join(names)}{nearest(name, names)}"
+                flag,
+                f"'{text}': no input drives '{name.strip()}': expected {', '.join(names)}{nearest(name, names)}",
             )
         j = names.index(name.strip())
         if j in found:
@@ -103,7 +106,8 @@ def _at(m: Mechanism, text: str) -> list[float]:
     given = _named(m, text, "--at")
     home = _home(m)
     return [
-        _quantity(m, j, given[j], "--at") if j in given else _shown(m, j, home[j]) for j in range(len(m.inputs))
+        _quantity(m, j, given[j], "--at") if j in given else _shown(m, j, home[j])
+        for j in range(len(m.inputs))
     ]
 
 
@@ -111,32 +115,42 @@ def _sweep(m: Mechanism, text: str, at: list[str] | None) -> Inputs:
     """`0deg:360deg:1deg` or `0deg:360deg/3600`; with several inputs one is swept by name and the others held."""
     (j, span), *more = _named(m, text, "--sweep").items()
     if more:
-        raise options.bad("--sweep", f"'{text}': one input can be swept; hold the others with --at, or use --inputs FILE.csv")
+        raise options.bad(
+            "--sweep",
+            f"'{text}': one input can be swept; hold the others with --at, or use --inputs FILE.csv",
+        )
     if at and len(m.inputs) == 1:
         raise options.bad("--sweep", "expected --at or --sweep, not both")
     body, slash, count = span.partition("/")
     parts = body.split(":")
     if len(parts) != (2 if slash else 3):
-        raise options.bad("--sweep", f"'{span}': expected START:STOP:STEP or START:STOP/COUNT, such as 0deg:360deg:1deg")
+        raise options.bad(
+            "--sweep", f"'{span}': expected START:STOP:STEP or START:STOP/COUNT, such as 0deg:360deg:1deg"
+        )
     start, stop = (_quantity(m, j, part, "--sweep") for part in parts[:2])
+    swept: NDArray[np.float64]
     if slash:
         try:
             n = int(count)
         except ValueError:
             n = 0
         if not 1 <= n <= MOST:
-            raise options.bad("--sweep", f"'{span}': expected a whole number of steps from 1 to {MOST} after the /")
-        swept = start + (stop - start) * (np.arange(n + 1) / n)
+            raise options.bad(
+                "--sweep", f"'{span}': expected a whole number of steps from 1 to {MOST} after the /"
+            )
+        swept = start + (stop - start) * (np.arange(n + 1, dtype=float) / n)
         swept[-1] = stop
     else:
         step = _quantity(m, j, parts[2], "--sweep")
         if step == 0 or (stop - start) / step < 0:
-            raise options.bad("--sweep", f"'{span}': a step of {parts[2]} does not lead from {parts[0]} to {parts[1]}")
+            raise options.bad(
+                "--sweep", f"'{span}': a step of {parts[2]} does not lead from {parts[0]} to {parts[1]}"
+            )
         ratio = (stop - start) / step
         if ratio > MOST:
             raise options.bad("--sweep", f"'{span}': more than {MOST} poses")
         n = round(ratio) if abs(ratio - round(ratio)) <= 1e-9 * max(1.0, ratio) else math.floor(ratio)
-        swept = start + step * np.arange(n + 1)
+        swept = start + step * np.arange(n + 1, dtype=float)
         if abs(n - ratio) <= 1e-9 * max(1.0, ratio):
             swept[-1] = stop
     rest = _at(m, at[0]) if at else [_shown(m, i, value) for i, value in enumerate(_home(m))]
@@ -161,12 +175,18 @@ def _from_table(m: Mechanism, path: str) -> Inputs:
     for key, dimension in numbers.items():
         if key in table.numbers:
             column = table.numbers[key]
-            columns[key] = (column.values, column.unit, np.asarray(to_si(column.values, dimension, column.unit)))
+            columns[key] = (
+                column.values,
+                column.unit,
+                np.asarray(to_si(column.values, dimension, column.unit)),
+            )
     shown, values = [], []
     for name, e in names.items():
         if name.lower() not in columns:
             units = " or ".join(f"{name}_{u}" for u in list(UNITS["length" if e.is_slide else "angle"])[:2])
-            raise DataError(f"{path}: no column {units} for the input '{name}' (the header is: {', '.join(table.header)})")
+            raise DataError(
+                f"{path}: no column {units} for the input '{name}' (the header is: {', '.join(table.header)})"
+            )
         raw, unit, si = columns[name.lower()]
         values.append(si)
         shown.append(si if e.is_slide else (raw if unit == "deg" else np.degrees(si)))
@@ -175,7 +195,9 @@ def _from_table(m: Mechanism, path: str) -> Inputs:
     for kind in ("speed", "acceleration"):
         given = [columns.get(f"{name.lower()}_{kind}") for name in names]
         rates.append(
-            np.array([np.zeros(len(q)) if g is None else g[2] for g in given]).T if any(g is not None for g in given) else None
+            np.array([np.zeros(len(q)) if g is None else g[2] for g in given]).T
+            if any(g is not None for g in given)
+            else None
         )
     if "time" in columns and rates[0] is None:
         rates = list(_rates_of(path, columns["time"][2], q))
@@ -186,7 +208,9 @@ def _from_table(m: Mechanism, path: str) -> Inputs:
 def _rates_of(path: str, time: NDArray[np.float64], q: NDArray[np.float64]) -> tuple[Any, Any]:
     """Speed and acceleration of a law given as a table over time: those of the cubic spline through it."""
     if len(time) < 4 or not (np.diff(time) > 0).all():
-        raise DataError(f"{path}: time_s: expected at least 4 rows with rising time, for the speeds of the law of motion")
+        raise DataError(
+            f"{path}: time_s: expected at least 4 rows with rising time, for the speeds of the law of motion"
+        )
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(time, q, axis=0)

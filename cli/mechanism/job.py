@@ -67,7 +67,9 @@ class Job:
             return every
         number = int(self.branch)
         if number > len(every):
-            raise DataError(f"--branch {number}: the mechanism has {len(every)} assemblies at the guess's input")
+            raise DataError(
+                f"--branch {number}: the mechanism has {len(every)} assemblies at the guess's input"
+            )
         return (every[number - 1],)
 
     @cached_property

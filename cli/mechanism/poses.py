@@ -23,7 +23,7 @@ SLIDE = ("position_m", "speed_m_s", "acceleration_m_s2", "jerk_m_s3")
 
 def cells(values: NDArray[np.float64]) -> Column:
     """Numbers as Python's own; None where there is none."""
-    listed = values.tolist()
+    listed: Column = values.tolist()
     if np.isfinite(values).all():
         return listed
     return [v if math.isfinite(v) else None for v in listed]
@@ -60,7 +60,9 @@ def of_slide(motion: Motion, name: str, order: int) -> dict[str, Column]:
     slide = motion.slide(name)
     return {
         key: cells(getattr(slide, attribute))
-        for key, attribute in zip(SLIDE[: order + 1], ("position", "speed", "acceleration", "jerk"), strict=False)
+        for key, attribute in zip(
+            SLIDE[: order + 1], ("position", "speed", "acceleration", "jerk"), strict=False
+        )
     }
 
 
@@ -155,7 +157,11 @@ def wide_table(job: Job) -> dict[str, Column]:
             put("branch", [str(assembly.number)] * motion.n, motion.n)
         if "inputs" in inputs:
             for j, e in enumerate(job.mechanism.inputs):
-                put(f"{e.name}_input_{'m' if e.is_slide else 'deg'}", job.inputs.shown[:, j].tolist(), motion.n)
+                put(
+                    f"{e.name}_input_{'m' if e.is_slide else 'deg'}",
+                    job.inputs.shown[:, j].tolist(),
+                    motion.n,
+                )
         else:
             for key, values in inputs.items():
                 put(key, values, motion.n)

@@ -25,8 +25,13 @@ def table(job: Job) -> dict[str, list[Any]]:
         parts: dict[str, dict[str, list[Any]]] = {}
         for name in job.links:
             link = m.links[name]
-            part: dict[str, list[Any]] = {"mass_kg": [link.mass] * motion.n, "inertia_kg_m2": [link.inertia] * motion.n}
-            for k, (x, y) in enumerate((("x_m", "y_m"), ("vx_m_s", "vy_m_s"), ("ax_m_s2", "ay_m_s2"))[: job.order + 1]):
+            part: dict[str, list[Any]] = {
+                "mass_kg": [link.mass] * motion.n,
+                "inertia_kg_m2": [link.inertia] * motion.n,
+            }
+            for k, (x, y) in enumerate(
+                (("x_m", "y_m"), ("vx_m_s", "vy_m_s"), ("ax_m_s2", "ay_m_s2"))[: job.order + 1]
+            ):
                 z = motion.at(name, link.center).complex(k)
                 part[x], part[y] = cells(z.real + 0.0), cells(z.imag + 0.0)
             angle = of_link(motion, name, min(job.order, 2))

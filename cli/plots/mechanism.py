@@ -38,7 +38,9 @@ def draw(job: Job) -> Figure:
                 xytext=(0, 5), fontsize=8, color="0.15", ha="center",
             )  # fmt: skip
     if len(good):
-        chosen = list(dict.fromkeys(good[np.linspace(0, len(good) - 1, min(DRAWN, len(good))).astype(int)].tolist()))
+        chosen = list(
+            dict.fromkeys(good[np.linspace(0, len(good) - 1, min(DRAWN, len(good))).astype(int)].tolist())
+        )
         for rank, i in enumerate(reversed(chosen)):
             _pose(axes, job, motion, i, scale, full=rank == len(chosen) - 1)
     for name, z in job.mechanism.ground.items():
@@ -91,13 +93,26 @@ def _pose(axes: Axes, job: Job, motion: Motion, i: int, scale: float, *, full: b
         z = np.array([motion.point(p).complex(0)[i] for p in link.points]) * scale
         colour = "0.72"
         if full:
-            colour = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:olive", "tab:cyan")[k % 8]
+            colour = (
+                "tab:blue",
+                "tab:orange",
+                "tab:green",
+                "tab:red",
+                "tab:purple",
+                "tab:brown",
+                "tab:olive",
+                "tab:cyan",
+            )[k % 8]
         width, level = (2.4, 4) if full else (1.0, 1)
         if len(z) > 2:
             order = _around(z)
-            axes.fill(z[order].real, z[order].imag, facecolor=colour, alpha=0.16 if full else 0.05, zorder=level - 1)
+            axes.fill(
+                z[order].real, z[order].imag, facecolor=colour, alpha=0.16 if full else 0.05, zorder=level - 1
+            )
             ring = np.append(order, order[0])
-            axes.plot(z[ring].real, z[ring].imag, color=colour, lw=width, zorder=level, solid_capstyle="round")
+            axes.plot(
+                z[ring].real, z[ring].imag, color=colour, lw=width, zorder=level, solid_capstyle="round"
+            )
         elif len(z) == 2:
             axes.plot(z.real, z.imag, color=colour, lw=width, zorder=level, solid_capstyle="round")
         if full and len(z) > 1:
@@ -152,6 +167,7 @@ def graphs(job: Job, text: str) -> Figure:
     figure = Figure(figsize=(7.2, 1.0 + 2.2 * len(units)), layout="constrained")
     rows = figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0]
     m = job.mechanism
+    x: Any
     if len(m.inputs) == 1:
         slide = m.inputs[0].is_slide
         x, label = job.inputs.shown[:, 0], f"{m.inputs[0].name}, {'m' if slide else 'deg'}"

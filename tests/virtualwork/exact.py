@@ -17,7 +17,6 @@ def solve(assembly, q, order=2):
     """
     plan, group = assembly.merged
     st = assembly.state((q,))
-    m = assembly.mechanism
     exact = mp.mpf(q)
     fixed = {GROUND: [mp.mpf(0)] * 3}
     slides = {}
@@ -81,7 +80,9 @@ def solve(assembly, q, order=2):
     def gaps(values, k):
         angle, slide = series(values)
         return [
-            node(c.start, angle, slide, k) - node(c.end, angle, slide, k) + sum(term(t, angle, slide, k) for t in c.terms)
+            node(c.start, angle, slide, k)
+            - node(c.end, angle, slide, k)
+            + sum(term(t, angle, slide, k) for t in c.terms)
             for c in group.closures
         ]
 
