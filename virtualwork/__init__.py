@@ -1,5 +1,14 @@
 """Planar mechanisms: kinematics, and equilibrium at rest and in motion by virtual work."""
 
+from virtualwork.combination import (
+    block_on_bar,
+    crank_rod_piston,
+    on_incline,
+    on_moving_ramp,
+    rotation,
+    second_point,
+    sense,
+)
 from virtualwork.errors import AssemblyError, DescriptionError, MechanismError, MobilityError
 from virtualwork.mechanism import Gear, Guess, Guide, Input, Link, Mechanism
 
@@ -14,4 +23,11 @@ __all__ = [
     "Mechanism",
     "MechanismError",
     "MobilityError",
+    "block_on_bar",
+    "crank_rod_piston",
+    "on_incline",
+    "on_moving_ramp",
+    "rotation",
+    "second_point",
+    "sense",
 ]

@@ -532,7 +532,7 @@ def _pairs(z: Complexes) -> Reals:
 def _weigh(value: Number, factor: Number) -> Number:
     if value is None or (isinstance(factor, float) and factor == 0.0):
         return None
-    return value * factor
+    return value if isinstance(factor, float) and factor == 1.0 else value * factor
 
 
 def _plus(a: Number, b: Number) -> Number:

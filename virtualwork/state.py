@@ -208,18 +208,18 @@ def columns(group: Group, st: State, plan: Plan) -> list[list[Number]]:
             v = t.z * st.turn[t.body]
             vectors.append((t, v, v if t.slide is None else v * st.slide[t.slide]))
         for angle in group.angles:
-            c: Number = 0j
+            c: Number = None
             for t, _, full in vectors:
                 r = ratio(plan, group, t.body, angle)
                 if r:
-                    c = c + (full if r == 1.0 else r * full)
-            row.append(1j * c)
+                    c = _add(c, _scale(r, full))
+            row.append(0j if c is None else 1j * c)
         for g in group.slides:
-            c = 0j
+            c = None
             for t, bare, _ in vectors:
                 if t.slide == g:
-                    c = c + bare
-            row.append(c)
+                    c = _add(c, bare)
+            row.append(0j if c is None else c)
         rows.append(row)
     return rows
 
@@ -265,7 +265,7 @@ class Jets:
         total: Number = None
         for j in range(k - 1):
             if theta[j] is not None:
-                total = _add(total, comb(k - 1, j) * (theta[j] * self.turn(body, k - 1 - j)))
+                total = _add(total, _scale(comb(k - 1, j), _scale(theta[j], self.turn(body, k - 1 - j))))
         if top is not None:
             total = _add(total, top * self.st.turn[body])
         return None if total is None else 1j * total
@@ -329,7 +329,7 @@ class Jets:
             if s[j - 1] is not None:
                 e = self.turn(t.body, k - j)
                 if e is not None:
-                    total = _add(total, comb(k, j) * (s[j - 1] * e))
+                    total = _add(total, _scale(comb(k, j), s[j - 1] * e))
         return _scale(t.z, total)
 
     def right_side(self, group: Group, k: int) -> list[Number]:
@@ -396,7 +396,9 @@ def _add(a: Number, b: Number) -> Number:
 
 
 def _scale(f: Number, a: Number) -> Number:
-    return None if a is None else a if f == 1 else f * a
+    if a is None:
+        return None
+    return a if isinstance(f, (int, float)) and f == 1 else f * a
 
 
 def _put(store: dict[Any, list[Number]], key: Any, k: int, value: Number) -> None:

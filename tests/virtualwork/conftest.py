@@ -1,10 +1,14 @@
-"""The same loops in 50 digits: an answer to measure errors against, by another route than the closed forms."""
+"""An answer of 50 digits, and random mechanisms, for the tests of kinematics."""
 
 from __future__ import annotations
 
+import cmath
+
 import mpmath as mp
 import numpy as np
+import pytest
 
+from virtualwork import Guess, Guide, Input, Link, Mechanism
 from virtualwork.mechanism import GROUND
 
 mp.mp.dps = 50
@@ -114,7 +118,61 @@ def solve(assembly, q, order=2):
     return {name: [v[i] for v in values] for i, name in enumerate(names)}
 
 
-def four_bar(rng, scale=1.0):
-    """A random four-bar, its guess an assembled pose."""
-    a, b, c, d = rng.uniform(0.2, 2.0, 4)
-    return {"a": a * scale, "b": b * scale, "c": c * scale, "d": d * scale}
+def build(kind, rng, scale=1.0):
+    """A random mechanism that stands assembled at its guess; every link's frame lies anyhow in it."""
+    a, b, c, d, e, f, g = (complex(*rng.uniform(-1, 1, 2)) * scale for _ in range(7))
+    guess = {}
+
+    def link(name, points):
+        origin = next(iter(points.values()))
+        theta = rng.uniform(-3, 3)
+        guess[name] = theta
+        off = complex(*rng.normal(size=2)) * 0.3 * scale
+        return Link({p: (z - origin) / cmath.exp(1j * theta) + off for p, z in points.items()})
+
+    four = {"crank": {"A": a, "B": b}, "coupler": {"B": b, "C": c}, "rocker": {"C": c, "D": d}}
+    ground = {"A": a, "D": d}
+    guides = []
+    if kind == "four-bar":
+        bodies = four
+    elif kind == "slider-crank":
+        bodies = {"crank": four["crank"], "coupler": four["coupler"]}
+        angle = rng.uniform(-3, 3)
+        guides = [Guide("C", "coupler", "ground", c - rng.normal() * scale * cmath.exp(1j * angle), angle)]
+    elif kind == "inverted slider-crank":
+        bodies = {"crank": four["crank"], "rocker": {"D": d, "E": e}}
+    elif kind == "Watt":
+        bodies = {
+            "crank": {"A": a, "B": b}, "coupler": {"B": b, "C": c, "E": e}, "rocker": {"C": c, "D": d, "F": f},
+            "fifth": {"E": e, "G": g}, "sixth": {"F": f, "G": g},
+        }  # fmt: skip
+    elif kind == "Stephenson":
+        ground["G"] = g
+        bodies = {
+            "crank": {"A": a, "B": b}, "coupler": {"B": b, "C": c, "E": e}, "rocker": {"C": c, "D": d},
+            "fifth": {"E": e, "F": f}, "sixth": {"F": f, "G": g},
+        }  # fmt: skip
+    else:  # a triad: the input drives the five-bar loop
+        ground["G"] = g
+        bodies = {
+            "crank": {"G": g, "F": f}, "rod": {"F": f, "E": e}, "coupler": {"E": e, "B": b, "C": c},
+            "left": {"B": b, "A": a}, "right": {"C": c, "D": d},
+        }  # fmt: skip
+    links = {name: link(name, points) for name, points in bodies.items()}
+    if kind == "inverted slider-crank":
+        local = (b - d) / cmath.exp(1j * guess["rocker"]) + links["rocker"].points["D"]
+        angle = rng.uniform(-3, 3)
+        guides = [Guide("B", "crank", "rocker", local - rng.normal() * scale * cmath.exp(1j * angle), angle)]
+    return Mechanism(ground, links, guides, inputs=Input(link="crank"), guess=Guess(guess["crank"], guess))
+
+
+@pytest.fixture
+def exact():
+    """Unknowns and derivatives of a mechanism in 50 digits."""
+    return solve
+
+
+@pytest.fixture
+def random_mechanism():
+    """A maker of random mechanisms: (kind, rng, scale)."""
+    return build

@@ -1,0 +1,149 @@
+"""Change points, limits and branches: never a silent jump."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from virtualwork import Guess, Guide, Input, Link, Mechanism
+from virtualwork.check import Check
+
+TWO_TURNS = np.radians(np.arange(0.0, 721.0))
+
+
+def four_bar(crank, coupler, rocker, ground, at, coupler_angle, rocker_angle, scale=1.0):
+    return Mechanism(
+        {"A": (0, 0), "D": (ground * scale, 0)},
+        {
+            "crank": Link({"A": (0, 0), "B": (crank * scale, 0)}),
+            "coupler": Link({"B": (0, 0), "C": (coupler * scale, 0)}),
+            "rocker": Link({"D": (0, 0), "C": (rocker * scale, 0)}),
+        },
+        inputs=Input(link="crank"),
+        guess=Guess(
+            math.radians(at), {"coupler": math.radians(coupler_angle), "rocker": math.radians(rocker_angle)}
+        ),
+    )
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-9, 1e9])
+@pytest.mark.parametrize(("crank", "ground"), [(2.0, 5.0), (0.3, 0.7), (5.0, 2.0)])
+def test_a_parallelogram_stays_one(crank, ground, scale):
+    m = four_bar(crank, ground, crank, ground, 60, 0, 60, scale)
+    motion = m.motion(TWO_TURNS, speed=1.0, acceleration=0.0)
+    assert motion.assembled.all()
+    assert np.abs(np.exp(1j * motion.link("rocker").angle) - np.exp(1j * TWO_TURNS)).max() < 1e-12
+    assert np.abs(motion.link("rocker").omega - 1).max() < 1e-11
+    assert np.abs(motion.link("coupler").omega).max() < 1e-11
+    assert np.abs(motion.link("rocker").alpha).max() < 1e-9
+    assert np.degrees(Check(m.assembly).change_points) == pytest.approx([0, 180], abs=1e-10)
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-15, 1e-12, 1e-8, 1e-4, 0.02])
+def test_at_a_change_point_the_velocity_is_the_exact_limit(apart):
+    motion = four_bar(2, 5, 2, 5, 60, 0, 60).motion(math.pi + apart, speed=1.0, acceleration=0.0)
+    assert motion.link("rocker").omega[0] == pytest.approx(1.0, abs=1e-13)
+    assert motion.link("rocker").alpha[0] == pytest.approx(0.0, abs=1e-11)
+    assert motion.link("rocker").jerk[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_an_antiparallelogram_stays_one():
+    motion = four_bar(2, 5, 2, 5, 60, -60, -100).motion(TWO_TURNS, speed=1.0, acceleration=0.0)
+    omega = motion.link("rocker").omega
+    # at 0 and 180 degrees the follower's speed is -(g + a)/(g - a) and its inverse
+    assert omega[[0, 360, 720]] == pytest.approx([-7 / 3] * 3, abs=1e-12)
+    assert omega[[180, 540]] == pytest.approx([-3 / 7] * 2, abs=1e-12)
+    assert np.abs(np.diff(omega)).max() < 0.03
+
+
+def test_a_kite_turns_its_rocker_once_in_two_turns():
+    motion = four_bar(2, 5, 5, 2, 60, 90, 100).motion(TWO_TURNS, speed=1.0)
+    angle = np.unwrap(motion.link("rocker").angle)
+    assert motion.assembled.all()
+    assert angle[720] - angle[0] == pytest.approx(2 * math.pi, abs=1e-12)
+    assert angle[360] - angle[0] == pytest.approx(math.pi, abs=1e-12)
+    assert np.abs(np.diff(angle)).max() < 0.0125
+    assert motion.link("rocker").omega[[0, 360, 720]] == pytest.approx([0.7, 0.3, 0.7], abs=1e-12)
+
+
+def test_an_isosceles_slider_crank_goes_through_its_centre():
+    m = Mechanism(
+        {"O": (0, 0)},
+        {"crank": Link({"O": (0, 0), "A": (1, 0)}), "rod": Link({"A": (0, 0), "B": (1, 0)})},
+        [Guide("B", "rod")],
+        inputs=Input(link="crank"),
+        guess=Guess(math.radians(30), {"rod": math.radians(-30)}),
+    )
+    motion = m.motion(TWO_TURNS, speed=1.0)
+    assert motion.slide("B").position == pytest.approx(2 * np.cos(TWO_TURNS), abs=1e-12)
+    assert motion.slide("B").speed == pytest.approx(-2 * np.sin(TWO_TURNS), abs=1e-11)
+
+
+def test_across_a_gap_the_branch_is_remembered():
+    m = four_bar(2, 5, 2, 4, 180, 17, 115)
+    motion = m.motion(TWO_TURNS)
+    rocker = motion.link("rocker").angle
+    for i in (60, 180, 300):
+        assert rocker[i] == pytest.approx(rocker[i + 360], abs=1e-13)
+    limit = math.degrees(math.acos((2**2 + 4**2 - 3**2) / (2 * 2 * 4)))
+    assert np.array_equal(np.isnan(rocker[:361]), np.abs(np.arange(361.0) - 180) > 180 - limit)
+    assert np.degrees(Check(m.assembly).input_limits) == pytest.approx([limit, 360 - limit], abs=1e-11)
+    # the antiparallel twin of the same linkage is on the other branch, everywhere
+    other = four_bar(2, 5, 2, 4, 180, -17, -115).motion(TWO_TURNS).link("rocker").angle
+    good = np.isfinite(rocker)
+    assert np.abs(np.exp(1j * other[good]) - np.exp(1j * rocker[good])).min() > 1e-3
+
+
+def test_a_narrow_gap_between_two_samples_is_a_gap():
+    """Lengths a hair off a parallelogram: 0.02 degrees cannot be assembled, and both limits are found."""
+    crank, coupler = 2.0, 5.0 * (1 - 1e-8)
+    m = four_bar(crank, coupler, crank, 5.0, 90, 0, 90)
+    limits = [limit.input for limit in m.assembly.track.limits()]
+    assert len(limits) == 2
+    # d² = (b + c)² at the ends of the gap
+    edge = math.acos((crank**2 + 25.0 - (coupler + crank) ** 2) / (2 * crank * 5.0))
+    assert sorted(limits) == pytest.approx([edge, 2 * math.pi - edge], abs=1e-9)
+    assert not m.motion(math.pi).assembled[0]
+
+
+def test_peaucellier_goes_straight_through_its_own_change_point():
+    """At 60 degrees C, A and D lie in one line: B goes on along x = 1.5 instead of staying with A."""
+    rod = {"crank": ("P", "A", 1), "arm1": ("O", "C", 2), "arm2": ("O", "D", 2), "ac": ("A", "C", 1),
+           "ad": ("A", "D", 1), "cb": ("C", "B", 1), "db": ("D", "B", 1)}  # fmt: skip
+    m = Mechanism(
+        {"O": (0, 0), "P": (1, 0)},
+        {name: Link({p: (0, 0), q: (length, 0)}) for name, (p, q, length) in rod.items()},
+        inputs=Input(link="crank"),
+        guess=Guess(math.radians(40), points={"C": (1.7, 1.0), "D": (1.9, -0.4), "B": (1.5, 0.5)}),
+    )
+    q = np.radians(np.arange(-110.0, 110.5, 0.5))
+    motion = m.motion(q, speed=3.0, acceleration=0.0)
+    x, y = motion.point("B").position.T
+    assert x == pytest.approx(np.full(len(q), 1.5), abs=1e-12)
+    assert y == pytest.approx(1.5 * np.tan(q / 2), abs=1e-11)
+    assert motion.point("B").velocity[:, 0] == pytest.approx(np.zeros(len(q)), abs=1e-10)
+
+
+def test_three_parallel_cranks_have_a_redundant_constraint_and_turn():
+    links = {
+        "crank": Link({"A": (0, 0), "B": (2, 0)}),
+        "coupler": Link({"B": (0, 0), "M": (2, 0), "C": (5, 0)}),
+        "middle": Link({"N": (0, 0), "M": (2, 0)}),
+        "rocker": Link({"D": (0, 0), "C": (2, 0)}),
+    }
+    m = Mechanism(
+        {"A": (0, 0), "D": (5, 0), "N": (2, 0)},
+        links,
+        inputs=Input(link="crank"),
+        guess=Guess(1.0, {"coupler": 0.0, "middle": 1.0, "rocker": 1.0}),
+    )
+    q = np.radians(np.arange(0, 361, 15.0))
+    motion = m.motion(q, speed=1.0)
+    assert motion.assembled.all()
+    assert np.abs(np.exp(1j * motion.link("rocker").angle) - np.exp(1j * q)).max() < 1e-12
+    assert motion.link("middle").omega == pytest.approx(np.ones(len(q)), abs=1e-11)
+    check = Check(m.assembly)
+    assert (check.mobility, check.mobility_by_rank) == (0, 1)
+    assert "pin M" in check.redundant
