@@ -228,6 +228,8 @@ class _Reader:
     def inputs(self) -> list[Input]:
         found = []
         rows = list(self.rows("input"))
+        if not rows:
+            raise DescriptionError("[input]: missing; nothing drives the mechanism")
         for i, entry in rows:
             where = "[input]" if len(rows) == 1 else f"[[input]] {i}"
             keys = {"link", "on", "slider", "angle", "position", "speed", "acceleration", "jerk", "law"}
