@@ -350,18 +350,19 @@ class Mechanism:
     def motion(
         self,
         angle: ArrayLike | None = None,
-        speed: ArrayLike | None = None,
-        acceleration: ArrayLike | None = None,
-        jerk: ArrayLike | None = None,
+        speed: ArrayLike = 0.0,
+        acceleration: ArrayLike = 0.0,
+        jerk: ArrayLike = 0.0,
     ) -> Motion:
         """Motion of the assembly that the guess chooses; every quantity is solved when first asked for.
 
         Parameters
         ----------
         angle : array (n,), or (n, k) for k inputs
-            The input: rad for a turning input, m for a slide. Default: the description's own value.
+            The input: rad for a turning input, m for a slide. Without it the motion is the description's own: its
+            value, its speed and its acceleration.
         speed, acceleration, jerk : same shape or scalar
-            Its derivatives in time. Default: the description's own, else zero.
+            Its derivatives in time.
 
         Returns
         -------
@@ -376,6 +377,8 @@ class Mechanism:
         """
         from virtualwork.motion import Motion
 
+        if angle is None:
+            return Motion(self.assembly)
         return Motion(self.assembly, angle, speed, acceleration, jerk)
 
     def assemblies(self) -> tuple[Assembly, ...]:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 # domain -> (module with a function `measure`, what it measures)
 DOMAINS = {
+    "mechanisms": ("cli.bench.mechanisms", "kinematics of a four-bar and of the Klann leg"),
     "rotors": ("cli.bench.rotors", "corrections of rotors with known masses"),
 }
 
