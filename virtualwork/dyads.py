@@ -50,7 +50,7 @@ Engine = One | Many
 
 def square(z: Number) -> Number:
     """|z|², without the root."""
-    return z.real * z.real + z.imag * z.imag
+    return (z.conjugate() * z).real
 
 
 def cross(a: Number, b: Number) -> Number:
@@ -59,12 +59,12 @@ def cross(a: Number, b: Number) -> Number:
     >>> cross(1 + 0j, 1j)
     1.0
     """
-    return a.real * b.imag - a.imag * b.real
+    return (a.conjugate() * b).imag
 
 
 def dot(a: Number, b: Number) -> Number:
     """The scalar product a_x·b_x + a_y·b_y."""
-    return a.real * b.real + a.imag * b.imag
+    return (a.conjugate() * b).real
 
 
 def two_angles(

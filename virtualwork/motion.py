@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
-BLOCK = 4096
+BLOCK = 8192
 
 
 class PointMotion:
@@ -505,17 +505,19 @@ def _uniform(q: Reals, blocks: list[State]) -> None:
     top = max(abs(q[0]), abs(q[-1]))
     size = min(n, BLOCK)
     ramp = h * np.arange(size)
+    offs = []
     with np.errstate(invalid="ignore"):
         for i, st in enumerate(blocks):
             off = (st.inputs[0] - q[i * BLOCK]) - ramp[: len(st.inputs[0])]
-            if not np.abs(off).max() <= 64 * np.finfo(float).eps * max(top, 1e-3):
+            bound = 64 * np.finfo(float).eps * max(top, 1e-3)
+            if not (off.max() <= bound and off.min() >= -bound):
                 return
+            offs.append(off)
     table = np.empty(size, complex)
     np.cos(ramp, out=table.real)
     np.sin(ramp, out=table.imag)
-    for i, st in enumerate(blocks):
-        length = len(st.inputs[0])
-        off = (st.inputs[0] - q[i * BLOCK]) - ramp[:length]
+    for i, (st, off) in enumerate(zip(blocks, offs, strict=True)):
+        length = len(off)
         e = table[:length] * complex(np.cos(q[i * BLOCK]), np.sin(q[i * BLOCK]))
         turn = np.empty(length, complex)
         turn.real = 1.0

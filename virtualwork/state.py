@@ -262,6 +262,10 @@ class Jets:
     def turn_partial(self, body: str, k: int, top: Number) -> Number:
         """(e^{iθ})⁽ᵏ⁾ with θ⁽ᵏ⁾ replaced by `top`."""
         theta = self.angle[body]
+        if k == 2 and theta[0] is not None:
+            # the commonest case, −ω²·e^{iθ}, in one step
+            normal = -(theta[0] * theta[0]) * self.st.turn[body]
+            return normal if top is None else normal + 1j * (top * self.st.turn[body])
         total: Number = None
         for j in range(k - 1):
             if theta[j] is not None:
