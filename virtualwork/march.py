@@ -164,9 +164,19 @@ class March:
             total += weight * (q[i] - near)
         return float(near + total)
 
+    def _turned_back(self, q: Reals) -> Reals:
+        """Beyond a limit the branch is remembered: a whole turn later or earlier the mechanism stands as before."""
+        if not any(self.stopped.values()) or not self.track.whole or any(map(len, self.track.flips.values())):
+            return q
+        low = min([self.q[0], *(q for q, side in self.ends if side > 0)])
+        high = max([self.q[-1], *(q for q, side in self.ends if side < 0)])
+        outside = (q < low) | (q > high)
+        turned = low + np.mod(q - low, 2 * np.pi)
+        return np.where(outside & (turned <= high), turned, q)
+
     def close(self, st: State) -> None:
         """Close the group at a state's poses."""
-        q = np.atleast_1d(np.asarray(st.inputs[0], dtype=float))
+        q = self._turned_back(np.atleast_1d(np.asarray(st.inputs[0], dtype=float)))
         nodes, x, rate = np.array(self.q), np.array(self.x), np.array(self.rate)
         if len(nodes) == 1:
             start = x[0] + np.outer(q - nodes[0], np.nan_to_num(rate[0]))
@@ -182,6 +192,15 @@ class March:
                 + b * t * t * (3 - 2 * t)
                 + h * (rate[i] * t * (1 - t) ** 2 - rate[i + 1] * t * t * (1 - t))
             )
+        for limit, side in self.ends:
+            # between the last node and the limit: x = x_L − 2x′·√((q_L − q_last)(q_L − q)), the fold's own parabola
+            end = -1 if side < 0 else 0
+            last, left = nodes[end], limit - nodes[end]
+            beyond = (np.abs(q - last) > 0) & ((q - last) * left > 0) & ((limit - q) * left >= 0)
+            if beyond.any() and left != 0:
+                root = np.sqrt(np.maximum((limit - q[beyond]) / left, 0.0))[:, None]
+                start[beyond] = x[end] + 2 * rate[end] * left * (1 - root)
+                inside |= beyond
         many = st
         if not st.many:
             many = State([q], many=True)

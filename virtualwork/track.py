@@ -94,7 +94,8 @@ class Track:
         ) and all(
             float(r).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, r in s.angle.bases
         )
-        self._repeats = whole and not slide and all(g.kind != "Newton" for g in self.plan.groups)
+        self.whole = whole and not slide
+        self._repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
         self.settled = False  # no change point anywhere, however far the input turns
 
     # --- what poses ask ---------------------------------------------------------------------------------------

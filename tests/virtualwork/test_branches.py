@@ -147,3 +147,32 @@ def test_three_parallel_cranks_have_a_redundant_constraint_and_turn():
     check = Check(m.assembly)
     assert (check.mobility, check.mobility_by_rank) == (0, 1)
     assert "pin M" in check.redundant
+
+
+def test_a_triad_has_limits_and_remembers_its_branch():
+    """A Stephenson III driven in its five-bar loop, with a crank too long to turn: Newton-Raphson up to the limit."""
+    m = Mechanism(
+        {"A": (0, 0), "D": (100, 0), "G": (150, 60)},
+        {
+            "crank": Link({"G": (0, 0), "F": (35, 0)}),
+            "rod": Link({"F": (0, 0), "E": (105, 0)}),
+            "left": Link({"A": (0, 0), "B": (70, 0)}),
+            "coupler": Link({"B": (0, 0), "C": (80, 0), "E": (45, 60)}),
+            "right": Link({"D": (0, 0), "C": (75, 0)}),
+        },
+        inputs=Input(link="crank"),
+        guess=Guess(math.radians(90), points={"B": (10, 69), "C": (88, 74), "E": (50, 130), "F": (150, 85)}),
+    )
+    low, high = Check(m.assembly).input_limits
+    edge = [low + 1e-11, low - 1e-11, high - 1e-11, high + 1e-11]
+    assert m.motion(edge).assembled.tolist() == [True, False, True, False]
+    motion = m.motion(TWO_TURNS, speed=1.0)
+    e = motion.point("E").position
+    assert np.isfinite(e[90]).all()
+    assert e[360:] == pytest.approx(e[:361], abs=1e-11, nan_ok=True)
+    # the loops close, all of them, to rounding
+    q = TWO_TURNS[motion.assembled]
+    swept = m.motion(q)
+    for p, o, length in (("E", "F", 105), ("C", "B", 80), ("E", "B", 75), ("C", "D", 75)):
+        apart = np.abs(swept.point(p).complex(0) - swept.point(o).complex(0))
+        assert apart == pytest.approx(np.full(len(q), length), rel=1e-13)
