@@ -96,6 +96,13 @@ class Job:
         """The guides asked for, by their point; the points themselves tell where they are."""
         return tuple(g.point for g in self.mechanism.guides if self.only is None or g.point in self.only)
 
+    def given(self, link: str) -> NDArray[np.float64] | None:
+        """The angles asked for of a link that is driven against the ground, degrees; None for any other."""
+        for j, e in enumerate(self.mechanism.inputs):
+            if e.link == link and e.on == "ground":
+                return self.inputs.shown[:, j]
+        return None
+
     def check_names(self) -> None:
         """Refuse names that --only cannot find."""
         known = {*self.mechanism.links, *(p for body in self.mechanism.bodies.values() for p in body)}

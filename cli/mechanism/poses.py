@@ -29,10 +29,14 @@ def cells(values: NDArray[np.float64]) -> Column:
     return [v if math.isfinite(v) else None for v in listed]
 
 
-def of_link(motion: Motion, name: str, order: int) -> dict[str, Column]:
-    """A link's angle and its rates."""
+def of_link(
+    motion: Motion, name: str, order: int, given: NDArray[np.float64] | None = None
+) -> dict[str, Column]:
+    """A link's angle and its rates; `given`: the angle of a driven link as it was asked for, degrees."""
     link = motion.link(name)
     angle = np.where(np.isfinite(link.angle), degrees(np.exp(1j * link.angle)), np.nan)
+    if given is not None:
+        angle = np.where(np.isfinite(angle), given, np.nan)
     parts = {"angle_deg": cells(exact_degrees(angle))}
     for key, attribute in zip(LINK[1 : order + 1], ("omega", "alpha", "jerk"), strict=False):
         parts[key] = cells(getattr(link, attribute))
@@ -118,7 +122,7 @@ def document(job: Job) -> list[dict[str, Any]]:
                 assembled.tolist(),
                 cells(motion.condition) if job.only is None else None,
                 marks_of(job, motion),
-                {name: of_link(motion, name, job.order) for name in job.links},
+                {name: of_link(motion, name, job.order, job.given(name)) for name in job.links},
                 {name: of_point(motion, name, job.order) for name in job.points},
                 {name: of_slide(motion, name, job.order) for name in job.slides},
             )
@@ -172,6 +176,6 @@ def wide_table(job: Job) -> dict[str, Column]:
             for key, values in of_slide(motion, name, job.order).items():
                 put(f"{name}_{key}", values, motion.n)
         for name in job.links:
-            for key, values in of_link(motion, name, job.order).items():
+            for key, values in of_link(motion, name, job.order, job.given(name)).items():
                 put(f"{name}_{key}", values, motion.n)
     return table

@@ -34,7 +34,7 @@ def table(job: Job) -> dict[str, list[Any]]:
             ):
                 z = motion.at(name, link.center).complex(k)
                 part[x], part[y] = cells(z.real + 0.0), cells(z.imag + 0.0)
-            angle = of_link(motion, name, min(job.order, 2))
+            angle = of_link(motion, name, min(job.order, 2), job.given(name))
             part["angle_deg"] = angle["angle_deg"]
             part |= {key: angle[key] for key in ("omega_rad_s", "alpha_rad_s2") if key in angle}
             if job.order >= 1:
