@@ -14,7 +14,10 @@ from cli.errors import DataError
 COMMANDS = {
     "balance": ("cli.commands.balance", "Balance rotors from a table of known eccentric masses."),
     "bench": ("cli.commands.bench", "Measure run time against error."),
-    "mechanism": ("cli.commands.mechanism", "Solve a planar mechanism: position, velocity, acceleration, check."),
+    "mechanism": (
+        "cli.commands.mechanism",
+        "Solve a planar mechanism: position, velocity, acceleration, check.",
+    ),
     "examples": ("cli.commands.examples", "List the worked examples, or write one into the current folder."),
 }
 
