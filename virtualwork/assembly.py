@@ -179,7 +179,7 @@ class _Chooser:
                 if step.kind == "Newton":
                     starts[step.name] = self._newton(step, st)
                 else:
-                    signs[step.name] = self._sign(step, helper.cases[step.name], st)
+                    signs[step.name] = self._sign(step, helper.cases[step.name], st, signs)
                     st.angle.update({b: float(np.angle(st.turn[b])) for b in step.members})
             elif isinstance(step, Place):
                 place(step, st)
@@ -228,21 +228,81 @@ class _Chooser:
                 found.append((sign, trial))
         return found
 
-    def _sign(self, group: Group, case: Case, st: State) -> int:
+    def _meeting(self, group: Group) -> str:
+        return (
+            f"[guess] at: {group.name} stands at a change point or a limit there, where its two assemblies "
+            "meet; taken is the one whose links stand still or turn with the input; another `at` chooses the other"
+        )
+
+    def _near(self, group: Group, case: Case, st: State, signs: Mapping[str, int], sign: int) -> None:
+        """Put the group into the state as it stands just beyond a point where its closed form has no direction."""
+        beside = State(
+            [q + 1e-7 * (self.m.size if self.m.inputs[0].is_slide else 1.0) for q in self.m.at], many=False
+        )
+        before = Assembly(self.m, self.plan, signs, {})
+        before.run([s for s in self.plan.needed(self.plan.writes(group)) if s is not group], beside, False)
+        case.solve(beside, sign, self.m.size)
+        st.turn.update({b: beside.turn[b] for b in group.members})
+        st.slide.update({g: beside.slide[g] for g in group.slides})
+
+    def _ahead(
+        self, group: Group, case: Case, signs: Mapping[str, int], here: State | None = None
+    ) -> list[float] | None:
+        """How far the group's two assemblies go a little beyond the guess.
+
+        Each link's least distance to standing still or to turning with the input, so that a parallelogram is
+        preferred to its antiparallel twin; where the pose itself is not determined, the distance to the guess.
+        """
+        if len(self.m.inputs) != 1:
+            return None
+        step = 0.02 * (self.m.size if self.m.inputs[0].is_slide else 1.0)
+        before = Assembly(self.m, self.plan, signs, {})
+        for side in (1, -1):
+            st = State([self.m.at[0] + side * step], many=False)
+            try:
+                before.run(
+                    [s for s in self.plan.needed(self.plan.writes(group)) if s is not group], st, False
+                )
+            except (KeyError, ZeroDivisionError):
+                return None
+            found = self.solutions(group, case, st)
+            if len(found) == 2:
+                # seen from before the point, the Jacobian has the other sign on the same branch
+                distances = [self._distance(group, trial) for _, trial in found]
+                if here is not None and group.members:
+                    turned = complex(np.exp(1j * side * step))
+                    distances = [
+                        sum(
+                            min(abs(e - trial.turn[b]), abs(e * turned - trial.turn[b]))
+                            for b in group.members
+                            for e in [here.turn[b]]
+                        )
+                        for _, trial in found
+                    ]
+                return distances if side > 0 else distances[::-1]
+        return None
+
+    def _sign(self, group: Group, case: Case, st: State, signs: Mapping[str, int]) -> int:
         if group.kind == "PRP":
             case.solve(st, 1, self.m.size)
             return 1
         found = self.solutions(group, case, st)
         if not found:
+            ahead = self._ahead(group, case, signs)
+            if ahead is not None and self._informed(group):
+                self.warnings.append(self._meeting(group))
+                sign = (1, -1)[int(np.argmin(ahead))]
+                self._near(group, case, st, signs, sign)
+                return sign
             st.turn.update({b: complex(np.nan, np.nan) for b in group.members})
             st.slide.update(dict.fromkeys(group.slides, np.nan))
             return self._sign_of_guess(group, case, st)
         distances = [self._distance(group, trial) for _, trial in found]
         if len(found) == 2 and abs(found[0][1].margin[group.name]) < 1e-14:
-            self.warnings.append(
-                f"[guess] at: {group.name} stands at a change point or a limit there, where its two assemblies "
-                "meet; give another `at` to choose between them"
-            )
+            ahead = self._ahead(group, case, signs, found[0][1])
+            if ahead is not None:
+                distances = ahead
+            self.warnings.append(self._meeting(group))
         elif len(found) == 2 and not self._informed(group):
             raise AssemblyError(self._choices(group, [t for _, t in found]))
         best = int(np.argmin(distances))

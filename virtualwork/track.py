@@ -131,7 +131,7 @@ class Track:
         flips = self.flips.get(group.name)
         if flips is None or not len(flips):
             return base
-        passed = np.searchsorted(flips, q) - np.searchsorted(flips, self.start)
+        passed = np.searchsorted(flips, q, "right") - np.searchsorted(flips, self.start, "right")
         return base * (1 - 2 * (passed & 1))
 
     def mend(self, group: Group, st: State) -> None:
@@ -214,7 +214,7 @@ class Track:
 
     def _scan(self, a: float, b: float) -> None:
         step = (b - a) / SAMPLES
-        q: Reals = a + step * (np.arange(-1, SAMPLES + 1, dtype=float) + 0.5)
+        q: Reals = a + step * (np.arange(-3, SAMPLES + 3, dtype=float) + 0.5)
         st = State([q], many=True)
         for s in self.plan.steps:
             if isinstance(s, Group) and s.kind != "Newton":
@@ -241,7 +241,7 @@ class Track:
             if np.isfinite(m[i]) and np.isfinite(m[i + 1]) and inside[i] | inside[i + 1]:
                 self._brackets.append((group.name, float(q[i]), float(q[i + 1])))
         dips = 1 + np.flatnonzero((m[1:-1] <= m[:-2]) & (m[1:-1] < m[2:]) & (np.abs(m[1:-1]) < DIP))
-        changed = False
+        fresh: list[float] = []
         for i in dips:
             found = self._bottom(group, float(q[i - 1]), float(q[i + 1]))
             if found is None:
@@ -249,16 +249,21 @@ class Track:
             where, depth, noise = found
             if depth < -noise and m[i] > 0:  # the gap is narrower than the samples
                 self._brackets += [(group.name, float(q[i - 1]), where), (group.name, where, float(q[i + 1]))]
-            if abs(depth) <= noise and a <= where < b:
+            edge = 1e-9 * self.length  # a change point at the seam of two chunks belongs to both
+            if abs(depth) <= noise and a - edge <= where < b + edge:
                 known = self.flips.setdefault(group.name, np.empty(0))
                 if not len(known) or np.abs(known - where).min() > 1e-6 * self.length:
                     self._brackets = [
                         x for x in self._brackets if not (x[0] == group.name and x[1] <= where <= x[2])
                     ]
-                    self.flips[group.name] = np.sort(np.append(known, where))
-                    self.changes.setdefault(group.name, []).append(self._through(group, where))
-                    changed = True
-        return changed
+                    # a guess at the change point itself means the branch beyond it
+                    here = min(where, self.start) if abs(where - self.start) < 1e-9 * self.length else where
+                    self.flips[group.name] = np.sort(np.append(known, here))
+                    fresh.append(where)
+        # the branch through each one can be told only once all of them are known
+        for where in fresh:
+            self.changes.setdefault(group.name, []).append(self._through(group, where))
+        return bool(fresh)
 
     def _bottom(self, group: Group, a: float, b: float) -> tuple[float, float, float] | None:
         """The lowest point of a radicand near a sampled dip: where, how low, and the rounding in that depth.

@@ -176,3 +176,20 @@ def test_a_triad_has_limits_and_remembers_its_branch():
     for p, o, length in (("E", "F", 105), ("C", "B", 80), ("E", "B", 75), ("C", "D", 75)):
         apart = np.abs(swept.point(p).complex(0) - swept.point(o).complex(0))
         assert apart == pytest.approx(np.full(len(q), length), rel=1e-13)
+
+
+@pytest.mark.parametrize("at", [0, 180, 360, -180])
+def test_a_guess_at_the_change_point_itself_means_the_parallelogram(at):
+    m = four_bar(2, 5, 2, 5, at, 0, at)
+    q = np.radians(np.arange(-360.0, 361.0))
+    motion = m.motion(q, speed=1.0)
+    assert np.abs(np.exp(1j * motion.link("rocker").angle) - np.exp(1j * q)).max() < 1e-12
+    assert np.abs(motion.link("rocker").omega - 1).max() < 1e-11
+    assert "change point" in m.assembly.warnings[0]
+    assert m.motion(math.radians(at), speed=1.0).link("rocker").omega[0] == pytest.approx(1, abs=1e-12)
+
+
+def test_a_kite_guessed_where_it_is_folded():
+    motion = four_bar(2, 5, 5, 2, 0, 90, 90).motion(TWO_TURNS, speed=1.0)
+    assert motion.assembled.all()
+    assert np.abs(np.diff(np.unwrap(motion.link("rocker").angle))).max() < 0.0125
