@@ -18,6 +18,7 @@ COMMANDS = {
         "cli.commands.mechanism",
         "Solve a planar mechanism: position, velocity, acceleration, check.",
     ),
+    "work": ("cli.commands.work", "Find the load that balances a table of link states, by virtual work."),
     "examples": ("cli.commands.examples", "List the worked examples, or write one into the current folder."),
 }
 

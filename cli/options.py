@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from cli.units import parse_quantity, to_si
+from cli.units import parse_number, parse_quantity, to_si
 
 
 def bad(flag: str, message: object) -> typer.BadParameter:
@@ -31,3 +31,14 @@ def quantity(flag: str, text: str | None, dimension: str, *, positive: bool = Fa
     """Read a value in SI; None stays None."""
     given = with_unit(flag, text, dimension, positive=positive)
     return None if given is None else float(to_si(given[0], dimension, given[1]))
+
+
+def vector(flag: str, text: str) -> complex:
+    """Read `X,Y` in SI as x + iy."""
+    parts = text.split(",")
+    try:
+        if len(parts) != 2:
+            raise ValueError
+        return complex(parse_number(parts[0]), parse_number(parts[1]))
+    except ValueError:
+        raise bad(flag, f"'{text}': expected two numbers X,Y, such as 0,-9.81") from None

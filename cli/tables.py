@@ -144,7 +144,7 @@ def read(
         )
         for name, (index, unit) in found.items()
     ]
-    if not (source.large and not marker and _read_large(source, table, plan)):
+    if not (source.large and _read_large(source, table, plan, marker)):
         _read_small(source, table, plan, marker)
     if table.rows == 0:
         raise DataError(f"{source.file}: a header and no rows: expected at least one row of data")
@@ -326,7 +326,7 @@ def _read_small(source: _Source, table: Table, plan: _Plan, marker: str) -> None
             table.numbers[name] = Numbers(source.header[index], unit, values)
 
 
-def _read_large(source: _Source, table: Table, plan: _Plan) -> bool:
+def _read_large(source: _Source, table: Table, plan: _Plan, marker: str) -> bool:
     """Read with pandas; False where anything is out of order, for the csv module to say what and where."""
     import pandas as pd
 
@@ -363,12 +363,17 @@ def _read_large(source: _Source, table: Table, plan: _Plan) -> bool:
         except ValueError:
             return False
     rows = len(frame)
+    marks: dict[tuple[int, str], str] = {}
     for name, index, unit, kind, may_be_blank in plan:
         if kind == "number" and not may_be_blank:
             values = frame[index].to_numpy()
         elif kind == "number":
             text = frame[index].to_numpy(dtype=object)
             empty = text == ""
+            if marker:
+                marked = frame[index].str.startswith(marker).to_numpy(dtype=bool)
+                marks |= {(int(row), name): text[row].strip() for row in np.flatnonzero(marked)}
+                empty |= marked
             try:
                 values = np.where(empty, "0", text).astype(float)
             except ValueError:
@@ -387,4 +392,5 @@ def _read_large(source: _Source, table: Table, plan: _Plan) -> bool:
             values[empty] = np.nan
         table.numbers[name] = Numbers(source.header[index], unit, values)
     table.rows = rows
+    table.marks.update(marks)
     return True

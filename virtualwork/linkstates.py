@@ -1,0 +1,294 @@
+"""The balance of virtual power from a plain table of link states: the second source document, eqs. (3) to (5).
+
+Of a mechanism only the state of each link is known: the velocity of its centre of mass, its angular velocity,
+and the loads on it. In equilibrium, at rest or (with inertia loads, d'Alembert) in motion, their power vanishes:
+
+    Σ F·v_F + Σ T ω + Σ m g·v_G − Σ m a_G·v_G − Σ I α ω = 0                      (Riul, unit II, eq. 5)
+
+Forces between links and on fixed supports do no work and do not appear. One load may be unknown; with several
+independent velocity fields of the same instant, as many unknowns as fields. Vectors of the plane are complex
+numbers x + iy: F·v is the real part of F v̄.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
+
+KINDS = ("applied force", "applied torque", "weight", "inertia force", "inertia torque")
+"""The kinds of terms, in the order of eq. (5)."""
+
+ROUNDING = 8 * np.finfo(float).eps
+"""A power below this share of load times largest velocity is rounding: the load does no work."""
+
+
+class Term(NamedTuple):
+    """The loads of one kind on all links."""
+
+    power: Real
+    """(..., n), W; exactly zero where the load does no work."""
+    works: Mask
+    """(..., n): there is a load, and it does work."""
+    workless: Mask
+    """(..., n): there is a load, and it does none: it is normal to the velocity, or its point is at rest."""
+
+
+@dataclass(frozen=True)
+class LinkStates:
+    """The states of n links at an instant, or at many.
+
+    Every entry is an array (..., n) or a number, links on the last axis. Vectors are complex, x + iy.
+
+    Parameters
+    ----------
+    velocity : complex, (..., n)
+        Of the centres of mass, m/s.
+    omega : (..., n)
+        Angular velocities, rad/s.
+    mass, inertia : (..., n)
+        kg, and kg·m² about the centre of mass.
+    acceleration : complex, (..., n)
+        Of the centres of mass, m/s².
+    alpha : (..., n)
+        Angular accelerations, rad/s².
+    force, torque : (..., n)
+        The applied force (complex, N) and torque (N·m) on each link.
+    point_velocity : complex, (..., n), optional
+        Velocity of the force's point of application, m/s; the centre of mass's where it is not given.
+    gravity : complex
+        m/s², such as −9.81j.
+
+    Examples
+    --------
+    Riul's example 1, links 2, 3 and 4: the weight, the inertia force and the inertia torque of the coupler,
+    the inertia force of the piston and the gas force on it.
+
+    >>> states = LinkStates(
+    ...     velocity=[0, 300 + 200j, -500], omega=[20, -50, 0], mass=[0, 3, 2], inertia=[0, 0.1, 0],
+    ...     acceleration=[0, 900 - 600j, 900], alpha=[0, -800, 0], force=[0, 0, 5000], gravity=-10j)
+    >>> float(states.power), float(states.terms["inertia torque"].power[1])
+    (-2060000.0, -4000.0)
+    """
+
+    velocity: ArrayLike
+    omega: ArrayLike = 0.0
+    mass: ArrayLike = 0.0
+    inertia: ArrayLike = 0.0
+    acceleration: ArrayLike = 0.0
+    alpha: ArrayLike = 0.0
+    force: ArrayLike = 0.0
+    torque: ArrayLike = 0.0
+    point_velocity: ArrayLike | None = None
+    gravity: complex = 0j
+
+    @cached_property
+    def shape(self) -> tuple[int, ...]:
+        """The common shape (..., n)."""
+        given = [getattr(self, name) for name in self.__dataclass_fields__ if name != "gravity"]
+        return np.broadcast_shapes(*(np.shape(value) for value in given if value is not None), (1,))
+
+    @cached_property
+    def terms(self) -> dict[str, Term]:
+        """The power of every load, by kind (see KINDS); a kind of which there is no load is absent.
+
+        Kinds without a load are never multiplied out.
+        """
+        v, mass = self._vectors(self.velocity), np.asarray(self.mass, dtype=float)
+        inertia = np.asarray(self.inertia, dtype=float)
+        at = v if self.point_velocity is None else self._vectors(self.point_velocity)
+        found = {
+            "applied force": self._linear(self._vectors(self.force), at),
+            "applied torque": self._angular(np.asarray(self.torque, dtype=float)),
+            "weight": self._linear(mass * self.gravity, v),
+            "inertia force": self._linear(-mass * self._vectors(self.acceleration), v),
+            "inertia torque": self._angular(-inertia * np.asarray(self.alpha, dtype=float)),
+        }
+        return {kind: term for kind, term in found.items() if term is not None}
+
+    @cached_property
+    def power(self) -> Real:
+        """The power of all known loads together, (...), W: the left side of eq. (5) without the unknown."""
+        total = np.zeros(self.shape[:-1])
+        for term in self.terms.values():
+            total = total + term.power.sum(axis=-1)
+        return total
+
+    @cached_property
+    def fastest(self) -> tuple[Real, Real]:
+        """The largest speed of a point (m/s) and the largest angular speed (rad/s) among the links, each (..., 1)."""
+        speed = np.abs(self._vectors(self.velocity))
+        if self.point_velocity is not None:
+            speed = np.maximum(speed, np.abs(self._vectors(self.point_velocity)))
+        turning = np.abs(np.asarray(self.omega, dtype=float))
+        full = self.shape
+        return (
+            np.broadcast_to(speed, full).max(axis=-1, keepdims=True),
+            np.broadcast_to(turning, full).max(axis=-1, keepdims=True),
+        )
+
+    @staticmethod
+    def _vectors(value: ArrayLike) -> Complex:
+        return np.asarray(value, dtype=complex)
+
+    def _linear(self, force: Complex, velocity: Complex) -> Term | None:
+        if not force.any():
+            return None
+        return self._term(np.abs(force), (force * velocity.conj()).real, self.fastest[0])
+
+    def _angular(self, torque: Real) -> Term | None:
+        if not torque.any():
+            return None
+        return self._term(np.abs(torque), torque * np.asarray(self.omega, dtype=float), self.fastest[1])
+
+    def _term(self, load: Real, power: Real, fastest: Real) -> Term:
+        works = np.broadcast_to((np.abs(power) > ROUNDING * load * fastest) | np.isinf(power), self.shape)
+        there = np.broadcast_to(load > 0, self.shape)
+        return Term(np.where(works, power, 0.0), works, there & ~works)
+
+
+@dataclass(frozen=True)
+class UnitLoad:
+    """The pattern of an unknown load: what acts on each link per newton or newton-metre of the unknown.
+
+    `force` is complex, (..., n), acting where `LinkStates.force` acts; `torque` is (..., n).
+
+    >>> UnitLoad(torque=[1, 0, 0])  # an unknown torque on the first of three links
+    UnitLoad(force=0.0, torque=[1, 0, 0])
+    """
+
+    force: ArrayLike = 0.0
+    torque: ArrayLike = 0.0
+
+
+@dataclass(frozen=True)
+class Balance:
+    """What balances the known loads; see `balance`. k is the number of unknowns and of velocity fields."""
+
+    value: Real
+    """The unknowns, (..., k), N or N·m; NaN where they are not determined."""
+    determined: Mask
+    """(..., k): the velocity fields determine this unknown."""
+    works: Mask
+    """(..., k): the unknown does work in some field; where not, no equation holds it."""
+    coefficient: Real
+    """(..., k, k): the power of each unknown (last axis), per unit, in each velocity field, W."""
+    condition: Real
+    """(...): condition number of the coefficients, rows and columns scaled; 1 for one unknown."""
+    power: Real
+    """(..., k): the power of the known loads in each field, W."""
+
+    @cached_property
+    def unknown_power(self) -> Real:
+        """The power of each unknown (last axis) in each field, (..., k, k), W; zero where it is not determined."""
+        value = np.where(self.determined, self.value, 0.0)
+        return np.asarray(self.coefficient * value[..., None, :])
+
+    @cached_property
+    def sum(self) -> Real:
+        """The whole power in each field, (..., k), W: rounding, where every unknown is determined."""
+        return np.asarray(self.power + self.unknown_power.sum(axis=-1))
+
+
+def balance(states: LinkStates, unknowns: Sequence[UnitLoad]) -> Balance:
+    """Return the loads that balance a table of link states, by the principle of virtual power.
+
+    Parameters
+    ----------
+    states : LinkStates
+        For one unknown (..., n); for k > 1 unknowns (..., k, n): k independent velocity fields of the instant,
+        the actual one among them or not. The loads and accelerations are those of the instant in each.
+    unknowns : sequence of UnitLoad, k
+
+    Returns
+    -------
+    Balance
+
+    Notes
+    -----
+    With P_f the power of the known loads in field f and c_fj that of a unit of unknown j, Σ_j c_fj x_j = −P_f
+    (J. A. Riul, Dinâmica das Máquinas, unit II, eqs. 3 and 5, solved for the unknowns). An unknown that does no
+    work has no equation: it is not determined, and says so in `works`.
+
+    Examples
+    --------
+    Riul's example 1 (with −I·α = +80 and its power −4 000, which he prints as −80 and +4 000):
+
+    >>> states = LinkStates(
+    ...     velocity=[0, 300 + 200j, -500], omega=[20, -50, 0], mass=[0, 3, 2], inertia=[0, 0.1, 0],
+    ...     acceleration=[0, 900 - 600j, 900], alpha=[0, -800, 0], force=[0, 0, 5000], gravity=-10j)
+    >>> balance(states, [UnitLoad(torque=[1, 0, 0])]).value
+    array([103000.])
+    """
+    k = len(unknowns)
+    if k > 1 and (len(states.shape) < 2 or states.shape[-2] != k):
+        raise ValueError(
+            f"{k} unknowns need {k} velocity fields, on the last axis but one: the states have shape {states.shape}"
+        )
+    at = states.velocity if states.point_velocity is None else states.point_velocity
+    fast, turning = (largest[..., 0] for largest in states.fastest)
+    columns, scales = [], []
+    for unknown in unknowns:
+        force, torque = np.asarray(unknown.force, dtype=complex), np.asarray(unknown.torque, dtype=float)
+        power = (force * np.conj(at)).real + torque * np.asarray(states.omega, dtype=float)
+        columns.append(np.broadcast_to(power, states.shape).sum(axis=-1))
+        full_force = np.broadcast_to(np.abs(force), states.shape).sum(axis=-1)
+        full_torque = np.broadcast_to(np.abs(torque), states.shape).sum(axis=-1)
+        scales.append(full_force * fast + full_torque * turning)
+    coefficient, scale = np.stack(columns, axis=-1), np.stack(scales, axis=-1)
+    coefficient = np.where(np.abs(coefficient) > ROUNDING * scale, coefficient, 0.0)
+    if k == 1:
+        works = coefficient != 0
+        value = np.full(works.shape, np.nan)
+        np.divide(-states.power[..., None], coefficient, out=value, where=works)
+        value += 0.0  # no −0
+        return Balance(
+            value,
+            works,
+            works,
+            coefficient[..., None, :],
+            np.where(works[..., 0], 1.0, np.inf),
+            states.power[..., None],
+        )
+    return _solve(coefficient, states.power)
+
+
+def _solve(coefficient: Real, power: Real) -> Balance:
+    """Solve the k × k systems, rows and columns scaled; name what a singular one leaves open."""
+    works = (coefficient != 0).any(axis=-2)
+    rows = np.abs(coefficient).max(axis=-1, keepdims=True)
+    scaled = coefficient / np.where(rows > 0, rows, 1.0)
+    columns = np.abs(scaled).max(axis=-2, keepdims=True)
+    columns = np.where(columns > 0, columns, 1.0)
+    scaled = scaled / columns
+    right = -power / np.where(rows > 0, rows, 1.0)[..., 0]
+    k = coefficient.shape[-1]
+    u, sigma, vh = np.linalg.svd(scaled)
+    seen = sigma > k * ROUNDING * sigma[..., :1]
+    regular = seen.all(axis=-1)
+    safe = np.where(regular[..., None, None], scaled, np.eye(k))
+    value = np.linalg.solve(safe, right[..., None])[..., 0]
+    # A singular system still determines the unknowns in which its null vectors have no part, if it has a solution.
+    open_part = np.where(seen[..., None], 0.0, np.abs(vh)).max(axis=-2)
+    along = (np.swapaxes(u, -1, -2) @ right[..., None])[..., 0]
+    solvable = (
+        np.where(seen, 0.0, np.abs(along)) <= k * ROUNDING * np.abs(right).max(axis=-1, keepdims=True)
+    ).all(axis=-1)
+    partial = (
+        np.swapaxes(vh, -1, -2) @ np.divide(along, sigma, out=np.zeros_like(along), where=seen)[..., None]
+    )[..., 0]
+    determined = regular[..., None] | (solvable[..., None] & (open_part <= np.sqrt(k) * ROUNDING) & works)
+    value = np.where(regular[..., None], value, partial) / columns[..., 0, :]
+    smallest = sigma[..., -1]
+    condition = np.divide(sigma[..., 0], smallest, out=np.full_like(smallest, np.inf), where=regular)
+    return Balance(
+        np.where(determined, value + 0.0, np.nan), determined, works, coefficient, condition, power
+    )
