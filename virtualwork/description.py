@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -352,8 +353,8 @@ class _Reader:
 
     def force(self, entry: dict[str, Any], i: int) -> Force:
         where = f"[[forces]] {i}"
-        _known(entry, {"link", "point", "force", "frame"}, where, "key")
-        _need(entry, ("link", "force"), where)
+        _known(entry, {"link", "point", "force", "frame", "table"}, where, "key")
+        _need(entry, ("link",) if "table" in entry else ("link", "force"), where)
         link = self.body(entry["link"], f"{where} link", ground=False)
         point = (
             self.place(link, entry["point"], f"{where} point")
@@ -363,7 +364,40 @@ class _Reader:
         frame = entry.get("frame", "ground")
         if frame not in ("ground", "link"):
             raise _wrong(f"{where} frame", frame, "'ground' or 'link'")
+        if "table" in entry:
+            if "force" in entry:
+                raise DescriptionError(f"{where}: found force and table, expected one of them")
+            return Force(link, point, 0j, frame, *self.force_table(entry["table"], where))
         return Force(link, point, self.pair(entry["force"], "force", f"{where} force"), frame)
+
+    def force_table(self, name: Any, where: str) -> tuple[tuple[tuple[float, complex], ...], bool]:
+        """A force over the input: a CSV of angle_deg (angle_rad, position_m, position_mm), fx_N and fy_N."""
+        import csv
+
+        inputs = list(self.rows("input"))
+        if len(inputs) != 1:
+            raise _wrong(f"{where} table", name, "a mechanism with one input, for the force is given over it")
+        slide = "slider" in inputs[0][1]
+        kinds = {"position_m": 1.0, "position_mm": 1e-3} if slide else {"angle_rad": 1.0, "angle_deg": math.pi / 180}
+        try:
+            with (self.folder / str(name)).open(newline="", encoding="utf-8-sig") as stream:
+                rows = list(csv.DictReader(stream))
+        except OSError:
+            raise _wrong(f"{where} table", name, "a CSV file that can be read") from None
+        column = next((c for c in kinds if rows and c in rows[0]), None)
+        if column is None or not {"fx_N", "fy_N"} & set(rows[0]):
+            raise _wrong(f"{where} table", name, f"columns {' or '.join(kinds)}, fx_N and fy_N")
+        try:
+            found = [
+                (float(r[column]) * kinds[column], complex(float(r.get("fx_N") or 0), float(r.get("fy_N") or 0)))
+                for r in rows
+            ]
+        except (TypeError, ValueError):
+            raise _wrong(f"{where} table", name, "numbers in every row") from None
+        if len(found) < 2 or any(not b[0] > a[0] for a, b in itertools.pairwise(found)):
+            raise _wrong(f"{where} table", name, f"at least two rows with rising {column}")
+        turns = (found[-1][0] - found[0][0]) / (2 * math.pi)
+        return tuple(found), not slide and abs(turns - round(turns)) < 1e-9 and round(turns) > 0
 
     def torque(self, entry: dict[str, Any], i: int) -> Torque:
         where = f"[[torques]] {i}"

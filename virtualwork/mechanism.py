@@ -154,12 +154,18 @@ class Guess:
 
 @dataclass(frozen=True)
 class Force:
-    """A force of fixed components in ground or link axes (N), at a point of a link given in the link's axes (m)."""
+    """A force of fixed components in ground or link axes (N), at a point of a link given in the link's axes (m).
+
+    `history` is a table (input, force) in place of a constant, linear between its rows; with a turning input and a
+    span of whole turns it is `periodic`, one cycle that repeats.
+    """
 
     link: str
     point: complex
-    force: complex
+    force: complex = 0j
     frame: Literal["ground", "link"] = "ground"
+    history: tuple[tuple[float, complex], ...] | None = None
+    periodic: bool = False
 
 
 @dataclass(frozen=True)

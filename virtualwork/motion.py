@@ -23,6 +23,7 @@ What virtual work stands on (the plane as complex numbers, arrays over the n pos
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from virtualwork.assembly import Assembly
+    from virtualwork.dynamics import Dynamics
 
     Reals = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -263,6 +265,35 @@ class Motion:
                 for s in g.slides:
                     whole[rows] &= np.isfinite(st.slide[s])
         return np.asarray(whole & np.isfinite(self.inputs).all(axis=1))
+
+    # --- forces -----------------------------------------------------------------------------------------------
+    @cached_property
+    def dynamics(self) -> Dynamics:
+        """All forces of this motion, each formed when first asked for."""
+        from virtualwork.dynamics import Dynamics
+
+        return Dynamics(self)
+
+    @property
+    def effort(self) -> Reals:
+        """The effort at the input by virtual work, (n,) N·m (N at a slide); (n, k) for k inputs.
+
+        Static where speed and acceleration are zero (Riul, unit II, eq. 3), else with inertia loads (eq. 5).
+        """
+        found = self.dynamics.effort
+        return found[:, 0] if len(self.mechanism.inputs) == 1 else found
+
+    def reaction(self, joint: str, on: str) -> Reals:
+        """The force of all others on a link at a joint, (n, 2) N (000 §2.2).
+
+        Parameters
+        ----------
+        joint : str
+            The name of a pin, or of the point of a slot or slider.
+        on : str
+            A link that the joint holds.
+        """
+        return self.dynamics.reaction(joint, on)
 
     @property
     def condition(self) -> Reals:

@@ -53,7 +53,7 @@ class ChangePoint:
     def unknown(self, delta: Number, order: int) -> Any:
         """The unknowns' derivatives of one order at a distance from the point (order 0: their change)."""
         n = len(self.rates)
-        total = 0.0
+        total = np.zeros((*np.shape(delta), len(self.rates[0])))
         for j in range(n - order, -1, -1):
             k = order + j
             if k == 0:

@@ -1,0 +1,182 @@
+"""The effort at the inputs by virtual work: the velocity coefficients are the virtual displacements.
+
+For a unit of input j every point moves by K_j = ∂P/∂q_j and every link turns by κ_j = ∂θ/∂q_j, so that by
+d'Alembert's principle (Riul, unit II, eqs. 3 and 5, divided by the input's own displacement)
+
+    τ_j + Σ F·K_j + Σ T κ_j = 0,      F, T with the inertia loads −m a_G and −I α.
+
+Joint forces do no work and do not appear. A load whose point cannot move has no K and is never evaluated.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from virtualwork.dyads import Number, dot
+from virtualwork.loads import Block, Load, Scene, SpringEnd, TorsionEnd, plus, times
+from virtualwork.mechanism import GROUND
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Reals = NDArray[np.float64]
+
+
+def displacement(load: Load, block: Block, j: int) -> Number:
+    """The virtual displacement on which a load does work, for a unit of input j; None where it cannot move.
+
+    Of a spring between two moving points the first end carries the whole relative displacement, the second none:
+    action and reaction are one term.
+    """
+    if isinstance(load, SpringEnd):
+        assert load.path is not None
+        assert load.spring is not None
+        if not load.first and load.spring.between[0][0] != GROUND:
+            return None
+        return plus(block.coefficient(load.path, j), times(block.coefficient(load.other, j), -1.0))
+    if isinstance(load, TorsionEnd):
+        assert load.spring is not None
+        a, b = load.spring.links
+        if load.sign < 0 and a != GROUND:
+            return None
+        turn = plus(block.turning(a, j), times(block.turning(b, j), -1.0))
+        return times(turn, load.sign)
+    if load.path is None:
+        return block.turning(load.body, j)
+    return block.coefficient(load.path, j)
+
+
+def power(load: Load, block: Block, j: int) -> Number:
+    """The virtual work of a load for a unit of input j, or None: it is not evaluated where nothing moves."""
+    moved = displacement(load, block, j)
+    if moved is None:
+        return None
+    value = block.keep(load)
+    if value is None:
+        return None
+    return value * moved if load.path is None else dot(value, moved)
+
+
+def effort(scene: Scene) -> Reals:
+    """The effort at each input by virtual work, (n, k): N·m at a turning input, N at a slide."""
+    k, n = len(scene.mechanism.inputs), scene.motion.n
+    out = np.zeros((n, k))
+    loads = [*scene.loads, *scene.rubs]
+    for block in scene.blocks():
+        for j in range(k):
+            total: Number = None
+            for load in loads:
+                total = plus(total, power(load, block, j))
+            if total is not None:
+                out[block.rows, j] = np.where(_singular(scene, block, j), np.nan, -total)
+    out[np.logical_not(scene.motion.assembled)] = np.nan
+    out += 0.0
+    return through_carriers(scene, out)
+
+
+def _singular(scene: Scene, block: Block, j: int) -> Any:
+    """Where a link turns more than 10¹³ times as fast as the input: at a dead point to rounding, no number is left."""
+    reach = scene.mechanism.size if scene.mechanism.inputs[j].is_slide else 1.0
+    found: Any = False
+    for group in scene.plan.groups:
+        for body in group.angles:
+            known = block.by[j].angle.get(body)
+            if known and known[0] is not None:
+                found = found | ~(np.abs(known[0]) * reach < 1e13)
+    return found
+
+
+def carrier(scene: Scene, j: int) -> str:
+    """The body that feels the reaction of input j's torque: the carrier of its motor, else what it is driven on."""
+    entry = scene.mechanism.inputs[j]
+    return next((m.carrier for m in scene.mechanism.motors if m.drives == entry.link), entry.on)
+
+
+def through_carriers(scene: Scene, force: Reals) -> Reals:
+    """Turn generalized forces at the inputs into motor torques, where a motor sits on another body than `on`.
+
+    A motor's torque T acts on the driven link and −T on its carrier (000 §2.3), so Σ_j T_j ∂(θ_driven − θ_carrier)_j/∂q_i
+    is the generalized force i.
+    """
+    inputs = scene.mechanism.inputs
+    k = len(inputs)
+    moved = [j for j, e in enumerate(inputs) if not e.is_slide and carrier(scene, j) != e.on]
+    if not moved:
+        return force
+    motion = scene.motion
+    matrix = np.broadcast_to(np.eye(k), (motion.n, k, k)).copy()
+    for j in moved:
+        for i in range(k):
+            driven = motion.angle_coefficient(str(inputs[j].link), i)
+            matrix[:, i, j] = driven - motion.angle_coefficient(carrier(scene, j), i)
+    if k == 1:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(force / matrix[:, 0])
+    good: Any = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(force).all(axis=1)
+    out = np.full_like(force, np.nan)
+    regular: Any = np.asarray(
+        good & (np.abs(np.linalg.det(np.where(good[:, None, None], matrix, np.eye(k)))) > 1e-14)
+    )
+    out[regular] = np.linalg.solve(matrix[regular], force[regular][..., None])[..., 0]
+    return out
+
+
+def ledger(scene: Scene, j: int = 0) -> tuple[dict[str, Reals], list[str], list[str]]:
+    """Each load's virtual work for a unit of input j, which loads do none, and which are absent.
+
+    Returns
+    -------
+    works : dict of load name to (n,), N·m (or N for a slide)
+    workless : list of str
+        Loads that act where nothing can move: they were left out.
+    absent : list of str
+        Kinds of loads that the scene does not have, and why.
+    """
+    works: dict[str, Reals] = {}
+    workless: list[str] = []
+    for block in scene.blocks():
+        for load in [*scene.loads, *scene.rubs]:
+            value = power(load, block, j)
+            if value is None:
+                if (
+                    displacement(load, block, j) is None
+                    and load.name not in workless
+                    and not _reaction_end(load)
+                ):
+                    workless.append(load.name)
+                continue
+            known = works.setdefault(load.name, np.zeros(scene.motion.n))
+            known[block.rows] += value
+    return works, [name for name in workless if name not in works], absent(scene)
+
+
+def _reaction_end(load: Load) -> bool:
+    """Whether a load is the second side of a pair whose work its first side carries."""
+    return (isinstance(load, SpringEnd) and not load.first) or (
+        isinstance(load, TorsionEnd) and load.sign < 0
+    )
+
+
+def absent(scene: Scene) -> list[str]:
+    """Which terms of eq. (5) the scene does not have, and why: they are never formed."""
+    m, found = scene.mechanism, []
+    massless = [body for body, r in scene.rigid.items() if not r.mass]
+    if massless:
+        found.append(f"{', '.join(massless)}: no weight and no inertia force, for there is no mass")
+    flat = [body for body, r in scene.rigid.items() if r.mass and not r.inertia]
+    if flat:
+        found.append(f"{', '.join(flat)}: no inertia torque, for there is no inertia")
+    if not m.gravity:
+        found.append("no weights: gravity is zero")
+    if not scene.moves:
+        found.append("no inertia loads, no damping, no friction: speed and acceleration are zero")
+    for what, entries in (
+        ("applied forces", m.forces),
+        ("applied torques", m.torques),
+        ("springs", m.springs),
+    ):
+        if not entries:
+            found.append(f"no {what} in the file")
+    return found
