@@ -10,6 +10,7 @@ from cli import options
 from cli.render import Expect, Json, Output, Plot, Rtol, Shown, Text, show
 
 if TYPE_CHECKING:
+    from cli.mechanism.asked import Asked
     from cli.mechanism.job import Job
 
 
@@ -52,6 +53,19 @@ def run(
     explain: Annotated[
         bool, typer.Option("--explain", help="The order of solution, and what was skipped.")
     ] = False,
+    forces: Annotated[
+        bool, typer.Option("--forces", help="The input's effort, every joint reaction, the shaking force.")
+    ] = False,
+    equilibrium: Annotated[
+        bool, typer.Option("--equilibrium", help="Where the loads balance without effort, and whether stably.")
+    ] = False,
+    flywheel: Annotated[
+        float | None, typer.Option(metavar="COEFFICIENT", help="Inertia for this speed fluctuation, such as 0.02.")
+    ] = None,
+    counterweights: Annotated[
+        str | None,
+        typer.Option(metavar="LINK,...", help="Counterweights on these links that leave the least shaking force."),
+    ] = None,
     graph: Annotated[
         str | None,
         typer.Option(
@@ -80,13 +94,20 @@ def run(
     names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
     if names == []:
         raise options.bad("--only", "expected names of links or points")
+    if flywheel is not None and not 0 < flywheel < float("inf"):
+        raise options.bad("--flywheel", "expected a positive speed fluctuation, such as 0.02")
+    if (flywheel is not None or counterweights is not None) and sweep is None and inputs is None:
+        flag = "--flywheel" if flywheel is not None else "--counterweights"
+        raise options.bad(flag, "expected a cycle too: --sweep, such as --sweep 0deg:360deg:1deg")
+    from cli.mechanism.asked import Asked
     from virtualwork import MechanismError
 
+    asked = Asked(forces, equilibrium, flywheel, counterweights, swept=sweep is not None or inputs is not None)
     try:
         job = _job(file, at, sweep, inputs, names, order, branch)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not json or expect is not None or output is not None
-        shown = _shown(job, table=table, newton=newton, check=check, explain=explain, graph=graph)
+        shown = _shown(job, asked, table=table, newton=newton, check=check, explain=explain, graph=graph, written=output is not None)
         show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text)
     except MechanismError as error:
         from cli.errors import DataError
@@ -119,11 +140,23 @@ def _job(
     return job
 
 
-def _shown(job: Job, *, table: bool, newton: bool, check: bool, explain: bool, graph: str | None) -> Shown:
+def _shown(
+    job: Job,
+    asked: Asked,
+    *,
+    table: bool,
+    newton: bool,
+    check: bool,
+    explain: bool,
+    graph: str | None,
+    written: bool,
+) -> Shown:
     from cli.mechanism import checking, poses, states
 
     columns: dict[str, list[Any]] = {}
-    if table:
+    if table and asked.forces and not written:
+        columns = asked.table(job)
+    elif table:
         columns = states.table(job) if job.only is None else poses.wide_table(job)
     extra: dict[str, Any] = {}
     after: list[str] = []
@@ -134,15 +167,20 @@ def _shown(job: Job, *, table: bool, newton: bool, check: bool, explain: bool, g
     if check:
         extra["check"] = checking.check_document(job)
         after.append(checking.check_text(extra["check"]))
-    warnings = job.warnings + checking.limit_warnings(job)
+    of_forces = asked.document(job)
+    extra |= of_forces
+    warnings = job.warnings + checking.limit_warnings(job) + asked.warnings(job)
 
     def document() -> dict[str, Any]:
-        return {"name": job.mechanism.name, "poses": poses.document(job), **extra}
+        return {"name": job.mechanism.name, "poses": asked.with_forces(job, poses.document(job)), **extra}
 
     def afterword() -> str:
-        return "\n\n".join([*after, *([checking.explain_text(job)] if explain else [])])
+        told = [checking.explain_text(job)] if explain else []
+        return "\n\n".join([*after, *asked.text(of_forces), *told, *(asked.explain(job) if explain else [])])
 
     def figure() -> Any:
+        if asked.forces and not graph and len(job.inputs.shown) > 2:
+            return asked.figure(job)
         from cli.plots import mechanism as pictures
 
         return pictures.graphs(job, graph) if graph else pictures.draw(job)

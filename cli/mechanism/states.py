@@ -1,7 +1,13 @@
-"""The link-state table: one row for each pose and link, as `dalembert work` reads it."""
+"""The link-state table: one row for each pose and link, as `dalembert work` reads it.
+
+The unknown is the input's effort: `?` in the driven link's torque; where that cell holds a known torque, in a row of
+its own. A drive that reacts on a moving link, or along a guide, is `?NAME*factor` in each of its components. With
+several inputs every pose has as many velocity fields (column `field`): a unit of each input's virtual velocity.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,62 +18,143 @@ from cli.mechanism.poses import cells, of_link
 if TYPE_CHECKING:
     from virtualwork.motion import Motion
 
-UNKNOWN = "?"
+GROUND = "ground"
+ORDER = (
+    "step", "branch", "field", "link", "x_m", "y_m", "angle_deg", "mass_kg", "inertia_kg_m2", "vx_m_s", "vy_m_s",
+    "omega_rad_s", "ax_m_s2", "ay_m_s2", "alpha_rad_s2", "fx_N", "fy_N", "fvx_m_s", "fvy_m_s", "torque_N_m",
+)  # fmt: skip
+
+Part = dict[str, list[Any]]
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Where an input's unknown effort acts: cells of a link, and for a force the velocity of its point."""
+
+    link: str
+    cells: Part
 
 
 def table(job: Job) -> dict[str, list[Any]]:
     """Centre of mass, angle, rates and loads of every link at every pose."""
-    m = job.mechanism
-    driven = {e.link for e in m.inputs if e.link is not None}
+    rows: list[dict[str, Any]] = []
     several = len(job.motions) > 1
-    columns: dict[str, list[Any]] = {}
     for assembly, motion in zip(job.assemblies, job.motions, strict=True):
-        parts: dict[str, dict[str, list[Any]]] = {}
-        for name in job.links:
-            link = m.links[name]
-            part: dict[str, list[Any]] = {
-                "mass_kg": [link.mass] * motion.n,
-                "inertia_kg_m2": [link.inertia] * motion.n,
-            }
-            for k, (x, y) in enumerate(
-                (("x_m", "y_m"), ("vx_m_s", "vy_m_s"), ("ax_m_s2", "ay_m_s2"))[: job.order + 1]
-            ):
-                z = motion.at(name, link.center).complex(k)
-                part[x], part[y] = cells(z.real + 0.0), cells(z.imag + 0.0)
-            angle = of_link(motion, name, min(job.order, 2), job.given(name))
-            part["angle_deg"] = angle["angle_deg"]
-            part |= {key: angle[key] for key in ("omega_rad_s", "alpha_rad_s2") if key in angle}
-            if job.order >= 1:
-                part |= _loads(motion, name)
-                if name in driven:
-                    part["torque_N_m"] = [UNKNOWN] * motion.n
-            parts[name] = part
+        order = job.order
+        massive = any(r.mass or r.inertia for r in motion.dynamics.scene.rigid.values())
+        if order == 1 and massive:
+            order = 2  # a speed alone already makes accelerations, and masses feel them
+        parts = {name: _part(job, motion, name, order) for name in job.links}
+        fields: list[tuple[str, dict[str, Part], list[Mark]]] = [("", {}, [])]
+        if order >= 1:
+            k = len(job.mechanism.inputs)
+            fields = [("", {}, _marks(motion, None))]
+            if k > 1:
+                fields = [
+                    (e.name, {name: _virtual(motion, name, j) for name in job.links}, _marks(motion, j))
+                    for j, e in enumerate(job.mechanism.inputs)
+                ]
         for i in range(motion.n):
-            for name, part in parts.items():
-                row: dict[str, Any] = {"step": job.inputs.steps[i]}
-                if several:
-                    row["branch"] = str(assembly.number)
-                row |= {"link": name, **{key: values[i] for key, values in part.items()}}
-                for key, value in row.items():
-                    columns.setdefault(key, []).append(value)
-    order = ["step", "branch", "link", "x_m", "y_m", "angle_deg", "mass_kg", "inertia_kg_m2"]
-    return {key: columns[key] for key in (*order, *(k for k in columns if k not in order)) if key in columns}
+            head: dict[str, Any] = {"step": job.inputs.steps[i]}
+            if several:
+                head["branch"] = str(assembly.number)
+            for field, velocities, marks in fields:
+                lead = {**head, "field": field} if field else head
+                here = {
+                    name: {key: values[i] for key, values in (part | velocities.get(name, {})).items()}
+                    for name, part in parts.items()
+                }
+                extra: list[dict[str, Any]] = []
+                for mark in marks:
+                    if mark.link not in here:
+                        continue
+                    wanted = {key: values[i] for key, values in mark.cells.items() if values[i] != ""}
+                    row = here[mark.link]
+                    if any(row.get(key) for key in wanted if key != "omega_rad_s") or "fvx_m_s" in wanted:
+                        extra.append({**lead, "link": mark.link, **wanted})
+                    else:
+                        row |= wanted
+                rows += [{**lead, "link": name, **row} for name, row in here.items()]
+                rows += extra
+    keys = {key for row in rows for key in row}
+    return {key: [row.get(key) for row in rows] for key in ORDER if key in keys}
 
 
-def _loads(motion: Motion, link: str) -> dict[str, list[Any]]:
-    """Applied forces and torques of the description, reduced to the link's centre of mass; no weights."""
-    m = motion.mechanism
-    force = np.zeros(motion.n, dtype=complex)
-    torque = np.zeros(motion.n)
-    center = m.links[link].center
-    for f in m.forces:
-        if f.link == link:
-            turn = np.exp(1j * motion.angle(link))
-            vector = f.force * turn if f.frame == "link" else np.full(motion.n, f.force)
-            arm = (f.point - center) * turn
-            force += vector
-            torque += (arm.conjugate() * vector).imag
-    for t in m.torques:
-        if t.link == link:
-            torque += t.torque
-    return {"fx_N": cells(force.real), "fy_N": cells(force.imag), "torque_N_m": cells(torque)}
+def _part(job: Job, motion: Motion, name: str, order: int) -> Part:
+    body = motion.dynamics.scene.rigid[name]
+    part: Part = {"mass_kg": [body.mass] * motion.n, "inertia_kg_m2": [body.inertia] * motion.n}
+    for x, y, k in (("x_m", "y_m", 0), ("vx_m_s", "vy_m_s", 1), ("ax_m_s2", "ay_m_s2", 2))[: order + 1]:
+        z = motion.at(name, body.center).complex(k)
+        part[x], part[y] = cells(z.real + 0.0), cells(z.imag + 0.0)
+    angle = of_link(motion, name, min(order, 2))
+    part |= {key: angle[key] for key in ("angle_deg", "omega_rad_s", "alpha_rad_s2") if key in angle}
+    if order >= 1:
+        force, torque = motion.dynamics.applied(name)
+        part |= {
+            "fx_N": cells(force.real + 0.0),
+            "fy_N": cells(force.imag + 0.0),
+            "torque_N_m": cells(torque + 0.0),
+        }
+    return part
+
+
+def _virtual(motion: Motion, name: str, j: int) -> Part:
+    """The virtual velocities of a link for a unit of input j."""
+    z = motion.at(name, motion.dynamics.scene.rigid[name].center).coefficient(j)
+    turning = motion.link(name).coefficient(j)
+    return {
+        "vx_m_s": cells(z.real + 0.0),
+        "vy_m_s": cells(z.imag + 0.0),
+        "omega_rad_s": cells(turning + 0.0),
+    }
+
+
+def _marks(motion: Motion, field: int | None) -> list[Mark]:
+    """The marks of every input's effort, with the velocities of one field (None: the motion's own)."""
+    from virtualwork.work import carrier
+
+    m, n = motion.mechanism, motion.n
+    found: list[Mark] = []
+    for j, entry in enumerate(m.inputs):
+        name = f"?{entry.name}"
+        if not entry.is_slide:
+            reacts = carrier(motion.dynamics.scene, j)
+            plain = len(m.inputs) == 1 and reacts == GROUND
+            for link, mark in ((str(entry.link), "?" if plain else name), (reacts, f"{name}*-1")):
+                if link != GROUND:
+                    turning = (
+                        motion.link(link).omega if field is None else motion.link(link).coefficient(field)
+                    )
+                    found.append(Mark(link, {"torque_N_m": [mark] * n, "omega_rad_s": cells(turning + 0.0)}))
+            continue
+        i = next(i for i, g in enumerate(m.guides) if g.point == entry.slider)
+        g = m.guides[i]
+        rail = motion.dynamics.reactions.over(
+            lambda block, i=i: motion.dynamics.reactions.rail(block, i), complex
+        )
+        through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
+        slide = motion.slide(g.point).position
+        for link, sign in ((g.link, 1.0), (g.on, -1.0)):
+            if link == GROUND:
+                continue
+            if sign > 0:
+                at = motion.at(link, g.point)
+                velocity = at.complex(1) if field is None else at.coefficient(field)
+            else:
+                base = motion.at(link, through)
+                turning = motion.link(link).omega if field is None else motion.link(link).coefficient(field)
+                velocity = (
+                    base.complex(1) if field is None else base.coefficient(field)
+                ) + 1j * turning * slide * rail
+            cells_: Part = {"fvx_m_s": cells(velocity.real + 0.0), "fvy_m_s": cells(velocity.imag + 0.0)}
+            cells_["fx_N"] = [_share(name, sign * float(c)) for c in rail.real]
+            cells_["fy_N"] = [_share(name, sign * float(c)) for c in rail.imag]
+            found.append(Mark(link, cells_))
+    return found
+
+
+def _share(name: str, factor: float) -> str:
+    """`?NAME*factor`; empty where the component is none."""
+    if not np.isfinite(factor) or factor == 0:
+        return ""
+    return name if factor == 1.0 else f"{name}*{factor!r}"
