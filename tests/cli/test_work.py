@@ -113,7 +113,6 @@ BAD = {
     "no link": ("omega_rad_s,torque_N_m\n1,?\n", "no column link"),
     "link twice": ("link,mass_kg,omega_rad_s,torque_N_m\na,1,1,?\na,1,1,2\n", "each link once"),
     "dependent fields": (FIELDS.replace("1,a,q,0", "1,a,q,2").replace("1,b,q,0,,1", "1,b,q,0,,2"), "independent velocity fields"),
-    "overflow": ("link,omega_rad_s,torque_N_m\na,1,?\nb,1e308,1e308\n", "too large"),
     "bad mark": ("link,omega_rad_s,torque_N_m\na,1,?T*x\n", "?NAME*FACTOR"),
     "empty": ("", "empty"),
 }  # fmt: skip
