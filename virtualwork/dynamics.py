@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Iterable
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from virtualwork.errors import DescriptionError
 from virtualwork.loads import Block, Scene, plus
 from virtualwork.mechanism import GROUND
 from virtualwork.reactions import Joint, Reactions
-from virtualwork.work import effort
+from virtualwork.work import effort, finished, write_effort
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,6 +40,7 @@ class Dynamics:
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
         self.scene = Scene(motion)
+        self._forces: dict[tuple[str, str], NDArray[np.complex128]] = {}
 
     @cached_property
     def _settled(self) -> tuple[int, NDArray[np.bool_]]:
@@ -86,36 +88,75 @@ class Dynamics:
     @cached_property
     def newton_euler(self) -> Reals:
         """The effort at each input by Newton and Euler, (n, k): ΣM = 0 of the driven link with its joint forces."""
-        found = []
-        for j, entry in enumerate(self.motion.mechanism.inputs):
-            if self.statics is None:
-                found.append(self.reactions.effort(j))
-            else:
-                found.append(self.statics.get(("force" if entry.is_slide else "torque", str(j), "")))
-        return np.stack(found, axis=1)
+        r, inputs = self.reactions, self.motion.mechanism.inputs
+        if self.statics is not None:
+            names = [("force" if entry.is_slide else "torque", str(j), "") for j, entry in enumerate(inputs)]
+            return np.stack([self.statics.get(name) for name in names], axis=1)
+        return np.stack(r.over(*(partial(r.effort, j=j) for j in range(len(inputs)))), axis=1)
+
+    def solve(self, sides: Iterable[tuple[Joint, str]] | None = None) -> None:
+        """Form effort, both ways, and joint forces in one pass over the poses, instead of each when asked for.
+
+        Parameters
+        ----------
+        sides : iterable of (joint, body), optional
+            The joint forces; default one side of every joint.
+        """
+        r, inputs = self.reactions, self.motion.mechanism.inputs
+        if self.statics is not None or self.scene.rubs or r.carried:
+            return
+        if sides is None:
+            sides = [(joint, joint.bodies[-1]) for joint in r.joints]
+        wanted = [side for side in sides if (side[0].key, side[1]) not in self._forces]
+        n, k = self.motion.n, len(inputs)
+        work, euler = np.zeros((n, k)), np.zeros((n, k))
+
+        def others(block: Block) -> Number:
+            if "effort" not in self.__dict__:
+                write_effort(self.scene, block, work)
+            for j in range(k):
+                value = r.effort(block, j)
+                if value is not None:
+                    euler[block.rows, j] = value
+            return None
+
+        forms = [partial(r.joint_force, joint=joint, body=body) for joint, body in wanted]
+        *found, _ = r.over(*forms, others, kind=complex)
+        for (joint, body), force in zip(wanted, found, strict=True):
+            self._forces[joint.key, body] = force
+        if self.scene.lost is not None:
+            euler[self.scene.lost] = np.nan
+        self.__dict__.setdefault("newton_euler", euler)
+        if "effort" not in self.__dict__:
+            self.__dict__["effort"] = finished(self.scene, work)
 
     def joint_force(self, joint: Joint, body: str) -> NDArray[np.complex128]:
         """The force of a joint on one of its bodies, (n,) complex; NaN where statics does not determine it."""
-        solver = self.reactions if self.statics is None else self.statics
-        found = solver.joint_force(joint, body)
-        if self.scene.rubs:
-            found[self.locked] = np.nan
-        return found
+        key = joint.key, body
+        if key not in self._forces:
+            if self.statics is not None:
+                self._forces[key] = self.statics.joint_force(joint, body)
+            else:
+                form = partial(self.reactions.joint_force, joint=joint, body=body)
+                (self._forces[key],) = self.reactions.over(form, kind=complex)
+            if self.scene.rubs:
+                self._forces[key][self.locked] = np.nan
+        return self._forces[key]
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """The moment of a joint on one of its bodies about the joint's point, (n,): a guide's, or a pin's friction."""
-        n = self.motion.n
-        found = np.zeros(n)
+        r = self.reactions
+        found = np.zeros(self.motion.n)
         if joint.guide is not None:
             g = self.motion.mechanism.guides[joint.guide]
             if self.statics is None:
-                found = self.reactions.guide_moment(joint.guide, body)
+                (found,) = r.over(partial(r.guide_moment, guide=joint.guide, body=body))
             elif g.is_slider:
                 value = self.statics.get(("moment", joint.key, ""))
                 found = value if body == g.link else -value
         for load in self.scene.rubs:
             if load.path is None and load.joint == joint.key and load.body == body:
-                found = found + self.reactions.over(load.value, float)
+                found = found + r.over(load.value)[0]
         return found
 
     def joints_named(self, name: str) -> list[Joint]:
@@ -138,7 +179,7 @@ class Dynamics:
         if not here:
             raise DescriptionError(f"link '{on}' has no joint at '{joint}'")
         total: Any = sum(self.joint_force(found, on) for found in here)
-        return np.stack([total.real, total.imag], axis=-1)
+        return pairs(total)
 
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:
@@ -150,7 +191,8 @@ class Dynamics:
         n = self.motion.n
         force, moment = np.zeros(n, complex), np.zeros(n)
         loads = [load for load in self.scene.loads if load.kind in EXTERNAL and load.body != GROUND]
-        for block in self.scene.blocks():
+
+        def work(block: Block) -> None:
             f: Number = None
             m: Number = None
             for load in loads:
@@ -166,9 +208,11 @@ class Dynamics:
                 force[block.rows] = f
             if m is not None:
                 moment[block.rows] = m
-        bad = ~self.motion.assembled
-        force[bad], moment[bad] = np.nan, np.nan
-        return np.stack([force.real, force.imag], axis=-1), moment
+
+        self.scene.each((), work)
+        if self.scene.lost is not None:
+            force[self.scene.lost], moment[self.scene.lost] = np.nan, np.nan
+        return pairs(force), moment
 
     def applied(self, link: str) -> tuple[NDArray[np.complex128], Reals]:
         """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
@@ -197,3 +241,8 @@ class Dynamics:
     def blocks(self) -> list[Block]:
         """The scene's blocks."""
         return self.scene.blocks()
+
+
+def pairs(z: NDArray[np.complex128]) -> Reals:
+    """x + iy as rows (x, y), without a copy."""
+    return np.ascontiguousarray(z).view(float).reshape(-1, 2)

@@ -7,7 +7,7 @@ Everything else, virtual work and joint reactions, reads this list.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     Reals = NDArray[np.float64]
 
+BLOCK = 8192  # up to so many poses there is nothing to keep in cache
 Path = tuple[str | None, tuple[Term, ...]]  # a point of a body: P[base] + Σ terms
 
 
@@ -94,14 +95,14 @@ class Block:
             return times(self.by[0].vector(*path, 1), self.rates[0])
         return None if self.along is None else self.along.vector(*path, 1)
 
-    def acceleration(self, path: Path) -> Number:
-        """P̈ = K q̈ + L q̇², complex."""
+    def acceleration(self, path: Path, factor: float = 1.0) -> Number:
+        """P̈ = K q̈ + L q̇², complex, times a factor."""
         if not self.one:
-            return None if self.along is None else self.along.vector(*path, 2)
+            return None if self.along is None else times(self.along.vector(*path, 2), factor)
         speed, rate = self.rates
         return plus(
-            times(self.by[0].vector(*path, 2), None if speed is None else speed * speed),
-            None if rate is None else times(self.by[0].vector(*path, 1), rate),
+            None if speed is None else times(self.by[0].vector(*path, 2), speed * speed * factor),
+            None if rate is None else times(self.by[0].vector(*path, 1), rate * factor),
         )
 
     def omega(self, body: str) -> Number:
@@ -112,16 +113,16 @@ class Block:
             return times(self.by[0].angle[body][0], self.rates[0])
         return None if self.along is None else self.along.angle[body][0]
 
-    def alpha(self, body: str) -> Number:
-        """α."""
+    def alpha(self, body: str, factor: float = 1.0) -> Number:
+        """α, times a factor."""
         if body == GROUND:
             return None
         if not self.one:
-            return None if self.along is None else self.along.angle[body][1]
+            return None if self.along is None else times(self.along.angle[body][1], factor)
         speed, rate = self.rates
         return plus(
-            times(self.by[0].angle[body][1], None if speed is None else speed * speed),
-            times(self.by[0].angle[body][0], rate),
+            times(self.by[0].angle[body][1], None if speed is None else speed * speed * factor),
+            times(self.by[0].angle[body][0], None if rate is None else rate * factor),
         )
 
     def slide_rate(self, guide: int) -> Number:
@@ -228,7 +229,7 @@ class InertiaForce(Load):
 
     def value(self, block: Block) -> Number:
         assert self.path is not None
-        return times(block.acceleration(self.path), -self.mass)
+        return block.acceleration(self.path, -self.mass)
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +239,7 @@ class InertiaTorque(Load):
     inertia: float = 0.0
 
     def value(self, block: Block) -> Number:
-        return times(block.alpha(self.body), -self.inertia)
+        return block.alpha(self.body, -self.inertia)
 
 
 @dataclass(frozen=True, eq=False)
@@ -457,29 +458,34 @@ class Scene:
                 keys |= {f"angle:{body}" for body in load.spring.links}
         return {key for key in keys if key != f"angle:{GROUND}"}
 
-    def blocks(self, keys: Iterable[str] = ()) -> list[Block]:
-        """The blocks of poses, with everything solved that the loads and `keys` hang on."""
-        motion = self.motion
+    def _targets(self, keys: Iterable[str]) -> tuple[tuple[str, ...], int]:
         targets = tuple(sorted(self.reads([*self.loads, *self.rubs]) | set(keys)))
         if not targets:  # nothing acts: any one thing that moves will do
             targets = self.plan.writes(next(step for step in self.plan.steps if not isinstance(step, Place)))
+        inertial = self.moves and any(isinstance(load, InertiaForce | InertiaTorque) for load in self.loads)
+        return targets, 2 if inertial else 1
+
+    def blocks(self, keys: Iterable[str] = ()) -> list[Block]:
+        """The blocks of poses, with everything solved that the loads and `keys` hang on."""
+        motion = self.motion
+        targets, order = self._targets(keys)
         if targets in self._blocks:
             return self._blocks[targets]
         k = len(self.mechanism.inputs)
-        order = (
-            2
-            if self.moves and any(isinstance(load, InertiaForce | InertiaTorque) for load in self.loads)
-            else 1
-        )
         along = None
         if k == 1:
             by = [motion._solve(targets, order)]
         else:
             by = [motion._solve(targets, 1, j) for j in range(k)]
             along = motion._solve(targets, order) if self.moves else None
+        return self._kept_blocks(targets, by, along)
+
+    def _kept_blocks(
+        self, targets: tuple[str, ...], by: list[list[Jets]], along: list[Jets] | None
+    ) -> list[Block]:
         found = [
             Block(self, i, rows, st, None if along is None else along[i], [jets[i] for jets in by])
-            for i, (rows, st) in enumerate(motion._rows())
+            for i, (rows, st) in enumerate(self.motion._rows())
         ]
         for old in self._blocks.values():
             for block, before in zip(found, old, strict=True):
@@ -487,6 +493,27 @@ class Scene:
                 block.friction = before.friction
         self._blocks = {targets: found}
         return found
+
+    def each(self, keys: Iterable[str], form: Callable[[Block], None]) -> None:
+        """Form something over every block; of a single input while the block is still in cache from its solution."""
+        targets, order = self._targets(keys)
+        if len(self.mechanism.inputs) > 1 or targets in self._blocks or self.motion.n <= BLOCK:
+            for block in self.blocks(keys):
+                form(block)
+            return
+
+        def then(i: int) -> None:
+            if targets not in self._blocks:
+                self._kept_blocks(targets, [self.motion._jets[-1]], None)
+            form(self._blocks[targets][i])
+
+        self.motion._solve(targets, order, then=then)
+
+    @cached_property
+    def lost(self) -> NDArray[np.bool_] | None:
+        """(n,): the poses that are not assembled; None where all are."""
+        there = self.motion.assembled
+        return None if there.all() else ~there
 
 
 def path_reads(path: Path) -> set[str]:

@@ -22,7 +22,7 @@ What virtual work stands on (the plane as complex numbers, arrays over the n pos
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -340,8 +340,17 @@ class Motion:
         for i, st in enumerate(self._states()):
             yield slice(i * BLOCK, min((i + 1) * BLOCK, self.n)), st
 
-    def _solve(self, targets: Iterable[str], order: int, which: int = -1) -> list[Jets]:
-        """Work out the targets' derivatives up to an order; `which`: along the motion (−1), or for input j alone."""
+    def _solve(
+        self,
+        targets: Iterable[str],
+        order: int,
+        which: int = -1,
+        then: Callable[[int], None] | None = None,
+    ) -> list[Jets]:
+        """Work out the targets' derivatives up to an order; `which`: along the motion (−1), or for input j alone.
+
+        `then` is called with each block's number while the block is still in cache, and what it forms is forgotten.
+        """
         steps = self.assembly.needed(targets)
         missing: list[tuple[int, list[Step]]] = []
         for k in range(order + 1):
@@ -351,7 +360,7 @@ class Motion:
                 missing.append((k, new))
                 self._done.update((id(s), k, key) for s in new)
                 self.solved += [(s, k) for s in new]
-        if not missing:
+        if not missing and then is None:
             return self._jets.get(which, [])
         states = self._states()
         if order and which not in self._jets:
@@ -368,6 +377,8 @@ class Motion:
                         for w in list(self._jets) if k else [-2]:
                             if (id(step), k, w) in self._done:
                                 self._advance(i, w, [(k, [step])])
+                if then is not None:
+                    then(i)
                 if many and order:
                     self._jets[which][i].slim()
         return self._jets.get(which, [])

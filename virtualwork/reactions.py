@@ -21,7 +21,7 @@ import numpy as np
 
 from virtualwork.dyads import Number, cross, dot
 from virtualwork.errors import MechanismError
-from virtualwork.loads import Block, Scene, path_reads, plus, times
+from virtualwork.loads import BLOCK, Block, Scene, path_reads, plus, times
 from virtualwork.mechanism import GROUND
 from virtualwork.newton import stack
 from virtualwork.state import columns
@@ -29,6 +29,8 @@ from virtualwork.steps import Group, Place, Term, Turn
 from virtualwork.work import carrier, effort
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from virtualwork.mechanism import Mechanism
@@ -371,28 +373,46 @@ class Reactions:
             joint, body = side
             self.formed.add(f"{joint} on {body}")
             if body == GROUND:
-                return self._less(
-                    block, [(joint, other) for other in self.by_key[joint].bodies if other != GROUND]
-                )
+                return self._sum(block, None, [(joint, other) for other in self.by_key[joint].bodies], -1)
             kind, of = self.recipes[side]
             if kind == "loop":
                 group, c = of
                 return self.multiplier(block, group)[c]
             if kind == "joint":
-                return self._less(
-                    block, [(joint, other) for other in self.by_key[joint].bodies if other != body]
-                )
-            others = self._less(block, [other for other in self.sides[body] if other != side])
-            return plus(others, times(self.force(block, body), -1.0))
+                others = [(joint, other) for other in self.by_key[joint].bodies if other != body]
+                return self._sum(block, None, others, -1)
+            return self._sum(block, self.force(block, body), [s for s in self.sides[body] if s != side], -1)
 
         return self._memo(block, side, form)
 
-    def _less(self, block: Block, sides: list[Side]) -> Number:
-        """−Σ of joint forces."""
-        total: Number = None
+    def _sum(self, block: Block, start: Number, sides: list[Side], sign: int) -> Number:
+        """±(start + Σ of joint forces), in one pass for each; a force that is another's reaction is not formed for it."""
+        parts: list[tuple[int, Number]] = [] if start is None else [(sign, start)]
         for side in sides:
-            total = plus(total, self.on_side(block, side))
-        return times(total, -1.0)
+            factor, value = self._signed(block, side)
+            if value is not None:
+                parts.append((sign * factor, value))
+        if not parts:
+            return None
+        parts.sort(key=lambda part: -part[0])
+        (factor, total), *rest = parts
+        if factor < 0:
+            total = -total
+        for factor, value in rest:
+            total = total + value if factor > 0 else total - value
+        return total
+
+    def _signed(self, block: Block, side: Side) -> tuple[int, Number]:
+        """A joint force as ± one that is known."""
+        joint, body = side
+        if body == GROUND:
+            return 1, None
+        kind, _ = self.recipes[side]
+        bodies = self.by_key[joint].bodies
+        if kind == "joint" and len(bodies) == 2 and side not in self._cache(block):
+            other = bodies[0] if bodies[1] == body else bodies[1]
+            return -1, self.on_side(block, (joint, other))
+        return 1, self.on_side(block, side)
 
     def place(self, block: Block, side: Side) -> Number:
         """Where a joint's force acts, from the body's centre of mass, in ground axes."""
@@ -414,9 +434,10 @@ class Reactions:
         def form() -> Number:
             total = self.moment(block, body)
             for side in self.sides[body]:
-                value = self.on_side(block, side)
+                factor, value = self._signed(block, side)
                 if value is not None:
-                    total = plus(total, cross(self.place(block, side), value))
+                    turned = cross(self.place(block, side), value)
+                    total = plus(total, turned if factor > 0 else -turned)
             return total
 
         return self._memo(block, ("rest", body), form)
@@ -434,8 +455,9 @@ class Reactions:
         return total
 
     # --- over all poses -------------------------------------------------------------------------------------------
-    def blocks(self) -> list[Block]:
-        """The scene's blocks, with what all joints' places hang on."""
+    @cached_property
+    def keys(self) -> tuple[str, ...]:
+        """What the places of all joints hang on."""
         keys: set[str] = set()
         for body in self.mechanism.links:
             keys |= path_reads(self._reference(body)) | {f"angle:{body}"}
@@ -443,42 +465,40 @@ class Reactions:
             keys.add(f"slide:{i}")
         for group in self.plan.groups:
             keys |= self.plan.reads(group) | set(self.plan.writes(group))
-        return self.scene.blocks(sorted(keys))
+        return tuple(sorted(keys))
 
-    def over(self, form: Any, kind: type) -> Any:
-        """A quantity over all blocks, NaN where a pose is not assembled."""
-        out: Any = np.zeros(self.scene.motion.n, dtype=kind)
-        for block in self.blocks():
-            value = form(block)
-            if value is not None:
-                out[block.rows] = value
-            self._trim(block)
-        assembled = self.scene.motion.assembled
-        if not assembled.all():
-            out[~assembled] = np.nan
-        return out
+    def blocks(self) -> list[Block]:
+        """The scene's blocks, with what all joints' places hang on."""
+        return self.scene.blocks(self.keys)
 
-    def _trim(self, block: Block) -> None:
-        """Keep joint forces and multipliers over a long sweep, not what they were made of."""
-        if self.scene.motion.n > len(block.by) * 4096:
-            cache = self._cache(block)
-            for key in [key for key in cache if key[0] in ("force", "moment", "rest") or ":" in key[0][5:6]]:
-                del cache[key]
+    def over(self, *forms: Callable[[Block], Number], kind: type = float) -> list[Any]:
+        """Quantities over all blocks, formed block by block together; NaN where a pose is not assembled."""
+        n = self.scene.motion.n
+        found: list[Any] = [np.empty(n, dtype=kind) for _ in forms]
 
-    def joint_force(self, joint: Joint, body: str) -> NDArray[np.complex128]:
-        """The force of a joint on a body over all poses, (n,) complex, without the force of an input that drives it."""
+        def work(block: Block) -> None:
+            for out, form in zip(found, forms, strict=True):
+                value = form(block)
+                out[block.rows] = 0.0 if value is None else value
+            if n > BLOCK:  # over a long sweep what the quantities were made of is not kept
+                cache = self._cache(block)
+                for key in [key for key in cache if key[0][:4] not in ("loop", "pin:", "guid")]:
+                    del cache[key]
+                block._kept.clear()
 
-        def form(block: Block) -> Number:
-            value = self.on_side(block, (joint.key, body))
-            return plus(value, self._rubbed(block, joint, body))
+        self.scene.each(self.keys, work)
+        if self.scene.lost is not None:
+            for out in found:
+                out[self.scene.lost] = np.nan
+        return found
 
-        value = self.over(form, complex)
-        if joint.guide is not None:
-            j = self._driving(joint.guide)
-            if j is not None:
-                along = self.over(lambda block: self.rail(block, joint.guide), complex)
-                value = value - dot(value, along) * along
-        return np.asarray(value)
+    def joint_force(self, block: Block, joint: Joint, body: str) -> Number:
+        """The force of a joint on a body over a block, without the force of an input that drives it."""
+        value = plus(self.on_side(block, (joint.key, body)), self._rubbed(block, joint, body))
+        if joint.guide is not None and value is not None and self._driving(joint.guide) is not None:
+            rail = self.rail(block, joint.guide)
+            value = value - dot(value, rail) * rail
+        return value
 
     def _rubbed(self, block: Block, joint: Joint, body: str) -> Number:
         """The friction force along a guide belongs to its reaction."""
@@ -499,27 +519,21 @@ class Reactions:
         d = self.plan.directions[guide]
         return d if on == GROUND else d * block.st.turn[on]
 
-    def guide_moment(self, guide: int, body: str) -> Reals:
-        """The moment a guide puts on one of its bodies about its point, (n,)."""
+    def guide_moment(self, block: Block, guide: int, body: str) -> Number:
+        """The moment a guide puts on one of its bodies about its point, over a block."""
         g = self.mechanism.guides[guide]
         if not g.is_slider:
-            return np.zeros(self.scene.motion.n)
-        value = np.asarray(self.over(lambda block: self.couple(block, "guide", guide), float))
-        return value if body == g.link else -value
+            return None
+        return times(self.couple(block, "guide", guide), 1.0 if body == g.link else -1.0)
 
-    def effort(self, j: int) -> Reals:
-        """The effort at input j by Newton and Euler, (n,): ΣM = 0 of the driven link, or the force along the slide."""
+    def effort(self, block: Block, j: int) -> Number:
+        """The effort at input j by Newton and Euler: ΣM = 0 of the driven link, or the force along the slide."""
         entry = self.mechanism.inputs[j]
         if not entry.is_slide:
-            return np.asarray(self.over(lambda block: self.couple(block, "input", j), float))
+            return self.couple(block, "input", j)
         guide = next(i for i, g in enumerate(self.mechanism.guides) if g.point == entry.slider)
-        side = (f"guide:{guide}", self.mechanism.guides[guide].link)
-
-        def form(block: Block) -> Number:
-            value = self.on_side(block, side)
-            return None if value is None else dot(value, self.rail(block, guide))
-
-        return np.asarray(self.over(form, float))
+        value = self.on_side(block, (f"guide:{guide}", self.mechanism.guides[guide].link))
+        return None if value is None else dot(value, self.rail(block, guide))
 
 
 def _inverse(det: Number, c1: Number, c2: Number) -> Number:

@@ -172,9 +172,13 @@ class Statics:
                 others = [self.joint_force(joint, other) for other in joint.bodies if other != GROUND]
                 return np.asarray(-sum(others))
             return np.asarray(self.get(("fx", joint.key, body)) + 1j * self.get(("fy", joint.key, body)))
-        rail = self.reactions.over(lambda block: self.reactions.rail(block, joint.guide), complex)
+        r = self.reactions
+        rail, rub = r.over(
+            lambda block: r.rail(block, joint.guide),
+            lambda block: r._rubbed(block, joint, body),
+            kind=complex,
+        )
         sign = 1.0 if body == self.mechanism.guides[joint.guide].link else -1.0
-        rub: Any = self.reactions.over(lambda block: self.reactions._rubbed(block, joint, body), complex)
         return np.asarray(sign * self.get(("normal", joint.key, "")) * 1j * rail + rub)
 
     def undetermined(self) -> list[str]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.dyads import Number, dot
-from virtualwork.loads import Block, Load, Scene, SpringEnd, TorsionEnd, plus, times
+from virtualwork.loads import BLOCK, Block, Load, Scene, SpringEnd, TorsionEnd, plus, times
 from virtualwork.mechanism import GROUND
 
 if TYPE_CHECKING:
@@ -61,17 +61,34 @@ def power(load: Load, block: Block, j: int) -> Number:
 
 def effort(scene: Scene) -> Reals:
     """The effort at each input by virtual work, (n, k): N·m at a turning input, N at a slide."""
-    k, n = len(scene.mechanism.inputs), scene.motion.n
-    out = np.zeros((n, k))
-    loads = [*scene.loads, *scene.rubs]
-    for block in scene.blocks():
-        for j in range(k):
-            total: Number = None
-            for load in loads:
-                total = plus(total, power(load, block, j))
-            if total is not None:
-                out[block.rows, j] = np.where(_singular(scene, block, j), np.nan, -total)
-    out[np.logical_not(scene.motion.assembled)] = np.nan
+    out = np.zeros((scene.motion.n, len(scene.mechanism.inputs)))
+
+    def work(block: Block) -> None:
+        write_effort(scene, block, out)
+        if scene.motion.n > BLOCK:
+            block._kept.clear()
+
+    scene.each((), work)
+    return finished(scene, out)
+
+
+def write_effort(scene: Scene, block: Block, out: Reals) -> None:
+    """The generalized forces over one block."""
+    for j in range(out.shape[1]):
+        total: Number = None
+        for load in scene.loads:
+            total = plus(total, power(load, block, j))
+        for rub in scene.rubs:
+            total = plus(total, power(rub, block, j))
+        if total is not None:
+            bad = _singular(scene, block, j)
+            out[block.rows, j] = -total if bad is False else np.where(bad, np.nan, -total)
+
+
+def finished(scene: Scene, out: Reals) -> Reals:
+    """The generalized forces as efforts: NaN where not assembled, no −0, through motors' carriers."""
+    if scene.lost is not None:
+        out[scene.lost] = np.nan
     out += 0.0
     return through_carriers(scene, out)
 
@@ -84,7 +101,9 @@ def _singular(scene: Scene, block: Block, j: int) -> Any:
         for body in group.angles:
             known = block.by[j].angle.get(body)
             if known and known[0] is not None:
-                found = found | ~(np.abs(known[0]) * reach < 1e13)
+                fast = np.abs(known[0])
+                if not np.max(fast) * reach < 1e13:
+                    found = found | ~(fast * reach < 1e13)
     return found
 
 

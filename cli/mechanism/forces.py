@@ -55,6 +55,7 @@ def poses(job: Job) -> list[dict[str, Any]]:
 
 def _motion_parts(job: Job, motion: Motion) -> list[dict[str, Any]]:
     d, inputs = motion.dynamics, job.mechanism.inputs
+    d.solve([(joint, on) for joint, on, _ in rows_of(job, motion)])
     work, euler = ([cells(values[:, j]) for j in range(len(inputs))] for values in (d.effort, d.newton_euler))
     reactions = []
     for joint, on, of in rows_of(job, motion):

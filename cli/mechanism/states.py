@@ -8,6 +8,7 @@ several inputs every pose has as many velocity fields (column `field`): a unit o
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -129,9 +130,8 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
             continue
         i = next(i for i, g in enumerate(m.guides) if g.point == entry.slider)
         g = m.guides[i]
-        rail = motion.dynamics.reactions.over(
-            lambda block, i=i: motion.dynamics.reactions.rail(block, i), complex
-        )
+        reactions = motion.dynamics.reactions
+        (rail,) = reactions.over(partial(reactions.rail, guide=i), kind=complex)
         through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
         slide = motion.slide(g.point).position
         for link, sign in ((g.link, 1.0), (g.on, -1.0)):
