@@ -20,14 +20,16 @@ GREYS = ("0.0", "0.35", "0.55")
 def draw(job: Job) -> Figure:
     """Draw the effort and the sizes of the joint forces against the input, and the shaking force as a hodograph."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
 
     m, motion = job.mechanism, job.motions[0]
     d = motion.dynamics
     slide = m.inputs[0].is_slide
     x = job.inputs.shown[:, 0]
     label = f"position of {m.inputs[0].name}, m" if slide else f"angle of {m.inputs[0].name}, deg"
-    figure = Figure(figsize=(11, 6.4), layout="constrained")
-    halves: Any = figure.subfigures(1, 2, width_ratios=(1.45, 1))
+    shakes = d.scene.moves  # at rest the ground carries a constant load, which is no picture
+    figure = Figure(figsize=(11 if shakes else 7, 6.4), layout="constrained")
+    halves: Any = figure.subfigures(1, 2, width_ratios=(1.45, 1)) if shakes else (figure, None)
     left, right = halves
     top, bottom = left.subplots(2, 1, sharex=True)
     for j, entry in enumerate(m.inputs):
@@ -61,12 +63,17 @@ def draw(job: Job) -> Figure:
         bottom.set_xticks(
             np.arange(np.ceil(x.min() / 60) * 60, x.max() + 1, 60 if x.max() - x.min() <= 360 else 120)
         )
+    if not shakes:
+        return figure
     shaking, moment = d.shaking
+    if np.nanmax(np.abs(moment)) <= 1e-12 * np.nanmax(np.abs(shaking)) * m.size:
+        moment = np.zeros_like(moment)
     hodograph, curve = right.subplots(2, 1, height_ratios=(1.6, 1))
     hodograph.plot(shaking[:, 0], shaking[:, 1], color="0.0", lw=1.4)
     hodograph.plot(*shaking[0], marker="o", color="0.0", ms=5)
     hodograph.plot(0, 0, marker="+", color="0.3", ms=9)
     hodograph.set_aspect("equal", adjustable="datalim")
+    hodograph.xaxis.set_major_locator(MaxNLocator(4))
     hodograph.set_xlabel("shaking force, x, N (dot: first pose)")
     hodograph.set_ylabel("y, N")
     hodograph.grid(color="0.9")
