@@ -243,6 +243,17 @@ def _check(states: States) -> None:
                             "of the step's first velocity field: taken as given (the loads of one instant are the same in each)"
                         )
                         return
+    if "inertia" in values and ("ax" in values or "ay" in values):
+        zero = np.zeros(table.rows)
+        carried = (values["inertia"] > 0) & ((values.get("ax", zero) != 0) | (values.get("ay", zero) != 0))
+        given = table.numbers.get("mass")
+        blank = np.isnan(given.values) if given is not None else np.ones(table.rows, dtype=bool)
+        if (carried & blank).any():
+            row = int(np.argmax(carried & blank))
+            header = given.header if given is not None else "mass_kg"
+            raise table.error(
+                row, header, "", f"a mass: link {states.links[row]} has an inertia and its centre accelerates"
+            )
     for rate, body in (("ax", "mass"), ("ay", "mass"), ("alpha", "inertia")):
         if body not in values and values.get(rate, np.zeros(1)).any():
             states.warnings.append(

@@ -144,11 +144,23 @@ def warnings(job: Job) -> list[str]:
             )
         if d.statics is not None:
             found += d.statics.undetermined()
+    for motion in job.motions[:1]:
+        for body, r in motion.dynamics.scene.rigid.items():
+            if r.inertia and not r.mass and motion.dynamics.scene.moves and not _pinned(job, body, r.center):
+                found.append(
+                    f"[links.{body}]: an inertia and no mass, though its centre moves: no inertia force from it"
+                )
     if job.mechanism.friction and not any(motion.dynamics.scene.moves for motion in job.motions):
         found.append(
             "friction: nothing moves (speed zero), so that its direction and size are not determined: left out"
         )
     return list(dict.fromkeys(found))
+
+
+def _pinned(job: Job, body: str, center: complex) -> bool:
+    """Whether a link turns about its centre, pinned to the ground there."""
+    points = job.mechanism.links[body].points
+    return any(GROUND in bodies and points.get(name) == center for name, bodies in job.mechanism.pins.items())
 
 
 def _listed(job: Job, bad: NDArray[np.bool_], what: str) -> list[str]:

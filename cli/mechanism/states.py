@@ -87,7 +87,7 @@ def _part(job: Job, motion: Motion, name: str, order: int) -> Part:
     for x, y, k in (("x_m", "y_m", 0), ("vx_m_s", "vy_m_s", 1), ("ax_m_s2", "ay_m_s2", 2))[: order + 1]:
         z = motion.at(name, body.center).complex(k)
         part[x], part[y] = cells(z.real + 0.0), cells(z.imag + 0.0)
-    angle = of_link(motion, name, min(order, 2))
+    angle = of_link(motion, name, min(order, 2), job.given(name))
     part |= {key: angle[key] for key in ("angle_deg", "omega_rad_s", "alpha_rad_s2") if key in angle}
     if order >= 1:
         force, torque = motion.dynamics.applied(name)

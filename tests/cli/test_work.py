@@ -110,6 +110,7 @@ BAD = {
     "no unit": ("link,omega,torque_N_m\n1,0,?\n", "the column omega has no unit"),
     "not a number": ("link,omega_rad_s,torque_N_m\n1,abc,?\n", "row 1 (line 2), column omega_rad_s: found 'abc'"),
     "negative mass": ("link,mass_kg,omega_rad_s,torque_N_m\na,-1,1,?\n", "a mass that is not negative"),
+    "no mass": ("link,mass_kg,inertia_kg_m2,ax_m_s2,omega_rad_s,torque_N_m\na,,0.1,5,1,?\n", "has an inertia and its centre accelerates"),
     "no link": ("omega_rad_s,torque_N_m\n1,?\n", "no column link"),
     "link twice": ("link,mass_kg,omega_rad_s,torque_N_m\na,1,1,?\na,1,1,2\n", "each link once"),
     "dependent fields": (FIELDS.replace("1,a,q,0", "1,a,q,2").replace("1,b,q,0,,1", "1,b,q,0,,2"), "independent velocity fields"),
