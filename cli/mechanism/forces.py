@@ -258,7 +258,11 @@ def equilibria(job: Job, swept: bool) -> tuple[list[dict[str, Any]], list[str]]:
         place = next(iter(values.values())) if len(m.inputs) == 1 else {"inputs": values}
         rows.append({**place, "stable": e.stable, "potential_J": e.potential})
     said = []
-    if found.everywhere:
+    if not found.loaded:
+        said.append("nothing acts at rest: every position is one of equilibrium")
+    elif found.region:
+        said.append("positions of rest fill a part of the range: they are not isolated, and not listed")
+    elif found.everywhere:
         said.append(
             "the loads balance in every position: equilibrium everywhere, neither stable nor unstable"
         )
