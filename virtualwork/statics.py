@@ -215,6 +215,17 @@ class Statics:
                 sums.append(
                     f"{axis} from the ground at {' and '.join(names[self.unknowns[i][1]] for i in ground)}"
                 )
+        for link in self.mechanism.links:
+            here = [
+                i
+                for i in free
+                if self.unknowns[i][0] == "normal"
+                and link in self.reactions.by_key[self.unknowns[i][1]].bodies
+            ]
+            if len(here) > 1 and np.abs(null[:, :, here].sum(axis=2)).max() <= 1e-7:
+                sums.append(
+                    f"normal force on {link} at {' and '.join(names[self.unknowns[i][1]] for i in here)}"
+                )
         if sums:
             found.append("determined are the sums of " + "; ".join(sums))
         return found
