@@ -167,7 +167,9 @@ def _smallest(a: Complex, b: Complex, limit: Real) -> tuple[Complex, float]:
     else:
         fix = least_squares(a, b)
         largest = float(fix.residual_max)
-        if not largest > 64 * EPS * max(float(np.abs(b).max()), float((np.abs(a) @ np.abs(fix.corrections)).max())):
+        if not largest > 64 * EPS * max(
+            float(np.abs(b).max()), float((np.abs(a) @ np.abs(fix.corrections)).max())
+        ):
             return fix.corrections, 0.0
     space = _Space(a, b, limit)
     q, c = space.residuals
@@ -442,7 +444,9 @@ def _polish(
             gradient[: 2 * p] += square.T @ (square @ x[: 2 * p] + at)
         slack = radius - np.abs(r)
         return max(
-            float(np.abs(gradient).max()), float(np.maximum(-slack, 0).max()), float(np.abs(nu * slack * radius).max())
+            float(np.abs(gradient).max()),
+            float(np.maximum(-slack, 0).max()),
+            float(np.abs(nu * slack * radius).max()),
         )
 
     slack = s[:, 0] - np.hypot(s[:, 1], s[:, 2])
