@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -93,8 +94,33 @@ class Readings:
         alpha = influence_coefficients(runs[:, 0], runs[:, 1:], self.trial_masses)
         return least_squares(alpha, runs[:, 0] - shift, weights, ridge=ridge).corrections
 
-    def covariance(self, corrections: Complex, weights: ArrayLike | None = None, ridge: float = 0.0) -> Real:
+    def problem_samples(self, n: int = 200, seed: int = 0) -> Iterator[tuple[Complex, Complex]]:
+        """Draw coefficients (s, p) and vibration (s,) from readings with their errors."""
+        shift = 0 if self.runout is None else self.runout
+        for runs in self._draw(n, seed):
+            if self.trials is None or self.trial_masses is None:
+                yield self.coefficients, runs[0] - shift
+            else:
+                yield influence_coefficients(runs[0], runs[1:], self.trial_masses), runs[0] - shift
+
+    def covariance(
+        self,
+        corrections: Complex,
+        weights: ArrayLike | None = None,
+        ridge: float = 0.0,
+        *,
+        along: Complex | None = None,
+    ) -> Real:
         """Propagate the reading errors linearly to least-squares corrections.
+
+        Parameters
+        ----------
+        corrections
+            The corrections from the initial state, (p,).
+        weights, ridge
+            As they were found with.
+        along
+            The directions, (p,), where they are not the corrections' own.
 
         Returns
         -------
@@ -140,9 +166,9 @@ class Readings:
         back = np.where(np.abs(w) > 0, w.conj() / size, 1.0)[
             :, None, None
         ]  # turns each correction onto the real axis
-        along = back * (linear * v + antilinear * v.conj()) * self.amplitude_error
+        radial = back * (linear * v + antilinear * v.conj()) * self.amplitude_error
         across = back * 1j * (linear * v - antilinear * v.conj()) * self.phase_error
-        parts = np.stack([np.stack([x.real, x.imag]) for x in (along, across)])  # (2, 2, p, 1 + r, s)
+        parts = np.stack([np.stack([x.real, x.imag]) for x in (radial, across)])  # (2, 2, p, 1 + r, s)
         return np.asarray(np.einsum("eaprs,ebprs->pab", parts, parts))
 
 

@@ -1,0 +1,580 @@
+"""From measured runs to corrections, in every form they are shown in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing import (
+    AmplitudeFit,
+    Balance,
+    DependentPlanes,
+    DependentTrials,
+    Infeasible,
+    Readings,
+    influence_coefficients,
+    influence_from_amplitudes,
+    least_squares,
+    minimax,
+    plane_significance,
+    spread,
+    trial_effect,
+)
+from cli.errors import DataError
+from cli.field_runs import Group, Runs, Stored
+from cli.options import bad
+from cli.render import Shown
+from cli.units import degrees, from_si
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+NEARLY = 0.1  # a plane whose effect others bring about but for this share is said to be nearly dependent
+UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the options ask for."""
+
+    objective: str = "least-squares"
+    max_mass: dict[str, float] = field(default_factory=dict)
+    """Limit of each plane, SI; the key "" is for all."""
+    max_residual: float | None = None
+    """In the table's amplitude unit."""
+    from_here: bool = False
+    runout: dict[str, complex] = field(default_factory=dict)
+    reading_error: tuple[float, float] | None = None
+    """Relative, rad."""
+    monte_carlo: int = 0
+    four_run: bool = False
+    ridge: float = 0.0
+    tolerance: tuple[str | None, float] | None = None
+    radius: float | None = None
+    conventions: str = ""
+
+
+@dataclass
+class Solved:
+    """A group's result."""
+
+    group: Group
+    planes: list[str]
+    alpha: Complex
+    initial: Complex
+    """(g, s), run-out off."""
+    corrections: Complex
+    """(g, p), as given out (from here, where that was asked for)."""
+    standing: Complex
+    """(g, p): what of the trial masses is on the rotor where the corrections start from."""
+    residual: Complex
+    condition: Real
+    bound: Real | None
+    covariance: Real | None = None
+    residual_95: Real | None = None
+    fits: list[AmplitudeFit] = field(default_factory=list)
+
+    @property
+    def total(self) -> Complex:
+        """What is added to the rotor in its initial state, (g, p)."""
+        return self.corrections + self.standing
+
+
+class Field:
+    """The corrections of every rotor of a table of runs."""
+
+    def __init__(self, runs: Runs, wanted: Wanted, stored: Stored | None = None) -> None:
+        self.runs, self.wanted, self.stored = runs, wanted, stored
+        self.warnings: list[str] = []
+        self.several = len(runs.rotors) > 1
+        self.solved = [self._solve(group) for group in runs.groups]
+        self.place: list[tuple[int, int]] = [(0, 0)] * len(runs.rotors)
+        for k, group in enumerate(runs.groups):
+            for i, rotor in enumerate(group.rotors.tolist()):
+                self.place[rotor] = (k, i)
+        for solved in self.solved:
+            self._remark(solved)
+        limit = 25
+        if len(self.warnings) > limit:
+            more = len(self.warnings) - limit
+            self.warnings = [*self.warnings[:limit], f"… and {more} further warnings"]
+
+    # -- solving -------------------------------------------------------------------------------------------
+
+    def _of(self, group: Group, i: int = 0) -> str:
+        return f"rotor {self.runs.rotors[group.rotors[i]]}: " if self.several else ""
+
+    def _solve(self, group: Group) -> Solved:
+        wanted = self.wanted
+        runout = np.array([wanted.runout.get(channel.sensor, 0) for channel in group.channels], dtype=complex)
+        initial = group.initial - runout
+        planes, fits = group.planes, []
+        if self.stored is not None:
+            matrices = []
+            for rotor in group.rotors:
+                planes, matrix = self.stored.matrix(self.runs.rotors[rotor], group.channels, self.runs)
+                matrices.append(matrix)
+                if "rotor" not in self.stored.table.texts:
+                    break
+            alpha = np.broadcast_to(np.stack(matrices), (len(group.rotors), *matrices[0].shape))
+        elif wanted.four_run:
+            fits = self._amplitudes(group)
+            alpha = np.stack([fit.influence for fit in fits])[..., None]
+        else:
+            try:
+                alpha = influence_coefficients(group.initial, group.runs, group.on)
+            except DependentTrials as error:
+                raise DataError(self._of(group, *error.case) + self._trials_say(group, error)) from None
+        standing = np.zeros((len(group.rotors), len(planes)), dtype=complex)
+        if wanted.from_here and self.stored is None:
+            standing = group.kept
+            if not standing.any():
+                self._warn(
+                    "--from-here: no trial mass is kept on the rotor, so that it stands as in the initial run"
+                )
+        here = initial + np.matvec(alpha, standing) if standing.any() else initial
+        limit = self._limits(planes)
+        corrections, bounds, condition = self._corrections(group, planes, alpha, here, limit)
+        residual = here + np.matvec(alpha, corrections)
+        # below the rounding of its terms a residual is zero
+        noise = np.abs(initial) + np.matvec(np.abs(alpha), np.abs(corrections) + np.abs(standing))
+        residual = np.where(np.abs(residual) > 1e-15 * noise, residual, 0)
+        solved = Solved(
+            group, planes, alpha, initial, corrections, standing, residual, condition, bounds, fits=fits
+        )
+        if wanted.reading_error is not None:
+            self._confidence(solved, runout)
+        return solved
+
+    def _limits(self, planes: list[str]) -> Real | None:
+        given = self.wanted.max_mass
+        if not given:
+            return None
+        for name in given:
+            if name and name not in planes:
+                raise bad("--max-mass", f"no plane {name}: expected one of {', '.join(planes)}")
+        limit = np.array([given.get(plane, given.get("", np.inf)) for plane in planes])
+        return limit if np.isfinite(limit).any() else None
+
+    def _corrections(
+        self, group: Group, planes: list[str], alpha: Complex, here: Complex, limit: Real | None
+    ) -> tuple[Complex, Real | None, Real]:
+        """Return the corrections, for minimax the proven bounds, and the condition numbers."""
+        wanted, weights = self.wanted, group.weights
+        ceiling = wanted.max_residual
+        if wanted.objective == "least-squares" and limit is None and ceiling is None:
+            try:
+                fix = least_squares(alpha, here, weights, ridge=wanted.ridge)
+            except DependentPlanes as error:
+                raise DataError(self._of(group, *error.case[:1]) + self._planes_say(planes, error)) from None
+            return fix.corrections, None, fix.condition_number
+        fixes: list[Balance] = []
+        for i in range(len(here)):
+            w = None if weights is None else weights[i]
+            try:
+                if wanted.objective == "minimax":
+                    fix = minimax(alpha[i], here[i], limit, weights=w)
+                    if ceiling is not None and float(fix.residual_max) > ceiling * (1 + 1e-9):
+                        raise Infeasible(float(minimax(alpha[i], here[i], limit).residual_max))
+                else:
+                    fix = least_squares(alpha[i], here[i], w, max_mass=limit, max_residual=ceiling)
+            except DependentPlanes as error:
+                raise DataError(self._of(group, i) + self._planes_say(planes, error)) from None
+            except Infeasible as error:
+                unit = self.runs.amplitude_unit
+                with_limits = " with the limits of the masses" if limit is not None else ""
+                raise DataError(
+                    f"{self._of(group, i)}no corrections{with_limits} leave every residual within {ceiling:g} {unit}: "
+                    f"infeasible; the smallest limit that can be met is {error.smallest:.6g} {unit}"
+                ) from None
+            fixes.append(fix)
+        bounds = [fix.bound for fix in fixes]
+        return (
+            np.stack([fix.corrections for fix in fixes]),
+            None if None in bounds else np.array(bounds, dtype=float),
+            np.array([fix.condition_number for fix in fixes]),
+        )
+
+    def _amplitudes(self, group: Group) -> list[AmplitudeFit]:
+        """The four-run method, rotor by rotor."""
+        if len(group.planes) != 1:
+            raise DataError(
+                f"{self._of(group)}the four-run method is for one plane, found {', '.join(group.planes)}: with more planes "
+                "the phase must be measured"
+            )
+        fits = []
+        for i in range(len(group.rotors)):
+            try:
+                fit = influence_from_amplitudes(group.initial[i].real, group.runs[i].real, group.on[i, :, 0])
+            except ValueError as error:
+                raise DataError(f"{self.runs.table.file}: {self._of(group, i)}{error}") from None
+            fits.append(fit)
+            unit = self.runs.amplitude_unit
+            for channel, misfit, first in zip(group.channels, fit.misfit, group.initial[i].real, strict=True):
+                text = (
+                    f"{self._of(group, i)}sensor {channel}: the readings are inconsistent: no influence coefficient fits them "
+                    f"better than {misfit:.3g} {unit} (r.m.s.), {misfit / first:.0%} of the initial reading"
+                )
+                if misfit > 0.25 * first:
+                    raise DataError(
+                        f"{self.runs.table.file}: {text}: expected four readings that fit one plane's effect"
+                    )
+                if misfit > 0.05 * first:
+                    self._warn(text)
+        return fits
+
+    def _confidence(self, solved: Solved, runout: Complex) -> None:
+        """Propagate the reading errors, rotor by rotor."""
+        assert self.wanted.reading_error is not None
+        group, wanted = solved.group, self.wanted
+        covariances, residuals = [], []
+        limited = wanted.objective == "minimax" or wanted.max_mass or wanted.max_residual is not None
+        draws = wanted.monte_carlo or 4000
+        for i in range(len(group.rotors)):
+            readings = Readings(
+                group.initial[i],
+                *wanted.reading_error,
+                trials=None if self.stored is not None else group.runs[i],
+                trial_masses=None if self.stored is not None else group.on[i],
+                influence=solved.alpha[i],
+                runout=runout,
+            )
+            w = None if group.weights is None else group.weights[i]
+            total = solved.total[i]
+            try:
+                if limited:
+                    samples = self._limited_samples(solved, readings, w)
+                    covariances.append(spread(samples, solved.corrections[i]))
+                elif wanted.monte_carlo:
+                    samples = readings.correction_samples(w, wanted.ridge, draws) - solved.standing[i]
+                    covariances.append(spread(samples, solved.corrections[i]))
+                else:
+                    covariances.append(
+                        readings.covariance(total, w, wanted.ridge, along=solved.corrections[i])
+                    )
+            except ValueError:
+                covariances.append(np.full((len(solved.planes), 2, 2), np.nan))
+            left = np.abs(readings.residual_samples(total, draws)).max(axis=1)
+            residuals.append(np.quantile(left, 0.95))
+        solved.covariance, solved.residual_95 = np.stack(covariances), np.array(residuals)
+
+    def _limited_samples(self, solved: Solved, readings: Readings, weights: Real | None) -> Complex:
+        """Draw corrections under limits or of the minimax problem: no formula, each draw is solved."""
+        limit, wanted = self._limits(solved.planes), self.wanted
+        samples = []
+        for alpha, v in readings.problem_samples(min(wanted.monte_carlo or 200, 1000)):
+            standing = solved.standing[0]
+            here = v + alpha @ standing
+            if wanted.objective == "minimax":
+                samples.append(minimax(alpha, here, limit, weights=weights).corrections)
+            else:
+                samples.append(least_squares(alpha, here, weights, max_mass=limit).corrections)
+        return np.stack(samples)
+
+    # -- what is to be said --------------------------------------------------------------------------------
+
+    def _warn(self, text: str) -> None:
+        if text not in self.warnings:
+            self.warnings.append(text)
+
+    def _combination(self, names: list[str], combination: Complex) -> str:
+        terms = []
+        for name, share in zip(names, combination, strict=True):
+            if abs(share) > 1e-6:
+                terms.append(f"{abs(share):.3g} at {float(degrees(share)):.0f}° in {name}")
+        return ", ".join(terms)
+
+    def _planes_say(self, planes: list[str], error: DependentPlanes) -> str:
+        told = [name for name, share in zip(planes, error.combination, strict=True) if abs(share) > 1e-6]
+        if len(told) == 1:
+            return (
+                f"plane {told[0]} has no effect on any reading: its correction cannot be found; expected sensors that "
+                "respond to it, or the plane left out"
+            )
+        return (
+            f"the readings cannot tell the planes {' and '.join(told)} apart (singular): masses in the ratio "
+            f"{self._combination(planes, error.combination)} leave no trace; leave one of these planes out, or damp with --ridge"
+        )
+
+    def _trials_say(self, group: Group, error: DependentTrials) -> str:
+        told = [
+            name for name, share in zip(group.planes, error.combination, strict=True) if abs(share) > 1e-6
+        ]
+        runs = len(group.trials)
+        if runs < len(group.planes):
+            return (
+                f"{len(group.planes)} planes ({', '.join(group.planes)}) and {runs} trial run{'s' * (runs != 1)}: expected a "
+                "trial run for every plane"
+            )
+        return (
+            f"the trial runs do not tell the planes {' and '.join(told)} apart: expected each plane tried by itself, "
+            "or in different proportions"
+        )
+
+    def _remark(self, solved: Solved) -> None:
+        group, planes = solved.group, solved.planes
+        for i in np.flatnonzero(~np.abs(solved.initial).any(axis=1))[:5]:
+            self._warn(f"{self._of(group, int(i))}no vibration in the initial run: nothing to correct")
+        for i in np.flatnonzero(~(solved.condition < 5))[:200]:
+            weights = None if group.weights is None else group.weights[i]
+            share = plane_significance(solved.alpha[i], weights)
+            weak = [
+                f"{plane} ({s:.2g})"
+                for plane, s in zip(planes, share, strict=True)
+                if s < NEARLY and len(planes) > 1
+            ]
+            if weak:
+                self._warn(
+                    f"{self._of(group, int(i))}planes nearly dependent: others bring about what these do but for the share in "
+                    f"brackets: {', '.join(weak)}; condition number {solved.condition[i]:.3g}, errors grow by as much: leave "
+                    "one out, or damp with --ridge"
+                )
+        if not self.wanted.four_run:
+            self._thirty(group)
+        for i, fit in enumerate(solved.fits):
+            for s, (first, rival) in enumerate(zip(group.initial[i], fit.other, strict=True)):
+                if rival == rival:
+                    other = -first / rival
+                    self._warn(
+                        f"{self._of(group, i)}sensor {group.channels[s]}: two corrections fit the amplitudes; the other one is "
+                        f"{self._amount(abs(other)):.6g} {self._unit} at {float(degrees(other)):.2f}°: a further trial run at "
+                        "another angle decides"
+                    )
+        if self.wanted.tolerance is not None:
+            for i in range(min(len(group.rotors), 1000)):
+                if all(before <= share for _, share, before in self._verdict(solved, i)):
+                    self._warn(
+                        f"{self._of(group, i)}already within the permissible residual unbalance in every plane: stop, no correction "
+                        "is needed"
+                    )
+        if self.wanted.max_residual is not None:
+            fine = (np.abs(solved.initial) <= self.wanted.max_residual).all(axis=1)
+            for i in np.flatnonzero(fine)[:5]:
+                self._warn(f"{self._of(group, int(i))}the initial vibration is within --max-residual already")
+
+    def _thirty(self, group: Group) -> None:
+        """The 30/30 rule."""
+        for j, trial in enumerate(group.trials):
+            if not trial.masses:
+                continue
+            before = group.initial if group.base[j] < 0 else group.runs[:, group.base[j]]
+            effect = trial_effect(before, group.runs[:, j])
+            little = ~((effect.amplitude >= 0.3) | (effect.phase >= np.radians(30))).any(axis=1)
+            for i in np.flatnonzero(little)[:5]:
+                most = np.max(effect.amplitude[i])
+                turn = np.degrees(np.max(effect.phase[i]))
+                self._warn(
+                    f"{self._of(group, int(i))}run {trial.run}: the trial mass changed the vibration by {most:.0%} and {turn:.0f}° "
+                    "at most: less than 30 % and 30°, its coefficients may be noise; expected a larger trial mass"
+                )
+
+    def _verdict(self, solved: Solved, i: int) -> list[tuple[str, float, float]]:
+        """For each plane: name, permissible and initial unbalance, kg·m."""
+        assert self.wanted.tolerance is not None
+        share = self.wanted.tolerance[1] / len(solved.planes)
+        size = np.abs(solved.total[i]) * (1.0 if self.runs.per == "unbalance" else self.wanted.radius or 1.0)
+        return [(plane, share, float(u)) for plane, u in zip(solved.planes, size, strict=True)]
+
+    # -- shown ---------------------------------------------------------------------------------------------
+
+    @property
+    def _unit(self) -> str:
+        return self.runs.mass_unit.replace("_", "·")
+
+    def _amount(self, value: Any) -> Any:
+        return from_si(value, self.runs.per, self.runs.mass_unit)
+
+    def shown(self) -> Shown:
+        """Return the result in every form."""
+        from cli.field_text import afterword, notes
+
+        return Shown(
+            document=self.document,
+            columns=self.columns,
+            keys=("rotor", "plane"),
+            notes=lambda: notes(self),
+            afterword=lambda: afterword(self),
+            figure=self.figure,
+            warnings=[*self.runs.warnings, *self.warnings],
+        )
+
+    def figure(self) -> Any:
+        """Draw the first rotors."""
+        from cli.plots.field import draw
+
+        return draw(self, range(min(len(self.runs.rotors), 3)))
+
+    def uncertainty(self, solved: Solved) -> tuple[Real, Real] | None:
+        """Return the standard deviations of size (SI) and angle (degrees; NaN where it is not known), (g, p) each."""
+        if solved.covariance is None:
+            return None
+        size = np.abs(solved.corrections)
+        along = np.sqrt(solved.covariance[..., 0, 0])
+        across = np.sqrt(solved.covariance[..., 1, 1])
+        safe = np.where(size > 0, size, 1.0)
+        angle = np.where(size > 0, np.degrees(across / safe), np.nan)
+        return along, np.where(angle <= UNKNOWN_ANGLE, angle, np.nan)
+
+    @cached_property
+    def columns(self) -> dict[str, Any]:
+        """The CSV: one row per rotor and plane."""
+        order = []
+        for k, solved in enumerate(self.solved):
+            g, p = solved.corrections.shape
+            order.append(
+                np.stack(
+                    [
+                        np.repeat(solved.group.rotors, p),
+                        np.tile(np.arange(p), g),
+                        np.full(g * p, k),
+                    ]
+                )
+            )
+        keys = np.concatenate(order, axis=1)
+        sort = np.lexsort((keys[1], keys[0]))
+        flat = np.concatenate([solved.corrections.ravel() for solved in self.solved])[sort]
+        rotor, plane, group = (row[sort].tolist() for row in keys)
+        rotors = self.runs.rotors
+        columns: dict[str, Any] = {
+            "rotor": [rotors[r] for r in rotor],
+            "plane": [self.solved[k].planes[p] for k, p in zip(group, plane, strict=True)],
+            f"{self.runs.per}_{self.runs.mass_unit}": self._amount(np.abs(flat)),
+            "angle_deg": degrees(flat),
+        }
+        if self.wanted.reading_error is not None:
+            pairs = [self.uncertainty(solved) for solved in self.solved]
+            along = np.concatenate([pair[0].ravel() for pair in pairs if pair is not None])[sort]
+            angle = np.concatenate([pair[1].ravel() for pair in pairs if pair is not None])[sort]
+            columns[f"{self.runs.per}_uncertainty_{self.runs.mass_unit}"] = self._amount(along)
+            columns["angle_uncertainty_deg"] = angle
+        return columns
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        documents = []
+        suffix = "kg" if self.runs.per == "mass" else "kg_m"
+        key = self.runs.per
+        for rotor, (k, i) in enumerate(self.place):
+            solved = self.solved[k]
+            group = solved.group
+            spreads = self.uncertainty(solved)
+            corrections: list[dict[str, Any]] = []
+            for p, plane in enumerate(solved.planes):
+                w = solved.corrections[i, p]
+                entry = {"plane": plane, f"{key}_{suffix}": abs(w), "angle_deg": float(degrees(w))}
+                entry[f"{key}_uncertainty_{suffix}"] = None if spreads is None else _number(spreads[0][i, p])
+                entry["angle_uncertainty_deg"] = None if spreads is None else _number(spreads[1][i, p])
+                corrections.append(entry)
+            residual = solved.residual[i]
+            size = np.abs(residual)
+            largest = float(size.max())
+            document: dict[str, Any] = {
+                "rotor": self.runs.rotors[rotor],
+                "influence": [
+                    {
+                        "sensor": channel.sensor,
+                        "speed_rad_s": channel.speed,
+                        "plane": plane,
+                        f"magnitude_per_{suffix}": abs(solved.alpha[i, s, p]),
+                        "phase_deg": float(degrees(solved.alpha[i, s, p])),
+                    }
+                    for s, channel in enumerate(group.channels)
+                    for p, plane in enumerate(solved.planes)
+                ],
+                "condition_number": _number(solved.condition[i]),
+                "corrections": corrections,
+                "residual": [
+                    {
+                        "sensor": channel.sensor,
+                        "speed_rad_s": channel.speed,
+                        "amplitude": abs(residual[s]),
+                        "phase_deg": None if self.wanted.four_run else float(degrees(residual[s])),
+                    }
+                    for s, channel in enumerate(group.channels)
+                ],
+                "residual_rms": largest * float(np.sqrt(np.square(size / largest).mean()))
+                if largest
+                else 0.0,
+                "residual_max": largest,
+                "initial_max": float(np.abs(solved.initial[i]).max()),
+                "objective": self.wanted.objective,
+            }
+            if solved.bound is not None:
+                document["residual_bound"] = float(solved.bound[i])
+            if solved.residual_95 is not None:
+                document["residual_max_95"] = float(solved.residual_95[i])
+            if solved.fits:
+                document["misfit"] = [
+                    {"sensor": channel.sensor, "amplitude": float(misfit)}
+                    for channel, misfit in zip(group.channels, solved.fits[i].misfit, strict=True)
+                ]
+                others = [
+                    -v / a for v, a in zip(group.initial[i], solved.fits[i].other, strict=True) if a == a
+                ]
+                document["alternatives"] = [
+                    {"plane": solved.planes[0], f"{key}_{suffix}": abs(w), "angle_deg": float(degrees(w))}
+                    for w in others
+                ]
+            if self.wanted.tolerance is not None:
+                document["tolerance"] = {
+                    "grade": self.wanted.tolerance[0],
+                    "permissible_kg_m": self.wanted.tolerance[1],
+                    "planes": [
+                        {
+                            "plane": plane,
+                            "permissible_kg_m": share,
+                            "initial_kg_m": before,
+                            "within": before <= share,
+                        }
+                        for plane, share, before in self._verdict(solved, i)
+                    ],
+                }
+            documents.append(document)
+        return {
+            "correction": "add",
+            "state": "as it stands" if self.wanted.from_here else "initial",
+            "convention": self.wanted.conventions,
+            "rotors": documents,
+            "amplitude_unit": self.runs.amplitude_unit,
+        }
+
+    def coefficients(self) -> dict[str, Any]:
+        """The columns of --save-influence."""
+        columns: dict[str, list[Any]] = {}
+        per = self.runs.mass_unit
+        from cli.units import to_si
+
+        for rotor, (k, i) in enumerate(self.place):
+            solved = self.solved[k]
+            for s, channel in enumerate(solved.group.channels):
+                for p, plane in enumerate(solved.planes):
+                    a = solved.alpha[i, s, p]
+                    row: dict[str, Any] = {"rotor": self.runs.rotors[rotor]} if self.several else {}
+                    speed = None
+                    if channel.speed is not None and channel.speed_given is not None:
+                        speed = (
+                            channel.speed_given
+                            if self.runs.speed_unit == "rpm"
+                            else from_si(channel.speed, "speed", "rpm")
+                        )
+                    row |= {
+                        "sensor": channel.sensor,
+                        "speed_rpm": speed,
+                        "plane": plane,
+                        f"magnitude_per_{per}": float(to_si(abs(a), self.runs.per, per)),
+                        "phase_deg": float(degrees(a)),
+                        "amplitude_unit": self.runs.amplitude_unit,
+                    }
+                    for name, value in row.items():
+                        columns.setdefault(name, []).append(value)
+        return columns
+
+
+def _number(value: Any) -> float | None:
+    """A finite number, or None."""
+    number = float(value)
+    return number if np.isfinite(number) else None
