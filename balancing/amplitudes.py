@@ -66,7 +66,7 @@ def influence_from_amplitudes(initial: ArrayLike, trials: ArrayLike, trial_masse
     """
     o = np.atleast_1d(np.asarray(initial, dtype=float))
     reading = np.asarray(trials, dtype=float)
-    t = np.asarray(trial_masses, dtype=complex)
+    t: Complex = np.asarray(trial_masses, dtype=complex)
     if reading.ndim != 2 or reading.shape != (len(t), len(o)):
         raise ValueError(
             f"shapes do not fit: initial {o.shape}, trials {reading.shape}, trial_masses {t.shape}"
@@ -80,7 +80,8 @@ def influence_from_amplitudes(initial: ArrayLike, trials: ArrayLike, trial_masse
     if np.ptp(t.real) + np.ptp(t.imag) <= 1e-9 * np.abs(t).max():
         raise ValueError("the trial masses are all alike: expected different angles")
     unit = float(np.abs(t).max())
-    found = [_fit(read / first, t / unit) for first, read in zip(o, reading.T, strict=True)]
+    scaled: Complex = np.asarray(t / unit, dtype=complex)
+    found = [_fit(read / first, scaled) for first, read in zip(o, reading.T, strict=True)]
     return AmplitudeFit(
         np.array([fit[0] for fit in found]) * o / unit,
         np.array([fit[1] for fit in found]) * o,

@@ -68,7 +68,7 @@ class Balance:
     @cached_property
     def residual(self) -> Complex:
         """The predicted vibration with the corrections on, (..., s)."""
-        return self.initial + np.matvec(self.influence, self.corrections)
+        return np.asarray(self.initial + np.matvec(self.influence, self.corrections))
 
     @property
     def residual_rms(self) -> Real:
@@ -243,7 +243,7 @@ def least_squares(
     q, r = np.linalg.qr(scaled)
     sigma = _require_independent(r, scale, readings, planes, "readings", DependentPlanes)
     x = np.linalg.solve(r, -(_adjoint(q) @ b[..., None]))[..., 0]
-    fix = Balance(alpha, v, x * scale + 0.0, w)
+    fix = Balance(alpha, v, np.asarray(x * scale + 0.0, dtype=complex), w)
     if not ridge:
         fix.__dict__["condition_number"] = sigma[..., 0] / sigma[..., -1]
     return fix

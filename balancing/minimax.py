@@ -144,7 +144,7 @@ def limited_least_squares(
         offset,
     )
     x, _ = _solve(problem)
-    return space.masses(x, b, start)
+    return space.masses(x)
 
 
 def _limits(max_mass: ArrayLike | None, planes: int) -> Real:
@@ -182,7 +182,7 @@ def _smallest(a: Complex, b: Complex, limit: Real) -> tuple[Complex, float]:
         np.concatenate([np.ones(readings), np.zeros(len(caps[2]))]),
     )
     x, force = _solve(problem)
-    w = space.masses(x, b)
+    w = space.masses(x)
     # the proof: y along the residuals, made orthogonal to the columns where no limit can take up the rest
     y = force[:readings]
     total = float(np.abs(y).sum())
@@ -236,12 +236,14 @@ class _Space:
 
     def within(self, rows: Complex) -> Complex:
         """Return rows over w as rows over z."""
-        inside: Complex = np.linalg.solve(self.r.T, (rows * self.scale).T).T
-        return inside
+        return np.asarray(np.linalg.solve(self.r.T, (rows * self.scale).T).T, dtype=complex)
 
-    def masses(self, z: Real, b: Complex, instead: Complex | None = None) -> Complex:
+    def masses(self, z: Real) -> Complex:
+        """Return w of (Re z, Im z, ...)."""
         p = len(self.scale)
-        w: Complex = self.start + self.scale * np.linalg.solve(self.r, z[:p] + 1j * z[p : 2 * p])
+        w = np.asarray(
+            self.start + self.scale * np.linalg.solve(self.r, z[:p] + 1j * z[p : 2 * p]), dtype=complex
+        )
         if len(self.limited):  # rounding must not carry a mass over its limit
             over = np.abs(w) > self.limit
             w = np.where(over, w * (self.limit / np.where(over, np.abs(w), 1.0)), w)
@@ -496,7 +498,7 @@ def _polish(
 def _consistent(system: Real, rhs: Real) -> Real:
     """Solve a symmetric system, which is singular (but consistent) where the optimum is not unique."""
     try:
-        u: Real = np.linalg.solve(system, rhs)
+        u = np.asarray(np.linalg.solve(system, rhs))
         if np.isfinite(u).all() and np.abs(system @ u - rhs).max() <= 1e-9 * max(np.abs(rhs).max(), EPS):
             return u
     except np.linalg.LinAlgError:

@@ -307,7 +307,8 @@ def drill_depth(
     slope = np.tan(point_angle / 2)
     point = d / 2 / slope
     cone = area * point / 3
-    return np.where(volume >= cone, (volume - cone) / area + point, np.cbrt(3 * volume / (np.pi * slope**2)))
+    shallow = np.cbrt(3 * volume / (np.pi * slope**2))
+    return np.asarray(np.where(volume >= cone, (volume - cone) / area + point, shallow))
 
 
 def transfer(unbalance: ArrayLike, z: ArrayLike, planes: ArrayLike) -> Complex:

@@ -230,6 +230,7 @@ class Field:
     def _confidence(self, solved: Solved, runout: Complex) -> None:
         """Propagate the reading errors, rotor by rotor."""
         assert self.wanted.reading_error is not None
+        relative, angle = self.wanted.reading_error
         group, wanted = solved.group, self.wanted
         covariances, residuals = [], []
         limited = wanted.objective == "minimax" or wanted.max_mass or wanted.max_residual is not None
@@ -237,7 +238,8 @@ class Field:
         for i in range(len(group.rotors)):
             readings = Readings(
                 group.initial[i],
-                *wanted.reading_error,
+                relative,
+                angle,
                 trials=None if self.stored is not None else group.runs[i],
                 trial_masses=None if self.stored is not None else group.on[i],
                 influence=solved.alpha[i],

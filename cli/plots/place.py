@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ def draw(
     from matplotlib.lines import Line2D
 
     figure = Figure(figsize=(5.6, 6.2), layout="constrained")
-    axes = figure.subplots(subplot_kw={"projection": "polar"})
+    axes: Any = figure.subplots(subplot_kw={"projection": "polar"})
     scale = max(abs(target), abs(total), *masses) or 1.0
     rim = 1.3 * scale
     axes.set_rlim(0, 1.55 * scale)
