@@ -249,7 +249,7 @@ class _Space:
             w = np.where(over, w * (self.limit / np.where(over, np.abs(w), 1.0)), w)
             tight = over & (np.abs(w) > self.limit)
             w = np.where(tight, w * (1 - EPS), w)
-        return w + 0.0
+        return np.asarray(w + 0.0, dtype=complex)
 
     def bound(self, y: Complex) -> float:
         """Re yᴴb - Σ m_p |(αᴴy)_p|: with limits any y with Σ|y| = 1 proves as much (unlimited planes: αᴴy = 0)."""
