@@ -144,7 +144,22 @@ def limited_least_squares(
         offset,
     )
     x, _ = _solve(problem)
-    return space.masses(x)
+    w = space.masses(x)
+    if start is None:
+        return w
+
+    def beyond(share: float) -> bool:
+        mixed = w + share * (start - w)
+        return bool((np.abs(v[capped] + alpha[capped] @ mixed) > ceiling[capped]).any())
+
+    # next to infeasible a constraint may be missed by a little: towards the minimax corrections all hold
+    low, high = 0.0, 1.0
+    if not beyond(0.0):
+        return w
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if beyond(middle) else (low, middle)
+    return np.asarray(w + high * (start - w), dtype=complex)
 
 
 def _limits(max_mass: ArrayLike | None, planes: int) -> Real:
@@ -194,7 +209,7 @@ def _smallest(a: Complex, b: Complex, limit: Real) -> tuple[Complex, float]:
             y = y - q @ (q.conj().T @ y)
             bound = float(np.vdot(y, c).real) / float(np.abs(y).sum()) * space.size
         else:
-            bound = space.bound(y)
+            bound = space.bound(y, w)
     return w, max(bound, 0.0)
 
 
@@ -251,16 +266,23 @@ class _Space:
             w = np.where(tight, w * (1 - EPS), w)
         return np.asarray(w + 0.0, dtype=complex)
 
-    def bound(self, y: Complex) -> float:
-        """Re yᴴb - Σ m_p |(αᴴy)_p|: with limits any y with Σ|y| = 1 proves as much (unlimited planes: αᴴy = 0)."""
-        free = np.flatnonzero(~np.isfinite(self.limit))
-        if len(free):
-            q, _ = np.linalg.qr(self.a[:, free])
+    def bound(self, y: Complex, w: Complex) -> float:
+        """Re yᴴb - Σ m_p |(αᴴy)_p|: with limits any y with Σ|y| = 1 proves as much (unlimited planes: αᴴy = 0).
+
+        Planes that do not touch their limit pull nothing at the optimum; y is made orthogonal to them.
+        """
+        best = 0.0
+        for loose in (~np.isfinite(self.limit), np.abs(w) < (1 - 1e-9) * self.limit):
+            u, sigma, _ = np.linalg.svd(self.a[:, loose], full_matrices=False)
+            u = u[:, sigma > 1e-13 * sigma.max(initial=0.0)]
             for _ in range(2):
-                y = y - q @ (q.conj().T @ y)
-            y = y / np.abs(y).sum()
-        pull = np.abs(self.a[:, self.limited].conj().T @ y)
-        return float(np.vdot(y, self.b).real - pull @ self.limit[self.limited])
+                y = y - u @ (u.conj().T @ y)
+            total = float(np.abs(y).sum())
+            if total > 0:
+                y = y / total
+                pull = np.abs(self.a.conj().T @ y)[self.limited]
+                best = max(best, float(np.vdot(y, self.b).real - pull @ self.limit[self.limited]))
+        return best
 
 
 @dataclass
@@ -467,7 +489,7 @@ def _polish(
         gradient[:, : 2 * p] = re * ra.real[:, None] + im * ra.imag[:, None]
         weight = np.sqrt(np.maximum(trial_nu[active], 0.0))[:, None]
         rows = np.concatenate([weight * re, weight * im])
-        hessian = np.zeros((n, n))
+        hessian = np.zeros((n, n))  # of orthonormal coordinates: nothing of κ(α) is squared in it
         hessian[: 2 * p, : 2 * p] = rows.T @ rows
         slope = np.zeros(n)
         if with_t:
@@ -480,11 +502,11 @@ def _polish(
         system = np.zeros((n + m, n + m))
         system[:n, :n], system[n:, :n], system[:n, n:] = hessian, gradient, gradient.T
         size = np.abs(ra)
-        rhs = -np.concatenate([slope, (size - va) * (size + va) / 2])
-        solution = _consistent(system, rhs)
+        rhs = -np.concatenate([slope + gradient.T @ trial_nu[active], (size - va) * (size + va) / 2])
+        solution = _consistent(system, rhs, 10 * max(float(np.abs(trial_nu).max()), 1.0))
         trial_x = trial_x + solution[:n]
-        trial_nu = np.zeros(k)
-        trial_nu[active] = solution[n:]
+        trial_nu = trial_nu.copy()
+        trial_nu[active] += solution[n:]
         if not np.isfinite(solution).all() or trial_nu.min() < -1e-9 * np.abs(trial_nu).max():
             break
         quality = judge(trial_x, trial_nu)
@@ -495,13 +517,13 @@ def _polish(
     return x, nu * values(x)[0]
 
 
-def _consistent(system: Real, rhs: Real) -> Real:
-    """Solve a symmetric system, which is singular (but consistent) where the optimum is not unique."""
+def _consistent(system: Real, rhs: Real, largest: float) -> Real:
+    """Solve a symmetric system; of a singular one (the optimum is not unique) the solution of least norm."""
     try:
         u = np.asarray(np.linalg.solve(system, rhs))
-        if np.isfinite(u).all() and np.abs(system @ u - rhs).max() <= 1e-9 * max(np.abs(rhs).max(), EPS):
+        if np.isfinite(u).all() and np.abs(u).max() <= largest:
             return u
     except np.linalg.LinAlgError:
         pass
-    found: tuple[Any, ...] = np.linalg.lstsq(system, rhs, rcond=1e-12)
+    found: tuple[Any, ...] = np.linalg.lstsq(system, rhs, rcond=1e-11)
     return np.asarray(found[0])
