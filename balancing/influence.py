@@ -354,11 +354,14 @@ def _checked(
 
 def _columns_scaled(a: Complex) -> tuple[Complex, Real]:
     """Return a·diag(scale) with columns within a factor of two of the largest, and the scale (powers of two)."""
-    norms = np.sqrt((a.real * a.real + a.imag * a.imag).sum(axis=-2))
-    largest = norms.max(axis=-1, keepdims=True)
-    ratio = largest / np.where(norms > 0, norms, np.where(largest > 0, largest, 1.0))
-    scale = np.ldexp(1.0, np.frexp(ratio)[1] - 1)
-    scale = np.where(ratio > 0, scale, 1.0)
+    re, im = a.real, a.imag
+    square = np.einsum("...sp,...sp->...p", re, re) + np.einsum("...sp,...sp->...p", im, im)
+    largest = square.max(axis=-1, keepdims=True)
+    ratio = np.divide(largest, square, out=np.ones_like(square), where=square > 0)
+    exponent = (np.frexp(ratio)[1] - 1) >> 1  # ⌊log₂ √ratio⌋
+    if not exponent.any():
+        return a, np.ones_like(square)
+    scale = np.ldexp(1.0, exponent)
     return a * scale[..., None, :], scale
 
 

@@ -34,6 +34,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 NEARLY = 0.1  # a plane whose effect others bring about but for this share is said to be nearly dependent
+SHOWN = 5  # of so many rotors the same is said, of the others together
 UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
 
 
@@ -98,10 +99,6 @@ class Field:
                 self.place[rotor] = (k, i)
         for solved in self.solved:
             self._remark(solved)
-        limit = 25
-        if len(self.warnings) > limit:
-            more = len(self.warnings) - limit
-            self.warnings = [*self.warnings[:limit], f"… and {more} further warnings"]
 
     # -- solving -------------------------------------------------------------------------------------------
 
@@ -283,6 +280,10 @@ class Field:
         if text not in self.warnings:
             self.warnings.append(text)
 
+    def _more(self, count: int, what: str) -> None:
+        if count > SHOWN:
+            self._warn(f"… and the same of {count - SHOWN} further rotors: {what}")
+
     def _combination(self, names: list[str], combination: Complex) -> str:
         terms = []
         for name, share in zip(names, combination, strict=True):
@@ -319,22 +320,25 @@ class Field:
 
     def _remark(self, solved: Solved) -> None:
         group, planes = solved.group, solved.planes
-        for i in np.flatnonzero(~np.abs(solved.initial).any(axis=1))[:5]:
+        still = np.flatnonzero(~np.abs(solved.initial).any(axis=1))
+        for i in still[:SHOWN]:
             self._warn(f"{self._of(group, int(i))}no vibration in the initial run: nothing to correct")
-        for i in np.flatnonzero(~(solved.condition < 5))[:200]:
-            weights = None if group.weights is None else group.weights[i]
-            share = plane_significance(solved.alpha[i], weights)
-            weak = [
-                f"{plane} ({s:.2g})"
-                for plane, s in zip(planes, share, strict=True)
-                if s < NEARLY and len(planes) > 1
-            ]
-            if weak:
+        self._more(len(still), "no vibration in the initial run")
+        doubtful = np.flatnonzero(~(solved.condition < 5)) if len(planes) > 1 else np.zeros(0, dtype=int)
+        if len(doubtful):
+            weights = None if group.weights is None else group.weights[doubtful]
+            share = plane_significance(solved.alpha[doubtful], weights)
+            weak = share < NEARLY
+            rows = np.flatnonzero(weak.any(axis=1))
+            for k in rows[:SHOWN]:
+                named = [f"{planes[p]} ({share[k, p]:.2g})" for p in np.flatnonzero(weak[k])]
+                i = int(doubtful[k])
                 self._warn(
-                    f"{self._of(group, int(i))}planes nearly dependent: others bring about what these do but for the share in "
-                    f"brackets: {', '.join(weak)}; condition number {solved.condition[i]:.3g}, errors grow by as much: leave "
+                    f"{self._of(group, i)}planes nearly dependent: others bring about what these do but for the share in "
+                    f"brackets: {', '.join(named)}; condition number {solved.condition[i]:.3g}, errors grow by as much: leave "
                     "one out, or damp with --ridge"
                 )
+            self._more(len(rows), "planes nearly dependent")
         if not self.wanted.four_run:
             self._thirty(group)
         for i, fit in enumerate(solved.fits):
@@ -347,16 +351,20 @@ class Field:
                         "another angle decides"
                     )
         if self.wanted.tolerance is not None:
-            for i in range(min(len(group.rotors), 1000)):
-                if all(before <= share for _, share, before in self._verdict(solved, i)):
-                    self._warn(
-                        f"{self._of(group, i)}already within the permissible residual unbalance in every plane: stop, no correction "
-                        "is needed"
-                    )
+            _, whole = self.wanted.tolerance
+            size = np.abs(solved.total) * (1.0 if self.runs.per == "unbalance" else self.wanted.radius or 1.0)
+            good = np.flatnonzero((size <= whole / len(planes)).all(axis=1))
+            for i in good[:SHOWN]:
+                self._warn(
+                    f"{self._of(group, int(i))}already within the permissible residual unbalance in every plane: stop, no "
+                    "correction is needed"
+                )
+            self._more(len(good), "already within the permissible residual unbalance")
         if self.wanted.max_residual is not None:
             fine = (np.abs(solved.initial) <= self.wanted.max_residual).all(axis=1)
-            for i in np.flatnonzero(fine)[:5]:
+            for i in np.flatnonzero(fine)[:SHOWN]:
                 self._warn(f"{self._of(group, int(i))}the initial vibration is within --max-residual already")
+            self._more(int(fine.sum()), "initial vibration within --max-residual already")
 
     def _thirty(self, group: Group) -> None:
         """The 30/30 rule."""
@@ -366,13 +374,14 @@ class Field:
             before = group.initial if group.base[j] < 0 else group.runs[:, group.base[j]]
             effect = trial_effect(before, group.runs[:, j])
             little = ~((effect.amplitude >= 0.3) | (effect.phase >= np.radians(30))).any(axis=1)
-            for i in np.flatnonzero(little)[:5]:
+            for i in np.flatnonzero(little)[:SHOWN]:
                 most = np.max(effect.amplitude[i])
                 turn = np.degrees(np.max(effect.phase[i]))
                 self._warn(
                     f"{self._of(group, int(i))}run {trial.run}: the trial mass changed the vibration by {most:.0%} and {turn:.0f}° "
                     "at most: less than 30 % and 30°, its coefficients may be noise; expected a larger trial mass"
                 )
+            self._more(int(little.sum()), f"run {trial.run} changed the vibration by less than 30 % and 30°")
 
     def _verdict(self, solved: Solved, i: int) -> list[tuple[str, float, float]]:
         """For each plane: name, permissible and initial unbalance, kg·m."""
