@@ -20,6 +20,7 @@ from balancing import (
     influence_from_amplitudes,
     least_squares,
     minimax,
+    place,
     plane_significance,
     spread,
     trial_effect,
@@ -57,6 +58,8 @@ class Wanted:
     tolerance: tuple[str | None, float] | None = None
     radius: float | None = None
     conventions: str = ""
+    places: list[float] | None = None
+    """Where masses can go, degrees: the corrections are split onto them."""
 
 
 @dataclass
@@ -99,6 +102,8 @@ class Field:
                 self.place[rotor] = (k, i)
         for solved in self.solved:
             self._remark(solved)
+            for w in solved.corrections[:SHOWN].ravel():
+                self.split(w)  # what cannot be reached is said at once
 
     # -- solving -------------------------------------------------------------------------------------------
 
@@ -413,6 +418,19 @@ class Field:
             warnings=[*self.runs.warnings, *self.warnings],
         )
 
+    def split(self, w: complex) -> list[tuple[str, float, float]]:
+        """Split a correction onto the places: name, angle in degrees, amount in SI of each that is used."""
+        if self.wanted.places is None or w == 0:
+            return []
+        placed = place(complex(w), np.radians(self.wanted.places))
+        if abs(placed.error) > 1e-9 * abs(w):
+            self._warn(f"a correction at {degrees(w):.4g}° cannot be reached from the places given")
+        return [
+            (str(k + 1), self.wanted.places[k] % 360.0, float(mass))
+            for k, mass in enumerate(placed.masses)
+            if mass > 0
+        ]
+
     def figure(self) -> Any:
         """Draw the first rotors."""
         from cli.plots.field import draw
@@ -479,6 +497,11 @@ class Field:
                 entry = {"plane": plane, f"{key}_{suffix}": abs(w), "angle_deg": float(degrees(w))}
                 entry[f"{key}_uncertainty_{suffix}"] = None if spreads is None else _number(spreads[0][i, p])
                 entry["angle_uncertainty_deg"] = None if spreads is None else _number(spreads[1][i, p])
+                if self.wanted.places is not None:
+                    entry["split"] = [
+                        {"position": name, "angle_deg": angle, f"{key}_{suffix}": part}
+                        for name, angle, part in self.split(w)
+                    ]
                 corrections.append(entry)
             residual = solved.residual[i]
             size = np.abs(residual)

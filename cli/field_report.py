@@ -16,10 +16,11 @@ STYLE = """
 body { font: 10.5pt/1.35 system-ui, sans-serif; color: #111; max-width: 190mm; margin: 8mm auto; padding: 0 4mm; }
 h1 { font-size: 15pt; margin: 0 0 1mm; } h2 { font-size: 11pt; margin: 3.5mm 0 1mm; border-bottom: 1px solid #999; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 9.5pt; }
-th, td { padding: .3mm 2.5mm; text-align: right; border-bottom: 1px solid #ddd; } th { background: #f0f0f0; font-weight: 600; }
+th, td { padding: .15mm 2mm; text-align: right; border-bottom: 1px solid #ddd; } th { background: #f0f0f0; font-weight: 600; }
 td.text, th.text { text-align: left; } table.main td { font-size: 12pt; font-weight: 600; }
+.beside { display: flex; gap: 8mm; } .beside > div { flex: 1 1 auto; }
 p, ul { margin: 1mm 0; } .small { font-size: 9pt; color: #333; } .warning { border-left: 3px solid #b00; padding-left: 2mm; }
-svg { width: 100%; height: auto; max-height: 78mm; } section { break-after: page; } section:last-of-type { break-after: auto; }
+svg { width: 100%; height: auto; max-height: 64mm; } section { break-after: page; } section:last-of-type { break-after: auto; }
 @page { size: A4; margin: 10mm; } @media print { body { margin: 0; max-width: none; } }
 """
 
@@ -36,13 +37,15 @@ def html(field: Field, source: str, warnings: Sequence[str]) -> bytes:
             *([f'<p class="warning">{escape(warning)}</p>' for warning in warnings] if rotor == 0 else []),
             "<h2>Readings</h2>",
             f'<p class="small">{escape("; ".join(text.trials_lines(field, solved, i)))}</p>',
-            _table(text.runs_table(field, solved, i)),
+            _table(text.runs_table(field, solved, i)) if solved.group.trials else "<p>The initial run stands below, beside the predicted vibration.</p>",
             "<h2>Influence coefficients</h2>",
             _table(text.influence_table(field, solved, i)),
-            "<h2>Corrections</h2>",
+            '<div class="beside"><div><h2>Corrections</h2>',
             _table(text.correction_table(field, solved, i), "main"),
-            "<h2>Predicted vibration</h2>",
+            "".join(f"<p>{escape(line)}</p>" for line in text.split_lines(field, solved, i)),
+            "</div><div><h2>Predicted vibration</h2>",
             _table(text.residual_table(field, solved, i)),
+            "</div></div>",
             "".join(f"<p>{escape(line)}</p>" for line in text.summary(field, solved, i)),
         ]
         if lines := text.verdict(field, solved, i):

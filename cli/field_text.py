@@ -86,6 +86,20 @@ def correction_table(field: Field, solved: Solved, i: int) -> dict[str, list[Any
     return columns
 
 
+def split_lines(field: Field, solved: Solved, i: int) -> list[str]:
+    """How each correction is split onto the places there are, a line for each plane."""
+    lines = []
+    for p, plane in enumerate(solved.planes):
+        parts = field.split(solved.corrections[i, p])
+        if parts:
+            shares = " + ".join(
+                f"{field._amount(part[2]):.5g} {field._unit} at {part[1]:.5g}° (place {part[0]})"
+                for part in parts
+            )
+            lines.append(f"{plane} split: {shares}")
+    return lines
+
+
 def _known(value: Any) -> Any:
     return float(value) if np.isfinite(value) else "unknown"
 
@@ -188,6 +202,7 @@ def afterword(field: Field) -> str:
             else f"{name}nothing to correct",
             "",
         ]
+        lines[1:1] = [f"{name}{line}" for line in split_lines(field, solved, i)]
         lines += [f"{name}predicted vibration", table_text(residual_table(field, solved, i)).rstrip("\n"), ""]
         lines += [*summary(field, solved, i), *verdict(field, solved, i)]
         parts.append("\n".join(lines))

@@ -35,15 +35,6 @@ class Wanted:
     unit: str
 
 
-def coincident(places: Sequence[float]) -> float | None:
-    """Return an angle at which two places lie, if there is one."""
-    turned = sorted(angle % 360.0 for angle in places)
-    for one, other in zip(turned, [*turned[1:], turned[0] + 360.0], strict=True):
-        if len(turned) > 1 and other - one < 1e-7:
-            return one
-    return None
-
-
 def place_corrections(
     vectors: Sequence[tuple[tuple[float, str], tuple[float, str]]], wanted: Wanted
 ) -> Shown:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 # domain -> (module with a function `measure`, what it measures)
 DOMAINS = {
     "rotors": ("cli.bench.rotors", "corrections of rotors with known masses"),
+    "field": ("cli.bench.field", "corrections from measured vibration, placement"),
 }
 
 

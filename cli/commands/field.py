@@ -95,6 +95,13 @@ def run(
         ),
     ] = False,
     planes: Annotated[int, typer.Option(min=1, help="Number of planes, for --suggest-trial.")] = 1,
+    blades: Annotated[
+        int | None, typer.Option(min=1, help="Split the corrections onto so many places, evenly spaced.")
+    ] = None,
+    positions: Annotated[
+        str | None, typer.Option(metavar="ANGLES", help="Split them onto these places: 0deg,30deg,60deg.")
+    ] = None,
+    first: Annotated[str, typer.Option(metavar="ANGLE", help="Angle of the first of --blades.")] = "0deg",
     report: Annotated[
         Path | None,
         typer.Option(metavar="FILE.html", help="Write a report to print.", callback=_html),
@@ -148,6 +155,7 @@ def run(
     if runs is None:
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
     from cli.commands.balance import _tolerance
+    from cli.commands.place import places
 
     tolerance = _tolerance(grade, speed, rotor_mass, permissible, None)
     limits = _limits(max_mass or [])
@@ -184,6 +192,7 @@ def run(
         tolerance=None if tolerance is None else tolerance[:2],
         radius=arm,
         conventions=_conventions(method, phase_lag, rotation),
+        places=places(positions, blades, first),
     )
     field = Field(measured, wanted, stored)
     shown = field.shown()

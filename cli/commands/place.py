@@ -66,8 +66,6 @@ def run(
     Several corrections are combined first. Without --positions or --blades the result is the one mass.
     """
     vectors = [_vector(spec) for spec in corrections]
-    if positions is not None and blades is not None:
-        raise options.bad("--blades", "expected --positions or --blades, not both")
     at = options.quantity("--at-radius", at_radius, "length", positive=True)
     to = options.quantity("--to-radius", to_radius, "length", positive=True)
     if (at is None) != (to is None):
@@ -92,20 +90,13 @@ def run(
         ]
         if diameter is not None:
             raise options.bad("--stock", "weights from stock are not drilled: expected --stock or --drill")
-    places = None
-    if positions is not None:
-        places = [_angle("--positions", part) for part in positions.split(",")]
+    chosen = places(positions, blades, first)
+    if weights is not None and chosen is None:
+        raise options.bad("--stock", "expected --positions or --blades for the weights to go to")
     from cli import place_job as job
 
-    if blades is not None:
-        start = _angle("--first", first)
-        places = [(start + 360.0 * k / blades) % 360.0 for k in range(blades)]
-    if weights is not None and places is None:
-        raise options.bad("--stock", "expected --positions or --blades for the weights to go to")
-    if places is not None and (twice := job.coincident(places)) is not None:
-        raise options.bad("--positions", f"two positions at {twice:g}deg")
     wanted = job.Wanted(
-        places=places,
+        places=chosen,
         limit=options.quantity("--max-mass", max_mass, "mass", positive=True),
         stock=weights,
         pieces=pieces,
@@ -118,6 +109,23 @@ def run(
     )
     shown = job.place_corrections([(mass, angle) for mass, angle in vectors], wanted)
     show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text)
+
+
+def places(positions: str | None, blades: int | None, first: str) -> list[float] | None:
+    """Return the angles of the places, in degrees; None where none are given."""
+    if positions is not None and blades is not None:
+        raise options.bad("--blades", "expected --positions or --blades, not both")
+    if blades is not None:
+        start = _angle("--first", first)
+        return [(start + 360.0 * k / blades) % 360.0 for k in range(blades)]
+    if positions is None:
+        return None
+    chosen = [_angle("--positions", part) for part in positions.split(",")]
+    turned = sorted(angle % 360.0 for angle in chosen)
+    for one, other in zip(turned, [*turned[1:], turned[0] + 360.0], strict=True):
+        if len(turned) > 1 and other - one < 1e-7:
+            raise options.bad("--positions", f"two positions at {one:g}deg")
+    return chosen
 
 
 def _vector(spec: str) -> tuple[tuple[float, str], tuple[float, str]]:
