@@ -29,8 +29,8 @@ def draw(
     figure = Figure(figsize=(5.6, 6.2), layout="constrained")
     axes: Any = figure.subplots(subplot_kw={"projection": "polar"})
     scale = max(abs(target), abs(total), *masses) or 1.0
-    rim = 1.3 * scale
-    axes.set_rlim(0, 1.55 * scale)
+    rim = 1.2 * scale
+    axes.set_rlim(0, 1.75 * scale)
     axes.set_rticks([tick for tick in axes.get_yticks() if 0 < tick <= scale])
     axes.set_rlabel_position(_free_direction([target, total]))
     axes.tick_params(labelsize=8, colors="0.3")
@@ -52,7 +52,7 @@ def draw(
             axes.annotate(
                 f"{k + 1}: {mass:.4g} {unit}",
                 xy=(at, rim),
-                xytext=(-30 * np.cos(at), -22 * np.sin(at)),
+                xytext=(36 * np.cos(at), 20 * np.sin(at)),
                 textcoords="offset points",
                 ha="center",
                 va="center",
