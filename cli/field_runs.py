@@ -18,6 +18,7 @@ Complex = NDArray[np.complex128]
 Rows = NDArray[np.intp]
 
 YES = ("yes", "y", "true", "1", "kept", "on")
+NEAR_SPEED = 0.05  # among several speeds one is recognised within this share
 NO = ("no", "n", "false", "0", "", "removed", "off")
 
 
@@ -159,6 +160,13 @@ def _layouts(table: Table, rotor: Rows) -> Iterator[tuple[Rows, Rows]]:
             yield rotors[same], rows[same]
 
 
+def _apart(one: float | None, other: float) -> float:
+    """How far two speeds are apart, relatively; 0 where either is not known."""
+    if one is None or other != other or one == other:
+        return 0.0
+    return abs(one - other) / max(abs(one), abs(other))
+
+
 class _Reader:
     """Reads the groups; the first rotor of each tells how it was measured."""
 
@@ -172,6 +180,8 @@ class _Reader:
             texts["sensor"] = ["1"] * self.table.rows
         self.sensor = texts["sensor"]
         self.run = texts.get("run") or []
+        if not self.run and self.stored:
+            self.run = ["initial"] * self.table.rows
         if not self.run:
             raise DataError(
                 f"{self.table.file}: no column run (the header is: {', '.join(self.table.header)})"
@@ -387,28 +397,25 @@ class _Reader:
     ) -> list[list[int]]:
         """Return the rows of a trial run that belong to each channel of the initial run."""
         found: list[list[int]] = [[] for _ in channels]
-        sensors = [channel.sensor for channel in channels]
-        alone = len(set(sensors)) == len(sensors)
-        loose = alone and len({self.speed_given[rows[i]] for i in members}) == 1
         for i in members:
             name, speed = self.sensor[rows[i]], float(self.speed_given[rows[i]])
-            for s, channel in enumerate(channels):
-                same = channel.speed_given == speed or (channel.speed_given is None and speed != speed)
-                if channel.sensor == name and (same or loose):
-                    found[s].append(i)
-                    if not same and channel.speed_given and abs(speed / channel.speed_given - 1) > 0.01:
-                        self._warn(
-                            f"{of}run {run} ran at {speed:g}, the initial run at {channel.speed_given:g}: coefficients hold "
-                            "at one speed"
-                        )
-                    break
-            else:
+            same = [s for s, channel in enumerate(channels) if channel.sensor == name]
+            # the speed of a run is never quite that of another: the nearest is meant
+            off = [_apart(channels[s].speed_given, speed) for s in same]
+            nearest = min(range(len(same)), key=off.__getitem__, default=None)
+            if nearest is None or (off[nearest] > NEAR_SPEED and len(same) > 1):
                 what = name if speed != speed else f"{name} at {speed:g}"
                 raise self.fail(
                     rows[i],
                     "sensor",
                     what,
                     f"a sensor and speed of the initial run ({', '.join(map(str, channels))})",
+                )
+            found[same[nearest]].append(i)
+            if off[nearest] > 0.01:
+                self._warn(
+                    f"{of}run {run} ran at {speed:g}, the initial run at {channels[same[nearest]].speed_given or 0:g}: "
+                    "coefficients hold at one speed"
                 )
         for channel, mine in zip(channels, found, strict=True):
             if not mine:
@@ -486,25 +493,20 @@ class Stored:
         planes = list(dict.fromkeys(plane[i] for i in mine))
         alpha = np.full((len(channels), len(planes)), np.nan, dtype=complex)
         for s, channel in enumerate(channels):
-            for i in mine:
-                if sensor[i] != channel.sensor:
-                    continue
-                speed = self.speed[i]
-                if (
-                    channel.speed is not None
-                    and speed == speed
-                    and abs(speed - channel.speed) > 0.01 * channel.speed
-                ):
-                    continue
-                p = planes.index(plane[i])
-                if not np.isnan(alpha[s, p]):
+            for p, name in enumerate(planes):
+                rows = [i for i in mine if sensor[i] == channel.sensor and plane[i] == name]
+                off = [0.0 if channel.speed is None else _apart(channel.speed, self.speed[i]) for i in rows]
+                best = [i for i, apart in zip(rows, off, strict=True) if apart == min(off) and apart <= 0.01]
+                if not best:
+                    raise DataError(f"{self.table.file}: no coefficient of sensor {channel} for plane {name}")
+                if len(best) > 1:
                     raise self.table.error(
-                        i, "sensor", sensor[i], f"one coefficient for sensor {channel} and plane {plane[i]}"
+                        best[1],
+                        "sensor",
+                        sensor[best[1]],
+                        f"one coefficient for sensor {channel} and plane {name}",
                     )
-                alpha[s, p] = self.values[i]
-            if np.isnan(alpha[s]).any():
-                missing = planes[int(np.argmax(np.isnan(alpha[s])))]
-                raise DataError(f"{self.table.file}: no coefficient of sensor {channel} for plane {missing}")
+                alpha[s, p] = self.values[best[0]]
         if self.amplitude_unit:
             one = np.ones(1)
             factor = convert_amplitude(one, self.amplitude_unit, runs.amplitude_unit, f"{self.table.file}")[0]

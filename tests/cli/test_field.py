@@ -431,3 +431,35 @@ def test_text_report_and_pictures(dalembert: Dalembert, tmp_path: Path) -> None:
     assert "<script" not in page
     assert 'src="http' not in page
     assert (tmp_path / "p.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_speeds_that_differ_a_little_are_one_speed(dalembert: Dalembert, tmp_path: Path) -> None:
+    head = "run,sensor,speed_rpm,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg"
+    rows = []
+    for run, (trial, on) in enumerate([(",,", [0, 0]), ("A,1,0", [1, 0]), ("B,1,90", [0, 1j])]):
+        for s, v in enumerate(V0 + ALPHA @ np.asarray(on)):
+            rows.append(f"{run},x,{(900, 1500, 3000)[s] + run},{cell(v)},{trial}")
+    done = dalembert("field", "-", "--json", "--save-influence", "ic.csv", stdin=table(*rows, head=head))
+    assert np.abs(corrections(done) * 1e3 - W).max() < 1e-12
+    again = dalembert("field", "-", "--json", "--influence", "ic.csv", stdin=table(*rows[:3], head=head))
+    assert np.abs(corrections(again) * 1e3 - W).max() < 1e-12
+    # without a column run the table is the initial run
+    plain = table(*(row.partition(",")[2] for row in rows[:3]), head=head.partition(",")[2])
+    again = dalembert("field", "-", "--json", "--influence", "ic.csv", stdin=plain)
+    assert np.abs(corrections(again) * 1e3 - W).max() < 1e-12
+    far = table(
+        *rows[:3], *(row.replace(",903,", ",1200,").replace(",901,", ",1200,") for row in rows[3:]), head=head
+    )
+    done = dalembert("field", "-", stdin=far)
+    assert done.returncode == 1
+    assert "expected a sensor and speed of the initial run" in done.stderr
+
+
+def test_the_split_onto_places(dalembert: Dalembert) -> None:
+    (fix,) = document(dalembert("field", "-", "--json", "--blades", "12", stdin=FAN))["rotors"][0][
+        "corrections"
+    ]
+    parts = [m["mass_kg"] * np.exp(1j * np.radians(m["angle_deg"])) for m in fix["split"]]
+    assert len(parts) == 2
+    assert abs(sum(parts) - fix["mass_kg"] * np.exp(1j * np.radians(fix["angle_deg"]))) < 1e-17
+    assert dalembert("field", "-", "--blades", "3", "--positions", "0deg", stdin=FAN).returncode == 2
