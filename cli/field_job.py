@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -16,6 +17,7 @@ from balancing import (
     DependentTrials,
     Infeasible,
     Readings,
+    condition_number,
     influence_coefficients,
     influence_from_amplitudes,
     least_squares,
@@ -174,32 +176,70 @@ class Field:
             except DependentPlanes as error:
                 raise DataError(self._of(group, *error.case[:1]) + self._planes_say(planes, error)) from None
             return fix.corrections, None, fix.condition_number
-        fixes: list[Balance] = []
-        for i in range(len(here)):
+        if wanted.objective == "minimax":
+            proven = [
+                self._one(group, planes, i, lambda i=i: self._minimax(alpha[i], here[i], limit, weights, i))  # type: ignore[misc]
+                for i in range(len(here))
+            ]
+            return (
+                np.stack([fix.corrections for fix in proven]),
+                np.array([fix.bound for fix in proven], dtype=float),
+                np.array([fix.condition_number for fix in proven]),
+            )
+        # rotors that keep the limits by themselves all at once, the others one by one
+        corrections = np.zeros((len(here), len(planes)), dtype=complex)
+        left = np.arange(len(here))
+        try:
+            free = least_squares(alpha, here, weights)
+            corrections[:] = free.corrections
+            beyond = np.zeros(len(here), dtype=bool)
+            if limit is not None:
+                beyond |= (np.abs(free.corrections) > limit).any(axis=1)
+            if ceiling is not None:
+                beyond |= (np.abs(free.residual) > ceiling).any(axis=1)
+            left = np.flatnonzero(beyond)
+        except DependentPlanes:
+            pass
+        for i in left.tolist():
             w = None if weights is None else weights[i]
-            try:
-                if wanted.objective == "minimax":
-                    fix = minimax(alpha[i], here[i], limit, weights=w)
-                    if ceiling is not None and float(fix.residual_max) > ceiling * (1 + 1e-9):
-                        raise Infeasible(float(minimax(alpha[i], here[i], limit).residual_max))
-                else:
-                    fix = least_squares(alpha[i], here[i], w, max_mass=limit, max_residual=ceiling)
-            except DependentPlanes as error:
-                raise DataError(self._of(group, i) + self._planes_say(planes, error)) from None
-            except Infeasible as error:
-                unit = self.runs.amplitude_unit
-                with_limits = " with the limits of the masses" if limit is not None else ""
-                raise DataError(
-                    f"{self._of(group, i)}no corrections{with_limits} leave every residual within {ceiling:g} {unit}: "
-                    f"infeasible; the smallest limit that can be met is {error.smallest:.6g} {unit}"
-                ) from None
-            fixes.append(fix)
-        bounds = [fix.bound for fix in fixes]
-        return (
-            np.stack([fix.corrections for fix in fixes]),
-            None if None in bounds else np.array(bounds, dtype=float),
-            np.array([fix.condition_number for fix in fixes]),
-        )
+            corrections[i] = self._one(
+                group,
+                planes,
+                i,
+                lambda i=i, w=w: least_squares(alpha[i], here[i], w, max_mass=limit, max_residual=ceiling),  # type: ignore[misc]
+            ).corrections
+        return corrections, None, condition_number(alpha, weights)
+
+    def _minimax(
+        self, alpha: Complex, here: Complex, limit: Real | None, weights: Real | None, i: int
+    ) -> Balance:
+        """Minimax corrections of one rotor; Infeasible where even they leave more than --max-residual."""
+        fix = minimax(alpha, here, limit, weights=None if weights is None else weights[i])
+        ceiling = self.wanted.max_residual
+        if ceiling is not None and float(fix.residual_max) > ceiling * (1 + 1e-9):
+            least = (
+                float(minimax(alpha, here, limit).residual_max) if weights is not None else fix.residual_max
+            )
+            if least > ceiling * (1 + 1e-9):
+                raise Infeasible(float(least))
+            self._warn(
+                "with these weights a residual is beyond --max-residual, which without them could be met"
+            )
+        return fix
+
+    def _one(self, group: Group, planes: list[str], i: int, solve: Callable[[], Balance]) -> Balance:
+        """Solve for one rotor; what cannot be done is said with its name."""
+        try:
+            return solve()
+        except DependentPlanes as error:
+            raise DataError(self._of(group, i) + self._planes_say(planes, error)) from None
+        except Infeasible as error:
+            unit = self.runs.amplitude_unit
+            with_limits = " with the limits of the masses" if self.wanted.max_mass else ""
+            raise DataError(
+                f"{self._of(group, i)}no corrections{with_limits} leave every residual within {self.wanted.max_residual:g} "
+                f"{unit}: infeasible; the smallest limit that can be met is {error.smallest:.6g} {unit}"
+            ) from None
 
     def _amplitudes(self, group: Group) -> list[AmplitudeFit]:
         """The four-run method, rotor by rotor."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from balancing import Placement, drill_depth, place, place_from_stock
+from balancing import Placement, drill_depth, place, place_from_stock, transfer
 from cli.errors import DataError
 from cli.render import Shown
 from cli.units import degrees, from_si, phasor, to_si
@@ -31,6 +31,8 @@ class Wanted:
     drill: tuple[float, float, float] | None
     """Diameter, density, point angle in rad."""
     deepest: float | None
+    planes: tuple[float, list[float]] | None
+    """Where along the shaft the corrections are, and the planes they are carried over to, m."""
     remove: bool
     unit: str
 
@@ -56,52 +58,71 @@ def place_corrections(
     warnings: list[str] = []
     if target == 0:
         warnings.append("the corrections add up to nothing: there is nothing to place")
+    goals: list[tuple[float | None, complex]] = [(None, goal)]
+    if wanted.planes is not None:
+        at, planes = wanted.planes
+        goals = list(zip(planes, transfer([goal], [at], planes).tolist(), strict=True))
+    shares = [_place(z, share, wanted, warnings) for z, share in goals]
+    if opposite:
+        warnings.append("material is drilled out opposite (+180°) to the mass that would be added")
+    return _Placed(target, shares, wanted, warnings).shown()
+
+
+@dataclass(frozen=True)
+class _Share:
+    """What goes into one plane."""
+
+    z: float | None
+    goal: complex
+    places: list[float]
+    placed: Placement
+
+    @property
+    def error(self) -> complex:
+        error = self.placed.error
+        return error if abs(error) > 1e-14 * abs(self.goal) else 0j
+
+
+def _place(z: float | None, goal: complex, wanted: Wanted, warnings: list[str]) -> _Share:
+    """Place what goes into one plane."""
     if wanted.places is None:
-        placed = Placement(goal, np.array([np.angle(goal)]), np.array([abs(goal)]))
-        places = [float(degrees(goal))]
         if wanted.limit is not None and abs(goal) > wanted.limit * (1 + 1e-12):
             raise DataError(
                 f"the correction of {_show(abs(goal), wanted)} is beyond --max-mass {_show(wanted.limit, wanted)}, and "
                 "there is one place only: expected --positions or --blades to spread it over"
             )
-    else:
-        places = wanted.places
-        angles = np.radians(places)
-        if wanted.stock is not None:
-            try:
-                placed = place_from_stock(
-                    goal,
-                    angles,
-                    wanted.stock,
-                    wanted.limit,
-                    pieces=wanted.pieces,
-                    max_pieces=wanted.max_pieces,
-                )
-            except ValueError as error:
-                raise DataError(f"--stock: {error}") from None
-            used = int((placed.masses > 0).sum())
-            if used > 4 and wanted.max_pieces is None:
-                few = place_from_stock(
-                    goal, angles, wanted.stock, wanted.limit, pieces=wanted.pieces, max_pieces=3
-                )
-                warnings.append(
-                    f"{used} places carry weights to come within {_show(abs(placed.error), wanted)}; with 3 weights the error "
-                    f"would be {_show(abs(few.error), wanted)} (--max-pieces 3)"
-                )
-            if len(places) > 2 and placed.bound == 0 and abs(placed.error) > 1e-12 * abs(goal):
-                warnings.append(
-                    "too many choices to search them all: the places nearest to the correction were used"
-                )
-        else:
-            placed = place(goal, angles, wanted.limit)
-            if abs(placed.error) > 1e-9 * abs(goal):
-                warnings.append(
-                    f"the correction cannot be reached from these places{' with this --max-mass' if wanted.limit else ''}: an error "
-                    f"of {_show(abs(placed.error), wanted)} is left, the least there is"
-                )
-    if opposite:
-        warnings.append("material is drilled out opposite (+180°) to the mass that would be added")
-    return _Placed(target, goal, placed, places, wanted, warnings).shown()
+        alone = Placement(goal, np.array([np.angle(goal)]), np.array([abs(goal)]))
+        return _Share(z, goal, [float(degrees(goal))], alone)
+    angles = np.radians(wanted.places)
+    if wanted.stock is None:
+        placed = place(goal, angles, wanted.limit)
+        if abs(placed.error) > 1e-9 * abs(goal):
+            limited = " with this --max-mass" if wanted.limit else ""
+            warnings.append(
+                f"the correction cannot be reached from these places{limited}: an error of "
+                f"{_show(abs(placed.error), wanted)} is left, the least there is"
+            )
+        return _Share(z, goal, wanted.places, placed)
+
+    def choose(most: int | None) -> Placement:
+        assert wanted.stock is not None
+        return place_from_stock(
+            goal, angles, wanted.stock, wanted.limit, pieces=wanted.pieces, max_pieces=most
+        )
+
+    try:
+        placed = choose(wanted.max_pieces)
+    except ValueError as error:
+        raise DataError(f"--stock: {error}") from None
+    used = int((placed.masses > 0).sum())
+    if used > 4 and wanted.max_pieces is None:
+        warnings.append(
+            f"{used} places carry weights to come within {_show(abs(placed.error), wanted)}; with 3 weights the error "
+            f"would be {_show(abs(choose(3).error), wanted)} (--max-pieces 3)"
+        )
+    if len(wanted.places) > 2 and placed.bound == 0 and abs(placed.error) > 1e-12 * abs(goal):
+        warnings.append("too many choices to search them all: the places nearest to the correction were used")
+    return _Share(z, goal, wanted.places, placed)
 
 
 def _show(mass: float, wanted: Wanted) -> str:
@@ -113,20 +134,23 @@ class _Placed:
     """A placement with its drilling, ready to be shown."""
 
     target: complex
-    goal: complex
-    placed: Placement
-    places: list[float]
+    shares: list[_Share]
     wanted: Wanted
     warnings: list[str]
 
     def __post_init__(self) -> None:
-        masses = self.placed.masses
-        self.used = [i for i, mass in enumerate(masses) if mass > 0]
+        self.used = [
+            (share, i) for share in self.shares for i, mass in enumerate(share.placed.masses) if mass > 0
+        ]
+        self.mass = [float(share.placed.masses[i]) for share, i in self.used]
+        self.angle = [share.places[i] % 360.0 for share, i in self.used]
         self.depth: list[float | None] = [None] * len(self.used)
         self.holes: list[int | None] = [None] * len(self.used)
         if self.wanted.drill is not None:
-            for k, i in enumerate(self.used):
-                self.depth[k], self.holes[k] = self._drilled(float(masses[i]))
+            for k, mass in enumerate(self.mass):
+                self.depth[k], self.holes[k] = self._drilled(mass)
+        # of several planes the largest error
+        self.error = max((share.error for share in self.shares), key=abs)
 
     def _drilled(self, mass: float) -> tuple[float, int]:
         """Return the depth of each hole and how many there are."""
@@ -145,16 +169,15 @@ class _Placed:
                 depth = float(drill_depth(mass / holes, diameter, density, point))
         return depth, holes
 
-    def _error(self) -> complex:
-        error = self.placed.error
-        return error if abs(error) > 1e-14 * abs(self.goal) else 0j
-
     def shown(self) -> Shown:
         unit = self.wanted.unit
-        columns: dict[str, Any] = {
-            "position": [str(i + 1) for i in self.used],
-            "angle_deg": [self._angle(i) for i in self.used],
-            f"mass_{unit}": [float(from_si(self.placed.masses[i], "mass", unit)) for i in self.used],
+        columns: dict[str, Any] = {}
+        if self.wanted.planes is not None:
+            columns["z_mm"] = [float(from_si(share.z, "length", "mm")) for share, _ in self.used]
+        columns |= {
+            "position": [str(i + 1) for _, i in self.used],
+            "angle_deg": self.angle,
+            f"mass_{unit}": [float(from_si(mass, "mass", unit)) for mass in self.mass],
         }
         if self.wanted.drill is not None:
             columns["drill_depth_mm"] = [float(from_si(depth, "length", "mm")) for depth in self.depth]
@@ -162,34 +185,32 @@ class _Placed:
         return Shown(
             document=self.document,
             columns=columns,
-            keys=("position",),
+            keys=("position",) if self.wanted.planes is None else (),
             notes=self.notes,
             afterword=self.afterword,
             figure=self.figure,
             warnings=self.warnings,
         )
 
-    def _angle(self, i: int) -> float:
-        return self.places[i] % 360.0 if self.wanted.places is not None else self.places[i]
-
     def document(self) -> dict[str, Any]:
-        error = self._error()
-        total = self.placed.total
+        masses = [
+            {
+                "position": str(i + 1),
+                "angle_deg": angle,
+                "mass_kg": mass,
+                "drill_depth_m": depth,
+                "holes": holes,
+            }
+            | ({} if self.wanted.planes is None else {"z_m": share.z})
+            for (share, i), angle, mass, depth, holes in zip(
+                self.used, self.angle, self.mass, self.depth, self.holes, strict=True
+            )
+        ]
         return {
             "target": {"mass_kg": abs(self.target), "angle_deg": float(degrees(self.target))},
-            "masses": [
-                {
-                    "position": str(i + 1),
-                    "angle_deg": self._angle(i),
-                    "mass_kg": float(self.placed.masses[i]),
-                    "drill_depth_m": depth,
-                    "holes": holes,
-                }
-                for i, depth, holes in zip(self.used, self.depth, self.holes, strict=True)
-            ],
-            "error_kg": abs(error),
-            "error_angle_deg": float(degrees(error)),
-            "total": {"mass_kg": abs(total), "angle_deg": float(degrees(total))},
+            "masses": masses,
+            "error_kg": abs(self.error),
+            "error_angle_deg": float(degrees(self.error)),
             "action": "remove" if self.wanted.remove or self.wanted.drill is not None else "add",
         }
 
@@ -198,24 +219,36 @@ class _Placed:
             f"correction: {_show(abs(self.target), self.wanted)} at {degrees(self.target):.4g}° (angles counter-clockwise)"
         ]
         if self.wanted.ratio != 1:
-            lines.append(f"at the other radius: {_show(abs(self.goal), self.wanted)}")
+            lines.append(f"at the other radius: {_show(abs(self.target) * self.wanted.ratio, self.wanted)}")
+        for share in self.shares:
+            if share.z is not None:
+                lines.append(
+                    f"in the plane z = {from_si(share.z, 'length', 'mm'):g} mm: {_show(abs(share.goal), self.wanted)} at "
+                    f"{degrees(share.goal):.4g}°"
+                )
         remove = self.wanted.remove or self.wanted.drill is not None
         return "\n".join([*lines, f"material to {'REMOVE' if remove else 'ADD'}:"])
 
     def afterword(self) -> str:
-        error = self._error()
-        share = f" ({abs(error) / abs(self.goal):.3%} of the correction)" if self.goal else ""
-        return f"error: {_show(abs(error), self.wanted)} at {degrees(error):.4g}°{share}"
+        whole = max(abs(share.goal) for share in self.shares)
+        share = f" ({abs(self.error) / whole:.3%} of the correction)" if whole else ""
+        return f"error: {_show(abs(self.error), self.wanted)} at {degrees(self.error):.4g}°{share}"
 
     def figure(self) -> Any:
         from cli.plots.place import draw
 
         unit = self.wanted.unit
         return draw(
-            [self._angle(i) for i in range(len(self.places))],
-            [float(m) for m in from_si(self.placed.masses, "mass", unit)],
-            from_si(self.goal, "mass", unit),
-            from_si(self.placed.total, "mass", unit),
+            [
+                (
+                    "" if share.z is None else f"z = {from_si(share.z, 'length', 'mm'):g} mm: ",
+                    [angle % 360.0 for angle in share.places],
+                    [float(m) for m in from_si(share.placed.masses, "mass", unit)],
+                    complex(from_si(share.goal, "mass", unit)),
+                    complex(from_si(share.placed.total, "mass", unit)),
+                )
+                for share in self.shares
+            ],
             unit,
             removed=self.wanted.remove or self.wanted.drill is not None,
         )

@@ -36,6 +36,15 @@ def run(
         str | None, typer.Option(metavar="R", help="Radius the corrections were found for.")
     ] = None,
     to_radius: Annotated[str | None, typer.Option(metavar="R", help="Radius the masses go to.")] = None,
+    at_z: Annotated[
+        str | None, typer.Option(metavar="Z", help="Where along the shaft the corrections were found for.")
+    ] = None,
+    to_z: Annotated[
+        str | None,
+        typer.Option(
+            metavar="Z1:Z2", help="Carry them over to these planes, with the same force and moment."
+        ),
+    ] = None,
     drill: Annotated[
         str | None, typer.Option(metavar="DIAMETER", help="Remove material instead, by drilling opposite.")
     ] = None,
@@ -90,6 +99,7 @@ def run(
         ]
         if diameter is not None:
             raise options.bad("--stock", "weights from stock are not drilled: expected --stock or --drill")
+    moved = _planes(options.quantity("--at-z", at_z, "length"), to_z)
     chosen = places(positions, blades, first)
     if weights is not None and chosen is None:
         raise options.bad("--stock", "expected --positions or --blades for the weights to go to")
@@ -104,11 +114,26 @@ def run(
         ratio=1.0 if at is None or to is None else at / to,
         drill=None if diameter is None or rho is None else (diameter, rho, min(point, job.PI)),
         deepest=deepest,
+        planes=moved,
         remove=remove,
         unit=vectors[0][0][1],
     )
     shown = job.place_corrections([(mass, angle) for mass, angle in vectors], wanted)
     show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text)
+
+
+def _planes(at: float | None, text: str | None) -> tuple[float, list[float]] | None:
+    """Read --at-z and --to-z."""
+    if (at is None) != (text is None):
+        raise options.bad("--to-z" if text is None else "--at-z", "expected both --at-z and --to-z")
+    if at is None or text is None:
+        return None
+    planes = [options.quantity("--to-z", part, "length") or 0.0 for part in text.split(":")]
+    if len(planes) < 2:
+        raise options.bad("--to-z", f"'{text}': expected two planes or more, such as 0mm:90mm")
+    if len(set(planes)) < len(planes):
+        raise options.bad("--to-z", f"'{text}': two planes lie at the same place")
+    return at, planes
 
 
 def places(positions: str | None, blades: int | None, first: str) -> list[float] | None:

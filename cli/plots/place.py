@@ -13,24 +13,43 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def draw(
-    places: Sequence[float],
-    masses: Sequence[float],
-    target: complex,
-    total: complex,
-    unit: str,
-    *,
-    removed: bool,
-) -> Figure:
-    """Draw places (degrees) with their masses on the rim, target and total as vectors, in `unit`."""
+Panel = tuple[str, Sequence[float], Sequence[float], complex, complex]
+
+
+def draw(panels: Sequence[Panel], unit: str, *, removed: bool) -> Figure:
+    """Draw for each plane its places with their masses on the rim, target and total as vectors.
+
+    A panel is (title, places in degrees, masses, target, total), in `unit`.
+    """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    figure = Figure(figsize=(5.6, 6.2), layout="constrained")
-    axes: Any = figure.subplots(subplot_kw={"projection": "polar"})
+    figure = Figure(figsize=(5.6 * len(panels), 6.2), layout="constrained")
+    row = figure.subplots(1, len(panels), subplot_kw={"projection": "polar"}, squeeze=False)[0]
+    for axes, panel in zip(row, panels, strict=True):
+        _panel(axes, panel, unit, removed=removed)
+    handles = [
+        Line2D([], [], color="0.45", lw=4, label="correction"),
+        Line2D([], [], color="tab:red", lw=1.8, label="what the masses are together"),
+        Line2D(
+            [],
+            [],
+            color="tab:red",
+            marker="o",
+            ls="",
+            mfc="white" if removed else "tab:red",
+            label="drilled" if removed else "mass",
+        ),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=9, frameon=False)
+    return figure
+
+
+def _panel(axes: Any, panel: Panel, unit: str, *, removed: bool) -> None:
+    title, places, masses, target, total = panel
     scale = max(abs(target), abs(total), *masses) or 1.0
     rim = 1.2 * scale
-    axes.set_rlim(0, 1.75 * scale)
+    axes.set_rlim(0, 1.95 * scale)
     axes.set_rticks([tick for tick in axes.get_yticks() if 0 < tick <= scale])
     axes.set_rlabel_position(_free_direction([target, total]))
     axes.tick_params(labelsize=8, colors="0.3")
@@ -61,21 +80,8 @@ def draw(
             )
     _arrow(axes, target, scale, "0.45", 4.0, "-", "")
     _arrow(axes, total, scale, "tab:red", 1.8, "-", "")
-    handles = [
-        Line2D([], [], color="0.45", lw=4, label="correction"),
-        Line2D([], [], color="tab:red", lw=1.8, label="what the masses are together"),
-        Line2D(
-            [],
-            [],
-            color="tab:red",
-            marker="o",
-            ls="",
-            mfc="white" if removed else "tab:red",
-            label="drilled" if removed else "mass",
-        ),
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=9, frameon=False)
     axes.set_title(
-        f"material to {'remove' if removed else 'add'}, {unit}; angles counter-clockwise", fontsize=10, pad=16
+        f"{title}material to {'remove' if removed else 'add'}, {unit}; angles counter-clockwise",
+        fontsize=10,
+        pad=16,
     )
-    return figure

@@ -111,3 +111,31 @@ def test_text_and_picture(dalembert: Dalembert, tmp_path: Path) -> None:
     assert "material to ADD" in done.stdout
     assert "error: 0 g" in done.stdout
     assert (tmp_path / "p.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_other_planes(dalembert: Dalembert, tmp_path: Path) -> None:
+    found = document(dalembert("place", "12g@40deg", "--at-z", "30mm", "--to-z", "0mm:90mm", "--json"))
+    assert [m["z_m"] for m in found["masses"]] == [0, 0.09]
+    assert [m["mass_kg"] for m in found["masses"]] == pytest.approx([0.008, 0.004], rel=1e-12)
+    over = document(
+        dalembert(
+            "place",
+            "12g@40deg",
+            "--at-z",
+            "-30mm",
+            "--to-z",
+            "0mm:90mm",
+            "--blades",
+            "8",
+            "--json",
+            "--plot",
+            "p.png",
+        )
+    )
+    for z, share in ((0.0, 16e-3), (0.09, -4e-3)):
+        parts = [
+            m["mass_kg"] * np.exp(1j * np.radians(m["angle_deg"])) for m in over["masses"] if m["z_m"] == z
+        ]
+        assert abs(sum(parts) - share * np.exp(1j * np.radians(40))) < 1e-16
+    assert dalembert("place", "12g@40deg", "--to-z", "0mm:90mm").returncode == 2
+    assert dalembert("place", "12g@40deg", "--at-z", "1mm", "--to-z", "0mm:0mm").returncode == 2
