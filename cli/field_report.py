@@ -37,7 +37,9 @@ def html(field: Field, source: str, warnings: Sequence[str]) -> bytes:
             *([f'<p class="warning">{escape(warning)}</p>' for warning in warnings] if rotor == 0 else []),
             "<h2>Readings</h2>",
             f'<p class="small">{escape("; ".join(text.trials_lines(field, solved, i)))}</p>',
-            _table(text.runs_table(field, solved, i)) if solved.group.trials else "<p>The initial run stands below, beside the predicted vibration.</p>",
+            _table(text.runs_table(field, solved, i))
+            if solved.group.trials
+            else "<p>The initial run stands below, beside the predicted vibration.</p>",
             "<h2>Influence coefficients</h2>",
             _table(text.influence_table(field, solved, i)),
             '<div class="beside"><div><h2>Corrections</h2>',

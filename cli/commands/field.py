@@ -161,8 +161,9 @@ def run(
     limits = _limits(max_mass or [])
     ceiling = options.with_unit("--max-residual", max_residual, "amplitude", positive=True)
 
+    from cli.field_files import read_runout, read_stored
     from cli.field_job import Field, Wanted
-    from cli.field_runs import read_runout, read_runs, read_stored
+    from cli.field_runs import read_runs
 
     # a phase that lags, or a shaft that turns clockwise, turns the sense of the phase against the mass angles
     against = phase_lag != (rotation == "cw")
@@ -275,7 +276,7 @@ def _ceiling(given: tuple[float, str], runs: Runs) -> float:
     """Return the residual limit in the table's unit; without a tag it is meant as the table's amplitudes are."""
     import numpy as np
 
-    from cli.field_runs import convert_amplitude
+    from cli.field_files import convert_amplitude
     from cli.units import amplitude_kind
 
     value, unit = given
