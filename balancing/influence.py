@@ -356,11 +356,16 @@ def _columns_scaled(a: Complex) -> tuple[Complex, Real]:
     """Return a·diag(scale) with columns within a factor of two of the largest, and the scale (powers of two)."""
     re, im = a.real, a.imag
     square = np.einsum("...sp,...sp->...p", re, re) + np.einsum("...sp,...sp->...p", im, im)
-    largest = square.max(axis=-1, keepdims=True)
-    ratio = np.divide(largest, square, out=np.ones_like(square), where=square > 0)
-    exponent = (np.frexp(ratio)[1] - 1) >> 1  # ⌊log₂ √ratio⌋
+    if square.min() > 1e-280 and square.max() < 1e280:
+        exponent = (
+            np.frexp(square.max(axis=-1, keepdims=True) / square)[1] - 1
+        ) >> 1  # ⌊log₂ of the norms' ratio⌋
+    else:  # the squares leave the range of numbers, or a column is zero
+        peak = np.maximum(np.abs(re), np.abs(im)).max(axis=-2)
+        highest = peak.max(axis=-1, keepdims=True)
+        exponent = np.where(peak > 0, np.frexp(highest)[1] - np.frexp(peak)[1], 0)
     if not exponent.any():
-        return a, np.ones_like(square)
+        return a, np.ones(square.shape)
     scale = np.ldexp(1.0, exponent)
     return a * scale[..., None, :], scale
 

@@ -265,3 +265,14 @@ def test_what_is_not_finite(bad: float) -> None:
         least_squares([[1.0]], [1], max_mass=0)
     with pytest.raises(ValueError, match="ridge"):
         least_squares([[1.0]], [1], ridge=bad)
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-200, 1e200, 1e300])
+def test_beyond_the_range_of_squares(size: float) -> None:
+    alpha = np.array([[2, 1j], [1, 3]])
+    w = np.array([1 + 1j, 2])
+    columns = np.array([1.0, size])
+    found = least_squares(alpha * columns, -(alpha @ w)).corrections * columns
+    assert np.abs(found - w).max() < 1e-14
+    with pytest.raises(DependentPlanes):
+        least_squares(np.array([[1, 0], [1, 0]]) * size, [size, size])
