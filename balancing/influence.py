@@ -372,7 +372,7 @@ def _columns_scaled(a: Complex) -> tuple[Complex, Real]:
 
 def _threshold(rows: int, columns: int) -> float:
     """Below this ratio of singular values a combination of planes lies in the rounding of the data."""
-    return 8 * max(rows, columns) * EPS
+    return 64 * max(rows, columns) * EPS
 
 
 def _require_independent(

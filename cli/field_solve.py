@@ -25,6 +25,7 @@ from balancing import (
     plane_significance,
     spread,
     trial_effect,
+    unseen,
 )
 from cli.errors import DataError
 from cli.field_files import Stored
@@ -36,6 +37,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 NEARLY = 0.1  # a plane whose effect others bring about but for this share is said to be nearly dependent
+SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
 SHOWN = 5  # of so many rotors the same is said, of the others together
 UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
 
@@ -169,11 +171,20 @@ class Solver:
         """Return the corrections, for minimax the proven bounds, and the condition numbers."""
         wanted, weights = self.wanted, group.weights
         ceiling = wanted.max_residual
+        if limit is None and not wanted.ridge:
+            # the coefficients are differences of readings: what lies in their rounding is no information
+            beyond = np.flatnonzero(~(condition_number(alpha, weights) < SINGULAR))
+            if len(beyond):
+                i = int(beyond[0])
+                unseen_one = unseen(alpha[i], None if weights is None else weights[i])[0]
+                raise DataError(self._of(group, i) + self._planes_say(planes, unseen_one))
         if wanted.objective == "least-squares" and limit is None and ceiling is None:
             try:
                 fix = least_squares(alpha, here, weights, ridge=wanted.ridge)
             except DependentPlanes as error:
-                raise DataError(self._of(group, *error.case[:1]) + self._planes_say(planes, error)) from None
+                raise DataError(
+                    self._of(group, *error.case[:1]) + self._planes_say(planes, error.combination)
+                ) from None
             return fix.corrections, None, fix.condition_number
         if wanted.objective == "minimax":
             proven = [
@@ -231,7 +242,7 @@ class Solver:
         try:
             return solve()
         except DependentPlanes as error:
-            raise DataError(self._of(group, i) + self._planes_say(planes, error)) from None
+            raise DataError(self._of(group, i) + self._planes_say(planes, error.combination)) from None
         except Infeasible as error:
             unit = self.runs.amplitude_unit
             with_limits = " with the limits of the masses" if self.wanted.max_mass else ""
@@ -335,8 +346,8 @@ class Solver:
                 terms.append(f"{abs(share):.3g} at {float(degrees(share)):.0f}° in {name}")
         return ", ".join(terms)
 
-    def _planes_say(self, planes: list[str], error: DependentPlanes) -> str:
-        told = [name for name, share in zip(planes, error.combination, strict=True) if abs(share) > 1e-6]
+    def _planes_say(self, planes: list[str], combination: Complex) -> str:
+        told = [name for name, share in zip(planes, combination, strict=True) if abs(share) > 1e-6]
         if len(told) == 1:
             return (
                 f"plane {told[0]} has no effect on any reading: its correction cannot be found; expected sensors that "
@@ -344,7 +355,7 @@ class Solver:
             )
         return (
             f"the readings cannot tell the planes {' and '.join(told)} apart (singular): masses in the ratio "
-            f"{self._combination(planes, error.combination)} leave no trace; leave one of these planes out, or damp with --ridge"
+            f"{self._combination(planes, combination)} leave no trace; leave one of these planes out, or damp with --ridge"
         )
 
     def _trials_say(self, group: Group, error: DependentTrials) -> str:
