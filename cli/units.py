@@ -91,6 +91,7 @@ def amplitude_kind(unit: str) -> tuple[str, str]:
         return "acceleration", tag
     return "velocity" if bare.endswith("_s") else "displacement", tag
 
+
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII)
 
 
