@@ -13,6 +13,8 @@ from cli.errors import DataError
 # name -> (module with a function `run`, the line shown by `dalembert --help`)
 COMMANDS = {
     "balance": ("cli.commands.balance", "Balance rotors from a table of known eccentric masses."),
+    "field": ("cli.commands.field", "Balance rotors from measured vibration and trial masses."),
+    "place": ("cli.commands.place", "Put a correction where masses can go: holes, blades, weights in stock."),
     "bench": ("cli.commands.bench", "Measure run time against error."),
     "mechanism": (
         "cli.commands.mechanism",

@@ -75,7 +75,22 @@ AMPLITUDES: dict[str, Unit] = {
     "m_s2": (1, 1),
     "g": (_G0, 1),
 }
-UNITS["amplitude"] = AMPLITUDES
+# A tag says how it is read: peak, peak to peak, r.m.s.; amplitudes of different tags are different quantities.
+TAGS = ("", "_pk", "_pp", "_rms")
+UNITS["amplitude"] = {unit + tag: si for tag in TAGS for unit, si in AMPLITUDES.items()}
+
+# What influence coefficients are per: a mass or an unbalance.
+UNITS["per"] = {**UNITS["mass"], **UNITS["unbalance"]}
+
+
+def amplitude_kind(unit: str) -> tuple[str, str]:
+    """Return what an amplitude measures (displacement, velocity, acceleration) and its tag; only like ones convert."""
+    tag = next((tag for tag in TAGS[1:] if unit.endswith(tag)), "")
+    bare = unit[: len(unit) - len(tag)]
+    if bare in ("g", "mm_s2", "m_s2"):
+        return "acceleration", tag
+    return "velocity" if bare.endswith("_s") else "displacement", tag
+
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII)
 

@@ -1,0 +1,140 @@
+"""Balancing without phase: influence coefficients from amplitudes alone (the four-run, or three-point, method)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+STARTS = 24
+"""Directions from which the fit is started: it has few minima, all found from so many."""
+
+
+@dataclass(frozen=True)
+class AmplitudeFit:
+    """Influence coefficients of one plane from amplitudes; see `influence_from_amplitudes`."""
+
+    influence: Complex
+    """α (s,), amplitude per kg; its phase is counted from each sensor's own initial vibration."""
+    misfit: Real
+    """√(mean square of fitted - read amplitude) over the trial runs, (s,)."""
+    other: Complex
+    """A second coefficient (s,) that fits (almost) as well, or NaN where the answer is unique."""
+
+
+def influence_from_amplitudes(initial: ArrayLike, trials: ArrayLike, trial_masses: ArrayLike) -> AmplitudeFit:
+    """Find the influence coefficients of one plane from amplitudes, without any phase.
+
+    Parameters
+    ----------
+    initial
+        Amplitudes O without trial mass, (s,), positive.
+    trials
+        Amplitudes R with a trial mass in the plane, (r, s), r >= 2.
+    trial_masses
+        The trial mass at its angle in each run, complex (r,), kg.
+
+    Returns
+    -------
+    AmplitudeFit
+        α with Σ_r (|O + α t_r| - R_r)² least, the initial vibrations standing at phase 0; the misfit; and the
+        second answer where the runs leave two (two trial runs, or all trials on one line).
+
+    Raises
+    ------
+    ValueError
+        Fewer than two trial runs, an amplitude that is not positive, a trial without mass, all trials alike.
+
+    Notes
+    -----
+    The four-run method (O, and three trials some 120° apart) draws circles of radius R_r about -O e^{iθ_r}, whose
+    common point is the trial's effect; readings never meet in one point, and the least-squares point is taken. With
+    two trials the circles meet in two points.
+
+    Examples
+    --------
+    SPM A2010 manual, p. 68: 6.1 mm/s; 7.7, 3.2, 10.3 with 12.3 g at 0°, 120°, 240°.
+
+    >>> fit = influence_from_amplitudes([6.1], [[7.7], [3.2], [10.3]], 12.3 * np.exp(2j * np.pi * np.arange(3) / 3))
+    >>> w = -6.1 / fit.influence[0]
+    >>> abs(w).round(3), np.degrees(np.angle(w)).round(3)
+    (np.float64(16.364), np.float64(89.956))
+    """
+    o = np.atleast_1d(np.asarray(initial, dtype=float))
+    reading = np.asarray(trials, dtype=float)
+    t: Complex = np.asarray(trial_masses, dtype=complex)
+    if reading.ndim != 2 or reading.shape != (len(t), len(o)):
+        raise ValueError(
+            f"shapes do not fit: initial {o.shape}, trials {reading.shape}, trial_masses {t.shape}"
+        )
+    if len(t) < 2:
+        raise ValueError("expected at least two trial runs (three for a unique answer)")
+    if not ((o > 0).all() and (reading >= 0).all() and np.isfinite(reading).all() and np.isfinite(o).all()):
+        raise ValueError("amplitudes must be finite, and positive in the initial run")
+    if not (np.abs(t) > 0).all():
+        raise ValueError("a trial run without trial mass")
+    if np.ptp(t.real) + np.ptp(t.imag) <= 1e-9 * np.abs(t).max():
+        raise ValueError("the trial masses are all alike: expected different angles")
+    unit = float(np.abs(t).max())
+    scaled: Complex = np.asarray(t / unit, dtype=complex)
+    found = [_fit(read / first, scaled) for first, read in zip(o, reading.T, strict=True)]
+    return AmplitudeFit(
+        np.array([fit[0] for fit in found]) * o / unit,
+        np.array([fit[1] for fit in found]) * o,
+        np.array([fit[2] for fit in found]) * o / unit,
+    )
+
+
+def _fit(read: Real, t: Complex) -> tuple[complex, float, complex]:
+    """Minimise Σ (|1 + z t_r| - R_r)² over complex z from all directions at once: the best, its misfit, its rival."""
+    # each reading bounds the size: |R - 1| <= |z t| <= R + 1
+    low, high = float((np.abs(read - 1) / np.abs(t)).max()), float(((read + 1) / np.abs(t)).min())
+    sizes = np.geomspace(max(min(low, high), high / 20), max(low, high), 5)
+    z = np.outer(sizes, np.exp(2j * np.pi * (np.arange(STARTS) + 0.5) / STARTS)).ravel()
+    damping = np.full(z.shape, 1e-3)
+    cost = _cost(z, read, t)
+    for _ in range(80):
+        y = 1 + z[:, None] * t
+        length = np.abs(y)
+        u = y / np.where(length > 0, length, 1.0)
+        f = length - read
+        # d|y| = Re(ū t dz): rows (Re, -Im) of ū t
+        slope = u.conj() * t
+        j = np.stack([slope.real, -slope.imag], axis=-1)
+        gradient = np.einsum("nrk,nr->nk", j, f)
+        # exact curvature: |y|'' = (Im ū t dz)²/|y|
+        across = np.stack([slope.imag, slope.real], axis=-1)
+        bend = np.where(length > 1e-12, f / np.where(length > 0, length, 1.0), 0.0)
+        normal = np.einsum("nrk,nrl->nkl", j, j)
+        hessian = normal + np.einsum("nr,nrk,nrl->nkl", bend, across, across)
+        definite = (hessian[:, 0, 0] > 0) & (
+            np.linalg.det(hessian) > 1e-9 * np.trace(hessian, axis1=1, axis2=2) ** 2
+        )
+        hessian = np.where(definite[:, None, None], hessian, normal)
+        hessian = hessian + (damping * np.trace(normal, axis1=1, axis2=2))[:, None, None] * np.eye(2)
+        move = -np.linalg.solve(hessian, gradient[..., None])[..., 0]
+        trial = z + (move[:, 0] + 1j * move[:, 1])
+        new = _cost(trial, read, t)
+        better = new <= cost
+        z, cost = np.where(better, trial, z), np.where(better, new, cost)
+        damping = np.where(better, damping * 0.1, np.minimum(damping * 10, 1e6))
+        if (np.abs(move).max(axis=1) <= 1e-15 * np.abs(z)).all():
+            break
+    best = int(np.argmin(cost))
+    misfit = float(np.sqrt(cost[best] / len(t)))
+    away = np.abs(z - z[best]) > 1e-3 * abs(z[best])
+    rival: complex = complex(np.nan, np.nan)
+    if away.any():
+        second = int(np.argmin(np.where(away, cost, np.inf)))
+        # a rival is one that the readings cannot tell from the best
+        if np.sqrt(cost[second] / len(t)) <= max(2 * misfit, 1e-3 * float(np.abs(read).max())):
+            rival = complex(z[second])
+    return complex(z[best]), misfit, rival
+
+
+def _cost(z: Complex, read: Real, t: Complex) -> Real:
+    return np.asarray(np.square(np.abs(1 + z[:, None] * t) - read).sum(axis=-1))

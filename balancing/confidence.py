@@ -1,0 +1,180 @@
+"""What the errors of readings do to corrections, and what vibration is left then."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from balancing.influence import _adjoint, influence_coefficients, least_squares
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Readings:
+    """The readings from which corrections were found, and their errors; one rotor.
+
+    The errors are standard deviations: of the amplitude, relative to it, and of the phase in rad; those of
+    different readings are independent.
+    """
+
+    initial: Complex
+    """V as read, run-out not yet subtracted, (s,)."""
+    amplitude_error: float
+    phase_error: float
+    trials: Complex | None = None
+    """The trial runs as read, (r, s); None where the coefficients were given, and count as exact."""
+    trial_masses: Complex | None = None
+    """(r, p), kg."""
+    influence: Complex | None = None
+    """The given coefficients (s, p), where there are no trials."""
+    runout: Complex | None = None
+    """(s,), subtracted from every reading."""
+
+    @cached_property
+    def _all(self) -> Complex:
+        """Initial run and trial runs, (1 + r, s)."""
+        runs = [self.initial[None]] if self.trials is None else [self.initial[None], self.trials]
+        return np.concatenate(runs)
+
+    @cached_property
+    def coefficients(self) -> Complex:
+        """α from these readings, (s, p)."""
+        if self.trials is None or self.trial_masses is None:
+            assert self.influence is not None
+            return self.influence
+        return influence_coefficients(self.initial, self.trials, self.trial_masses)
+
+    @cached_property
+    def vibration(self) -> Complex:
+        """V without run-out, (s,)."""
+        return self.initial if self.runout is None else self.initial - self.runout
+
+    def _share(self, corrections: Complex) -> Complex:
+        """How the residual at fixed corrections depends on each run: r = Σ_j share_j V_j, (1 + r,).
+
+        With c = wᵀT⁺ it is r = (1 - Σc) V_0 + Σ c_j V_j.
+        """
+        if self.trial_masses is None or self.trials is None:
+            return np.ones(1, dtype=complex)
+        c = corrections @ np.linalg.pinv(self.trial_masses)
+        return np.concatenate([[1 - c.sum()], c])
+
+    def residual_samples(self, corrections: Complex, n: int = 4000, seed: int = 0) -> Complex:
+        """Draw the residual vibration (n, s) that the corrections as made leave on the true rotor.
+
+        At fixed corrections the residual is linear in the readings: no further approximation is made.
+        """
+        share = self._share(corrections)
+        error = self._draw(n, seed) - self._all
+        expected = self.vibration + self.coefficients @ corrections
+        return np.asarray(expected + np.tensordot(error, share, axes=([1], [0])))
+
+    def _draw(self, n: int, seed: int) -> Complex:
+        """Draw readings, (n, 1 + r, s)."""
+        normal = np.random.default_rng(seed).standard_normal((2, n, *self._all.shape))
+        return np.asarray(
+            self._all * (1 + self.amplitude_error * normal[0]) * np.exp(1j * self.phase_error * normal[1])
+        )
+
+    def correction_samples(
+        self, weights: ArrayLike | None = None, ridge: float = 0.0, n: int = 4000, seed: int = 0
+    ) -> Complex:
+        """Draw least-squares corrections (n, p) from readings with their errors (Monte Carlo)."""
+        runs = self._draw(n, seed)
+        shift = 0 if self.runout is None else self.runout
+        if self.trials is None:
+            return least_squares(self.coefficients, runs[:, 0] - shift, weights, ridge=ridge).corrections
+        assert self.trial_masses is not None
+        alpha = influence_coefficients(runs[:, 0], runs[:, 1:], self.trial_masses)
+        return least_squares(alpha, runs[:, 0] - shift, weights, ridge=ridge).corrections
+
+    def problem_samples(self, n: int = 200, seed: int = 0) -> Iterator[tuple[Complex, Complex]]:
+        """Draw coefficients (s, p) and vibration (s,) from readings with their errors."""
+        shift = 0 if self.runout is None else self.runout
+        for runs in self._draw(n, seed):
+            if self.trials is None or self.trial_masses is None:
+                yield self.coefficients, runs[0] - shift
+            else:
+                yield influence_coefficients(runs[0], runs[1:], self.trial_masses), runs[0] - shift
+
+    def covariance(
+        self,
+        corrections: Complex,
+        weights: ArrayLike | None = None,
+        ridge: float = 0.0,
+        *,
+        along: Complex | None = None,
+    ) -> Real:
+        """Propagate the reading errors linearly to least-squares corrections.
+
+        Parameters
+        ----------
+        corrections
+            The corrections from the initial state, (p,).
+        weights, ridge
+            As they were found with.
+        along
+            The directions, (p,), where they are not the corrections' own.
+
+        Returns
+        -------
+        ndarray
+            (p, 2, 2), kg²: the covariance of each correction along itself (its size) and across (its angle).
+
+        Notes
+        -----
+        With M = (αᴴWα)⁻¹ = R⁻¹R⁻ᴴ of the QR factors, δ the residual's change at fixed corrections and e the residual,
+
+            dw = -M αᴴW δ - M dαᴴ W e,
+
+        where the second term is there because the coefficients, too, come from readings.
+        """
+        alpha, w = self.coefficients, corrections
+        weight = np.ones(len(alpha)) if weights is None else np.asarray(weights, dtype=float)
+        a = np.sqrt(weight)[:, None] * alpha
+        if ridge:
+            norms = np.linalg.norm(a, axis=0)
+            norms = np.where(norms > 0, norms, norms.max())
+            a = np.concatenate([a, ridge * np.diag(norms)])
+        scale = 1 / np.linalg.norm(a, axis=0)
+        q, r = np.linalg.qr(a * scale)
+        inverse = np.linalg.inv(r) * scale[:, None]
+        gain = (inverse @ _adjoint(q))[:, : len(alpha)] * np.sqrt(weight)  # M αᴴ W, (p, s)
+        share = self._share(w)
+        linear = -gain[:, None, :] * share[:, None]  # (p, 1 + r, s)
+        antilinear = np.zeros_like(linear)
+        if self.trials is not None and self.trial_masses is not None:
+            left = weight * (self.vibration + alpha @ w)
+            m, undo = inverse @ _adjoint(inverse), np.linalg.pinv(self.trial_masses)
+            by_run = -(m @ undo.conj())[..., None] * left  # (p, r, s)
+            # the ridge, too, follows the coefficients: λ² ‖α_p‖² w_p
+            pull = (ridge**2 * w * alpha * weight[:, None]).T  # (p, s)
+            by_run = by_run - np.einsum("pj,js,jr->prs", m, pull, undo.conj())
+            pull = (ridge**2 * w * alpha.conj() * weight[:, None]).T
+            forward = -np.einsum("pj,js,jr->prs", m, pull, undo)
+            antilinear[:, 1:], antilinear[:, 0] = by_run, -by_run.sum(axis=1)
+            linear[:, 1:] += forward
+            linear[:, 0] -= forward.sum(axis=1)
+        v = self._all
+        size = np.where(np.abs(w) > 0, np.abs(w), 1.0)
+        back = np.where(np.abs(w) > 0, w.conj() / size, 1.0)[
+            :, None, None
+        ]  # turns each correction onto the real axis
+        radial = back * (linear * v + antilinear * v.conj()) * self.amplitude_error
+        across = back * 1j * (linear * v - antilinear * v.conj()) * self.phase_error
+        parts = np.stack([np.stack([x.real, x.imag]) for x in (radial, across)])  # (2, 2, p, 1 + r, s)
+        return np.asarray(np.einsum("eaprs,ebprs->pab", parts, parts))
+
+
+def spread(samples: Complex, about: Complex) -> Real:
+    """Return the covariance (p, 2, 2) of drawn corrections (n, p) along and across the given ones."""
+    size = np.where(np.abs(about) > 0, np.abs(about), 1.0)
+    turned = (samples - about) * np.where(np.abs(about) > 0, about.conj() / size, 1.0)
+    parts = np.stack([turned.real, turned.imag])
+    return np.asarray(np.einsum("anp,bnp->pab", parts, parts) / len(samples))

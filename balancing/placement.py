@@ -1,0 +1,323 @@
+"""Corrections where masses can go: holes, blades, weights in stock, other radii and planes, drilling."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from balancing.correction import correct
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Masses at given positions; see `place` and `place_from_stock`."""
+
+    target: complex
+    """What the masses together should be, complex kg."""
+    angles: Real
+    """The positions, (n,), rad."""
+    masses: Real
+    """The mass at each, (n,), kg; 0 for none."""
+    bound: float = 0.0
+    """No masses at these positions, within the limits, come nearer to the target than this, kg."""
+
+    @property
+    def total(self) -> complex:
+        """What the masses together are, complex kg."""
+        return complex((self.masses * np.exp(1j * self.angles)).sum())
+
+    @property
+    def error(self) -> complex:
+        """total - target, complex kg."""
+        return self.total - self.target
+
+
+def place(target: complex, angles: ArrayLike, max_mass: ArrayLike | None = None) -> Placement:
+    """Split a correction onto given positions: exactly and with the least mass, or as near as the limits let.
+
+    Parameters
+    ----------
+    target
+        The correction, complex kg.
+    angles
+        The positions (holes, blades), (n,), rad, different.
+    max_mass
+        Limit of each position, scalar or (n,), kg; None or inf for none.
+
+    Returns
+    -------
+    Placement
+        `.masses` (n,), `.error`. Without limits the two positions on either side of the target share it by the
+        sine rule; with limits the positions next to the target are filled up first.
+
+    Notes
+    -----
+    Least Σm with Σ m e^{iθ} = target is a linear program whose dual is a vector y: positions with
+    Re(ȳ e^{iθ}) > 1 are full, those below 1 empty. So the full ones are neighbours, with one partly filled
+    position on either side of them, and every such arc is tried. A target that is out of reach is nearest to
+    an edge of the reachable polygon (a zonotope): those with Re(ȳ e^{iθ}) > 0 full, one across partly filled.
+
+    Examples
+    --------
+    83.5 g at 308.87° onto blades at 292.5° and 315°:
+
+    >>> place(83.5 * np.exp(1j * np.radians(308.87)), np.radians([292.5, 315])).masses.round(2)
+    array([23.3, 61.5])
+    """
+    theta, cap = _positions(angles, max_mass)
+    goal = complex(target)
+    if not np.isfinite(goal):
+        raise ValueError("the target must be finite")
+    n, size = len(theta), abs(goal)
+    if size == 0:
+        return Placement(goal, theta, np.zeros(n))
+    order = np.argsort(theta % (2 * np.pi), kind="stable")
+    arms, limit = np.exp(1j * theta[order]), cap[order]
+    if not np.isfinite(limit).all():
+        sines = np.abs(np.imag(np.roll(arms, -1) * arms.conj()))
+        slimmest = float(sines[sines > 1e-9].min(initial=1.0))
+        limit = np.where(np.isfinite(limit), limit, 4 * size / slimmest)  # more than any share can be
+    masses = _exact(goal, arms, limit)
+    if masses is None:
+        masses = _nearest(goal, arms, limit)
+    found = np.zeros(n)
+    found[order] = np.where(masses > 4e-15 * size, masses, 0.0)
+    miss = abs(goal - complex((masses * arms).sum()))
+    return Placement(goal, theta, found, miss if miss > 1e-12 * size else 0.0)
+
+
+def _positions(angles: ArrayLike, max_mass: ArrayLike | None) -> tuple[Real, Real]:
+    theta = np.atleast_1d(np.asarray(angles, dtype=float))
+    if theta.ndim != 1 or not len(theta) or not np.isfinite(theta).all():
+        raise ValueError("expected the angles of one or more positions")
+    cap = np.broadcast_to(np.inf if max_mass is None else np.asarray(max_mass, dtype=float), theta.shape)
+    if not (cap >= 0).all():
+        raise ValueError("max_mass must not be negative")
+    arms = np.exp(1j * np.sort(theta % (2 * np.pi)))
+    if len(arms) > 1 and np.abs(arms - np.roll(arms, 1)).min() < 1e-9:
+        raise ValueError("two positions at the same angle")
+    return theta, cap
+
+
+def _exact(goal: complex, arms: Complex, limit: Real) -> Real | None:
+    """Masses that add up to the goal, of the least sum; None where it is out of reach."""
+    n = len(arms)
+    if n == 1:
+        along = goal * arms[0].conjugate()
+        fits = abs(along.imag) <= 1e-14 * abs(goal) and 0 <= along.real <= limit[0]
+        return np.array([along.real]) if fits else None
+    full = np.concatenate([[0], np.cumsum(np.tile(limit * arms, 2))])
+    amount = np.concatenate([[0], np.cumsum(np.tile(limit, 2))])
+    best: tuple[float, int, int, float, float] | None = None
+    first = np.arange(n)
+    for inside in range(n - 1):
+        last = (first + inside + 1) % n
+        rest = goal - (full[first + inside + 1] - full[first + 1])
+        a, b = arms[first], arms[last]
+        across = np.imag(a.conj() * b)
+        ok = np.abs(across) > 1e-12
+        safe = np.where(ok, across, 1.0)
+        x, y = np.imag(rest.conj() * b) / safe, np.imag(a.conj() * rest) / safe
+        slip = 1e-12 * abs(goal)
+        ok &= (x >= -slip) & (y >= -slip) & (x <= limit[first] + slip) & (y <= limit[last] + slip)
+        sums = np.where(ok, amount[first + inside + 1] - amount[first + 1] + x + y, np.inf)
+        i = int(np.argmin(sums))
+        if ok[i] and (best is None or sums[i] < best[0] * (1 - 1e-12)):
+            best = (float(sums[i]), i, inside, float(x[i]), float(y[i]))
+    if best is None:
+        return None
+    _, i, inside, at_first, at_last = best
+    masses = np.zeros(n)
+    between = (i + 1 + np.arange(inside)) % n
+    masses[between] = limit[between]
+    masses[i], masses[(i + inside + 1) % n] = at_first, at_last
+    return np.clip(masses, 0.0, limit)
+
+
+def _nearest(goal: complex, arms: Complex, limit: Real) -> Real:
+    """The masses whose sum comes nearest to a goal out of reach: on an edge of the reachable polygon."""
+    best, found = np.inf, np.zeros(len(arms))
+    for j, arm in enumerate(arms):
+        for side in (1j, -1j):
+            masses = np.where(np.real(arms * np.conj(side * arm)) > 1e-12, limit, 0.0)
+            masses[j] = 0.0
+            base = complex((masses * arms).sum())
+            masses[j] = min(max(((goal - base) * arm.conjugate()).real, 0.0), limit[j])
+            miss = abs(goal - base - masses[j] * arm)
+            if miss < best:
+                best, found = miss, masses
+    return found
+
+
+SUMS = 300_000
+"""So many sums of one half of the positions are searched at most."""
+
+
+def place_from_stock(
+    target: complex,
+    angles: ArrayLike,
+    stock: ArrayLike,
+    max_mass: ArrayLike | None = None,
+    *,
+    pieces: int = 1,
+    max_pieces: int | None = None,
+) -> Placement:
+    """Choose weights from stock for given positions so that they come nearest to a correction.
+
+    Parameters
+    ----------
+    target, angles, max_mass
+        As for `place`.
+    stock
+        The weights there are, (k,), kg, as many of each as wanted.
+    pieces
+        How many may go on one position.
+    max_pieces
+        How many may be used altogether; None for any number.
+
+    Returns
+    -------
+    Placement
+        `.masses` (n,) sums of stock weights, of the least |error| there is, and among equals of the least total
+        mass. Where there are too many choices to search (some 18 positions with three weights) only the
+        positions nearest to the target's direction are used, and `.bound` is 0.
+
+    Notes
+    -----
+    Exact, by meeting in the middle (Horowitz and Sahni, J. ACM 21 (1974) 277-292): all sums of one half of the
+    positions, and for each the nearest complement among the sums of the other half, by a k-d tree.
+
+    Examples
+    --------
+    >>> choice = place_from_stock(0.007, np.radians([0, 90, 180, 270]), [0.001, 0.002, 0.005], pieces=2)
+    >>> choice.masses.round(3)
+    array([0.007, 0.   , 0.   , 0.   ])
+    """
+    from scipy.spatial import KDTree
+
+    theta, cap = _positions(angles, max_mass)
+    weights = np.unique(np.asarray(stock, dtype=float))
+    goal = complex(target)
+    if not len(weights) or not (weights > 0).all() or not np.isfinite(weights).all():
+        raise ValueError("expected the weights in stock, positive")
+    if pieces < 1 or (max_pieces is not None and max_pieces < 0):
+        raise ValueError("expected at least one piece a position")
+    loads, counts = _loads(weights, pieces)
+    away = np.abs(np.angle(np.exp(1j * theta) * np.conj(goal))) if goal else np.zeros(len(theta))
+    room = max(2 * int(np.log(SUMS) / np.log(len(loads))), 2)
+    used = np.argsort(away, kind="stable")[:room]
+    halves = []
+    for part in (used[0::2], used[1::2]):  # every other one: both halves reach in all directions
+        sums, mass, count = np.zeros(1, dtype=complex), np.zeros(1), np.zeros(1, dtype=np.intp)
+        choice = np.zeros((1, len(part)), dtype=np.int16)
+        for column, position in enumerate(part):
+            fit = np.flatnonzero(loads <= cap[position] * (1 + 1e-12))
+            sums = (sums[:, None] + loads[fit] * np.exp(1j * theta[position])).ravel()
+            mass = (mass[:, None] + loads[fit]).ravel()
+            count = (count[:, None] + counts[fit]).ravel()
+            choice = np.repeat(choice, len(fit), axis=0)
+            choice[:, column] = np.tile(fit, len(choice) // len(fit))
+        if max_pieces is not None:
+            keep = count <= max_pieces
+            sums, mass, count, choice = sums[keep], mass[keep], count[keep], choice[keep]
+        halves.append((sums, mass, count, choice))
+    (sa, ma, ca, xa), (sb, mb, cb, xb) = halves
+    best: tuple[float, float, int, int] | None = None
+    slack = 1e-12 * float(max(abs(goal), weights[-1]))
+    for level in range(max_pieces + 1) if max_pieces is not None else [None]:
+        b = np.arange(len(sb)) if level is None else np.flatnonzero(cb == level)
+        a = (
+            np.arange(len(sa))
+            if level is None or max_pieces is None
+            else np.flatnonzero(ca <= max_pieces - level)
+        )
+        if not (len(a) and len(b)):
+            continue
+        # of sums that coincide the lightest
+        grid = np.round(np.stack([sb[b].real, sb[b].imag]) / (slack * 100))
+        order = np.lexsort((mb[b], grid[1], grid[0]))
+        new = np.append(True, (np.diff(grid[:, order], axis=1) != 0).any(axis=0))
+        b = b[order[new]]
+        tree = KDTree(np.stack([sb[b].real, sb[b].imag], axis=1))
+        wanted = goal - sa[a]
+        distance, _ = tree.query(np.stack([wanted.real, wanted.imag], axis=1))
+        least = float(distance.min())
+        if best is not None and least > best[0] + slack:
+            continue
+        for i in np.flatnonzero(distance <= least * (1 + 1e-9) + slack)[:1000]:
+            near = tree.query_ball_point([wanted[i].real, wanted[i].imag], least * (1 + 1e-9) + slack)
+            for j in near:
+                found = (least, float(ma[a[i]] + mb[b[j]]), int(a[i]), int(b[j]))
+                if best is None or found[0] < best[0] - slack or found[1] < best[1] - slack:
+                    best = found
+    assert best is not None  # no weight anywhere is always a choice
+    masses = np.zeros(len(theta))
+    masses[used[0::2]], masses[used[1::2]] = loads[xa[best[2]]], loads[xb[best[3]]]
+    return Placement(goal, theta, masses, best[0] if room >= len(theta) else 0.0)
+
+
+def _loads(weights: Real, pieces: int) -> tuple[Real, NDArray[np.intp]]:
+    """Return what up to so many pieces can weigh together, ascending from 0, and the fewest pieces for each."""
+    fewest = {0.0: 0}
+    for number in range(1, pieces + 1):
+        for load in [load for load, count in fewest.items() if count == number - 1]:
+            for weight in weights.tolist():
+                # 1 + 1 + 1 and 1 + 2 weigh the same, whatever the last digit
+                total = float(f"{load + weight:.12g}") if load else weight
+                fewest.setdefault(total, number)
+        if len(fewest) > 2000:
+            raise ValueError("too many combinations of weights: expected fewer pieces a position")
+    loads = sorted(fewest)
+    return np.array(loads), np.array([fewest[load] for load in loads], dtype=np.intp)
+
+
+def drill_depth(
+    mass: ArrayLike, diameter: ArrayLike, density: ArrayLike, point_angle: float = np.pi
+) -> NDArray[np.float64]:
+    """Tell how deep to drill to remove a mass, m, measured at the tip of the drill.
+
+    Parameters
+    ----------
+    mass, diameter, density
+        kg, m, kg/m³; they broadcast.
+    point_angle
+        The drill's point angle, rad; π for a flat bottom.
+
+    Notes
+    -----
+    m = ρ(π d²/4·h + π d³/(24 tan(φ/2))), h the depth of the full diameter; a hole shallower than the point
+    is a cone.
+
+    >>> round(float(drill_depth(0.010, 0.010, 7850.0)) * 1000, 2)
+    16.22
+    """
+    m, d, rho = (np.asarray(value, dtype=float) for value in (mass, diameter, density))
+    if not ((m >= 0).all() and (d > 0).all() and (rho > 0).all() and 0 < point_angle <= np.pi):
+        raise ValueError(
+            "mass must not be negative, diameter and density positive, the point angle in (0, π]"
+        )
+    volume, area = m / rho, np.pi * d**2 / 4
+    if point_angle == np.pi:
+        return np.asarray(volume / area)
+    slope = np.tan(point_angle / 2)
+    point = d / 2 / slope
+    cone = area * point / 3
+    shallow = np.cbrt(3 * volume / (np.pi * slope**2))
+    return np.asarray(np.where(volume >= cone, (volume - cone) / area + point, shallow))
+
+
+def transfer(unbalance: ArrayLike, z: ArrayLike, planes: ArrayLike) -> Complex:
+    """Carry corrections over to other planes, with the same force and moment (least norm for three or more).
+
+    Corrections (..., k) at z (..., k) become corrections (..., p) in the planes (p,); two planes share one
+    correction by its distances (the lever).
+
+    >>> transfer([12.0], [0.03], [0.0, 0.09]).real.round(12)
+    array([8., 4.])
+    """
+    return np.asarray(-correct(unbalance, z, planes).unbalance + 0.0)

@@ -1,0 +1,137 @@
+"""Around the measurement: the trial mass to begin with, what it must do, index balancing, the error budget."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+STANDARD_GRAVITY = 9.80665
+
+
+def trial_unbalance(
+    rotor_mass: ArrayLike, speed: ArrayLike, planes: int = 1, share: float = 0.1
+) -> NDArray[np.float64]:
+    """Suggest a trial unbalance m·r for the first run, kg·m.
+
+    The rule: its centrifugal force is a tenth (`share`) of the static load that the plane carries,
+    m·r·ω² = share·(M/planes)·g. It is felt, and does no harm. Rotor mass in kg, speed in rad/s.
+
+    >>> m_r = trial_unbalance(100.0, 1500 * np.pi / 30, planes=2)
+    >>> round(float(m_r / 0.2) * 1000, 2)  # grams at 200 mm
+    9.94
+    """
+    mass, omega = np.asarray(rotor_mass, dtype=float), np.asarray(speed, dtype=float)
+    if not ((mass > 0).all() and (omega > 0).all() and planes >= 1 and share > 0):
+        raise ValueError("rotor mass, speed, planes and share must be positive")
+    return np.asarray(share * mass / planes * STANDARD_GRAVITY / omega**2)
+
+
+class TrialEffect(NamedTuple):
+    """What a trial mass changed: the amplitude by this share, the phase by this angle (rad), (...,) each."""
+
+    amplitude: Real
+    phase: Real
+
+
+def trial_effect(before: ArrayLike, after: ArrayLike) -> TrialEffect:
+    """Tell how much a trial mass changed the readings, for the 30/30 rule.
+
+    The rule of the practitioner: a trial run tells something where the amplitude changed by 30 % or the phase
+    by 30° at one sensor at least. A vibration that rises from zero has changed by inf.
+
+    >>> effect = trial_effect(3.4 * np.exp(1j * np.radians(116)), 1.8 * np.exp(1j * np.radians(42)))
+    >>> effect.amplitude.round(2), np.degrees(effect.phase).round()
+    (np.float64(0.47), np.float64(74.0))
+    """
+    v0, v1 = np.asarray(before, dtype=complex), np.asarray(after, dtype=complex)
+    size = np.abs(v0)
+    change = np.abs(np.abs(v1) - size)
+    amplitude = np.where(size > 0, change / np.where(size > 0, size, 1.0), np.where(change > 0, np.inf, 0.0))
+    phase = np.where((size > 0) & (np.abs(v1) > 0), np.abs(np.angle(v1 * v0.conj())), 0.0)
+    return TrialEffect(amplitude[()], phase[()])
+
+
+class Indexed(NamedTuple):
+    """The unbalance of the rotor itself, and that of what it is mounted on, in the plane's own unit."""
+
+    rotor: Complex
+    mounting: Complex
+
+
+def index_balancing(readings: ArrayLike, turned: ArrayLike = (0.0, np.pi)) -> Indexed:
+    """Separate a rotor's unbalance from its arbor's by readings with the rotor turned on the arbor.
+
+    Parameters
+    ----------
+    readings
+        The unbalances as read in the arbor's axes, complex (..., k).
+    turned
+        By how much the rotor was turned on the arbor for each, (k,), rad; default 0 and 180°.
+
+    Notes
+    -----
+    Reading k is mounting + rotor·e^{iφ_k}; for 0 and 180° mounting is half the sum and rotor half the difference
+    (ISO 21940-14:2012, index balancing). More positions are fitted by least squares.
+
+    >>> both = index_balancing([5 + 1j, 1 - 1j])
+    >>> complex(both.rotor), complex(both.mounting)
+    ((2+1j), (3+0j))
+    """
+    read = np.asarray(readings, dtype=complex)
+    phi = np.asarray(turned, dtype=float)
+    if phi.ndim != 1 or read.shape[-1:] != phi.shape or len(phi) < 2:
+        raise ValueError("expected as many readings as angles, and at least two")
+    if not (np.isfinite(read).all() and np.isfinite(phi).all()):
+        raise ValueError("readings and angles must be finite")
+    turn = np.exp(1j * phi)
+    if np.abs(turn - turn[0]).max() < 1e-6:
+        raise ValueError("the rotor was not turned: expected different angles")
+    if len(phi) == 2 and abs(abs(phi[1] - phi[0]) - np.pi) < 1e-15:
+        return Indexed((read[..., 0] - read[..., 1]) / 2 * turn[0].conj(), (read[..., 0] + read[..., 1]) / 2)
+    a = np.stack([turn, np.ones_like(turn)], axis=-1)
+    q, r = np.linalg.qr(a)
+    solution = np.linalg.solve(r, np.matvec(q.conj().T, read)[..., None])[..., 0]
+    return Indexed(solution[..., 0], solution[..., 1])
+
+
+class ErrorBudget(NamedTuple):
+    """The error of a residual unbalance, and the readings from which on a rotor is in or out of tolerance."""
+
+    error: Real
+    accept: Real
+    """At most this reading: within tolerance whatever the error."""
+    reject: Real
+    """More than this reading: beyond tolerance whatever the error."""
+
+
+def error_budget(permissible: ArrayLike, random: ArrayLike = (), systematic: ArrayLike = ()) -> ErrorBudget:
+    """Combine the errors of balancing and say which residual readings pass.
+
+    Parameters
+    ----------
+    permissible
+        U_per of the plane, kg·m (any one unit for all three), scalar or (...).
+    random
+        Random errors (clearance, repeatability, drive play ...), (..., n): they add by squares.
+    systematic
+        Systematic errors that were NOT corrected, sizes, (..., n): they add in full, as the worst case.
+
+    Notes
+    -----
+    ISO 21940-14:2012 (before: ISO 1940-2): ΔU = Σ systematic + √Σ random²; the maker accepts a reading up to
+    U_per - ΔU, the user rejects one above U_per + ΔU; between the two it is not decided.
+
+    >>> error_budget(100.0, random=[3.0, 4.0], systematic=[2.0])
+    ErrorBudget(error=array(7.), accept=array(93.), reject=array(107.))
+    """
+    u = np.asarray(permissible, dtype=float)
+    r, s = np.asarray(random, dtype=float), np.asarray(systematic, dtype=float)
+    if not ((u > 0).all() and np.isfinite(r).all() and np.isfinite(s).all()):
+        raise ValueError("permissible must be positive and the errors finite")
+    error = np.abs(s).sum(axis=-1) + np.sqrt(np.square(r).sum(axis=-1))
+    return ErrorBudget(np.asarray(error), np.asarray(np.maximum(u - error, 0.0)), np.asarray(u + error))

@@ -1,0 +1,215 @@
+"""The corrections of a table of runs, in every form they are shown in."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.field_solve import UNKNOWN_ANGLE, Solved, Solver, Wanted
+from cli.render import Shown
+from cli.units import degrees, from_si, to_si
+
+Real = NDArray[np.float64]
+
+__all__ = ["Field", "Solved", "Wanted"]
+
+
+class Field(Solver):
+    """The corrections of every rotor of a table of runs, ready to be shown."""
+
+    def shown(self) -> Shown:
+        """Return the result in every form."""
+        from cli.field_text import afterword, notes
+
+        return Shown(
+            document=self.document,
+            columns=self.columns,
+            keys=("rotor", "plane"),
+            notes=lambda: notes(self),
+            afterword=lambda: afterword(self),
+            figure=self.figure,
+            warnings=[*self.runs.warnings, *self.warnings],
+        )
+
+    def figure(self) -> Any:
+        """Draw the first rotors."""
+        from cli.plots.field import draw
+
+        return draw(self, range(min(len(self.runs.rotors), 3)))
+
+    def uncertainty(self, solved: Solved) -> tuple[Real, Real] | None:
+        """Return the standard deviations of size (SI) and angle (degrees; NaN where it is not known), (g, p) each."""
+        if solved.covariance is None:
+            return None
+        size = np.abs(solved.corrections)
+        along = np.sqrt(solved.covariance[..., 0, 0])
+        across = np.sqrt(solved.covariance[..., 1, 1])
+        safe = np.where(size > 0, size, 1.0)
+        angle = np.where(size > 0, np.degrees(across / safe), np.nan)
+        return along, np.where(angle <= UNKNOWN_ANGLE, angle, np.nan)
+
+    @cached_property
+    def columns(self) -> dict[str, Any]:
+        """The CSV: one row per rotor and plane."""
+        order = []
+        for k, solved in enumerate(self.solved):
+            g, p = solved.corrections.shape
+            order.append(
+                np.stack(
+                    [
+                        np.repeat(solved.group.rotors, p),
+                        np.tile(np.arange(p), g),
+                        np.full(g * p, k),
+                    ]
+                )
+            )
+        keys = np.concatenate(order, axis=1)
+        sort = np.lexsort((keys[1], keys[0]))
+        flat = np.concatenate([solved.corrections.ravel() for solved in self.solved])[sort]
+        rotor, plane, group = (row[sort].tolist() for row in keys)
+        rotors = self.runs.rotors
+        columns: dict[str, Any] = {
+            "rotor": [rotors[r] for r in rotor],
+            "plane": [self.solved[k].planes[p] for k, p in zip(group, plane, strict=True)],
+            f"{self.runs.per}_{self.runs.mass_unit}": self._amount(np.abs(flat)),
+            "angle_deg": degrees(flat),
+        }
+        if self.wanted.reading_error is not None:
+            pairs = [self.uncertainty(solved) for solved in self.solved]
+            along = np.concatenate([pair[0].ravel() for pair in pairs if pair is not None])[sort]
+            angle = np.concatenate([pair[1].ravel() for pair in pairs if pair is not None])[sort]
+            columns[f"{self.runs.per}_uncertainty_{self.runs.mass_unit}"] = self._amount(along)
+            columns["angle_uncertainty_deg"] = angle
+        return columns
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        documents = []
+        suffix = "kg" if self.runs.per == "mass" else "kg_m"
+        key = self.runs.per
+        for rotor, (k, i) in enumerate(self.place):
+            solved = self.solved[k]
+            group = solved.group
+            spreads = self.uncertainty(solved)
+            corrections: list[dict[str, Any]] = []
+            for p, plane in enumerate(solved.planes):
+                w = solved.corrections[i, p]
+                entry = {"plane": plane, f"{key}_{suffix}": abs(w), "angle_deg": float(degrees(w))}
+                entry[f"{key}_uncertainty_{suffix}"] = None if spreads is None else _number(spreads[0][i, p])
+                entry["angle_uncertainty_deg"] = None if spreads is None else _number(spreads[1][i, p])
+                if self.wanted.places is not None:
+                    entry["split"] = [
+                        {"position": name, "angle_deg": angle, f"{key}_{suffix}": part}
+                        for name, angle, part in self.split(w)
+                    ]
+                corrections.append(entry)
+            residual = solved.residual[i]
+            size = np.abs(residual)
+            largest = float(size.max())
+            document: dict[str, Any] = {
+                "rotor": self.runs.rotors[rotor],
+                "influence": [
+                    {
+                        "sensor": channel.sensor,
+                        "speed_rad_s": channel.speed,
+                        "plane": plane,
+                        f"magnitude_per_{suffix}": abs(solved.alpha[i, s, p]),
+                        "phase_deg": float(degrees(solved.alpha[i, s, p])),
+                    }
+                    for s, channel in enumerate(group.channels)
+                    for p, plane in enumerate(solved.planes)
+                ],
+                "condition_number": _number(solved.condition[i]),
+                "corrections": corrections,
+                "residual": [
+                    {
+                        "sensor": channel.sensor,
+                        "speed_rad_s": channel.speed,
+                        "amplitude": abs(residual[s]),
+                        "phase_deg": None if self.wanted.four_run else float(degrees(residual[s])),
+                    }
+                    for s, channel in enumerate(group.channels)
+                ],
+                "residual_rms": largest * float(np.sqrt(np.square(size / largest).mean()))
+                if largest
+                else 0.0,
+                "residual_max": largest,
+                "initial_max": float(np.abs(solved.initial[i]).max()),
+                "objective": self.wanted.objective,
+            }
+            if solved.bound is not None:
+                document["residual_bound"] = float(solved.bound[i])
+            if solved.residual_95 is not None:
+                document["residual_max_95"] = float(solved.residual_95[i])
+            if solved.fits:
+                document["misfit"] = [
+                    {"sensor": channel.sensor, "amplitude": float(misfit)}
+                    for channel, misfit in zip(group.channels, solved.fits[i].misfit, strict=True)
+                ]
+                others = [
+                    -v / a for v, a in zip(group.initial[i], solved.fits[i].other, strict=True) if a == a
+                ]
+                document["alternatives"] = [
+                    {"plane": solved.planes[0], f"{key}_{suffix}": abs(w), "angle_deg": float(degrees(w))}
+                    for w in others
+                ]
+            if self.wanted.tolerance is not None:
+                document["tolerance"] = {
+                    "grade": self.wanted.tolerance[0],
+                    "permissible_kg_m": self.wanted.tolerance[1],
+                    "planes": [
+                        {
+                            "plane": plane,
+                            "permissible_kg_m": share,
+                            "initial_kg_m": before,
+                            "within": before <= share,
+                        }
+                        for plane, share, before in self._verdict(solved, i)
+                    ],
+                }
+            documents.append(document)
+        return {
+            "correction": "add",
+            "state": "as it stands" if self.wanted.from_here else "initial",
+            "convention": self.wanted.conventions,
+            "rotors": documents,
+            "amplitude_unit": self.runs.amplitude_unit,
+        }
+
+    def coefficients(self) -> dict[str, Any]:
+        """The columns of --save-influence."""
+        columns: dict[str, list[Any]] = {}
+        per = self.runs.mass_unit
+        for rotor, (k, i) in enumerate(self.place):
+            solved = self.solved[k]
+            for s, channel in enumerate(solved.group.channels):
+                for p, plane in enumerate(solved.planes):
+                    a = solved.alpha[i, s, p]
+                    row: dict[str, Any] = {"rotor": self.runs.rotors[rotor]} if self.several else {}
+                    speed = None
+                    if channel.speed is not None and channel.speed_given is not None:
+                        speed = (
+                            channel.speed_given
+                            if self.runs.speed_unit == "rpm"
+                            else from_si(channel.speed, "speed", "rpm")
+                        )
+                    row |= {
+                        "sensor": channel.sensor,
+                        "speed_rpm": speed,
+                        "plane": plane,
+                        f"magnitude_per_{per}": float(to_si(abs(a), self.runs.per, per)),
+                        "phase_deg": float(degrees(a)),
+                        "amplitude_unit": self.runs.amplitude_unit,
+                    }
+                    for name, value in row.items():
+                        columns.setdefault(name, []).append(value)
+        return columns
+
+
+def _number(value: Any) -> float | None:
+    """A finite number, or None."""
+    number = float(value)
+    return number if np.isfinite(number) else None
