@@ -192,17 +192,16 @@ class _Motion:
         self.period = np.full(self.count, np.inf)
         self.m1 = np.ones(self.count)
         self._start, self._q = start, q
-        self._prepare_simple(np.flatnonzero(self.simple))
+        self._prepare_simple(np.flatnonzero(self.simple), H)
         self._prepare_general(np.flatnonzero(~self.simple), H)
 
     # --- bodies with two equal moments, and permanent rotation about a principal axis ---
 
-    def _prepare_simple(self, bodies: NDArray[np.int64]) -> None:
+    def _prepare_simple(self, bodies: NDArray[np.int64], H: Array) -> None:
         """q(t) = exp(P t) q0 exp(S t): precession P fixed in space, spin S fixed in the body."""
         moments, omega = self.moments[bodies], self.omega[bodies]
         I1, I2, I3 = moments.T
-        moving = moments * omega != 0
-        single = (moving.sum(axis=-1) < 2) & (I1 > 0)
+        single = ((H[bodies] != 0).sum(axis=-1) < 2) & (I1 > 0)
         prolate = (I2 == I3) & (I1 != I2)
         pole = np.where(prolate, 0, 2)
         across = np.where(prolate, I3, I1)
