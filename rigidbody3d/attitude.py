@@ -206,10 +206,7 @@ def left_matrix(q: Array) -> Array:
     """Return the matrix of p -> q p, (..., 4, 4)."""
     w, x, y, z = np.moveaxis(q, -1, 0)
     return np.stack(
-        [
-            np.stack(r, axis=-1)
-            for r in ([w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w])
-        ],
+        [np.stack(r, axis=-1) for r in ([w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w])],
         axis=-2,
     )
 
@@ -218,9 +215,6 @@ def right_matrix(q: Array) -> Array:
     """Return the matrix of p -> p q, (..., 4, 4)."""
     w, x, y, z = np.moveaxis(q, -1, 0)
     return np.stack(
-        [
-            np.stack(r, axis=-1)
-            for r in ([w, -x, -y, -z], [x, w, z, -y], [y, -z, w, x], [z, y, -x, w])
-        ],
+        [np.stack(r, axis=-1) for r in ([w, -x, -y, -z], [x, w, z, -y], [y, -z, w, x], [z, y, -x, w])],
         axis=-2,
     )

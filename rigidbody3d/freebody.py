@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigidbody3d import attitude as quaternion
-from rigidbody3d.elliptic import Jacobi, Parameter, argument, jacobi, parameter, third, third_complete
+from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
 from rigidbody3d.inertia import principal
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ class FreeBody:
     >>> body = FreeBody([1, 2, 3], [1.0, 0.1, 0.5])
     >>> state = body.at([0.0, 10.0])
     >>> state.omega[1].round(10)
-    array([ 0.55965704, -0.8347359 , -0.14516195])
+    array([ 0.559657  , -0.83473591, -0.14516193])
     >>> float(body.period)
     14.8973683698591...
     """
@@ -256,9 +256,7 @@ class _Motion:
         self._drift = total / I3
         ratio = np.where(self._large, c3 / c1, 0.0)
         self._n = np.where(self._large, ratio, d23 / np.where(d12 > 0, d12, 1.0))
-        weight = np.where(
-            self._large, ratio * d13, (d23 / np.where(d12 > 0, d12, 1.0)) * d13
-        )
+        weight = np.where(self._large, ratio * d13, (d23 / np.where(d12 > 0, d12, 1.0)) * d13)
         self._weight = total * weight / self._rate
         self._third_quarter = third_complete(self._p, self._n)
         self._node0 = self._node(self._jacobi(np.zeros(1)))

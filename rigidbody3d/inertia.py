@@ -164,10 +164,8 @@ def principal(inertia: ArrayLike) -> Principal:
         moments[..., 2] - moments[..., 1] <= 4e-15 * moments[..., 2]
     )
     middle = (moments[..., 1] + moments[..., 2]) / 2
-    moments = np.where(
-        rod[..., None], np.stack([np.zeros_like(middle), middle, middle], axis=-1), moments
-    )
-    diagonal = (I == I * np.eye(3)).all(axis=(-1, -2))
+    moments = np.where(rod[..., None], np.stack([np.zeros_like(middle), middle, middle], axis=-1), moments)
+    diagonal = (I * np.eye(3) == I).all(axis=(-1, -2))
     if diagonal.any():
         plain = _sorted(np.diagonal(I, axis1=-2, axis2=-1))
         moments = np.where(diagonal[..., None], plain.moments, moments)
@@ -218,7 +216,7 @@ def check(inertia: ArrayLike, rtol: float = RTOL) -> Validity:
     reason = ""
     if not valid.all():
         I1, I2, I3 = moments[np.unravel_index(np.argmin(valid), valid.shape)]
-        if I1 < -rtol * max(abs(I1), abs(I3)):
+        if -rtol * max(abs(I1), abs(I3)) > I1:
             reason = f"the principal moment {I1:.6g} kg·m² is negative"
         else:
             reason = (
@@ -244,9 +242,7 @@ class Body:
     inertia: Array
 
     def __post_init__(self) -> None:
-        mass, center, inertia = (
-            np.asarray(x, dtype=float) for x in (self.mass, self.center, self.inertia)
-        )
+        mass, center, inertia = (np.asarray(x, dtype=float) for x in (self.mass, self.center, self.inertia))
         if center.shape[-1:] != (3,) or inertia.shape[-2:] != (3, 3):
             raise ValueError(
                 f"center must be (..., 3) and inertia (..., 3, 3), found {center.shape} and {inertia.shape}"
@@ -259,11 +255,17 @@ class Body:
         object.__setattr__(self, "inertia", np.broadcast_to(inertia, lead + (3, 3)))
 
     @classmethod
-    def of(cls, shape: str, mass: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0), **dimensions: ArrayLike) -> Body:
+    def of(
+        cls, shape: str, mass: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0), **dimensions: ArrayLike
+    ) -> Body:
         """Return a body of a shape (see `shapes.SHAPES`) along its own axes."""
         from rigidbody3d.shapes import inertia_of
 
-        return cls(np.asarray(mass, dtype=float), np.asarray(center, dtype=float), inertia_of(shape, mass, **dimensions))
+        return cls(
+            np.asarray(mass, dtype=float),
+            np.asarray(center, dtype=float),
+            inertia_of(shape, mass, **dimensions),
+        )
 
     def moved(self, offset: ArrayLike) -> Body:
         """Return the body moved by an offset (..., 3), m: its tensor stays as it is, digit for digit."""

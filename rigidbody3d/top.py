@@ -20,6 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,7 +62,7 @@ class Top:
     >>> q0 = [np.cos(0.2), np.sin(0.2), 0, 0]
     >>> top = Top([0.002, 0.002, 0.0008], 0.1962, [0, 0, 100.0], q0)
     >>> top.at(2 * np.pi).attitude.round(8)
-    array([ 0.68965605, -0.21286290,  0.041763  ,  0.69088333])
+    array([ 0.68965605, -0.2128629 ,  0.041763  ,  0.69088333])
     """
 
     inertia: ArrayLike
@@ -72,7 +73,7 @@ class Top:
     def __post_init__(self) -> None:
         I = np.asarray(self.inertia, dtype=float)
         if I.shape[-2:] == (3, 3):
-            if (I != I * np.eye(3)).any():
+            if (I * np.eye(3) != I).any():
                 raise ValueError("a top's axis is body z: expected a tensor without products of inertia")
             I = np.diagonal(I, axis1=-2, axis2=-1)
         omega, mgl = np.asarray(self.omega, dtype=float), np.asarray(self.mgl, dtype=float)
@@ -117,7 +118,7 @@ class Top:
     @property
     def nutation_period(self) -> Array:
         """The period of that angle, (...), s; infinite on the way to the sleeping position."""
-        return (2 * self._motion.p.quarter / self._motion.rate).reshape(self._lead)
+        return np.asarray(2 * self._motion.p.quarter / self._motion.rate).reshape(self._lead)
 
 
 @dataclass(frozen=True)
@@ -179,7 +180,8 @@ class _Motion:
         self.upside = mgl < 0
         q = np.where(self.upside[:, None], quaternion.compose([0.0, 1.0, 0.0, 0.0], q), q)
         rows = [
-            _constants(I[b, 0], I[b, 2], abs(mgl[b]), omega[b], q[b]) for b in range(self.count)
+            _constants(float(I[b, 0]), float(I[b, 2]), abs(float(mgl[b])), omega[b], q[b])
+            for b in range(self.count)
         ]
         c = {name: np.array([[row[name]] for row in rows]) for name in rows[0]} if rows else {}
         self.p = parameter(c["m"], c["m1"])
@@ -301,7 +303,7 @@ class _Motion:
             out[upside, :, :4] = quaternion.compose([0.0, -1.0, 0.0, 0.0], out[upside, :, :4])
 
 
-def _unit(z: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _unit(z: NDArray[Any]) -> NDArray[np.complex128]:
     size = np.abs(z)
     return np.asarray(z / np.where(size > 0, size, 1.0))
 
@@ -310,10 +312,9 @@ def _constants(I1: float, I3: float, mgl: float, omega: Array, q: Array) -> dict
     """The roots of the cubic and what follows from them, each rounded once from 80 digits."""
     with localcontext() as context:
         context.prec = DIGITS
-        D = lambda x: Decimal(float(x))  # noqa: E731
-        A, C, a = D(I1), D(I3), D(mgl)
-        w1, w2, w3 = (D(x) for x in omega)
-        w, x, y, z = (D(v) for v in q)
+        A, C, a = Decimal(I1), Decimal(I3), Decimal(mgl)
+        w1, w2, w3 = map(Decimal, omega.tolist())
+        w, x, y, z = map(Decimal, q.tolist())
         norm = w * w + x * x + y * y + z * z
         up, down = (w * w + z * z) / norm, (x * x + y * y) / norm  # (1 ± u)/2
         g1, g2 = 2 * (x * z - w * y) / norm, 2 * (y * z + w * x) / norm

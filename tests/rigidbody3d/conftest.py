@@ -28,7 +28,9 @@ def taylor_rotation(inertia, omega, attitude, t, *, gravity=0.0, order=40, reach
     w = [_fixed(x) for x in omega]
     q = [_fixed(x) for x in attitude]
     mgl = _fixed(gravity)
-    rate = max(float(np.linalg.norm(omega)), float(np.sqrt(abs(gravity) / min(inertia[:2]))) if gravity else 0.0)
+    rate = max(
+        float(np.linalg.norm(omega)), float(np.sqrt(abs(gravity) / min(inertia[:2]))) if gravity else 0.0
+    )
     steps = max(1, int(np.ceil(abs(t) * rate / reach)))
     h = int(Fraction(float(t)) / steps * ONE)
     for _ in range(steps):
