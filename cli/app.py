@@ -14,7 +14,10 @@ from cli.errors import DataError
 COMMANDS = {
     "balance": ("cli.commands.balance", "Balance rotors from a table of known eccentric masses."),
     "bench": ("cli.commands.bench", "Measure run time against error."),
-    "body": ("cli.commands.body", "Mass properties, angular momentum and bearing reactions of a body of parts."),
+    "body": (
+        "cli.commands.body",
+        "Mass properties, angular momentum and bearing reactions of a body of parts.",
+    ),
     "spin": ("cli.commands.spin", "Rotation of a body in time: free, under gravity, under a torque."),
     "examples": ("cli.commands.examples", "List the worked examples, or write one into the current folder."),
 }

@@ -73,7 +73,9 @@ def read_parts(path: str) -> Parts:
     whole = compose(each)
     verdict = check(whole.inertia)
     if not verdict.valid:
-        raise DataError(f"{table.file}: no body is made of these parts: {verdict.reason}: is a hole outside its part?")
+        raise DataError(
+            f"{table.file}: no body is made of these parts: {verdict.reason}: is a hole outside its part?"
+        )
     return Parts(table.file, name, [shape.lower() for shape in table.texts["shape"]], each, whole, warnings)
 
 
@@ -91,7 +93,9 @@ def _part(
         if dimension not in row:
             column = table.numbers[dimension].header if dimension in table.numbers else dimension
             raise table.error(index, column, "", f"a value: a {shape} needs {', '.join(needed)}")
-    unused = [key for key in (*LENGTHS, "angle", *MOMENTS, *PRODUCTS) if key in row and key not in needed + optional]
+    unused = [
+        key for key in (*LENGTHS, "angle", *MOMENTS, *PRODUCTS) if key in row and key not in needed + optional
+    ]
     if unused:
         warnings.append(f"{table.file}: part {quote(name)}: a {shape} has no {', '.join(unused)}: not used")
     dimensions = {key: row[key] for key in needed + optional if key in row}
@@ -101,7 +105,10 @@ def _part(
                 raise table.error(index, table.numbers[key].header, f"{value:g}", "a positive number")
         if dimensions.get("inner_radius", 0.0) > dimensions.get("radius", np.inf):
             raise table.error(
-                index, table.numbers["inner_radius"].header, f"{row['inner_radius']:g}", "no more than the radius"
+                index,
+                table.numbers["inner_radius"].header,
+                f"{row['inner_radius']:g}",
+                "no more than the radius",
             )
     mass = _mass(table, index, shape, row, dimensions)
     if shape != TENSOR:
@@ -123,7 +130,12 @@ def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimension
     densities = [key for key in DENSITIES.values() if key in row]
     if "mass" in row:
         if densities:
-            raise table.error(index, table.numbers[densities[0]].header, f"{row[densities[0]]:g}", "mass or density, not both")
+            raise table.error(
+                index,
+                table.numbers[densities[0]].header,
+                f"{row[densities[0]]:g}",
+                "mass or density, not both",
+            )
         if row["mass"] == 0:
             raise table.error(index, table.numbers["mass"].header, "0", "a mass that is not zero")
         return row["mass"]

@@ -108,7 +108,9 @@ class Answer:
     def moving(self) -> bool:
         """Whether any motion was asked about."""
         w = self.wanted
-        return w.shaft is not None or any(x is not None for x in (w.omega, w.alpha, w.velocity, w.acceleration))
+        return w.shaft is not None or any(
+            x is not None for x in (w.omega, w.alpha, w.velocity, w.acceleration)
+        )
 
     @cached_property
     def shaft(self) -> Shaft:
@@ -142,7 +144,9 @@ class Answer:
         found = []
         motion = self.motion
         if motion.frame_omega is not None:
-            size = np.abs(motion.momentum).max() * max(np.abs(motion.omega).max(), np.abs(motion.frame_omega).max())
+            size = np.abs(motion.momentum).max() * max(
+                np.abs(motion.omega).max(), np.abs(motion.frame_omega).max()
+            )
             if np.abs(motion.tensor_rate).max() > 1e-12 * size:
                 wrong = motion.rate - motion.tensor_rate
                 found.append(
@@ -249,7 +253,9 @@ class Answer:
                 if self.correction is not None:
                     rows[f"bearing{i + 1}_corrected_N"] = [*self.corrected[i], 0.0]
             rows["drive_torque_N_m"] = float(shaft.drive_torque)
-        return {name: x + 0.0 if isinstance(x, float) else [float(v) + 0.0 for v in x] for name, x in rows.items()}
+        return {
+            name: x + 0.0 if isinstance(x, float) else [float(v) + 0.0 for v in x] for name, x in rows.items()
+        }
 
     def columns(self) -> Columns:
         """Return the CSV: a row for each axis, then one for each correction plane; scalars stand in the first row."""
@@ -273,7 +279,9 @@ class Answer:
                 rows[column].append(cell)
         for row in self._corrections():
             for name in ("mass_kg", "angle_deg"):
-                for column, cell in zip(rows, [f"plane {row['plane']}: {name}", row[name], None, None, None], strict=True):
+                for column, cell in zip(
+                    rows, [f"plane {row['plane']}: {name}", row[name], None, None, None], strict=True
+                ):
                     rows[column].append(cell)
         return rows
 

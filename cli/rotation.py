@@ -61,7 +61,7 @@ def read_body(path: str) -> Given:
         mgl = float(_numbers(file, "top.mgl", top["mgl"], ()))
     warnings: list[str] = []
     if ("inertia" in document) == ("parts" in document):
-        raise DataError(f"{file}: expected inertia = [I1, I2, I3] (or a matrix) or parts = \"parts.csv\"")
+        raise DataError(f'{file}: expected inertia = [I1, I2, I3] (or a matrix) or parts = "parts.csv"')
     if "parts" in document:
         from cli.parts import read_parts
 
@@ -80,13 +80,15 @@ def read_body(path: str) -> Given:
     if not verdict.valid:
         raise DataError(f"{file}: inertia: no body has it: {verdict.reason}")
     if not verdict.moments[1] > 0:
-        raise DataError(f"{file}: inertia: found no moment of inertia: expected at least two that are positive")
+        raise DataError(
+            f"{file}: inertia: found no moment of inertia: expected at least two that are positive"
+        )
     if "omega" not in document:
         raise DataError(f"{file}: no omega: expected the angular velocity in body axes, rad/s")
     torque = document.get("torque")
     frame = document.get("frame", "body")
     if frame not in ("body", "space"):
-        raise DataError(f"{file}: frame: found {frame!r}, expected \"body\" or \"space\"")
+        raise DataError(f'{file}: frame: found {frame!r}, expected "body" or "space"')
     attitude = _numbers(file, "attitude", document.get("attitude", [1, 0, 0, 0]), (4,))
     try:
         attitude = normalize(attitude)
@@ -109,14 +111,20 @@ def _numbers(file: str, key: str, value: Any, *shapes: tuple[int, ...]) -> Array
     wanted = " or ".join("×".join(map(str, shape)) if shape else "one" for shape in shapes)
 
     def plain(x: Any) -> bool:
-        return all(map(plain, x)) if isinstance(x, list) else isinstance(x, (int, float)) and not isinstance(x, bool)
+        return (
+            all(map(plain, x))
+            if isinstance(x, list)
+            else isinstance(x, (int, float)) and not isinstance(x, bool)
+        )
 
     try:
         array = np.array(value, dtype=float) if plain(value) else np.array([np.nan])
     except (ValueError, OverflowError):
         array = np.array([np.nan])
     if array.shape not in shapes or not np.isfinite(array).all():
-        raise DataError(f"{file}: {key}: found {value!r}, expected {wanted} finite number{'s' * (wanted != 'one')}")
+        raise DataError(
+            f"{file}: {key}: found {value!r}, expected {wanted} finite number{'s' * (wanted != 'one')}"
+        )
     return array
 
 
@@ -206,7 +214,10 @@ class Answer:
         scale = max(abs(float(E)), abs(g.mgl or 0.0))
         energy = float(np.abs(self.states.energy - E).max())
         momentum = float(np.linalg.norm(stray, axis=-1).max())
-        return {"momentum": momentum / size if size else momentum, "energy": energy / scale if scale else energy}
+        return {
+            "momentum": momentum / size if size else momentum,
+            "energy": energy / scale if scale else energy,
+        }
 
     @cached_property
     def period(self) -> float | None:
@@ -314,7 +325,9 @@ class Answer:
             lines.append(f"period of nutation: {nutation:.6g} s")
         for found in (self.cones(), self.steady()):
             if found is not None:
-                lines.append(", ".join(f"{name}: {'none' if x is None else f'{x:.6g}'}" for name, x in found.items()))
+                lines.append(
+                    ", ".join(f"{name}: {'none' if x is None else f'{x:.6g}'}" for name, x in found.items())
+                )
         return "\n".join(lines)
 
     def figure(self) -> Any:

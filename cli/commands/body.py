@@ -19,7 +19,9 @@ def run(
     ] = None,
     alpha: Annotated[
         str | None,
-        typer.Option(metavar=_VECTOR, help="Its rate, rad/s²; with --frame-omega: that of its components there."),
+        typer.Option(
+            metavar=_VECTOR, help="Its rate, rad/s²; with --frame-omega: that of its components there."
+        ),
     ] = None,
     frame_omega: Annotated[
         str | None,
@@ -83,7 +85,9 @@ def run(
     )
     for flag, given in (("--velocity", velocity), ("--acceleration", acceleration)):
         if given is not None and fixed is not None:
-            raise options.bad(flag, "the motion of the centre of mass follows from --fixed: expected one of them")
+            raise options.bad(
+                flag, "the motion of the centre of mass follows from --fixed: expected one of them"
+            )
     if shaft is not None:
         for flag, given in (
             ("--omega", omega),
@@ -99,7 +103,11 @@ def run(
 
 
 def _shaft(
-    shaft: str | None, speed: str | None, speed_rate: str | None, gravity: str | None, correct: list[str] | None
+    shaft: str | None,
+    speed: str | None,
+    speed_rate: str | None,
+    gravity: str | None,
+    correct: list[str] | None,
 ):  # type: ignore[no-untyped-def]
     from cli.planes import from_options
     from cli.rigid_body import ShaftWanted

@@ -36,7 +36,9 @@ def run(
     at: Annotated[list[str] | None, typer.Option(metavar="T", help="A time, s; may be repeated.")] = None,
     method: Annotated[
         Method | None,
-        typer.Option(help="Default: exact wherever a closed form exists, else integrate.", show_default=False),
+        typer.Option(
+            help="Default: exact wherever a closed form exists, else integrate.", show_default=False
+        ),
     ] = None,
     integrator: Annotated[
         Integrator, typer.Option(help="For integration; the splitting is for a symmetric top.")
