@@ -16,7 +16,8 @@ from cli.errors import DataError, nearest
 from cli.render import Columns, Shown
 from rigidbody3d import FreeBody, FreeState, Top, TopState, Trajectory, check, integrate, principal
 from rigidbody3d import cones as cones_of
-from rigidbody3d import sleeping_threshold, steady_precession
+from rigidbody3d import sleeping_threshold as threshold_of
+from rigidbody3d import steady_precession as steady_of
 from rigidbody3d.attitude import normalize, rotate
 
 Array = NDArray[np.float64]
@@ -177,18 +178,22 @@ class Answer:
     @cached_property
     def states(self) -> FreeState | TopState | Trajectory:
         """The states at the times asked for."""
+        return self.at(self.time)
+
+    def at(self, time: Array) -> FreeState | TopState | Trajectory:
+        """Return the states at other times."""
         g = self.given
         try:
             if self.exact:
                 if g.mgl is None:
-                    return FreeBody(g.inertia, g.omega, g.attitude).at(self.time)
+                    return FreeBody(g.inertia, g.omega, g.attitude).at(time)
                 assert self.round_moments is not None
-                return Top(self.round_moments, g.mgl, g.omega, g.attitude).at(self.time)
+                return Top(self.round_moments, g.mgl, g.omega, g.attitude).at(time)
             return integrate(
                 g.inertia,
                 g.omega,
                 g.attitude,
-                self.time,
+                time,
                 torque=g.torque,
                 frame=g.frame,
                 mgl=g.mgl or 0.0,
@@ -255,11 +260,11 @@ class Answer:
         across, _, along = self.round_moments
         w, x, y, z = g.attitude
         tilt = 2 * np.arctan2(np.hypot(x, y), np.hypot(w, z))
-        rates = steady_precession(across, along, g.mgl, tilt, g.omega[2])
+        rates = steady_of(across, along, g.mgl, tilt, g.omega[2])
         return {
             "slow_rad_s": _finite(rates.slow),
             "fast_rad_s": _finite(rates.fast),
-            "sleeping_threshold_rad_s": _finite(sleeping_threshold(across, along, g.mgl)) if along else None,
+            "sleeping_threshold_rad_s": _finite(threshold_of(across, along, g.mgl)) if along else None,
         }
 
     def warnings(self) -> list[str]:
@@ -307,7 +312,8 @@ class Answer:
         columns |= {f"attitude_{a}": s.attitude[:, i] for i, a in enumerate("wxyz")}
         columns |= {f"momentum_{a}_kg_m2_s": s.momentum[:, i] for i, a in enumerate("xyz")}
         columns["energy_J"] = s.energy
-        return {name: np.asarray(column) + 0.0 for name, column in columns.items()}
+        plain: dict[str, Any] = {name: np.asarray(column) + 0.0 for name, column in columns.items()}
+        return plain
 
     def notes(self) -> str:
         """Say what is constant in the motion."""

@@ -288,16 +288,25 @@ class _Motion:
         side = np.where(self._large & (self._sign < 0), -1.0, 1.0)
         h2 = np.where(self._large, flip * h2, h2)
         h1 = np.where(self._large, flip * h1, h1)
-        spin = np.arctan2(side * h2, side * h3) + np.where(
-            self._large, np.where(side < 0, np.pi, 0.0), self._sign * at.turns * np.pi
-        )
+        # half turns by quarters of their half angle, exact however many there have been
+        turned = np.where(self._large, np.where(side < 0, 1.0, 0.0), np.fmod(self._sign * at.turns, 4.0))
+        half = (np.arctan2(side * h2, side * h3) + np.pi * turned) / 2
         node = self._drift * t + (self._node(at) - (self._node0 if hasattr(self, "_node0") else 0.0))
         across = np.hypot(h2, h3)
         larger = np.sqrt((1 + np.abs(h1)) / 2)
         smaller = across / (2 * larger)
         c, s = np.where(h1 >= 0, larger, smaller), np.where(h1 >= 0, smaller, larger)
-        plus, minus = (node + spin) / 2, (node - spin) / 2
-        return np.stack([c * np.cos(plus), s * np.cos(minus), s * np.sin(minus), c * np.sin(plus)], axis=-1)
+        # the two angles apart: the momentum's direction then does not feel the rounding of a large node
+        cn, sn, cs, ss = np.cos(node / 2), np.sin(node / 2), np.cos(half), np.sin(half)
+        return np.stack(
+            [
+                c * (cn * cs - sn * ss),
+                s * (cn * cs + sn * ss),
+                s * (sn * cs - cn * ss),
+                c * (sn * cs + cn * ss),
+            ],
+            axis=-1,
+        )
 
     def attitude_at(self, t: Array) -> Array:
         """Quaternions (b, n, 4)."""

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli import options
 from cli.render import Expect, Json, Output, Plot, Rtol, Text, show
+
+if TYPE_CHECKING:
+    from cli.rigid_body import ShaftWanted
 
 _VECTOR = "X,Y,Z"
 
@@ -108,7 +111,7 @@ def _shaft(
     speed_rate: str | None,
     gravity: str | None,
     correct: list[str] | None,
-):  # type: ignore[no-untyped-def]
+) -> ShaftWanted | None:
     from cli.planes import from_options
     from cli.rigid_body import ShaftWanted
 

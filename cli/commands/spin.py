@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -11,14 +11,14 @@ from cli import options
 from cli.render import Expect, Json, Output, Plot, Rtol, Text, show
 
 
-class Method(str, Enum):
+class Method(StrEnum):
     """How the rotation is found."""
 
     exact = "exact"
     integrate = "integrate"
 
 
-class Integrator(str, Enum):
+class Integrator(StrEnum):
     """What integrates it."""
 
     dop853 = "DOP853"
