@@ -276,8 +276,9 @@ class _Motion:
         at = jacobi(self.begin + self.rate * t, self.p)
         plus, minus = self._phases(at)
         turn = self.extra * t / 2
-        sn = np.where(at.sn == 0, 1e-150, at.sn)
-        cn = np.where(at.cn == 0, 1e-150, at.cn)
+        # no square underflows
+        sn = np.where(np.abs(at.sn) < 1e-150, 1e-150, at.sn)
+        cn = np.where(np.abs(at.cn) < 1e-150, 1e-150, at.cn)
         size_a = np.sqrt((self.above + self.span * sn**2) / 2)
         size_b = np.sqrt((self.below + self.span * cn**2) / 2)
         way_a, way_b = self.a0 * np.exp(1j * (plus + turn)), self.b0 * np.exp(1j * (minus - turn))

@@ -11,8 +11,8 @@ BITS = 256
 ONE = 1 << BITS
 
 
-def _fixed(x: float) -> int:
-    return int(Fraction(float(x)) * ONE)
+def _fixed(x: float | Fraction) -> int:
+    return int((x if isinstance(x, Fraction) else Fraction(float(x))) * ONE)
 
 
 def _series(a: list[int], b: list[int], k: int) -> int:
@@ -32,7 +32,7 @@ def taylor_rotation(inertia, omega, attitude, t, *, gravity=0.0, order=40, reach
         float(np.linalg.norm(omega)), float(np.sqrt(abs(gravity) / min(inertia[:2]))) if gravity else 0.0
     )
     steps = max(1, int(np.ceil(abs(t) * rate / reach)))
-    h = int(Fraction(float(t)) / steps * ONE)
+    h = int((t if isinstance(t, Fraction) else Fraction(float(t))) / steps * ONE)
     for _ in range(steps):
         W = [[x] for x in w]
         Q = [[x] for x in q]
