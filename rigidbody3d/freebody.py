@@ -258,14 +258,20 @@ class _Motion:
         self._n = np.where(self._large, ratio, d23 / np.where(d12 > 0, d12, 1.0))
         weight = np.where(self._large, ratio * d13, (d23 / np.where(d12 > 0, d12, 1.0)) * d13)
         self._weight = total * weight / self._rate
-        self._third_quarter = third_complete(self._p, self._n)
-        self._node0 = self._node(self._jacobi(np.zeros(1)))
+
+    @cached_property
+    def _third_quarter(self) -> Array:
+        return third_complete(self._p, self._n)
+
+    @cached_property
+    def _attitude_start(self) -> tuple[Array, Array]:
+        """The node's integral at time zero, and the 4 × 4 matrix from Euler's quaternion to the attitude."""
+        at, bodies = self._jacobi(np.zeros(1)), self._general
         frame = _cyclic(len(bodies))
-        if len(bodies):
-            before = quaternion.compose(self._euler(np.zeros(1))[:, 0], frame)
-            left = quaternion.compose(self._start[bodies], quaternion.inverse(before))
-            right = quaternion.compose(frame, quaternion.inverse(self.to_axes[bodies]))
-            self._both = quaternion.left_matrix(left) @ quaternion.right_matrix(right)
+        before = quaternion.compose(self._euler(at, np.zeros(1))[:, 0], frame)
+        left = quaternion.compose(self._start[bodies], quaternion.inverse(before))
+        right = quaternion.compose(frame, quaternion.inverse(self.to_axes[bodies]))
+        return self._node(at), quaternion.left_matrix(left) @ quaternion.right_matrix(right)
 
     def _jacobi(self, t: Array) -> Jacobi:
         return jacobi(self._u0 + self._rate * t, self._p)
@@ -279,9 +285,8 @@ class _Motion:
         x, y, z = self._ax * at.cn, self._ay * at.sn, self._az * at.dn
         return np.where(self._large, x, z), y, np.where(self._large, z, x)
 
-    def _euler(self, t: Array) -> Array:
+    def _euler(self, at: Jacobi, node: Array) -> Array:
         """The quaternion of Euler's angles (node, tilt, spin) about H and the first principal axis."""
-        at = self._jacobi(t)
         h1, h2, h3 = (h / self._total for h in self._momentum(at))
         flip = np.where(at.turns % 2 != 0, -1.0, 1.0)
         # around the largest moment H3 keeps its sign; around the smallest the spin angle runs on
@@ -291,7 +296,6 @@ class _Motion:
         # half turns by quarters of their half angle, exact however many there have been
         turned = np.where(self._large, np.where(side < 0, 1.0, 0.0), np.fmod(self._sign * at.turns, 4.0))
         half = (np.arctan2(side * h2, side * h3) + np.pi * turned) / 2
-        node = self._drift * t + (self._node(at) - (self._node0 if hasattr(self, "_node0") else 0.0))
         across = np.hypot(h2, h3)
         larger = np.sqrt((1 + np.abs(h1)) / 2)
         smaller = across / (2 * larger)
@@ -318,7 +322,10 @@ class _Motion:
             back = quaternion.inverse(self.to_axes[self._simple])[:, None, :]
             out[self._simple] = quaternion.compose(quaternion.compose(first, spin), back)
         if len(self._general):
-            out[self._general] = self._euler(t) @ np.swapaxes(self._both, -1, -2)
+            node0, both = self._attitude_start
+            at = self._jacobi(t)
+            euler = self._euler(at, self._drift * t + (self._node(at) - node0))
+            out[self._general] = euler @ np.swapaxes(both, -1, -2)
         return out
 
     def omega_at(self, t: Array) -> Array:

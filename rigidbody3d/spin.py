@@ -203,9 +203,10 @@ def _solve(
         if not len(order):
             continue
         method_class = getattr(scipy.integrate, method)
-        # The error estimate of a step says little about the drift of 10⁵ turns: never less than 40 steps a turn.
+        # The error estimate of a step says little about the drift of many turns: at the finest tolerance
+        # never less than 40 steps a turn, at a coarser one as many fewer as order eight allows.
         rate = max(float(np.linalg.norm(omega)), math.sqrt(abs(mgl) / tensor.diagonal().min()))
-        longest = 2 * math.pi / rate / 40 if rate else np.inf
+        longest = 2 * math.pi / rate / 40 * (max(rtol, 1e-13) / 1e-13) ** 0.125 if rate else np.inf
         limits = {"rtol": max(rtol, 3e-14), "atol": rtol, "max_step": longest}
         solver = method_class(rates, 0.0, start, sign * np.inf, **limits)
         before = (0.0, start)

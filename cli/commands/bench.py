@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 # domain -> (module with a function `measure`, what it measures)
 DOMAINS = {
     "rotors": ("cli.bench.rotors", "corrections of rotors with known masses"),
+    "rotation": ("cli.bench.rotation", "momentum of many states, rotation of bodies in time"),
 }
 
 
