@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError, nearest, quote
 from cli.tables import Table, read
-from cli.units import cosine_sine, to_si
-from rigidbody3d import Body, check, compose, inertia_of, measure_of, tensor
+from cli.units import UNITS, cosine_sine, to_si
+from rigidbody3d import Body, check, compose, inertia_of, load_mesh, measure_of, mesh, tensor
 from rigidbody3d.shapes import SHAPES
 
 Array = NDArray[np.float64]
@@ -20,6 +21,7 @@ MOMENTS = ("ixx", "iyy", "izz")
 PRODUCTS = ("ixy", "ixz", "iyz")
 DENSITIES = {3: "density", 2: "area_density", 1: "linear_density"}
 TENSOR = "tensor"
+MESH = "mesh"
 _NUMBERS = {
     "mass": "mass",
     "density": "density",
@@ -47,7 +49,7 @@ class Parts:
 
 def read_parts(path: str) -> Parts:
     """Read a table of parts and put them together."""
-    table = read(path, numbers=_NUMBERS, texts=["part", "shape"], blank=list(_NUMBERS))
+    table = read(path, numbers=_NUMBERS, texts=["part", "shape", "file", "file_unit"], blank=list(_NUMBERS))
     if "shape" not in table.texts:
         raise DataError(f"{table.file}: no column shape (the header is: {', '.join(table.header)})")
     values = {
@@ -58,11 +60,17 @@ def read_parts(path: str) -> Parts:
     turns = _turns(table)
     name = table.texts.get("part", [str(index + 1) for index in range(table.rows)])
     mass, inertia = np.empty(table.rows), np.empty((table.rows, 3, 3))
+    center = np.stack([np.nan_to_num(values.get(axis, np.zeros(table.rows))) for axis in "xyz"], axis=-1)
+    folder = Path() if path == "-" else Path(path).parent
     warnings = list(table.warnings)
     for index, shape in enumerate(table.texts["shape"]):
         row = {key: float(column[index]) for key, column in values.items() if not np.isnan(column[index])}
-        mass[index], inertia[index] = _part(table, index, shape.lower(), row, warnings, name[index])
-    center = np.stack([np.nan_to_num(values.get(axis, np.zeros(table.rows))) for axis in "xyz"], axis=-1)
+        if shape.lower() == MESH:
+            mass[index], own, inertia[index] = _mesh(table, index, row, folder)
+            if not row.keys() & {"x", "y", "z"}:  # it stays where the file has it
+                center[index] = own
+        else:
+            mass[index], inertia[index] = _part(table, index, shape.lower(), row, warnings, name[index])
     rotation = turns @ _along(table, values)
     each = Body(mass, center, inertia).turned(rotation)
     total = mass.sum()
@@ -83,9 +91,9 @@ def _part(
     table: Table, index: int, shape: str, row: dict[str, float], warnings: list[str], name: str
 ) -> tuple[float, Array]:
     """Return the mass of a part and its tensor along its own axes."""
-    known = {*SHAPES, TENSOR}
+    known = [*SHAPES, TENSOR, MESH]
     if shape not in known:
-        expected = f"one of {', '.join([*SHAPES, TENSOR])}{nearest(shape, known)}"
+        expected = f"one of {', '.join(known)}{nearest(shape, known)}"
         raise table.error(index, "shape", table.texts["shape"][index], expected)
     needed = MOMENTS if shape == TENSOR else SHAPES[shape].dimensions
     optional = PRODUCTS if shape == TENSOR else SHAPES[shape].optional
@@ -124,6 +132,31 @@ def _part(
             index, header, f"{row['ixx']:g}", f"a tensor that a body can have: {verdict.reason}"
         )
     return mass, given
+
+
+def _mesh(table: Table, index: int, row: dict[str, float], folder: Path) -> tuple[float, Array, Array]:
+    """Return mass, centre of mass and tensor of a closed mesh from a file."""
+    cell = table.texts.get("file", [""] * table.rows)[index]
+    unit = table.texts.get("file_unit", [""] * table.rows)[index]
+    if not cell:
+        raise table.error(index, "file", "", "the name of an STL or OBJ file")
+    if unit not in UNITS["length"]:
+        raise table.error(
+            index, "file_unit", unit, f"the file's unit of length: {', '.join(UNITS['length'])}"
+        )
+    if ("mass" in row) == ("density" in row) or not row.get("density", 1.0) > 0 or row.get("mass", 1.0) == 0:
+        raise table.error(index, "shape", MESH, "with it a mass, or a positive density_kg_m3")
+    try:
+        vertices, faces = load_mesh(str(folder / cell))
+        volume, center, inertia = mesh(to_si(vertices, "length", unit), faces)
+    except ImportError:
+        raise DataError(
+            f"{table.file}: a mesh needs trimesh: install dalembert with its extra, dalembert[mesh]"
+        ) from None
+    except ValueError as error:
+        raise table.error(index, "file", cell, f"a closed mesh: {error}") from None
+    density = row["density"] if "density" in row else row["mass"] / float(volume)
+    return density * float(volume), center, density * inertia
 
 
 def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimensions: dict[str, float]) -> float:

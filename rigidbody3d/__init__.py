@@ -10,7 +10,7 @@ from rigidbody3d.gyroscope import cones, gyroscopic_couple, sleeping_threshold, 
 from rigidbody3d.inertia import Body, check, compose, principal, products, shift, tensor
 from rigidbody3d.momentum import Motion, Wrench, strike
 from rigidbody3d.shaft import Shaft
-from rigidbody3d.shapes import SHAPES, inertia_of, measure_of, mesh
+from rigidbody3d.shapes import SHAPES, inertia_of, load_mesh, measure_of, mesh
 from rigidbody3d.spin import Trajectory, integrate
 from rigidbody3d.top import Top, TopState
 
@@ -32,6 +32,7 @@ __all__ = [
     "gyroscopic_couple",
     "inertia_of",
     "integrate",
+    "load_mesh",
     "measure_of",
     "mesh",
     "principal",

@@ -100,7 +100,7 @@ def to_matrix(q: ArrayLike) -> Array:
 
     Notes
     -----
-    H. Goldstein, Classical Mechanics, 3rd ed., eq. (4.47'); entries as differences of products only.
+    H. Goldstein, Classical Mechanics, §4.5; entries as differences of products only.
 
     Examples
     --------

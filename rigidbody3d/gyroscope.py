@@ -49,7 +49,7 @@ def steady_precession(
 
     Notes
     -----
-    I1 cos θ φ̇² - I3 ω3 φ̇ + m g l = 0 (Goldstein, eq. 5.77); with B = I3 ω3 and D = B² - 4 I1 m g l cos θ the
+    I1 cos θ φ̇² - I3 ω3 φ̇ + m g l = 0 (Goldstein, §5.7); with B = I3 ω3 and D = B² - 4 I1 m g l cos θ the
     larger root is (B ± √D)/(2 I1 cos θ), the other 2 m g l/(B ± √D), the sign that of B: nothing cancels. The
     fast rate is infinite at a right angle.
 
@@ -72,7 +72,7 @@ def steady_precession(
 
 
 def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) -> Array:
-    """Return the spin above which a top stands upright stably, 2 √(m g l I1)/I3, (...), rad/s (Goldstein, eq. 5.80).
+    """Return the spin above which a top stands upright stably, 2 √(m g l I1)/I3, (...), rad/s (Goldstein, §5.7).
 
     Zero where the centre of mass lies below the fixed point.
 
@@ -110,7 +110,7 @@ def cones(transverse: ArrayLike, axial: ArrayLike, omega: ArrayLike) -> Cones:
 
     Notes
     -----
-    Beer and Johnston, eqs. 18.47-18.49; Goldstein, §5.6. The angle between ω and H from its own sine,
+    Beer and Johnston, ch. 18; Goldstein, §5.6. The angle between ω and H from its own sine,
     (I1 - I3) ω⊥ ω3, which does not cancel where they are close.
 
     Examples

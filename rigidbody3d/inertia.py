@@ -89,7 +89,7 @@ def shift(mass: ArrayLike, offset: ArrayLike) -> Array:
 
     Notes
     -----
-    m (|r|² E - r rᵀ), its diagonal as sums of squares: m (y² + z²) … (Beer and Johnston, eqs. 9.45, 9.47).
+    m (|r|² E - r rᵀ), its diagonal as sums of squares: m (y² + z²) … (Beer and Johnston, ch. 9).
 
     Examples
     --------

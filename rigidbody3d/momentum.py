@@ -281,7 +281,7 @@ def strike(
 
     Notes
     -----
-    m Δv = J + R, I Δω = r × J + p × R, and at the pin Δv + Δω × p = 0 (Beer and Johnston, §18.3). The pin does
+    m Δv = J + R, I Δω = r × J + p × R, and at the pin Δv + Δω × p = 0 (Beer and Johnston, ch. 18). The pin does
     not feel a blow at the centre of percussion.
 
     Examples

@@ -6,7 +6,7 @@ V(z1) = ∫ (x + iy)(z - z1) dm, the inertia of a body turning at ω, ω̇ asks 
     R2 = (-ω² + i ω̇) V(z1)/(z2 - z1),   R1 = (-ω² + i ω̇) V(z2)/(z1 - z2),
 
 the moment about the other bearing over the span: no reaction is the difference of large numbers.
-(Beer and Johnston, §18.8; Meriam and Kraige, §7/9, with I_xz and I_yz about the bearings.)
+(Beer and Johnston, ch. 18; Meriam and Kraige, ch. 7, with I_xz and I_yz about the bearings.)
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Each shape is named by its field's word and lies along its own axes: a rod, cylinder, cone or tube along z
 (the cone's apex at +z), the normal of a disk, ring or plate along z. The tensors are those of the tables
-(Beer and Johnston, appendix; Meriam and Kraige, table D/4), with the hollow ones in product form: they hold
+(as in the appendices of Beer and Johnston, and of Meriam and Kraige), with the hollow ones in product form: they hold
 down to walls without thickness.
 """
 
@@ -255,3 +255,24 @@ def mesh(vertices: ArrayLike, faces: ArrayLike, density: float = 1.0) -> tuple[A
     second -= total * np.outer(center, center)
     inertia = density * (np.trace(second) * np.eye(3) - second)
     return np.asarray(density * total), center + middle, (inertia + inertia.T) / 2
+
+
+def load_mesh(path: str) -> tuple[Array, NDArray[np.int64]]:
+    """Return vertices (v, 3) and triangles (f, 3) of an STL, OBJ … file, in the file's own unit of length.
+
+    Raises
+    ------
+    ImportError
+        trimesh is not installed (the extra `mesh`).
+    ValueError
+        No mesh can be read from the file.
+    """
+    import trimesh
+
+    try:
+        loaded = trimesh.load_mesh(path)
+        return np.asarray(loaded.vertices, dtype=float), np.asarray(loaded.faces, dtype=np.int64)
+    except ImportError:
+        raise
+    except Exception as error:
+        raise ValueError(f"{path}: no mesh can be read from it: {error}") from None

@@ -72,7 +72,7 @@ def run(
     axis_x axis_y axis_z (default z), rx_* ry_* rz_* (a further turn about the fixed axes in that order), and the
     dimensions of its shape: point; rod length; disk, ring radius; arc radius, angle; cylinder, cone radius, length;
     tube radius, inner_radius, length; box width, height, depth; plate width, height; sphere radius, inner_radius;
-    tensor ixx iyy izz ixy ixz iyz, products as +∫xy dm. Thin shapes take linear_density_* or area_density_*.
+    tensor ixx iyy izz ixy ixz iyz, products as +∫xy dm; mesh file, file_unit (STL, OBJ). Thin shapes take linear_density_* or area_density_*.
     """
     from cli import rigid_body as job
 

@@ -164,3 +164,29 @@ def test_standard_input_and_a_missing_file(dalembert) -> None:
     done = dalembert("body", "-", "--json", stdin=DISK)
     assert json.loads(done.stdout)["mass_kg"] == 3.63
     assert dalembert("body", "none.csv").returncode == 1
+
+
+def test_a_mesh_is_read_through_trimesh(body, tmp_path) -> None:
+    pytest.importorskip("trimesh")
+    corners = [(x, y, z) for x in (0, 10) for y in (0, 20) for z in (0, 30)]
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    obj = [f"v {x} {y} {z}" for x, y, z in corners]
+    obj += [f"f {a + 1} {b + 1} {c + 1}\nf {a + 1} {c + 1} {d + 1}" for a, b, c, d in quads]
+    (tmp_path / "box.obj").write_text("\n".join(obj))
+    done = body("part,shape,file,file_unit,density_kg_m3\nb,mesh,box.obj,mm,1000\n", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["mass_kg"] == pytest.approx(0.006, rel=1e-12)
+    assert found["center_m"] == pytest.approx([0.005, 0.01, 0.015], rel=1e-12)
+    assert found["inertia_kg_m2"][0][0] == pytest.approx(0.006 * (0.02**2 + 0.03**2) / 12, rel=1e-12)
+    (tmp_path / "box.obj").write_text("\n".join(obj[:-1]))
+    done = body("part,shape,file,file_unit,density_kg_m3\nb,mesh,box.obj,mm,1000\n")
+    assert done.returncode == 1
+    assert "not closed" in done.stderr
+
+
+def test_a_mesh_without_its_library_or_its_file_is_one_line(body) -> None:
+    done = body("part,shape,file,file_unit,density_kg_m3\nb,mesh,none.stl,mm,1000\n")
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
+    assert body("part,shape,mass_kg\nb,mesh,1\n").returncode == 1
