@@ -180,8 +180,8 @@ class _Motion:
     def __init__(self, moments: Array, axes: Array, omega: Array, q: Array) -> None:
         self.moments, self.axes, self.omega, self.count = moments, axes, omega, len(moments)
         H = moments * omega
-        # what is 1e-140 of the rest has no square; it would grow by e^300 before it mattered
-        H = np.where(np.abs(H) < 1e-140 * np.abs(H).max(axis=-1, keepdims=True), 0.0, H)
+        # the square of what is 1e-100 of the rest may vanish; it would have to grow by e^230 before it mattered
+        H = np.where(np.abs(H) < 1e-100 * np.abs(H).max(axis=-1, keepdims=True), 0.0, H)
         # principal axes to space
         self.to_axes = quaternion.from_matrix(np.swapaxes(axes, -1, -2))
         start = quaternion.compose(q, self.to_axes)
@@ -216,7 +216,7 @@ class _Motion:
         self._spin, self._precession = spin, precession
         rate = np.abs(spin).sum(axis=-1)
         still = single | (rate == 0) | ((omega != 0).sum(axis=-1) < 2)
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             self.period[bodies] = np.where(still, np.inf, 2 * np.pi / rate)
 
     # --- everything else ---
@@ -224,9 +224,13 @@ class _Motion:
     def _prepare_general(self, bodies: NDArray[np.int64], H: Array) -> None:
         I1, I2, I3 = (self.moments[bodies][:, i : i + 1] for i in range(3))
         H1, H2, H3 = (H[bodies][:, i : i + 1] for i in range(3))
-        w1, w2, w3 = (np.where(h == 0, 0.0, h / i) for h, i in ((H1, I1), (H2, I2), (H3, I3)))
-        o = self.omega[bodies]
-        w1, w2, w3 = (np.where(w == 0, 0.0, o[:, i : i + 1]) for i, w in enumerate((w1, w2, w3)))
+        # measured by a power of two near |ω|: exact, and no square underflows
+        scale = np.exp2(np.frexp(np.abs(self.omega[bodies]).max(axis=-1, keepdims=True))[1].astype(float) - 1)
+        H1, H2, H3 = H1 / scale, H2 / scale, H3 / scale
+        w1, w2, w3 = (
+            np.where(h == 0, 0.0, self.omega[bodies][:, i : i + 1] / scale)
+            for i, h in enumerate((H1, H2, H3))
+        )
         d12, d23, d13 = (I2 - I1) / (I1 * I2), (I3 - I2) / (I2 * I3), (I3 - I1) / (I1 * I3)
         # 2E - |H|²/I3 and |H|²/I1 - 2E, as sums; and their weighted difference, whose sign tells the axis circled
         c3 = (I1 * (I3 - I1) * w1**2 + I2 * (I3 - I2) * w2**2) / I3
@@ -246,9 +250,8 @@ class _Motion:
         cn, sn = hx / self._ax, H2 / self._ay
         size = np.hypot(cn, sn)
         self._u0 = argument(sn / size, cn / size, self._p)
-        self._I = np.concatenate([I1, I2, I3], axis=1)
+        self._I, self._scale = np.concatenate([I1, I2, I3], axis=1), scale
         self._general = bodies
-        self.period[bodies] = (4 * self._p.quarter / self._rate)[:, 0]
         self.m1[bodies] = self._p.m1[:, 0]
         # the node's angle: |H| a3 t + weight·(third(u) - third(u0)), third with parameter n
         total = np.sqrt(H1**2 + H2**2 + H3**2)
@@ -258,6 +261,9 @@ class _Motion:
         self._n = np.where(self._large, ratio, d23 / np.where(d12 > 0, d12, 1.0))
         weight = np.where(self._large, ratio * d13, (d23 / np.where(d12 > 0, d12, 1.0)) * d13)
         self._weight = total * weight / self._rate
+        self._drift, self._rate = self._drift * scale, self._rate * scale
+        with np.errstate(over="ignore"):
+            self.period[bodies] = (4 * self._p.quarter / self._rate)[:, 0]
 
     @cached_property
     def _third_quarter(self) -> Array:
@@ -339,7 +345,7 @@ class _Motion:
             flip = np.where(at.turns % 2 != 0, -1.0, 1.0)
             h1, h2, h3 = self._momentum(at)
             h1, h2, h3 = np.where(self._large, flip * h1, h1), flip * h2, np.where(self._large, h3, flip * h3)
-            spin[self._general] = np.stack([h1, h2, h3], axis=-1) / self._I[:, None, :]
+            spin[self._general] = np.stack([h1, h2, h3], axis=-1) / self._I[:, None, :] * self._scale[:, None]
         return spin @ self.axes
 
 

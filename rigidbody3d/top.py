@@ -12,7 +12,7 @@ Im α), whose phases run at
 apart from the spin by which a top differs from a spherical one (Klein and Sommerfeld, Theorie des Kreisels).
 Each phase is one elliptic integral of the third kind, here split so that its sharp turn, where the axis passes
 near the vertical, is an arctangent and the rest is smooth. The three roots decide everything through their
-differences: they are worked out once per top with 80 digits.
+differences: they are worked out once per top with 200 digits.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, thi
 Array = NDArray[np.float64]
 
 BLOCK = 8192
-DIGITS = 80
+DIGITS = 200
 
 
 @dataclass(frozen=True)
@@ -176,6 +176,10 @@ class _Motion:
 
     def __init__(self, I: Array, mgl: Array, omega: Array, q: Array) -> None:
         self.count, self.omega = len(I), omega
+        # what is 1e-45 of the rest would have to grow by e^100 before it mattered, and has no fourth power
+        q = np.where(np.abs(q) < 1e-45, 0.0, q)
+        rate = np.abs(omega).max(axis=-1) + np.sqrt(np.abs(mgl) / I[:, 0])
+        omega = np.where(np.abs(omega) < 1e-45 * rate[:, None], 0.0, omega)
         # a centre of mass below: the same motion seen upside down
         self.upside = mgl < 0
         q = np.where(self.upside[:, None], quaternion.compose([0.0, 1.0, 0.0, 0.0], q), q)
@@ -279,8 +283,9 @@ class _Motion:
         # no square underflows
         sn = np.where(np.abs(at.sn) < 1e-150, 1e-150, at.sn)
         cn = np.where(np.abs(at.cn) < 1e-150, 1e-150, at.cn)
-        size_a = np.sqrt((self.above + self.span * sn**2) / 2)
-        size_b = np.sqrt((self.below + self.span * cn**2) / 2)
+        across_a, across_b = np.sqrt(self.above / 2), np.sqrt(self.below / 2)
+        swing_by = np.sqrt(self.span / 2)
+        size_a, size_b = np.hypot(across_a, swing_by * sn), np.hypot(across_b, swing_by * cn)
         way_a, way_b = self.a0 * np.exp(1j * (plus + turn)), self.b0 * np.exp(1j * (minus - turn))
         a, b = size_a * way_a, size_b * way_b
         # θ̇ and φ̇ sin θ, each as the small over the small
@@ -305,12 +310,11 @@ class _Motion:
 
 
 def _unit(z: NDArray[Any]) -> NDArray[np.complex128]:
-    size = np.abs(z)
-    return np.asarray(z / np.where(size > 0, size, 1.0))
+    return np.asarray(np.exp(1j * np.angle(z)))
 
 
 def _constants(I1: float, I3: float, mgl: float, omega: Array, q: Array) -> dict[str, float]:
-    """The roots of the cubic and what follows from them, each rounded once from 80 digits."""
+    """The roots of the cubic and what follows from them, each rounded once from 200 digits."""
     with localcontext() as context:
         context.prec = DIGITS
         A, C, a = Decimal(I1), Decimal(I3), Decimal(mgl)
