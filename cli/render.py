@@ -78,6 +78,8 @@ class Shown:
     """The CSV: column name -> values, all of one length; strings are keys, None an empty cell."""
     keys: Sequence[str] = ()
     """The columns that name a row."""
+    table: Callable[[], Columns] | None = None
+    """The terminal's table, where another layout reads better than that of the CSV."""
     notes: Callable[[], str] = lambda: ""
     """What the terminal shows above the table."""
     afterword: Callable[[], str] = lambda: ""
@@ -123,7 +125,8 @@ def show(
     elif report is not None:
         print(checked)
     elif text or (sys.stdout.isatty() and output is None):
-        sys.stdout.write(_paragraphs(shown.notes(), table_text(shown.columns), shown.afterword()))
+        columns = shown.columns if shown.table is None else shown.table()
+        sys.stdout.write(_paragraphs(shown.notes(), table_text(columns), shown.afterword()))
     elif output is None:
         sys.stdout.write(csv_text(shown.columns))
     sys.stdout.flush()

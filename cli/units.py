@@ -57,6 +57,8 @@ UNITS: dict[str, dict[str, Unit]] = {
         "lbf_in": (_LB[0] * _G0 * 127, _LB[1] * 5000),
     },
     "density": {"kg_m3": (1, 1), "g_cm3": (1000, 1)},
+    "area density": {"kg_m2": (1, 1), "g_cm2": (10, 1)},
+    "linear density": {"kg_m": (1, 1), "g_m": (1, 1000)},
     "time": {"s": (1, 1), "ms": (1, 1000), "min": (60, 1), "h": (3600, 1)},
 }
 """Dimension -> suffix -> unit. The first suffix of each dimension is SI."""

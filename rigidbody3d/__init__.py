@@ -1,1 +1,46 @@
-"""Rigid bodies in space: inertia, angular momentum, shafts, rotation in time."""
+"""Rigid bodies in space: inertia, angular momentum, shafts, rotation in time.
+
+SI units and radians; leading axes of an array are bodies, states or times. Quaternions are [w, x, y, z], body
+to space. Products of inertia are +∫ x y dm, and a tensor carries them with the minus sign.
+"""
+
+from rigidbody3d.attitude import from_scipy, to_scipy
+from rigidbody3d.freebody import FreeBody, FreeState
+from rigidbody3d.gyroscope import cones, gyroscopic_couple, sleeping_threshold, steady_precession
+from rigidbody3d.inertia import Body, check, compose, principal, products, shift, tensor
+from rigidbody3d.momentum import Motion, Wrench, strike
+from rigidbody3d.shaft import Shaft
+from rigidbody3d.shapes import SHAPES, inertia_of, load_mesh, measure_of, mesh
+from rigidbody3d.spin import Trajectory, integrate
+from rigidbody3d.top import Top, TopState
+
+__all__ = [
+    "SHAPES",
+    "Body",
+    "FreeBody",
+    "FreeState",
+    "Motion",
+    "Shaft",
+    "Top",
+    "TopState",
+    "Trajectory",
+    "Wrench",
+    "check",
+    "compose",
+    "cones",
+    "from_scipy",
+    "gyroscopic_couple",
+    "inertia_of",
+    "integrate",
+    "load_mesh",
+    "measure_of",
+    "mesh",
+    "principal",
+    "products",
+    "shift",
+    "sleeping_threshold",
+    "steady_precession",
+    "strike",
+    "tensor",
+    "to_scipy",
+]

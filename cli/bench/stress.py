@@ -14,7 +14,7 @@ from importlib import import_module
 import numpy as np
 
 # the modules that have a dict CAMPAIGNS: name -> (what it does, trial(rng) -> [(error, bound), ...])
-MODULES = ("cli.bench.rotors", "cli.bench.field")
+MODULES = ("cli.bench.rotors", "cli.bench.rotation", "cli.bench.field")
 
 Trial = Callable[[np.random.Generator], list[tuple[float, float]]]
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 DOMAINS = {
     "mechanisms": ("cli.bench.mechanisms", "kinematics of a four-bar and of the Klann leg"),
     "rotors": ("cli.bench.rotors", "corrections of rotors with known masses"),
+    "rotation": ("cli.bench.rotation", "momentum of many states, rotation of bodies in time"),
     "field": ("cli.bench.field", "corrections from measured vibration, placement"),
 }
 

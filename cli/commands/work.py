@@ -38,7 +38,7 @@ def run(
     torque cell holds ?; several unknowns are marked ?NAME and need as many velocity fields, told apart by a
     column field.
     """
-    g = 0j if gravity is None else options.vector("--gravity", gravity)
+    g = 0j if gravity is None else options.plane_vector("--gravity", gravity)
     from cli import link_states as job
 
     shown = job.balanced(job.read_states(states), g, ledger=ledger)

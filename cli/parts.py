@@ -1,0 +1,229 @@
+"""A body from a CSV of parts: each row a shape with its mass, place and orientation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.errors import DataError, nearest, quote
+from cli.tables import Table, read
+from cli.units import UNITS, cosine_sine, to_si
+from rigidbody3d import Body, check, compose, inertia_of, load_mesh, measure_of, mesh, tensor
+from rigidbody3d.shapes import SHAPES
+
+Array = NDArray[np.float64]
+
+LENGTHS = ("radius", "inner_radius", "length", "width", "height", "depth")
+MOMENTS = ("ixx", "iyy", "izz")
+PRODUCTS = ("ixy", "ixz", "iyz")
+DENSITIES = {3: "density", 2: "area_density", 1: "linear_density"}
+TENSOR = "tensor"
+MESH = "mesh"
+_NUMBERS = {
+    "mass": "mass",
+    "density": "density",
+    "area_density": "area density",
+    "linear_density": "linear density",
+    **dict.fromkeys(("x", "y", "z", *LENGTHS), "length"),
+    **dict.fromkeys(("axis_x", "axis_y", "axis_z"), "number"),
+    **dict.fromkeys(("rx", "ry", "rz", "angle"), "angle"),
+    **dict.fromkeys((*MOMENTS, *PRODUCTS), "inertia"),
+}
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The parts as read, and the body they make."""
+
+    file: str
+    name: list[str]
+    shape: list[str]
+    each: Body
+    """Mass (k,), centre (k, 3), tensor (k, 3, 3) of the parts."""
+    whole: Body
+    warnings: list[str]
+
+
+def read_parts(path: str) -> Parts:
+    """Read a table of parts and put them together."""
+    table = read(path, numbers=_NUMBERS, texts=["part", "shape", "file", "file_unit"], blank=list(_NUMBERS))
+    if "shape" not in table.texts:
+        raise DataError(f"{table.file}: no column shape (the header is: {', '.join(table.header)})")
+    values = {
+        name: to_si(column.values, _NUMBERS[name], column.unit) + 0.0
+        for name, column in table.numbers.items()
+        if name not in ("rx", "ry", "rz")
+    }
+    turns = _turns(table)
+    name = table.texts.get("part", [str(index + 1) for index in range(table.rows)])
+    mass, inertia = np.empty(table.rows), np.empty((table.rows, 3, 3))
+    center = np.stack([np.nan_to_num(values.get(axis, np.zeros(table.rows))) for axis in "xyz"], axis=-1)
+    folder = Path() if path == "-" else Path(path).parent
+    warnings = list(table.warnings)
+    for index, shape in enumerate(table.texts["shape"]):
+        row = {key: float(column[index]) for key, column in values.items() if not np.isnan(column[index])}
+        if shape.lower() == MESH:
+            mass[index], own, inertia[index] = _mesh(table, index, row, folder)
+            if not row.keys() & {"x", "y", "z"}:  # it stays where the file has it
+                center[index] = own
+        else:
+            mass[index], inertia[index] = _part(table, index, shape.lower(), row, warnings, name[index])
+    rotation = turns @ _along(table, values)
+    each = Body(mass, center, inertia).turned(rotation)
+    total = mass.sum()
+    if not total > 0:
+        raise DataError(
+            f"{table.file}: the masses add up to {total:g} kg: expected a positive total (a hole is a negative mass)"
+        )
+    whole = compose(each)
+    verdict = check(whole.inertia)
+    if not verdict.valid:
+        raise DataError(
+            f"{table.file}: no body is made of these parts: {verdict.reason}: is a hole outside its part?"
+        )
+    return Parts(table.file, name, [shape.lower() for shape in table.texts["shape"]], each, whole, warnings)
+
+
+def _part(
+    table: Table, index: int, shape: str, row: dict[str, float], warnings: list[str], name: str
+) -> tuple[float, Array]:
+    """Return the mass of a part and its tensor along its own axes."""
+    known = [*SHAPES, TENSOR, MESH]
+    if shape not in known:
+        expected = f"one of {', '.join(known)}{nearest(shape, known)}"
+        raise table.error(index, "shape", table.texts["shape"][index], expected)
+    needed = MOMENTS if shape == TENSOR else SHAPES[shape].dimensions
+    optional = PRODUCTS if shape == TENSOR else SHAPES[shape].optional
+    for dimension in needed:
+        if dimension not in row:
+            column = table.numbers[dimension].header if dimension in table.numbers else dimension
+            raise table.error(index, column, "", f"a value: a {shape} needs {', '.join(needed)}")
+    unused = [
+        key for key in (*LENGTHS, "angle", *MOMENTS, *PRODUCTS) if key in row and key not in needed + optional
+    ]
+    if unused:
+        warnings.append(f"{table.file}: part {quote(name)}: a {shape} has no {', '.join(unused)}: not used")
+    dimensions = {key: row[key] for key in needed + optional if key in row}
+    if shape != TENSOR:
+        for key, value in dimensions.items():
+            if value < 0 or (value == 0 and key != "inner_radius"):
+                raise table.error(index, table.numbers[key].header, f"{value:g}", "a positive number")
+        if dimensions.get("inner_radius", 0.0) > dimensions.get("radius", np.inf):
+            raise table.error(
+                index,
+                table.numbers["inner_radius"].header,
+                f"{row['inner_radius']:g}",
+                "no more than the radius",
+            )
+    mass = _mass(table, index, shape, row, dimensions)
+    if shape != TENSOR:
+        return mass, inertia_of(shape, mass, **dimensions)
+    given = tensor(*(row.get(key, 0.0) for key in (*MOMENTS, *PRODUCTS)))
+    # a hole's tensor may be given as that of the material taken away, or already with its sign
+    if mass < 0 and np.trace(given) > 0:
+        given = -given
+    verdict = check(given if mass > 0 else -given)
+    if not verdict.valid:
+        header = table.numbers["ixx"].header
+        raise table.error(
+            index, header, f"{row['ixx']:g}", f"a tensor that a body can have: {verdict.reason}"
+        )
+    return mass, given
+
+
+def _mesh(table: Table, index: int, row: dict[str, float], folder: Path) -> tuple[float, Array, Array]:
+    """Return mass, centre of mass and tensor of a closed mesh from a file."""
+    cell = table.texts.get("file", [""] * table.rows)[index]
+    unit = table.texts.get("file_unit", [""] * table.rows)[index]
+    if not cell:
+        raise table.error(index, "file", "", "the name of an STL or OBJ file")
+    if unit not in UNITS["length"]:
+        raise table.error(
+            index, "file_unit", unit, f"the file's unit of length: {', '.join(UNITS['length'])}"
+        )
+    if ("mass" in row) == ("density" in row) or not row.get("density", 1.0) > 0 or row.get("mass", 1.0) == 0:
+        raise table.error(index, "shape", MESH, "with it a mass, or a positive density_kg_m3")
+    try:
+        vertices, faces = load_mesh(str(folder / cell))
+        volume, center, inertia = mesh(to_si(vertices, "length", unit), faces)
+    except ImportError:
+        raise DataError(
+            f"{table.file}: a mesh needs trimesh: install dalembert with its extra, dalembert[mesh]"
+        ) from None
+    except ValueError as error:
+        raise table.error(index, "file", cell, f"a closed mesh: {error}") from None
+    density = row["density"] if "density" in row else row["mass"] / float(volume)
+    return density * float(volume), center, density * inertia
+
+
+def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimensions: dict[str, float]) -> float:
+    densities = [key for key in DENSITIES.values() if key in row]
+    if "mass" in row:
+        if densities:
+            raise table.error(
+                index,
+                table.numbers[densities[0]].header,
+                f"{row[densities[0]]:g}",
+                "mass or density, not both",
+            )
+        if row["mass"] == 0:
+            raise table.error(index, table.numbers["mass"].header, "0", "a mass that is not zero")
+        return row["mass"]
+    if not densities:
+        raise table.error(index, "mass", "", "a mass, or a density where the shape has a volume")
+    key = densities[0]
+    header = table.numbers[key].header
+    if not row[key] > 0:
+        raise table.error(index, header, f"{row[key]:g}", "a positive density (a hole is a negative mass)")
+    kind = 0 if shape == TENSOR else SHAPES[shape].thin
+    if DENSITIES.get(kind) != key or len(densities) > 1:
+        wanted = f"{DENSITIES[kind]} or mass" if kind else "mass"
+        raise table.error(index, header, f"{row[key]:g}", f"{wanted} for a {shape}")
+    measure, _ = measure_of(shape, **dimensions)
+    mass = row[key] * float(measure)
+    if mass == 0:
+        raise table.error(index, header, f"{row[key]:g}", "a mass that is not zero: this shape has no volume")
+    return mass
+
+
+def _turns(table: Table) -> Array:
+    """The turn about the fixed x, then y, then z, (k, 3, 3); degrees are exact at quarter turns."""
+    out = np.broadcast_to(np.eye(3), (table.rows, 3, 3))
+    for axis, name in enumerate(("rx", "ry", "rz")):
+        if name in table.numbers:
+            c, s = cosine_sine(np.nan_to_num(table.numbers[name].values), table.numbers[name].unit)
+            turn = np.zeros((table.rows, 3, 3))
+            p, q = (axis + 1) % 3, (axis + 2) % 3
+            turn[:, axis, axis] = 1.0
+            turn[:, p, p] = turn[:, q, q] = c
+            turn[:, p, q], turn[:, q, p] = -s, s
+            out = turn @ out
+    return out
+
+
+def _along(table: Table, values: dict[str, Array]) -> Array:
+    """The shortest turn that brings z onto each part's axis, (k, 3, 3); about x where the axis is -z."""
+    given = [values.get(f"axis_{axis}") for axis in "xyz"]
+    if all(column is None for column in given):
+        return np.broadcast_to(np.eye(3), (table.rows, 3, 3))
+    axis = np.stack([np.zeros(table.rows) if column is None else column for column in given], axis=-1)
+    axis = np.where(np.isnan(axis).all(axis=-1, keepdims=True), [0.0, 0.0, 1.0], np.nan_to_num(axis))
+    size = np.sqrt(np.square(axis).sum(axis=-1))
+    if (size == 0).any():
+        index = int(np.argmin(size))
+        header = next(table.numbers[f"axis_{a}"].header for a in "zyx" if f"axis_{a}" in table.numbers)
+        raise table.error(index, header, "0", "an axis that is not zero in every component")
+    x, y, z = (axis / size[:, None]).T
+    across = x * x + y * y
+    # 1/(1 + z), by the other quotient where z is near -1
+    k = np.where(z >= 0, 1 / (1 + np.abs(z)), (1 + np.abs(z)) / np.where(across > 0, across, 1.0))
+    flat = across == 0
+    turn = np.empty((table.rows, 3, 3))
+    turn[:, 0, 0], turn[:, 0, 1], turn[:, 0, 2] = 1 - k * x * x, -k * x * y, x
+    turn[:, 1, 0], turn[:, 1, 1], turn[:, 1, 2] = -k * x * y, 1 - k * y * y, y
+    turn[:, 2, 0], turn[:, 2, 1], turn[:, 2, 2] = -x, -y, z
+    turn[flat & (z < 0)] = np.diag([1.0, -1.0, -1.0])
+    return turn

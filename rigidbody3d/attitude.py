@@ -1,0 +1,220 @@
+"""Unit quaternions [w, x, y, z]: scalar first, body to space, Hamilton's product.
+
+A vector with components v in body axes has the components of q v q* in space axes; q and -q are one
+attitude. `compose(a, b)` turns by b first, then by a. scipy's `Rotation` keeps the scalar last:
+`to_scipy` and `from_scipy` convert.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+
+
+def compose(a: ArrayLike, b: ArrayLike) -> Array:
+    """Return the attitude of turning by b, then by a: the quaternion product a b.
+
+    Parameters
+    ----------
+    a, b
+        Quaternions, (..., 4).
+
+    Examples
+    --------
+    >>> compose([0, 1, 0, 0], [0, 0, 1, 0])  # i j = k
+    array([0., 0., 0., 1.])
+    """
+    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    w, x, y, z = np.moveaxis(a, -1, 0)
+    W, X, Y, Z = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            w * W - x * X - y * Y - z * Z,
+            w * X + x * W + y * Z - z * Y,
+            w * Y - x * Z + y * W + z * X,
+            w * Z + x * Y - y * X + z * W,
+        ],
+        axis=-1,
+    )
+
+
+def inverse(q: ArrayLike) -> Array:
+    """Return the opposite turn of a unit quaternion, (..., 4): its conjugate.
+
+    Examples
+    --------
+    >>> inverse([0.5, 0.5, 0.5, 0.5])
+    array([ 0.5, -0.5, -0.5, -0.5])
+    """
+    return np.asarray(q, dtype=float) * [1.0, -1.0, -1.0, -1.0]
+
+
+def normalize(q: ArrayLike) -> Array:
+    """Return the unit quaternion of the same direction, (..., 4).
+
+    Raises
+    ------
+    ValueError
+        A quaternion of zero length, or not finite.
+
+    Examples
+    --------
+    >>> normalize([2, 0, 0, 0])
+    array([1., 0., 0., 0.])
+    """
+    q = np.asarray(q, dtype=float)
+    if q.shape[-1:] != (4,):
+        raise ValueError(f"a quaternion has four components [w, x, y, z], found {q.shape[-1:]}")
+    largest = np.abs(q).max(axis=-1, keepdims=True)
+    if not (np.isfinite(q).all() and (largest > 0).all()):
+        raise ValueError("a quaternion must be finite and not zero")
+    scaled = q / largest
+    length = np.sqrt(np.square(scaled).sum(axis=-1, keepdims=True))
+    # a quaternion that is one already stays the one that was given
+    return np.where(np.abs(np.square(q).sum(axis=-1, keepdims=True) - 1) < 4e-16, q, scaled / length)
+
+
+def rotate(q: ArrayLike, vector: ArrayLike) -> Array:
+    """Return in space axes the vectors given in body axes, (..., 3).
+
+    Examples
+    --------
+    >>> rotate([0.5, 0.5, 0.5, 0.5], [1, 0, 0])  # x -> y -> z -> x
+    array([0., 1., 0.])
+    """
+    q, v = np.asarray(q, dtype=float), np.asarray(vector, dtype=float)
+    w, u = q[..., :1], q[..., 1:]
+    t = 2 * np.cross(u, v)
+    return np.asarray(v + w * t + np.cross(u, t))
+
+
+def to_matrix(q: ArrayLike) -> Array:
+    """Return the matrix of a unit quaternion, (..., 3, 3): its columns are the body's axes in space.
+
+    Notes
+    -----
+    H. Goldstein, Classical Mechanics, §4.5; entries as differences of products only.
+
+    Examples
+    --------
+    >>> to_matrix([0.5, 0.5, 0.5, 0.5])
+    array([[0., 0., 1.],
+           [1., 0., 0.],
+           [0., 1., 0.]])
+    """
+    w, x, y, z = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
+    rows = [
+        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def from_matrix(matrix: ArrayLike) -> Array:
+    """Return the unit quaternion of a rotation matrix, (..., 4), its largest component positive.
+
+    Notes
+    -----
+    S. W. Shepperd, J. Guidance and Control 1 (1978) 223-224: divide by the largest component.
+
+    Examples
+    --------
+    >>> from_matrix([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    array([0.5, 0.5, 0.5, 0.5])
+    """
+    R = np.asarray(matrix, dtype=float)
+    r = [[R[..., i, j] for j in range(3)] for i in range(3)]
+    # 4 q qᵀ: every row is a multiple of q; take the one with the largest diagonal
+    a, b, c = r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]
+    d, e, f = r[1][0] + r[0][1], r[0][2] + r[2][0], r[2][1] + r[1][2]
+    table = np.stack(
+        [
+            np.stack([1 + r[0][0] + r[1][1] + r[2][2], a, b, c], axis=-1),
+            np.stack([a, 1 + r[0][0] - r[1][1] - r[2][2], d, e], axis=-1),
+            np.stack([b, d, 1 - r[0][0] + r[1][1] - r[2][2], f], axis=-1),
+            np.stack([c, e, f, 1 - r[0][0] - r[1][1] + r[2][2]], axis=-1),
+        ],
+        axis=-2,
+    )
+    best = np.argmax(np.diagonal(table, axis1=-2, axis2=-1), axis=-1)
+    row = np.take_along_axis(table, best[..., None, None], axis=-2)[..., 0, :]
+    return np.asarray(row / np.sqrt(np.square(row).sum(axis=-1, keepdims=True)))
+
+
+def from_vector(turn: ArrayLike) -> Array:
+    """Return the quaternion of a turn by |v| radians about v, (..., 4).
+
+    Examples
+    --------
+    >>> from_vector([0, 0, np.pi]).round(12)
+    array([0., 0., 0., 1.])
+    """
+    v = np.asarray(turn, dtype=float)
+    half = np.sqrt(np.square(v).sum(axis=-1, keepdims=True)) / 2
+    safe = np.where(half > 0, half, 1.0)
+    return np.concatenate([np.cos(half), v / 2 * np.where(half > 0, np.sin(half) / safe, 1.0)], axis=-1)
+
+
+def to_scipy(q: ArrayLike) -> Rotation:
+    """Return scipy's `Rotation` of an attitude, (4,) or (n, 4).
+
+    Examples
+    --------
+    >>> to_scipy([0.5, 0.5, 0.5, 0.5]).apply([1, 0, 0])
+    array([0., 1., 0.])
+    """
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_quat(np.asarray(q, dtype=float)[..., [1, 2, 3, 0]])
+
+
+def from_scipy(rotation: Rotation) -> Array:
+    """Return the attitude [w, x, y, z] of scipy's `Rotation`.
+
+    Examples
+    --------
+    >>> from_scipy(to_scipy([0.5, 0.5, 0.5, 0.5]))
+    array([0.5, 0.5, 0.5, 0.5])
+    """
+    return np.asarray(np.asarray(rotation.as_quat())[..., [3, 0, 1, 2]])
+
+
+def angle_between(a: ArrayLike, b: ArrayLike) -> Array:
+    """Return the angle of the turn from attitude b to attitude a, (...), rad in [0, π]; q and -q are one.
+
+    By the sine of the half angle, so that a difference of 1e-16 is seen.
+
+    Examples
+    --------
+    >>> float(angle_between([1, 0, 0, 0], [-1, 0, 0, 0]))
+    0.0
+    """
+    turn = compose(a, inverse(b))
+    sine = np.sqrt(np.square(turn[..., 1:]).sum(axis=-1))
+    return np.asarray(2 * np.arctan2(sine, np.abs(turn[..., 0])))
+
+
+def left_matrix(q: Array) -> Array:
+    """Return the matrix of p -> q p, (..., 4, 4)."""
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    return np.stack(
+        [np.stack(r, axis=-1) for r in ([w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w])],
+        axis=-2,
+    )
+
+
+def right_matrix(q: Array) -> Array:
+    """Return the matrix of p -> p q, (..., 4, 4)."""
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    return np.stack(
+        [np.stack(r, axis=-1) for r in ([w, -x, -y, -z], [x, w, z, -y], [y, -z, w, x], [z, y, -x, w])],
+        axis=-2,
+    )

@@ -1,0 +1,392 @@
+"""Torque-free rotation in closed form: angular velocity and attitude at any time, without stepping.
+
+With the body's angular momentum H in principal axes, I1 ≤ I2 ≤ I3, and a = 1/I, Euler's equations read
+Ḣ1 = -(a2-a3) H2 H3, Ḣ2 = (a1-a3) H3 H1, Ḣ3 = -(a1-a2) H1 H2. They keep the same form when 1 and 3 change
+places, so that both kinds of motion, around the axis of the largest and of the smallest moment, are
+
+    Hx = Ax cn u,   Hy = Ay sn u,   Hz = Az dn u,   u = λt + u0,
+
+where z is the axis that H circles, y the middle one (Landau and Lifshitz, Mechanics, §37). The attitude
+follows from Euler's angles about H with the body's axis of LEAST moment as the polar axis: the node's rate,
+
+    φ̇ = |H| (a2 H2² + a3 H3²)/(H2² + H3²) = |H| a3 + |H| (a2-a3) H2²/(H2² + H3²),
+
+lies between |H|a3 and |H|a2, which are never far apart (I3 ≤ 2 I2), and is a sum of positive terms: nothing
+cancels on either side of the separatrix, nor for nearly symmetric bodies. Its integral is one R_J of Carlson.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigidbody3d import attitude as quaternion
+from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
+from rigidbody3d.inertia import principal
+
+Array = NDArray[np.float64]
+
+BLOCK = 8192  # states worked out at once: what is intermediate stays in the cache
+
+
+@dataclass(frozen=True)
+class FreeBody:
+    """A rigid body that no torque acts on, from its inertia and its state at time zero.
+
+    Parameters
+    ----------
+    inertia
+        Principal moments (..., 3) or the tensor at the centre of mass (..., 3, 3), kg·m². A single zero moment
+        is a thin rod. Moments that no body has, but for which Euler's equations make sense, are accepted
+        (`inertia.check` judges them).
+    omega
+        Angular velocity at time zero in body axes, (..., 3), rad/s.
+    attitude
+        Quaternion [w, x, y, z] at time zero, body to space, (..., 4).
+
+    Raises
+    ------
+    ValueError
+        Not finite, a tensor that is not symmetric, a moment that is negative, shapes that do not fit.
+
+    Notes
+    -----
+    See the module's text. Separatrix, permanent rotation, symmetric and spherical bodies included. The
+    distance to the separatrix is worked out in doubled precision: it is exact for the numbers given.
+
+    Examples
+    --------
+    >>> body = FreeBody([1, 2, 3], [1.0, 0.1, 0.5])
+    >>> state = body.at([0.0, 10.0])
+    >>> state.omega[1].round(10)
+    array([ 0.559657  , -0.83473591, -0.14516193])
+    >>> float(body.period)
+    14.8973683698591...
+    """
+
+    inertia: ArrayLike
+    omega: ArrayLike
+    attitude: ArrayLike = (1.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        moments, axes = principal(self.inertia)
+        omega = np.asarray(self.omega, dtype=float)
+        q = np.asarray(self.attitude, dtype=float)
+        if omega.shape[-1:] != (3,):
+            raise ValueError(f"omega has three components, found the shape {omega.shape}")
+        if not np.isfinite(omega).all():
+            raise ValueError("omega must be finite")
+        if (moments < 0).any() or (moments[..., 1] <= 0).any():
+            raise ValueError(
+                f"the principal moments of inertia must be positive (one may be zero: a thin rod), found {moments}"
+            )
+        if ((moments[..., 0] == 0) & (moments[..., 1] != moments[..., 2])).any():
+            raise ValueError("a body with one zero moment is a thin rod: the other two moments must be equal")
+        lead = np.broadcast_shapes(moments.shape[:-1], omega.shape[:-1], q.shape[:-1])
+        unit = np.broadcast_to(quaternion.normalize(q), lead + (4,)).reshape(-1, 4)
+        moments = np.broadcast_to(moments, lead + (3,)).reshape(-1, 3)
+        axes = np.broadcast_to(axes, lead + (3, 3)).reshape(-1, 3, 3)
+        spin = np.einsum("bij,bj->bi", axes, np.broadcast_to(omega, lead + (3,)).reshape(-1, 3))
+        object.__setattr__(self, "_lead", lead)
+        object.__setattr__(self, "_motion", _Motion(moments, axes, spin, unit))
+
+    _lead: tuple[int, ...] = ()
+    _motion: _Motion = None  # type: ignore[assignment]
+
+    def at(self, t: ArrayLike) -> FreeState:
+        """Return the state at times t, (n,) or a single one, s: `.omega` (..., n, 3), `.attitude` (..., n, 4)."""
+        time = np.asarray(t, dtype=float)
+        if time.ndim > 1:
+            raise ValueError(f"times are a number or one row of numbers, found the shape {time.shape}")
+        if not np.isfinite(time).all():
+            raise ValueError("times must be finite")
+        return FreeState(self, time)
+
+    @property
+    def period(self) -> Array:
+        """The period of the angular velocity in body axes, (...), s; infinite where it is constant or never returns."""
+        return self._motion.period.reshape(self._lead)
+
+    @property
+    def momentum(self) -> Array:
+        """The angular momentum in space axes, constant, (..., 3), kg·m²/s."""
+        return self._motion.momentum.reshape(self._lead + (3,))
+
+    @property
+    def energy(self) -> Array:
+        """The kinetic energy, constant, (...), J."""
+        m = self._motion
+        return np.asarray((m.moments * m.omega**2).sum(axis=-1) / 2).reshape(self._lead)
+
+    @property
+    def separatrix(self) -> Array:
+        """The complementary parameter m₁ of the motion, (...): 0 on the separatrix, 1 far from it or for a symmetric body."""
+        return self._motion.m1.reshape(self._lead)
+
+
+@dataclass(frozen=True)
+class FreeState:
+    """The state of a free body at given times; each quantity is computed when it is first asked for."""
+
+    body: FreeBody
+    time: Array
+
+    @cached_property
+    def omega(self) -> Array:
+        """Angular velocity in body axes, (..., n, 3), rad/s."""
+        return self._shaped(self.body._motion.omega_at, 3)
+
+    @cached_property
+    def attitude(self) -> Array:
+        """Quaternion [w, x, y, z], body to space, (..., n, 4), continuous in time."""
+        return self._shaped(self.body._motion.attitude_at, 4)
+
+    @cached_property
+    def momentum(self) -> Array:
+        """Angular momentum in space axes from this very state, (..., n, 3), kg·m²/s."""
+        moments, axes = principal(self.body.inertia)
+        tensor = np.einsum("...ki,...k,...kj->...ij", axes, moments, axes)
+        one = tensor[..., None, :, :] if self.time.ndim else tensor
+        body = np.einsum("...ij,...j->...i", one, self.omega)
+        return quaternion.rotate(self.attitude, body)
+
+    @cached_property
+    def energy(self) -> Array:
+        """Kinetic energy from this very state, (..., n), J."""
+        moments, axes = principal(self.body.inertia)
+        if self.time.ndim:
+            moments, axes = moments[..., None, :], axes[..., None, :, :]
+        spin = np.einsum("...ij,...j->...i", axes, self.omega)
+        return np.asarray((moments * spin**2).sum(axis=-1) / 2)
+
+    def _shaped(self, work, width: int) -> Array:  # type: ignore[no-untyped-def]
+        t = np.atleast_1d(self.time)
+        bodies = self.body._motion.count
+        out = np.empty((bodies, len(t), width))
+        step = max(1, BLOCK // bodies)
+        for start in range(0, len(t), step):
+            part = t[start : start + step]
+            out[:, start : start + step] = work(part)
+        shaped = out.reshape(self.body._lead + (len(t), width))
+        return shaped if self.time.ndim else shaped[..., 0, :]
+
+
+class _Motion:
+    """What is constant in the motion of b bodies, in principal axes I1 ≤ I2 ≤ I3."""
+
+    def __init__(self, moments: Array, axes: Array, omega: Array, q: Array) -> None:
+        self.moments, self.axes, self.omega, self.count = moments, axes, omega, len(moments)
+        H = moments * omega
+        # the square of what is 1e-100 of the rest may vanish; it would have to grow by e^230 before it mattered
+        H = np.where(np.abs(H) < 1e-100 * np.abs(H).max(axis=-1, keepdims=True), 0.0, H)
+        # principal axes to space
+        self.to_axes = quaternion.from_matrix(np.swapaxes(axes, -1, -2))
+        start = quaternion.compose(q, self.to_axes)
+        self.momentum = quaternion.rotate(start, moments * omega)
+        self.simple = (
+            (moments[:, 0] == moments[:, 1]) | (moments[:, 1] == moments[:, 2]) | ((H != 0).sum(axis=-1) < 2)
+        )
+        self.period = np.full(self.count, np.inf)
+        self.m1 = np.ones(self.count)
+        self._start, self._q = start, q
+        self._prepare_simple(np.flatnonzero(self.simple), H)
+        self._prepare_general(np.flatnonzero(~self.simple), H)
+
+    # --- bodies with two equal moments, and permanent rotation about a principal axis ---
+
+    def _prepare_simple(self, bodies: NDArray[np.int64], H: Array) -> None:
+        """q(t) = exp(P t) q0 exp(S t): precession P fixed in space, spin S fixed in the body."""
+        moments, omega = self.moments[bodies], self.omega[bodies]
+        I1, I2, I3 = moments.T
+        single = ((H[bodies] != 0).sum(axis=-1) < 2) & (I1 > 0)
+        prolate = (I2 == I3) & (I1 != I2)
+        pole = np.where(prolate, 0, 2)
+        across = np.where(prolate, I3, I1)
+        along = np.where(prolate, I1, I3)
+        rows = np.arange(len(bodies))
+        spin = np.zeros_like(omega)
+        # (across - along)/across: exactly what the difference of the given moments says
+        spin[rows, pole] = omega[rows, pole] * (across - along) / across
+        spin = np.where(single[:, None], omega, spin)
+        precession = np.where(single[:, None], 0.0, self.momentum[bodies] / across[:, None])
+        self._simple = bodies
+        self._spin, self._precession = spin, precession
+        rate = np.abs(spin).sum(axis=-1)
+        still = single | (rate == 0) | ((omega != 0).sum(axis=-1) < 2)
+        with np.errstate(divide="ignore", over="ignore"):
+            self.period[bodies] = np.where(still, np.inf, 2 * np.pi / rate)
+
+    # --- everything else ---
+
+    def _prepare_general(self, bodies: NDArray[np.int64], H: Array) -> None:
+        I1, I2, I3 = (self.moments[bodies][:, i : i + 1] for i in range(3))
+        H1, H2, H3 = (H[bodies][:, i : i + 1] for i in range(3))
+        # measured by a power of two near |ω|: exact, and no square underflows
+        scale = np.exp2(np.frexp(np.abs(self.omega[bodies]).max(axis=-1, keepdims=True))[1].astype(float) - 1)
+        H1, H2, H3 = H1 / scale, H2 / scale, H3 / scale
+        w1, w2, w3 = (
+            np.where(h == 0, 0.0, self.omega[bodies][:, i : i + 1] / scale)
+            for i, h in enumerate((H1, H2, H3))
+        )
+        d12, d23, d13 = (I2 - I1) / (I1 * I2), (I3 - I2) / (I2 * I3), (I3 - I1) / (I1 * I3)
+        # 2E - |H|²/I3 and |H|²/I1 - 2E, as sums; and their weighted difference, whose sign tells the axis circled
+        c3 = (I1 * (I3 - I1) * w1**2 + I2 * (I3 - I2) * w2**2) / I3
+        c1 = (I3 * (I3 - I1) * w3**2 + I2 * (I2 - I1) * w2**2) / I1
+        apart = _weighted_difference(I1, I2, I3, w1, w3) / I2
+        self._large = apart <= 0  # circles the axis of the largest moment
+        big = np.where(self._large, d23 * c1, d12 * c3)
+        small = np.where(self._large, d12 * c3, d23 * c1)
+        self._rate = np.sqrt(big)
+        self._p = parameter(small / big, np.minimum(d13 * np.abs(apart) / big, 1.0))
+        cz, cx = np.where(self._large, c3, c1), np.where(self._large, c1, c3)
+        dyz = np.where(self._large, d23, d12)
+        hx, hz = np.where(self._large, H1, H3), np.where(self._large, H3, H1)
+        sign = np.where(hz < 0, -1.0, 1.0)
+        self._ax, self._ay, self._az = np.sqrt(cz / d13), sign * np.sqrt(cz / dyz), sign * np.sqrt(cx / d13)
+        self._sign = sign
+        cn, sn = hx / self._ax, H2 / self._ay
+        size = np.hypot(cn, sn)
+        self._u0 = argument(sn / size, cn / size, self._p)
+        self._I, self._scale = np.concatenate([I1, I2, I3], axis=1), scale
+        self._general = bodies
+        self.m1[bodies] = self._p.m1[:, 0]
+        # the node's angle: |H| a3 t + weight·(third(u) - third(u0)), third with parameter n
+        total = np.sqrt(H1**2 + H2**2 + H3**2)
+        self._total = total
+        self._drift = total / I3
+        ratio = np.where(self._large, c3 / c1, 0.0)
+        self._n = np.where(self._large, ratio, d23 / np.where(d12 > 0, d12, 1.0))
+        weight = np.where(self._large, ratio * d13, (d23 / np.where(d12 > 0, d12, 1.0)) * d13)
+        self._weight = total * weight / self._rate
+        self._drift, self._rate = self._drift * scale, self._rate * scale
+        with np.errstate(over="ignore"):
+            self.period[bodies] = (4 * self._p.quarter / self._rate)[:, 0]
+
+    @cached_property
+    def _third_quarter(self) -> Array:
+        return third_complete(self._p, self._n)
+
+    @cached_property
+    def _attitude_start(self) -> tuple[Array, Array]:
+        """The node's integral at time zero, and the 4 × 4 matrix from Euler's quaternion to the attitude."""
+        at, bodies = self._jacobi(np.zeros(1)), self._general
+        frame = _cyclic(len(bodies))
+        before = quaternion.compose(self._euler(at, np.zeros(1))[:, 0], frame)
+        left = quaternion.compose(self._start[bodies], quaternion.inverse(before))
+        right = quaternion.compose(frame, quaternion.inverse(self.to_axes[bodies]))
+        return self._node(at), quaternion.left_matrix(left) @ quaternion.right_matrix(right)
+
+    def _jacobi(self, t: Array) -> Jacobi:
+        return jacobi(self._u0 + self._rate * t, self._p)
+
+    def _node(self, at: Jacobi) -> Array:
+        turns = np.where(np.isinf(self._p.quarter), 0.0, 2 * at.turns * self._third_quarter)
+        return np.asarray(self._weight * (turns + third(at, self._p, self._n)))
+
+    def _momentum(self, at: Jacobi) -> tuple[Array, Array, Array]:
+        """H1, H2, H3 in principal axes, without the sign (-1)ⁿ of the half turns for the two that have it."""
+        x, y, z = self._ax * at.cn, self._ay * at.sn, self._az * at.dn
+        return np.where(self._large, x, z), y, np.where(self._large, z, x)
+
+    def _euler(self, at: Jacobi, node: Array) -> Array:
+        """The quaternion of Euler's angles (node, tilt, spin) about H and the first principal axis."""
+        h1, h2, h3 = (h / self._total for h in self._momentum(at))
+        flip = np.where(at.turns % 2 != 0, -1.0, 1.0)
+        # around the largest moment H3 keeps its sign; around the smallest the spin angle runs on
+        side = np.where(self._large & (self._sign < 0), -1.0, 1.0)
+        h2 = np.where(self._large, flip * h2, h2)
+        h1 = np.where(self._large, flip * h1, h1)
+        # half turns by quarters of their half angle, exact however many there have been
+        turned = np.where(self._large, np.where(side < 0, 1.0, 0.0), np.fmod(self._sign * at.turns, 4.0))
+        half = (np.arctan2(side * h2, side * h3) + np.pi * turned) / 2
+        across = np.hypot(h2, h3)
+        larger = np.sqrt((1 + np.abs(h1)) / 2)
+        smaller = across / (2 * larger)
+        c, s = np.where(h1 >= 0, larger, smaller), np.where(h1 >= 0, smaller, larger)
+        # the two angles apart: the momentum's direction then does not feel the rounding of a large node
+        cn, sn, cs, ss = np.cos(node / 2), np.sin(node / 2), np.cos(half), np.sin(half)
+        return np.stack(
+            [
+                c * (cn * cs - sn * ss),
+                s * (cn * cs + sn * ss),
+                s * (sn * cs - cn * ss),
+                c * (sn * cs + cn * ss),
+            ],
+            axis=-1,
+        )
+
+    def attitude_at(self, t: Array) -> Array:
+        """Quaternions (b, n, 4)."""
+        out = np.empty((self.count, len(t), 4))
+        if len(self._simple):
+            turn = quaternion.from_vector(self._precession[:, None, :] * t[:, None])
+            spin = quaternion.from_vector(self._spin[:, None, :] * t[:, None])
+            first = quaternion.compose(turn, self._start[self._simple][:, None, :])
+            back = quaternion.inverse(self.to_axes[self._simple])[:, None, :]
+            out[self._simple] = quaternion.compose(quaternion.compose(first, spin), back)
+        if len(self._general):
+            node0, both = self._attitude_start
+            at = self._jacobi(t)
+            euler = self._euler(at, self._drift * t + (self._node(at) - node0))
+            out[self._general] = euler @ np.swapaxes(both, -1, -2)
+        return out
+
+    def omega_at(self, t: Array) -> Array:
+        """Angular velocity in the given body axes (b, n, 3)."""
+        spin = np.empty((self.count, len(t), 3))
+        if len(self._simple):
+            turn = quaternion.from_vector(-self._spin[:, None, :] * t[:, None])
+            spin[self._simple] = quaternion.rotate(turn, self.omega[self._simple][:, None, :])
+        if len(self._general):
+            at = self._jacobi(t)
+            flip = np.where(at.turns % 2 != 0, -1.0, 1.0)
+            h1, h2, h3 = self._momentum(at)
+            h1, h2, h3 = np.where(self._large, flip * h1, h1), flip * h2, np.where(self._large, h3, flip * h3)
+            spin[self._general] = np.stack([h1, h2, h3], axis=-1) / self._I[:, None, :] * self._scale[:, None]
+        return spin @ self.axes
+
+
+def _cyclic(count: int) -> Array:
+    """The turn that brings the first axis to the third place: e1 -> Z, e2 -> X, e3 -> Y."""
+    return np.broadcast_to([0.5, -0.5, -0.5, -0.5], (count, 4))
+
+
+def _weighted_difference(I1: Array, I2: Array, I3: Array, w1: Array, w3: Array) -> Array:
+    """I1 (I2-I1) ω1² - I3 (I3-I2) ω3² in doubled precision: on the separatrix it is all cancellation."""
+    first = _double_product(I1, I2, w1, -1.0)
+    last = _double_product(I3, I2, w3, 1.0)
+    s, e = _two_sum(first[0], -last[0])
+    return s + (e + (first[1] - last[1]))
+
+
+def _double_product(a: Array, b: Array, w: Array, sign: float) -> tuple[Array, Array]:
+    """a · sign·(a - b) · w², as a pair."""
+    d, d_rest = _two_sum(sign * a, -sign * b)
+    p, p_rest = _two_product(a, d)
+    p_rest = p_rest + a * d_rest
+    q, q_rest = _two_product(w, w)
+    r, r_rest = _two_product(p, q)
+    return r, r_rest + (p * q_rest + p_rest * q)
+
+
+def _two_sum(a: Array, b: Array) -> tuple[Array, Array]:
+    """The rounded sum and its rounding error (Knuth, TAOCP 2, 4.2.2, theorem B)."""
+    s = a + b
+    c = s - a
+    return s, (a - (s - c)) + (b - c)
+
+
+def _two_product(a: Array, b: Array) -> tuple[Array, Array]:
+    """The rounded product and its rounding error (Dekker, Numer. Math. 18, 1971, 224-242)."""
+    p = a * b
+    a1, b1 = _upper(a), _upper(b)
+    a2, b2 = a - a1, b - b1
+    return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
+
+
+def _upper(a: Array) -> Array:
+    c = 134217729.0 * a  # 2²⁷ + 1
+    return c - (c - a)

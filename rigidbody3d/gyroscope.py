@@ -1,0 +1,131 @@
+"""Gyroscopes: the couple of a rotor on a turning base, steady precession, cones, the sleeping top."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def gyroscopic_couple(momentum: ArrayLike, frame_omega: ArrayLike) -> Array:
+    """Return the moment that must act on a rotor whose base turns, Ω × H, (..., 3), N·m; the rotor answers -Ω × H.
+
+    Examples
+    --------
+    Beer and Johnston 18.81: I = 0.29632 kg·m² at 2700 rpm, taken through a 200 m curve at 90 km/h.
+
+    >>> H = [0, 0.29632 * 2700 * np.pi / 30, 0]
+    >>> gyroscopic_couple(H, [0, 0, 25 / 200])
+    array([-10.4728...,   0.        ,   0.        ])
+    """
+    return np.asarray(np.cross(np.asarray(frame_omega, dtype=float), np.asarray(momentum, dtype=float)))
+
+
+class Steady(NamedTuple):
+    """The two rates of steady precession, rad/s; NaN where the spin is too slow for any."""
+
+    slow: Array
+    fast: Array
+
+
+def steady_precession(
+    transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike, tilt: ArrayLike, spin: ArrayLike
+) -> Steady:
+    """Return the slow and the fast rate at which a top precesses at constant tilt.
+
+    Parameters
+    ----------
+    transverse, axial
+        Moments I1 and I3 about the fixed point, (...), kg·m².
+    mgl
+        N·m.
+    tilt
+        Angle of the axis with the vertical, (...), rad.
+    spin
+        ω3, the component of the angular velocity along the axis, (...), rad/s.
+
+    Notes
+    -----
+    I1 cos θ φ̇² - I3 ω3 φ̇ + m g l = 0 (Goldstein, §5.7); with B = I3 ω3 and D = B² - 4 I1 m g l cos θ the
+    larger root is (B ± √D)/(2 I1 cos θ), the other 2 m g l/(B ± √D), the sign that of B: nothing cancels. The
+    fast rate is infinite at a right angle.
+
+    Examples
+    --------
+    >>> [float(x) for x in steady_precession(0.002, 0.0008, 0.1962, 0.4, 60.0)]
+    [5.07653596218304..., 20.980370319014...]
+    """
+    I1, I3, a, theta, w = (np.asarray(x, dtype=float) for x in (transverse, axial, mgl, tilt, spin))
+    B = I3 * w
+    c = np.cos(theta)
+    # a right angle given in radians is one to rounding
+    c = np.where(np.abs(c) < 1e-16, 0.0, c)
+    square = B * B - 4 * I1 * a * c
+    with np.errstate(invalid="ignore", divide="ignore"):
+        large = B + np.where(B < 0, -1.0, 1.0) * np.sqrt(np.where(square < 0, np.nan, square))
+        slow = np.where(a == 0, 0.0 * large, 2 * a / large)
+        fast = large / (2 * I1 * c)
+    return Steady(np.asarray(slow), np.asarray(fast))
+
+
+def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) -> Array:
+    """Return the spin above which a top stands upright stably, 2 √(m g l I1)/I3, (...), rad/s (Goldstein, §5.7).
+
+    Zero where the centre of mass lies below the fixed point.
+
+    Examples
+    --------
+    >>> float(sleeping_threshold(0.002, 0.0008, 0.1962))
+    49.5227...
+    """
+    I1, I3, a = (np.asarray(x, dtype=float) for x in (transverse, axial, mgl))
+    return np.asarray(2 * np.sqrt(np.maximum(a, 0.0) * I1) / I3)
+
+
+class Cones(NamedTuple):
+    """The cones of a free symmetric body: half angles, rad, and rates, rad/s."""
+
+    space: Array
+    """Angle between ω and H: the cone fixed in space."""
+    body: Array
+    """Angle between ω and the axis of the body: the cone fixed in it."""
+    precession: Array
+    """Rate at which the axis goes round H, |H|/I1."""
+    spin: Array
+    """Rate of the body about its axis relative to the precessing plane, ω3 (I1 - I3)/I1."""
+
+
+def cones(transverse: ArrayLike, axial: ArrayLike, omega: ArrayLike) -> Cones:
+    """Return the cones that roll on each other when a symmetric body turns freely.
+
+    Parameters
+    ----------
+    transverse, axial
+        I1 (twice) and I3, (...), kg·m².
+    omega
+        Angular velocity in body axes, the axis last, (..., 3), rad/s.
+
+    Notes
+    -----
+    Beer and Johnston, ch. 18; Goldstein, §5.6. The angle between ω and H from its own sine,
+    (I1 - I3) ω⊥ ω3, which does not cancel where they are close.
+
+    Examples
+    --------
+    >>> c = cones(1.0, 2.0, [0.0, 1.0, 1.0])
+    >>> [round(float(np.degrees(x)), 4) for x in c[:2]]
+    [18.4349, 45.0]
+    """
+    I1, I3 = np.asarray(transverse, dtype=float), np.asarray(axial, dtype=float)
+    w = np.asarray(omega, dtype=float)
+    across, along = np.hypot(w[..., 0], w[..., 1]), w[..., 2]
+    space = np.arctan2(np.abs(I1 - I3) * across * np.abs(along), I1 * across**2 + I3 * along**2)
+    return Cones(
+        space,
+        np.arctan2(across, np.abs(along)),
+        np.hypot(across, I3 * along / I1),
+        np.asarray(along * (I1 - I3) / I1),
+    )

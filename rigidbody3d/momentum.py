@@ -1,0 +1,315 @@
+"""Angular momentum, its true rate in turning axes, and d'Alembert's wrench.
+
+    H_G = I ω                                   (Riul II, eqs. 24-35)
+    Ḣ_G = (Ḣ_G)_rel + Ω × H_G                   (eqs. 36-44), Ω the rate of the axes
+    ΣF = m a_G,  ΣM_G = Ḣ_G                     (eqs. 22, 23): the inertia wrench is (-m a_G, -Ḣ_G).
+
+Where the axes turn with the body (Ω = ω) the tensor is constant in them and (Ḣ)_rel = I·(ω̇)_rel. Where they do
+not, (Ḣ)_rel also holds the rate of the tensor itself, which vanishes only for a body of revolution about the
+axis of the difference ω - Ω; here Ḣ is always the true rate, I α + ω × (I ω) with α = (ω̇)_rel + Ω × ω.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+BLOCK = 8192  # states worked out at once: their columns stay in the cache
+
+
+class Wrench(NamedTuple):
+    """A force and a moment, (..., 3) each, N and N·m."""
+
+    force: Array
+    moment: Array
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class Motion:
+    """A rigid body in motion, one state or many: what its momentum is and what forces the motion asks for.
+
+    Each quantity is computed when it is first asked for. All components are along one set of axes, in which the
+    tensor is given: the fixed axes at the instant looked at, or axes turning with the body.
+
+    Parameters
+    ----------
+    inertia
+        The tensor at the centre of mass, (3, 3) or (..., 3, 3), kg·m²; the products enter as -I_xy.
+    omega
+        Angular velocity of the body, (..., 3), rad/s.
+    alpha
+        Rate of the components of ω in the axes given by `frame_omega`, (..., 3), rad/s².
+    frame_omega
+        Angular velocity Ω of axes that do not turn with the body, (..., 3), rad/s; None: they turn with it.
+    mass
+        (...), kg.
+    center
+        Position of the centre of mass, (..., 3), m.
+    velocity, acceleration
+        Of the centre of mass in fixed space, (..., 3), m/s, m/s².
+
+    Examples
+    --------
+    Riul's example 3: a disk of 3.63 kg, here 0.2 m in radius, spins at 12 rad/s about z on an arm that turns at
+    4 rad/s about y.
+
+    >>> from rigidbody3d import inertia_of
+    >>> disk = Motion(inertia_of("disk", 3.63, radius=0.2), [0, 4, 12.0], frame_omega=[0, 4.0, 0])
+    >>> disk.momentum.round(6)
+    array([0.    , 0.1452, 0.8712])
+    >>> disk.rate.round(6)
+    array([3.4848, 0.    , 0.    ])
+    """
+
+    inertia: Array
+    omega: Array
+    alpha: Array
+    frame_omega: Array | None
+    mass: Array
+    center: Array
+    velocity: Array
+    acceleration: Array
+
+    def __init__(
+        self,
+        inertia: ArrayLike,
+        omega: ArrayLike,
+        alpha: ArrayLike = (0.0, 0.0, 0.0),
+        frame_omega: ArrayLike | None = None,
+        mass: ArrayLike = 0.0,
+        center: ArrayLike = (0.0, 0.0, 0.0),
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        acceleration: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        def keep(name: str, given: ArrayLike, *wanted: int) -> None:
+            value = np.asarray(given, dtype=float)
+            if value.shape[value.ndim - len(wanted) :] != wanted:
+                shape = ", ".join(map(str, ("...", *wanted)))
+                raise ValueError(f"{name} must have the shape ({shape}), found {value.shape}")
+            object.__setattr__(self, name, value)
+
+        keep("inertia", inertia, 3, 3)
+        keep("mass", mass)
+        keep("omega", omega, 3)
+        keep("alpha", alpha, 3)
+        keep("center", center, 3)
+        keep("velocity", velocity, 3)
+        keep("acceleration", acceleration, 3)
+        object.__setattr__(self, "frame_omega", None)
+        if frame_omega is not None:
+            keep("frame_omega", frame_omega, 3)
+
+    @cached_property
+    def momentum(self) -> Array:
+        """H_G = I ω about the centre of mass, (..., 3), kg·m²/s."""
+        return _times(self.inertia, self.omega)
+
+    @cached_property
+    def true_alpha(self) -> Array:
+        """The angular acceleration in fixed space, (ω̇)_rel + Ω × ω, (..., 3), rad/s²."""
+        if self.frame_omega is None:
+            return self.alpha
+        return np.asarray(self.alpha + np.cross(self.frame_omega, self.omega))
+
+    @cached_property
+    def rate(self) -> Array:
+        """Ḣ_G in fixed space, (..., 3), N·m: the moment about the centre of mass that the motion asks for."""
+        I, w, alpha = self.inertia, self.omega, self.true_alpha
+        if "momentum" in self.__dict__ or I.ndim > 2 or w.ndim == 1 or w.shape != alpha.shape:
+            return np.asarray(_times(I, alpha) + np.cross(w, self.momentum))
+        # both in one pass: while a block of ω is in the cache
+        momentum, rate = _momentum_and_rate(I, w, alpha)
+        self.__dict__["momentum"] = momentum
+        return rate
+
+    @cached_property
+    def transport(self) -> Array:
+        """Ω × H_G, the part of the rate that the turning of the axes gives, (..., 3), N·m."""
+        frame = self.omega if self.frame_omega is None else self.frame_omega
+        return np.asarray(np.cross(frame, self.momentum))
+
+    @cached_property
+    def relative(self) -> Array:
+        """(Ḣ_G)_rel, the rate of the components of H_G in the turning axes, (..., 3), N·m."""
+        if self.frame_omega is None:
+            return _times(self.inertia, self.alpha)
+        return np.asarray(_times(self.inertia, self.alpha) + self.tensor_rate)
+
+    @cached_property
+    def tensor_rate(self) -> Array:
+        """İ_rel ω: what the change of the tensor in the turning axes adds, (..., 3), N·m; zero in body axes.
+
+        With ν = ω - Ω the turning of the body in those axes, İ_rel ω = ν × (I ω) - I (ν × ω).
+        """
+        if self.frame_omega is None:
+            return np.zeros_like(self.momentum)
+        slip = np.asarray(self.omega - self.frame_omega)
+        return np.asarray(np.cross(slip, self.momentum) - _times(self.inertia, np.cross(slip, self.omega)))
+
+    @cached_property
+    def linear_momentum(self) -> Array:
+        """m v_G, (..., 3), kg·m/s."""
+        return np.asarray(self.mass[..., None] * self.velocity)
+
+    @cached_property
+    def force(self) -> Array:
+        """m a_G, the external force that the motion asks for, (..., 3), N."""
+        return np.asarray(self.mass[..., None] * self.acceleration)
+
+    @cached_property
+    def inertia_force(self) -> Array:
+        """d'Alembert's inertia force, -m a_G, (..., 3), N."""
+        return np.asarray(-self.mass[..., None] * self.acceleration)
+
+    @cached_property
+    def inertia_wrench(self) -> Wrench:
+        """d'Alembert's wrench at the centre of mass: -m a_G and -Ḣ_G."""
+        return Wrench(self.inertia_force, -self.rate)
+
+    @cached_property
+    def energy(self) -> Array:
+        """Kinetic energy, ½ m v² + ½ ω·H, (...), J."""
+        v2 = (self.velocity * self.velocity).sum(axis=-1)
+        return np.asarray(self.mass * v2 / 2 + (self.omega * self.momentum).sum(axis=-1) / 2)
+
+    def momentum_about(self, point: ArrayLike) -> Array:
+        """Return H about a point, H_G + (G - P) × m v_G, (..., 3), kg·m²/s."""
+        return np.asarray(
+            self.momentum + np.cross(self.center - np.asarray(point, dtype=float), self.linear_momentum)
+        )
+
+    def rate_about(self, point: ArrayLike) -> Array:
+        """Return Ḣ about a point fixed in space, Ḣ_G + (G - P) × m a_G, (..., 3), N·m: the moment needed there."""
+        return np.asarray(self.rate + np.cross(self.center - np.asarray(point, dtype=float), self.force))
+
+    @classmethod
+    def about_fixed_point(
+        cls,
+        inertia: ArrayLike,
+        omega: ArrayLike,
+        alpha: ArrayLike = (0.0, 0.0, 0.0),
+        *,
+        mass: ArrayLike,
+        center: ArrayLike,
+        point: ArrayLike = (0.0, 0.0, 0.0),
+        frame_omega: ArrayLike | None = None,
+    ) -> Motion:
+        """Return the motion of a body that turns about a point fixed in space: v = ω × r, a = α × r + ω × v."""
+        w, r = (
+            np.asarray(omega, dtype=float),
+            np.asarray(center, dtype=float) - np.asarray(point, dtype=float),
+        )
+        true = np.asarray(alpha, dtype=float)
+        if frame_omega is not None:
+            true = true + np.cross(np.asarray(frame_omega, dtype=float), w)
+        v = np.cross(w, r)
+        return cls(inertia, w, alpha, frame_omega, mass, center, v, np.cross(true, r) + np.cross(w, v))
+
+
+def _times(I: Array, w: Array) -> Array:
+    """I ω for states (..., 3)."""
+    if I.ndim == 2:
+        return np.asarray(w @ I.T)
+    return np.asarray((I * w[..., None, :]).sum(axis=-1))
+
+
+def _momentum_and_rate(I: Array, w: Array, alpha: Array) -> tuple[Array, Array]:
+    """I ω and I α + ω × I ω for states (..., 3) of one tensor, in blocks that stay in the cache."""
+    flat, turn = w.reshape(-1, 3), alpha.reshape(-1, 3)
+    transposed = np.ascontiguousarray(I.T)
+    momentum, rate = np.empty_like(flat), np.empty_like(flat)
+    for s in range(0, len(flat), BLOCK):
+        part = slice(s, s + BLOCK)
+        np.matmul(flat[part], transposed, out=momentum[part])
+        np.matmul(turn[part], transposed, out=rate[part])
+        x, y, z = np.ascontiguousarray(flat[part].T)
+        h = np.ascontiguousarray(momentum[part].T)
+        cross = np.empty_like(h)
+        swap = np.empty_like(x)
+        for out, a, b, p, q in ((0, y, z, 2, 1), (1, z, x, 0, 2), (2, x, y, 1, 0)):
+            np.multiply(a, h[p], out=cross[out])
+            np.multiply(b, h[q], out=swap)
+            cross[out] -= swap
+        rate[part] += cross.T
+    return momentum.reshape(w.shape), rate.reshape(w.shape)
+
+
+# --- percussion ---
+
+
+class Blow(NamedTuple):
+    """What an impulse changes: velocity of the centre of mass, angular velocity, and the impulse of the pin."""
+
+    velocity: Array
+    omega: Array
+    reaction: Array
+
+
+def strike(
+    mass: ArrayLike,
+    inertia: ArrayLike,
+    impulse: ArrayLike,
+    offset: ArrayLike,
+    pin: ArrayLike | None = None,
+    axis: ArrayLike | None = None,
+) -> Blow:
+    """Return the change of a body's motion under an impulse, free, held at a point, or hinged on an axis.
+
+    Parameters
+    ----------
+    mass, inertia
+        (...), kg, and the tensor at the centre of mass, (..., 3, 3), kg·m².
+    impulse
+        (..., 3), N·s.
+    offset
+        From the centre of mass to where it strikes, (..., 3), m.
+    pin
+        From the centre of mass to a point held fixed, (..., 3), m; None: a free body.
+    axis
+        Direction of a hinge through the pin, (..., 3); None: a ball joint.
+
+    Returns
+    -------
+    Blow
+        Changes Δv (m/s) and Δω (rad/s), and the impulse with which the pin answers (N·s), (..., 3) each.
+
+    Notes
+    -----
+    m Δv = J + R, I Δω = r × J + p × R, and at the pin Δv + Δω × p = 0 (Beer and Johnston, ch. 18). The pin does
+    not feel a blow at the centre of percussion.
+
+    Examples
+    --------
+    A rod hung at its end does not pull at its pin if struck at two thirds of its length.
+
+    >>> from rigidbody3d import inertia_of
+    >>> rod = inertia_of("rod", 3.0, length=1.0)
+    >>> strike(3.0, rod, [1, 0, 0], [0, 0, -1 / 6], pin=[0, 0, 0.5], axis=[0, 1, 0]).reaction.round(12) + 0.0
+    array([0., 0., 0.])
+    """
+    m, I = np.asarray(mass, dtype=float), np.asarray(inertia, dtype=float)
+    J, r = np.asarray(impulse, dtype=float), np.asarray(offset, dtype=float)
+    if pin is None:
+        spin = np.asarray(np.linalg.solve(I, np.cross(r, J)[..., None])[..., 0])
+        move = np.asarray(J / m[..., None])
+        return Blow(move, spin, np.zeros_like(move))
+    from rigidbody3d.inertia import shift
+
+    p = np.asarray(pin, dtype=float)
+    at_pin = I + shift(m, p)
+    moment = np.cross(r - p, J)
+    if axis is None:
+        spin = np.asarray(np.linalg.solve(at_pin, moment[..., None])[..., 0])
+    else:
+        n = np.asarray(axis, dtype=float)
+        n = n / np.linalg.norm(n, axis=-1, keepdims=True)
+        lever = np.einsum("...i,...ij,...j->...", n, at_pin, n)
+        spin = n * ((n * moment).sum(axis=-1) / lever)[..., None]
+    v = np.asarray(np.cross(p, spin))
+    return Blow(v, spin, np.asarray(m[..., None] * v - J))

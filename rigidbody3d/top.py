@@ -1,0 +1,429 @@
+"""The heavy symmetric top in closed form: a body with a fixed point on its axis, under gravity.
+
+With u = cos θ, Lz the momentum about the vertical, L3 that about the axis and w± = 1 ± u,
+
+    u̇² = (2a/I1) (u - u1)(u2 - u)(u3 - u),   u = u1 + (u2 - u1) sn²,   a = m g l     (Goldstein, §5.7).
+
+The attitude is the pair α = √(w₊/2) e^{iχ₊}, β = √(w₋/2) e^{iχ₋} of Cayley and Klein (q = Re α, Re β, Im β,
+Im α), whose phases run at
+
+    χ̇₊ = (Lz + L3)/(2 I1 w₊),   χ̇₋ = (Lz - L3)/(2 I1 w₋),
+
+apart from the spin by which a top differs from a spherical one (Klein and Sommerfeld, Theorie des Kreisels).
+Each phase is one elliptic integral of the third kind, here split so that its sharp turn, where the axis passes
+near the vertical, is an arctangent and the rest is smooth. The three roots decide everything through their
+differences: they are worked out once per top with 200 digits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from decimal import Decimal, localcontext
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigidbody3d import attitude as quaternion
+from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
+
+Array = NDArray[np.float64]
+
+BLOCK = 8192
+DIGITS = 200
+
+
+@dataclass(frozen=True)
+class Top:
+    """A heavy symmetric top from its inertia about the fixed point and its state at time zero.
+
+    Parameters
+    ----------
+    inertia
+        Principal moments about the fixed point, the axis last: (I1, I1, I3), (..., 3), kg·m².
+    mgl
+        Weight times the distance of the centre of mass from the fixed point along +z of the body, (...), N·m;
+        negative if it lies on the other side. Gravity acts along -z of space.
+    omega
+        Angular velocity at time zero in body axes, (..., 3), rad/s.
+    attitude
+        Quaternion [w, x, y, z] at time zero, body to space, (..., 4).
+
+    Raises
+    ------
+    ValueError
+        Two different moments across the axis, a moment that is not positive, shapes that do not fit.
+
+    Examples
+    --------
+    A fast top let go at 0.4 rad without precession, after 2π seconds.
+
+    >>> q0 = [np.cos(0.2), np.sin(0.2), 0, 0]
+    >>> top = Top([0.002, 0.002, 0.0008], 0.1962, [0, 0, 100.0], q0)
+    >>> top.at(2 * np.pi).attitude.round(8)
+    array([ 0.68965605, -0.2128629 ,  0.041763  ,  0.69088333])
+    """
+
+    inertia: ArrayLike
+    mgl: ArrayLike
+    omega: ArrayLike
+    attitude: ArrayLike = (1.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        I = np.asarray(self.inertia, dtype=float)
+        if I.shape[-2:] == (3, 3):
+            if (I * np.eye(3) != I).any():
+                raise ValueError("a top's axis is body z: expected a tensor without products of inertia")
+            I = np.diagonal(I, axis1=-2, axis2=-1)
+        omega, mgl = np.asarray(self.omega, dtype=float), np.asarray(self.mgl, dtype=float)
+        q = np.asarray(self.attitude, dtype=float)
+        if I.shape[-1:] != (3,) or omega.shape[-1:] != (3,):
+            raise ValueError(f"inertia and omega have three components, found {I.shape} and {omega.shape}")
+        if not (np.isfinite(I).all() and np.isfinite(omega).all() and np.isfinite(mgl).all()):
+            raise ValueError("inertia, mgl and omega must be finite")
+        if (I[..., 0] != I[..., 1]).any() or (I[..., 0] <= 0).any() or (I[..., 2] < 0).any():
+            raise ValueError(
+                "a symmetric top has two equal positive moments across its axis, body z, and one about it"
+            )
+        lead = np.broadcast_shapes(I.shape[:-1], mgl.shape, omega.shape[:-1], q.shape[:-1])
+        unit = np.broadcast_to(quaternion.normalize(q), lead + (4,)).reshape(-1, 4)
+        motion = _Motion(
+            np.broadcast_to(I, lead + (3,)).reshape(-1, 3),
+            np.broadcast_to(mgl, lead).reshape(-1),
+            np.broadcast_to(omega, lead + (3,)).reshape(-1, 3),
+            unit,
+        )
+        object.__setattr__(self, "_lead", lead)
+        object.__setattr__(self, "_motion", motion)
+
+    _lead: tuple[int, ...] = ()
+    _motion: _Motion = None  # type: ignore[assignment]
+
+    def at(self, t: ArrayLike) -> TopState:
+        """Return the state at times t, (n,) or a single one, s: `.omega` (..., n, 3), `.attitude` (..., n, 4)."""
+        time = np.asarray(t, dtype=float)
+        if time.ndim > 1 or not np.isfinite(time).all():
+            raise ValueError("times are a finite number or one row of them")
+        return TopState(self, time)
+
+    @property
+    def nutation(self) -> Array:
+        """The least and the largest angle of the axis with the vertical, (..., 2), rad."""
+        m = self._motion
+        low = 2 * np.arctan2(np.sqrt(m.below + 0), np.sqrt(2 - m.below))
+        high = 2 * np.arctan2(np.sqrt(2 - m.above), np.sqrt(m.above))
+        return np.concatenate([low, high], axis=-1).reshape(self._lead + (2,))
+
+    @property
+    def nutation_period(self) -> Array:
+        """The period of that angle, (...), s; infinite on the way to the sleeping position."""
+        return np.asarray(2 * self._motion.p.quarter / self._motion.rate).reshape(self._lead)
+
+
+@dataclass(frozen=True)
+class TopState:
+    """The state of a top at given times; each quantity is computed when it is first asked for."""
+
+    top: Top
+    time: Array
+
+    @cached_property
+    def _both(self) -> Array:
+        t = np.atleast_1d(self.time)
+        motion = self.top._motion
+        out = np.empty((motion.count, len(t), 7))
+        step = max(1, BLOCK // motion.count)
+        for start in range(0, len(t), step):
+            motion.fill(t[start : start + step], out[:, start : start + step])
+        shaped = out.reshape(self.top._lead + (len(t), 7))
+        return shaped if self.time.ndim else shaped[..., 0, :]
+
+    @property
+    def attitude(self) -> Array:
+        """Quaternion [w, x, y, z], body to space, (..., n, 4)."""
+        return self._both[..., :4]
+
+    @property
+    def omega(self) -> Array:
+        """Angular velocity in body axes, (..., n, 3), rad/s."""
+        return self._both[..., 4:]
+
+    @cached_property
+    def momentum(self) -> Array:
+        """Angular momentum about the fixed point in space axes, (..., n, 3), kg·m²/s."""
+        return quaternion.rotate(self.attitude, self._moments * self.omega)
+
+    @cached_property
+    def energy(self) -> Array:
+        """Kinetic and potential energy, m g l cos θ included, (..., n), J."""
+        w, x, y, z = np.moveaxis(self.attitude, -1, 0)
+        mgl = np.asarray(self.top.mgl, dtype=float)
+        mgl = mgl[..., None] if self.time.ndim and mgl.ndim else mgl
+        return np.asarray(
+            (self._moments * self.omega**2).sum(axis=-1) / 2 + mgl * (w * w + z * z - x * x - y * y)
+        )
+
+    @property
+    def _moments(self) -> Array:
+        I = np.asarray(self.top.inertia, dtype=float)
+        I = np.diagonal(I, axis1=-2, axis2=-1) if I.shape[-2:] == (3, 3) else I
+        return I[..., None, :] if self.time.ndim else I
+
+
+class _Motion:
+    """What is constant in the motion of b tops; arrays (b, 1)."""
+
+    def __init__(self, I: Array, mgl: Array, omega: Array, q: Array) -> None:
+        self.count, self.omega = len(I), omega
+        # what is 1e-45 of the rest would have to grow by e^100 before it mattered, and has no fourth power
+        q = np.where(np.abs(q) < 1e-45, 0.0, q)
+        rate = np.abs(omega).max(axis=-1) + np.sqrt(np.abs(mgl) / I[:, 0])
+        omega = np.where(np.abs(omega) < 1e-45 * rate[:, None], 0.0, omega)
+        # a centre of mass below: the same motion seen upside down
+        self.upside = mgl < 0
+        q = np.where(self.upside[:, None], quaternion.compose([0.0, 1.0, 0.0, 0.0], q), q)
+        rows = [
+            _constants(float(I[b, 0]), float(I[b, 2]), abs(float(mgl[b])), omega[b], q[b])
+            for b in range(self.count)
+        ]
+        c = {name: np.array([[row[name]] for row in rows]) for name in rows[0]} if rows else {}
+        self.p = parameter(c["m"], c["m1"])
+        self.rate, self.span, self.above, self.below = c["rate"], c["span"], c["above"], c["below"]
+        self.plus, self.minus, self.twice_I1 = c["plus"], c["minus"], 2 * I[:, :1]
+        self.c = c
+        self.begin = argument(c["sn"], c["cn"], self.p)
+        self.extra = (omega[:, 2] * ((I[:, 0] - I[:, 2]) / I[:, 0]))[:, None]
+        n_plus, n_minus = c["n_plus"], c["n_minus"]
+        self.sharp = n_plus > np.sqrt(c["m"]), n_minus > np.sqrt(c["m"])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            self.n = tuple(
+                np.where(sharp, c["m"] / n, n) for sharp, n in zip(self.sharp, (n_plus, n_minus), strict=True)
+            )
+        self.quarter = tuple(third_complete(self.p, n) for n in self.n)
+        a, b = q[:, :1] + 1j * q[:, 3:], q[:, 1:2] + 1j * q[:, 2:3]
+        w1, w2 = omega[:, :1], omega[:, 1:2]
+        at = jacobi(self.begin, self.p)
+        start = self._phases(at)
+        half = 0.5j
+        # where α or β is zero its direction is that of its rate, just before or just after as rounding has it
+        before_a = np.where(at.sn < 0, -1.0, 1.0)
+        before_b = np.where(at.r > 0, -1.0, 1.0)
+        a_rate = -(q[:, 1:2] * w1 + q[:, 2:3] * w2) / 2 + half * (q[:, 1:2] * w2 - q[:, 2:3] * w1)
+        b_rate = (a * (w1 + 1j * w2)) / 2
+        self.a0 = np.where(np.abs(a) > 0, _unit(a), before_a * _unit(a_rate)) * np.exp(-1j * start[0])
+        self.b0 = np.where(np.abs(b) > 0, _unit(b), before_b * _unit(b_rate)) * np.exp(-1j * start[1])
+        self.q = q
+        # no lever, or upright or hanging at rest but for its spin: q(t) = exp(P t) q0 exp(S t)
+        self.simple = np.flatnonzero(c["still"][:, 0])
+        of = self.simple
+        free = (mgl[of] == 0)[:, None]
+        momentum = quaternion.rotate(q[of], I[of] * omega[of])
+        self.precession = np.where(free, momentum / I[of, :1], 0.0)
+        self.spin = np.where(free, self.extra[of] * [0.0, 0.0, 1.0], omega[of])
+
+    def _phases(self, at: Jacobi) -> tuple[Array, Array]:
+        """χ₊ and χ₋, but for a constant."""
+        c, p = self.c, self.p
+        lone = np.isinf(p.quarter)
+        half = np.where(lone, 0.0, 2 * p.quarter)
+        first = self._integral(at, 0)
+        turns = np.where(lone, 0.0, at.turns)
+        plus = first + turns * np.where(
+            self.sharp[0],
+            c["plus_arc"] * np.pi + c["plus_rest"] * 2 * self.quarter[0],
+            c["plus_line"] * (half - c["n_plus"] * 2 * self.quarter[0]),
+        )
+        # χ₋ is counted from the upper turning point: a quarter period on, without loss (A&S 16.8)
+        ahead = at.r > 0
+        shift = np.where(ahead, -1.0, 1.0)
+        root = np.sqrt(np.where(lone, 1.0, p.m1))
+        quarter = np.where(lone, 0.0, p.quarter)
+        other = Jacobi(
+            at.turns,
+            np.where(lone, 0.0, at.r + shift * quarter),
+            np.where(lone, 0.0, shift * at.cn / at.dn),
+            np.where(lone, 1.0, root * np.abs(at.sn) / at.dn),
+            np.where(lone, 1.0, root / at.dn),
+        )
+        n = c["n_minus"]
+        whole = np.where(
+            self.sharp[1],
+            c["minus_arc"] * np.pi - c["minus_line"] * (half - (1 + self.n[1]) * 2 * self.quarter[1]),
+            c["minus_line"] * (half - (n + p.m) * 2 * self.quarter[1]),
+        )
+        # the upper turning points lie at odd multiples of K
+        minus = self._integral(other, 1) + (turns + np.where(ahead, 1.0, 0.0)) * np.where(lone, 0.0, whole)
+        return plus, minus
+
+    def _integral(self, at: Jacobi, which: int) -> Array:
+        c, p, n, sharp = self.c, self.p, self.n[which], self.sharp[which]
+        smooth = third(at, p, n)
+        if which == 0:
+            sn = np.where(at.sn == 0, 1e-150, at.sn)
+            arc = np.arctan2(c["plus_g"] * sn, at.cn * at.dn)
+            return np.where(
+                sharp,
+                c["plus_arc"] * arc + c["plus_rest"] * smooth,
+                c["plus_line"] * (at.r - n * smooth),
+            )
+        sn = np.where(at.sn == 0, 1e-150, at.sn)
+        arc = np.arctan2(c["minus_g"] * sn, at.cn * at.dn)
+        return np.where(
+            sharp,
+            c["minus_arc"] * arc - c["minus_line"] * (at.r - (1 + n) * smooth),
+            c["minus_line"] * (at.r - (n + p.m) * smooth),
+        )
+
+    def fill(self, t: Array, out: Array) -> None:
+        """Write attitude and angular velocity at times t, (b, n, 7)."""
+        at = jacobi(self.begin + self.rate * t, self.p)
+        plus, minus = self._phases(at)
+        turn = self.extra * t / 2
+        # no square underflows
+        sn = np.where(np.abs(at.sn) < 1e-150, 1e-150, at.sn)
+        cn = np.where(np.abs(at.cn) < 1e-150, 1e-150, at.cn)
+        across_a, across_b = np.sqrt(self.above / 2), np.sqrt(self.below / 2)
+        swing_by = np.sqrt(self.span / 2)
+        size_a, size_b = np.hypot(across_a, swing_by * sn), np.hypot(across_b, swing_by * cn)
+        way_a, way_b = self.a0 * np.exp(1j * (plus + turn)), self.b0 * np.exp(1j * (minus - turn))
+        a, b = size_a * way_a, size_b * way_b
+        # θ̇ and φ̇ sin θ, each as the small over the small
+        with np.errstate(divide="ignore", invalid="ignore"):
+            tilt = -self.span * self.rate * sn * cn * at.dn / (size_a * size_b)
+            swing = (self.plus * (size_b / size_a) + self.minus * (size_a / size_b)) / self.twice_I1
+        across = np.conj(way_a) * way_b * (tilt + 1j * swing)
+        out[..., 0], out[..., 1], out[..., 2], out[..., 3] = a.real, b.real, b.imag, a.imag
+        out[..., 4], out[..., 5] = across.real, across.imag
+        out[..., 6] = self.omega[:, 2:]
+        if len(self.simple):
+            turn_in_space = quaternion.from_vector(self.precession[:, None, :] * t[:, None])
+            spin = quaternion.from_vector(self.spin[:, None, :] * t[:, None])
+            start = quaternion.compose(turn_in_space, self.q[self.simple][:, None, :])
+            out[self.simple, :, :4] = quaternion.compose(start, spin)
+            out[self.simple, :, 4:] = quaternion.rotate(
+                quaternion.inverse(spin), self.omega[self.simple][:, None, :]
+            )
+        upside = np.flatnonzero(self.upside)
+        if len(upside):
+            out[upside, :, :4] = quaternion.compose([0.0, -1.0, 0.0, 0.0], out[upside, :, :4])
+
+
+def _unit(z: NDArray[Any]) -> NDArray[np.complex128]:
+    return np.asarray(np.exp(1j * np.angle(z)))
+
+
+def _constants(I1: float, I3: float, mgl: float, omega: Array, q: Array) -> dict[str, float]:
+    """The roots of the cubic and what follows from them, each rounded once from 200 digits."""
+    with localcontext() as context:
+        context.prec = DIGITS
+        A, C, a = Decimal(I1), Decimal(I3), Decimal(mgl)
+        w1, w2, w3 = map(Decimal, omega.tolist())
+        w, x, y, z = map(Decimal, q.tolist())
+        norm = w * w + x * x + y * y + z * z
+        up, down = (w * w + z * z) / norm, (x * x + y * y) / norm  # (1 ± u)/2
+        g1, g2 = 2 * (x * z - w * y) / norm, 2 * (y * z + w * x) / norm
+        across = A * (w1 * g1 + w2 * g2)
+        plus, minus = across + 2 * C * w3 * up, across - 2 * C * w3 * down  # Lz ± L3
+        swing = w1 * w1 + w2 * w2
+        u = up - down
+        still = swing == 0 and (up == 0 or down == 0)
+        if still or a == 0:
+            return _uniform(up, down)
+        L3, Lz = C * w3, (plus + minus) / 2
+        k = 1 / (2 * a * A)
+        e = A * swing / (2 * a) + u
+        c2, c1, c0 = -e - k * L3 * L3, -1 + 2 * k * Lz * L3, e - k * Lz * Lz
+        u3 = _largest_root(c2, c1, c0)
+        s = -c2 - u3
+        product = c1 - u3 * s
+        half = max(s * s / 4 - product, Decimal(0)).sqrt()
+        u1, u2 = max(s / 2 - half, Decimal(-1)), min(s / 2 + half, Decimal(1))
+        u1, u2, u3 = min(u1, u), max(u2, u), max(u3, Decimal(1))
+        above, below, beyond = 1 + u1, 1 - u2, u3 - 1
+        tiny = Decimal(10) ** (-DIGITS // 2 + 5)
+        if plus == 0:
+            above = Decimal(0)
+        if minus == 0:
+            if below < beyond or below < tiny:
+                below = Decimal(0)
+            if beyond < below or beyond < tiny:
+                beyond = Decimal(0)
+        u1, u2, u3 = above - 1, 1 - below, 1 + beyond
+        span, wide = u2 - u1, u3 - u1
+        if span < tiny:  # steady precession
+            span = Decimal(0)
+        m, m1 = span / wide, (below + beyond) / wide
+        rate = (a * wide / (2 * A)).sqrt()
+        scale = 2 * A * rate
+        sn2 = min(max((u - u1) / span, Decimal(0)), Decimal(1)) if span else Decimal(0)
+        rising = g1 * w2 - g2 * w1 >= 0
+        sn, cn = sn2.sqrt(), (1 - sn2).sqrt()
+        return {
+            "still": 0.0,
+            "m": float(m),
+            "m1": float(m1),
+            "rate": float(rate),
+            "span": float(span),
+            "above": float(above),
+            "below": float(below),
+            "plus": float(plus),
+            "minus": float(minus),
+            "sn": float(sn if rising else -sn),
+            "cn": float(cn),
+            **_phase(plus, above, span, m * above / span if span else Decimal(0), m, scale, "plus"),
+            **_phase(minus, below, m * beyond, below / beyond if beyond else Decimal(0), m, scale, "minus"),
+        }
+
+
+def _phase(
+    push: Decimal, least: Decimal, wide: Decimal, inverse: Decimal, m: Decimal, scale: Decimal, name: str
+) -> dict[str, float]:
+    """The weights of one phase: push/(scale·least) ∫ du/(1 + n sn²), n = wide/least, and m/n = inverse."""
+    root = (least * (least + wide) * (1 + inverse)).sqrt()
+    line = push / (scale * least) if least else Decimal(0)
+    if name == "plus":
+        arc = push / (scale * root) if root else Decimal(1)
+        rest = push * m / (scale * wide) if wide else Decimal(0)
+    else:
+        # (1 + m/n)/G, and the weight of the straight part where the turn is sharp: m/n of `line`
+        arc = push * (1 + inverse) / (scale * root) if root else Decimal(1)
+        rest = Decimal(0)
+        if wide and least * least * m < wide * wide:
+            line = push * m / (scale * wide)
+    n = float(wide / least) if least and wide < least * Decimal(10) ** 290 else 1e290 if wide else 0.0
+    g = 1e200 if n >= 1e290 else float(((1 + wide / least) * (1 + inverse)).sqrt()) if least else 1.0
+    if not wide and not least:  # on the way to the sleeping position β keeps its direction
+        arc = Decimal(0)
+    return {
+        f"n_{name}": n,
+        f"{name}_g": g,
+        f"{name}_line": float(line),
+        f"{name}_arc": float(arc),
+        f"{name}_rest": float(rest),
+    }
+
+
+def _uniform(up: Decimal, down: Decimal) -> dict[str, float]:
+    """The constants of a top that needs none: its weight has no lever, or it stands or hangs still."""
+    flat = {f"{name}_{sign}": 0.0 for name in ("n",) for sign in ("plus", "minus")}
+    flat |= {f"{sign}_{name}": 0.0 for name in ("g", "line", "arc", "rest") for sign in ("plus", "minus")}
+    return flat | {
+        "still": 1.0, "m": 1.0, "m1": 0.0, "rate": 1.0, "span": 0.0, "sn": 0.0, "cn": 1.0, "plus": 0.0, "minus": 0.0,
+        "above": float(2 * up), "below": float(2 * down),
+    }  # fmt: skip
+
+
+def _largest_root(c2: Decimal, c1: Decimal, c0: Decimal) -> Decimal:
+    """The largest root of u³ + c2 u² + c1 u + c0 with three real ones: Newton from the right never overshoots."""
+    u = 1 + max(abs(c2), abs(c1), abs(c0))
+    for _ in range(1000):
+        slope = (3 * u + 2 * c2) * u + c1
+        value = ((u + c2) * u + c1) * u + c0
+        if slope <= 0 or value <= 0:
+            break
+        step = value / slope
+        u -= step
+        if step <= abs(u) * Decimal(10) ** (5 - DIGITS):
+            break
+    return u
