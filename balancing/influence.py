@@ -88,6 +88,26 @@ class Balance:
         """σ_max/σ_min of the coefficients after scaling the columns (see `condition_number`), (...)."""
         return condition_number(self.influence, self.weights)
 
+    def error_estimate(self) -> Real:
+        """Return a bound of the rounding error of `corrections` of a least-squares problem, (..., p), kg.
+
+        The data are taken as exact. Componentwise perturbation bound for least squares (Å. Björck, BIT 31 (1991)
+        238-244): |δw| ≤ c·ε·(|A⁺|(|A||w| + |V|) + |(AᴴA)⁻¹||Aᴴ||r|); the product with AᴴA is only a bound, nothing
+        is solved with it. Minimax and limited problems are judged by their objective: `residual_max` and `bound`.
+        """
+        if self.bound is not None:
+            raise ValueError("a minimax problem is judged by its objective: residual_max beside bound")
+        root = np.ones(self.initial.shape) if self.weights is None else np.sqrt(self.weights)
+        a, b, r = self.influence * root[..., None], self.initial * root, self.residual * root
+        q, upper = np.linalg.qr(a)
+        inverse = np.linalg.inv(upper)
+        size = np.abs(a)
+        fit = np.abs(inverse @ _adjoint(q)) @ (
+            size @ np.abs(self.corrections)[..., None] + np.abs(b)[..., None]
+        )
+        rest = np.abs(inverse @ _adjoint(inverse)) @ (np.swapaxes(size, -1, -2) @ np.abs(r)[..., None])
+        return np.asarray(8 * EPS * (fit + rest)[..., 0])
+
 
 def influence_coefficients(initial: ArrayLike, trials: ArrayLike, trial_masses: ArrayLike) -> Complex:
     """Find the influence coefficients from an initial run and trial runs.

@@ -161,7 +161,7 @@ def taylor_step(inertia: list[Any], state: list[Any], h: Any, order: int) -> lis
         ]
         for axis in range(4):
             q[axis].append(derivative[axis] / 2 / (n + 1))
-    return [mp.polyval(x[::-1], h) for x in c]
+    return [mp.fsum(x * h**n for n, x in enumerate(series)) for series in c]
 
 
 def main() -> None:

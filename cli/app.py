@@ -15,7 +15,10 @@ COMMANDS = {
     "balance": ("cli.commands.balance", "Balance rotors from a table of known eccentric masses."),
     "field": ("cli.commands.field", "Balance rotors from measured vibration and trial masses."),
     "place": ("cli.commands.place", "Put a correction where masses can go: holes, blades, weights in stock."),
-    "mechanism": ("cli.commands.mechanism", "Solve a planar mechanism: motion, limits, torque, joint forces."),
+    "mechanism": (
+        "cli.commands.mechanism",
+        "Solve a planar mechanism: motion, limits, torque, joint forces.",
+    ),
     "work": ("cli.commands.work", "Find the load that balances a table of link states, by virtual work."),
     "body": ("cli.commands.body", "Put a body together: inertia, angular momentum, shaft reactions."),
     "spin": ("cli.commands.spin", "Turn a body through time: free, under gravity, under a torque."),

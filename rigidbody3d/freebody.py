@@ -162,6 +162,18 @@ class FreeState:
         spin = np.einsum("...ij,...j->...i", axes, self.omega)
         return np.asarray((moments * spin**2).sum(axis=-1) / 2)
 
+    def error_estimate(self) -> Array:
+        """Return a bound of the rounding error of the attitude as an angle, (..., n), rad, the given data as exact.
+
+        A phase is rounded where it is a large number: the error grows as ε·|ω|t, and in no other way.
+        """
+        moments, _ = principal(self.body.inertia)
+        omega = np.linalg.norm(np.asarray(self.body.omega, dtype=float), axis=-1)
+        # the precession is faster than the spin where the moments differ much
+        rate = omega * moments[..., 2] / np.where(moments[..., 1] > 0, moments[..., 1], 1.0)
+        turned = rate[..., None] * np.abs(self.time) if self.time.ndim else rate * abs(self.time)
+        return np.asarray(np.finfo(float).eps * (12 + 2 * turned))
+
     def _shaped(self, work, width: int) -> Array:  # type: ignore[no-untyped-def]
         t = np.atleast_1d(self.time)
         bodies = self.body._motion.count

@@ -83,6 +83,14 @@ class PointMotion:
         """The order-th time derivative as x + iy, (n,)."""
         return self._motion.point_derivative(self._body, self._z, order, self._node)
 
+    def error_estimate(self, order: int = 0) -> Reals:
+        """Return a bound (n,) of the rounding error of the position (order 0), velocity (1) or acceleration (2).
+
+        The dimensions and the input are taken as exact. A relative rounding ε moves a pose by ε·condition of the
+        mechanism's size; the rates inherit the error of the pose and multiply it by the condition once more.
+        """
+        return self._motion._error_estimate(order)
+
     def coefficient(self, j: int = 0) -> Complexes:
         """The velocity coefficient dP/dq_j as x + iy, (n,): the point's virtual displacement for a unit of input j."""
         return self._motion.point_coefficient(self._body, self._z, j, self._node)
@@ -315,6 +323,30 @@ class Motion:
                 jacobian[:, :, : len(group.angles)] /= size
                 whole[rows] = inverse_norm(jacobian)
         return whole
+
+    def _error_estimate(self, order: int) -> Reals:
+        """ε·condition·size, and what becomes of it in the rates; see `PointMotion.error_estimate`."""
+        eps, c, size = float(np.finfo(float).eps), self.condition, self.mechanism.size
+        near = np.ones_like(c)
+        if any(len(where) for where in self.assembly.track.flips.values()):
+            # lengths that differ by little more than rounding are taken for equal at a change point
+            eps, near = 2048 * eps, c
+        if order == 0:
+            return np.asarray(3 * eps * c * size)
+        links = [self.link(name) for name in self.mechanism.links]
+        omega = np.max([np.abs(link.omega) for link in links], axis=0)
+        if order == 1:
+            return np.asarray(1.5 * eps * c**2 * size * omega)
+        alpha = np.max([np.abs(link.alpha) for link in links], axis=0)
+        drive = np.max(
+            [
+                np.abs(np.broadcast_to(np.asarray(rate, dtype=float), self.n))
+                / (size if given.is_slide else 1.0)
+                for rate, given in zip(self._rates[0], self.mechanism.inputs, strict=True)
+            ],
+            axis=0,
+        )
+        return np.asarray(eps * near * c**2 * size * (2 * alpha + (2 * omega + 3 * c * drive) * omega))
 
     # --- solving ----------------------------------------------------------------------------------------------
     def _states(self) -> list[State]:

@@ -72,9 +72,8 @@ def branches(group: Group, jets: Callable[[], Jets], order: int) -> list[list[Re
             x = particular(gap(trial, k))
             trial.write(group, k, list(x))
             rest = float(left @ gap(trial, k + 1))
-            trial.write(group, k, list(x + null))
-            step = float(left @ gap(trial, k + 1)) - rest
-            mu = -rest / step if step != 0 and slope != 0 else np.nan
+            # the (k+1)-th derivative holds (k+1)·n·(f_xx x′ + f_xq)·x⁽ᵏ⁾; at k = 1 it is twice, which is the slope
+            mu = -rest / (slope * (k + 1) / 2) if slope != 0 else np.nan
             x = x + mu * null
             trial.write(group, k, list(x))
             series.append(x)

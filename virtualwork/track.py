@@ -296,8 +296,20 @@ class Track:
         return min(arms, default=self.assembly.mechanism.size)
 
     def _through(self, group: Group, q0: float) -> ChangePoint:
-        """The exact branch through a change point."""
-        nodes = 0.02 * np.cos(np.pi * (np.arange(12) + 0.5) / 12) * self.length / (2 * np.pi)
+        """The exact branch through a change point.
+
+        Where the links are nearly equal one of the branches turns many times faster than the input: the closed form
+        is then compared with the series closer to the point, until one of the series is the branch.
+        """
+        for span in (0.02, 0.0025, 3e-4, 4e-5):
+            change, miss = self._branch(group, q0, span)
+            if miss < 1e-6:
+                break
+        return change
+
+    def _branch(self, group: Group, q0: float, span: float) -> tuple[ChangePoint, float]:
+        """The series that the closed form follows within a span around a change point, and how far they are apart."""
+        nodes = span * np.cos(np.pi * (np.arange(12) + 0.5) / 12) * self.length / (2 * np.pi)
         st = State([q0 + nodes], many=True)
         self.assembly.run(self.assembly.needed(self.plan.writes(group)), st)
         weights = _at_centre(nodes)
@@ -345,7 +357,7 @@ class Track:
                 best, nearest = rates, miss
         if best is None or not np.isfinite(best).all():
             unknown = np.full((ORDER, len(turn) + len(slide)), np.nan)
-            return ChangePoint(group.name, q0, tuple(turn), tuple(slide), unknown, 0.0)
+            return ChangePoint(group.name, q0, tuple(turn), tuple(slide), unknown, 0.0), np.inf
         scale = np.array([1.0] * len(turn) + [self.assembly.mechanism.size] * len(slide))
         terms = [float(np.abs(r / scale).max()) / factorial(k) for k, r in enumerate(best, 1)]
         radius = (
@@ -355,9 +367,10 @@ class Track:
         )
         reach = REACH * min(radius, 1.0 if self.length > 6 else self.length)
         others = [rates[0] for rates in found if rates is not best]
-        return ChangePoint(
+        change = ChangePoint(
             group.name, q0, tuple(turn), tuple(slide), np.array(best), reach, others[0] if others else None
         )
+        return change, float(nearest)
 
     @property
     def has_limits(self) -> bool:

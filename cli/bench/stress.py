@@ -14,7 +14,14 @@ from importlib import import_module
 import numpy as np
 
 # the modules that have a dict CAMPAIGNS: name -> (what it does, trial(rng) -> [(error, bound), ...])
-MODULES = ("cli.bench.rotors", "cli.bench.rotation", "cli.bench.field")
+MODULES = (
+    "cli.bench.rotors",
+    "cli.bench.linkages",
+    "cli.bench.field",
+    "cli.bench.vibration",
+    "cli.bench.rotation",
+    "cli.bench.turning",
+)
 
 Trial = Callable[[np.random.Generator], list[tuple[float, float]]]
 
