@@ -122,7 +122,7 @@ def _numbers(file: str, key: str, value: Any, *shapes: tuple[int, ...]) -> Array
         array = np.array(value, dtype=float) if plain(value) else np.array([np.nan])
     except (ValueError, OverflowError):
         array = np.array([np.nan])
-    if array.shape not in shapes or not np.isfinite(array).all():
+    if array.shape not in shapes or not (np.abs(array) <= 1e60).all():
         raise DataError(
             f"{file}: {key}: found {value!r}, expected {wanted} finite number{'s' * (wanted != 'one')}"
         )
