@@ -378,7 +378,11 @@ class _Reader:
         if len(inputs) != 1:
             raise _wrong(f"{where} table", name, "a mechanism with one input, for the force is given over it")
         slide = "slider" in inputs[0][1]
-        kinds = {"position_m": 1.0, "position_mm": 1e-3} if slide else {"angle_rad": 1.0, "angle_deg": math.pi / 180}
+        kinds = (
+            {"position_m": 1.0, "position_mm": 1e-3}
+            if slide
+            else {"angle_rad": 1.0, "angle_deg": math.pi / 180}
+        )
         try:
             with (self.folder / str(name)).open(newline="", encoding="utf-8-sig") as stream:
                 rows = list(csv.DictReader(stream))
@@ -389,7 +393,10 @@ class _Reader:
             raise _wrong(f"{where} table", name, f"columns {' or '.join(kinds)}, fx_N and fy_N")
         try:
             found = [
-                (float(r[column]) * kinds[column], complex(float(r.get("fx_N") or 0), float(r.get("fy_N") or 0)))
+                (
+                    float(r[column]) * kinds[column],
+                    complex(float(r.get("fx_N") or 0), float(r.get("fy_N") or 0)),
+                )
                 for r in rows
             ]
         except (TypeError, ValueError):

@@ -57,14 +57,18 @@ def run(
         bool, typer.Option("--forces", help="The input's effort, every joint reaction, the shaking force.")
     ] = False,
     equilibrium: Annotated[
-        bool, typer.Option("--equilibrium", help="Where the loads balance without effort, and whether stably.")
+        bool,
+        typer.Option("--equilibrium", help="Where the loads balance without effort, and whether stably."),
     ] = False,
     flywheel: Annotated[
-        float | None, typer.Option(metavar="COEFFICIENT", help="Inertia for this speed fluctuation, such as 0.02.")
+        float | None,
+        typer.Option(metavar="COEFFICIENT", help="Inertia for this speed fluctuation, such as 0.02."),
     ] = None,
     counterweights: Annotated[
         str | None,
-        typer.Option(metavar="LINK,...", help="Counterweights on these links that leave the least shaking force."),
+        typer.Option(
+            metavar="LINK,...", help="Counterweights on these links that leave the least shaking force."
+        ),
     ] = None,
     graph: Annotated[
         str | None,
@@ -102,12 +106,23 @@ def run(
     from cli.mechanism.asked import Asked
     from virtualwork import MechanismError
 
-    asked = Asked(forces, equilibrium, flywheel, counterweights, swept=sweep is not None or inputs is not None)
+    asked = Asked(
+        forces, equilibrium, flywheel, counterweights, swept=sweep is not None or inputs is not None
+    )
     try:
         job = _job(file, at, sweep, inputs, names, order, branch)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not json or expect is not None or output is not None
-        shown = _shown(job, asked, table=table, newton=newton, check=check, explain=explain, graph=graph, written=output is not None)
+        shown = _shown(
+            job,
+            asked,
+            table=table,
+            newton=newton,
+            check=check,
+            explain=explain,
+            graph=graph,
+            written=output is not None,
+        )
         show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text)
     except MechanismError as error:
         from cli.errors import DataError
