@@ -13,7 +13,7 @@ from virtualwork.counterweights import berkof_lowen, least_squares
 from virtualwork.cycle import Cycle
 from virtualwork.equilibrium import equilibria
 from virtualwork.errors import DescriptionError
-from virtualwork.mechanism import Force, Friction, Spring, Torque, TorsionSpring
+from virtualwork.mechanism import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.work import ledger
 
 
@@ -197,6 +197,31 @@ def test_dead_point_spoils_no_other_pose() -> None:
     phi = np.arcsin(0.1 * np.sin(theta) / 0.3)
     ratio = -0.1 * np.sin(theta + phi) / np.cos(phi)  # dx/dθ
     assert motion.effort[1:] == pytest.approx(-5.0 / ratio, rel=1e-12)
+
+
+def test_a_serial_arm_with_motors_on_its_links() -> None:
+    """The same arm driven by relative angles, and by absolute ones with the motor carried by the upper link."""
+    links = {"upper": Link({"O": 0j, "E": 1}, 2, 0.5, 0.1), "lower": Link({"E": 0j}, 1, 0.4, 0.05)}
+    relative = Mechanism(
+        {"O": 0j}, links, inputs=(Input(link="upper"), Input(link="lower", on="upper")), gravity=-9.81j
+    )
+    carried = Mechanism(
+        {"O": 0j},
+        links,
+        inputs=(Input(link="upper"), Input(link="lower")),
+        gravity=-9.81j,
+        motors=[Motor("upper", "lower")],
+    )
+    at_rest = relative.motion(np.array([[0.3, 0.5]])).effort[0]
+    lower = 9.81 * 0.4 * math.cos(0.8)
+    assert at_rest == pytest.approx([9.81 * 2 * math.cos(0.3) + lower, lower], rel=1e-14)
+    one = relative.motion(np.array([[0.3, 0.5]]), np.array([[1.0, 2.0]]), np.array([[0.5, -1.0]]))
+    other = carried.motion(np.array([[0.3, 0.8]]), np.array([[1.0, 3.0]]), np.array([[0.5, -0.5]]))
+    for motion in (one, other):
+        assert motion.effort[0] == pytest.approx(one.effort[0], rel=1e-13)
+        assert motion.dynamics.newton_euler[0] == pytest.approx(one.effort[0], rel=1e-13)
+        for joint, on in (("O", "upper"), ("E", "lower")):
+            assert motion.reaction(joint, on)[0] == pytest.approx(one.reaction(joint, on)[0], rel=1e-13)
 
 
 # -- friction ---------------------------------------------------------------------------------------------------
