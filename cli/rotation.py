@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from cli.errors import DataError, nearest
 from cli.render import Columns, Shown
+from cli.units import LARGEST
 from rigidbody3d import FreeBody, FreeState, Top, TopState, Trajectory, check, integrate, principal
 from rigidbody3d import cones as cones_of
 from rigidbody3d import sleeping_threshold as threshold_of
@@ -122,7 +123,7 @@ def _numbers(file: str, key: str, value: Any, *shapes: tuple[int, ...]) -> Array
         array = np.array(value, dtype=float) if plain(value) else np.array([np.nan])
     except (ValueError, OverflowError):
         array = np.array([np.nan])
-    if array.shape not in shapes or not (np.abs(array) <= 1e60).all():
+    if array.shape not in shapes or not (np.abs(array) <= LARGEST).all():
         raise DataError(
             f"{file}: {key}: found {value!r}, expected {wanted} finite number{'s' * (wanted != 'one')}"
         )

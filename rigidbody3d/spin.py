@@ -60,6 +60,9 @@ class Trajectory:
         return np.asarray((body * self.omega).sum(axis=-1) / 2 + self.mgl * (w * w + z * z - x * x - y * y))
 
 
+MOST = 10_000_000  # steps: some quarter of an hour
+
+
 def integrate(
     inertia: ArrayLike,
     omega: ArrayLike,
@@ -196,7 +199,7 @@ def _solve(
 
     out = np.empty((len(time), 7))
     start = np.concatenate([H0 / size, q0])
-    count = 0
+    count = steps = 0
     for sign in (1.0, -1.0):
         side = np.flatnonzero(time * sign > 0)
         order = side[np.argsort(np.abs(time[side]), kind="stable")]
@@ -207,6 +210,12 @@ def _solve(
         # never less than 40 steps a turn, at a coarser one as many fewer as order eight allows.
         rate = max(float(np.linalg.norm(omega)), math.sqrt(abs(mgl) / tensor.diagonal().min()))
         longest = 2 * math.pi / rate / 40 * (max(rtol, 1e-13) / 1e-13) ** 0.125 if rate else np.inf
+        planned = float(np.abs(time[order]).max()) / longest
+        if planned > MOST:
+            raise ValueError(
+                f"the integration would take some {planned:.1g} steps, more than {MOST:.0e}: expected a shorter time "
+                "or a slower rotation"
+            )
         limits = {"rtol": max(rtol, 3e-14), "atol": rtol, "max_step": longest}
         solver = method_class(rates, 0.0, start, sign * np.inf, **limits)
         before = (0.0, start)
@@ -215,6 +224,9 @@ def _solve(
             while abs(solver.t) < abs(stop):
                 before = (solver.t, solver.y)
                 message = solver.step()
+                steps += 1
+                if steps > MOST:
+                    raise RuntimeError(f"the integration stopped at {solver.t:g} s, after {MOST:.0e} steps")
                 if solver.status == "failed":
                     raise RuntimeError(f"the integration stopped at {solver.t:g} s: {message}")
             # a shorter step from the last station: the interpolant of the step taken is some digits worse

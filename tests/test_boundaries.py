@@ -42,7 +42,9 @@ def test_core_packages_stand_alone(package: str) -> None:
 def test_nothing_imports_the_tests_or_an_undeclared_package() -> None:
     allowed = set(sys.stdlib_module_names) | {*CORE, "cli", "numpy", "scipy", "pandas", "typer", "matplotlib"}
     for file in sorted((ROOT / "cli").rglob("*.py")):
-        assert imported(file) <= allowed, f"{file}: {imported(file) - allowed}"
+        # the stress campaigns compare with mpmath, which the extra `test` brings
+        here = allowed | {"mpmath"} if file.parent.name == "bench" else allowed
+        assert imported(file) <= here, f"{file}: {imported(file) - here}"
 
 
 def modules_after(*arguments: str) -> set[str]:

@@ -210,6 +210,8 @@ class Dynamics:
                 moment[block.rows] = m
 
         self.scene.each((), work)
+        out = ~self.motion.assembled
+        force[out], moment[out] = np.nan, np.nan
         if self.scene.lost is not None:
             force[self.scene.lost], moment[self.scene.lost] = np.nan, np.nan
         return pairs(force), moment

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.errors import DataError
+from cli.mechanism.poses import cells, pair
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,14 +19,6 @@ if TYPE_CHECKING:
 
 Column = list[Any]
 GROUND = "ground"
-
-
-def cells(values: NDArray[np.float64]) -> Column:
-    """Numbers as Python's own; None where there is none; no −0."""
-    listed: Column = (values + 0.0).tolist()
-    if np.isfinite(values).all():
-        return listed
-    return [v if math.isfinite(v) else None for v in listed]
 
 
 def effort_name(slide: bool) -> str:
@@ -60,7 +53,7 @@ def _motion_parts(job: Job, motion: Motion) -> list[dict[str, Any]]:
     reactions = []
     for joint, on, of in rows_of(job, motion):
         force = d.joint_force(joint, on)
-        columns = (cells(force.real), cells(force.imag), cells(d.joint_moment(joint, on)))
+        columns = (*pair(force), cells(d.joint_moment(joint, on)))
         reactions.append(({"joint": joint.name, "on": on, "from": of}, columns))
     shaking, moment = d.shaking
     shake = cells(shaking[:, 0]), cells(shaking[:, 1]), cells(moment)
@@ -108,8 +101,9 @@ def table(job: Job) -> dict[str, Column]:
         for joint, on, of in rows_of(job, motion):
             force = d.joint_force(joint, on)
             lead = f"{joint.name}_{of}_on_{on}"
-            put(f"{lead}_fx_N", cells(force.real))
-            put(f"{lead}_fy_N", cells(force.imag))
+            x, y = pair(force)
+            put(f"{lead}_fx_N", x)
+            put(f"{lead}_fy_N", y)
             moment = d.joint_moment(joint, on)
             if joint.guide is not None or moment.any():
                 put(f"{lead}_moment_N_m", cells(moment))

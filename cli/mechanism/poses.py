@@ -22,11 +22,17 @@ SLIDE = ("position_m", "speed_m_s", "acceleration_m_s2", "jerk_m_s3")
 
 
 def cells(values: NDArray[np.float64]) -> Column:
-    """Numbers as Python's own; None where there is none."""
-    listed: Column = values.tolist()
+    """Numbers as Python's own; None where there is none; no −0."""
+    listed: Column = (values + 0.0).tolist()
     if np.isfinite(values).all():
         return listed
     return [v if math.isfinite(v) else None for v in listed]
+
+
+def pair(z: NDArray[np.complex128]) -> tuple[Column, Column]:
+    """The components of plane vectors; None for both where one is not a number."""
+    known = np.isfinite(z.real) & np.isfinite(z.imag)
+    return cells(np.where(known, z.real, np.nan)), cells(np.where(known, z.imag, np.nan))
 
 
 def of_link(
@@ -53,9 +59,7 @@ def of_point(motion: Motion, name: str, order: int) -> dict[str, Column]:
     """A point's position and its rates."""
     parts: dict[str, Column] = {}
     for k in range(order + 1):
-        z = motion.point(name).complex(k)
-        for key, values in zip(POINT[k], (z.real, z.imag), strict=True):
-            parts[key] = cells(values + 0.0)
+        parts |= zip(POINT[k], pair(motion.point(name).complex(k)), strict=True)
     return parts
 
 

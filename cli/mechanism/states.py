@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.mechanism.job import Job
-from cli.mechanism.poses import cells, of_link
+from cli.mechanism.poses import cells, of_link, pair
 
 if TYPE_CHECKING:
     from virtualwork.motion import Motion
@@ -66,7 +66,7 @@ def table(job: Job) -> dict[str, list[Any]]:
                     for name, part in parts.items()
                 }
                 extra: list[dict[str, Any]] = []
-                for mark in marks:
+                for mark in marks if motion.assembled[i] else ():
                     if mark.link not in here:
                         continue
                     wanted = {key: values[i] for key, values in mark.cells.items() if values[i] != ""}
@@ -86,28 +86,25 @@ def _part(job: Job, motion: Motion, name: str, order: int) -> Part:
     part: Part = {"mass_kg": [body.mass] * motion.n, "inertia_kg_m2": [body.inertia] * motion.n}
     for x, y, k in (("x_m", "y_m", 0), ("vx_m_s", "vy_m_s", 1), ("ax_m_s2", "ay_m_s2", 2))[: order + 1]:
         z = motion.at(name, body.center).complex(k)
-        part[x], part[y] = cells(z.real + 0.0), cells(z.imag + 0.0)
+        part[x], part[y] = pair(z)
     angle = of_link(motion, name, min(order, 2), job.given(name))
     part |= {key: angle[key] for key in ("angle_deg", "omega_rad_s", "alpha_rad_s2") if key in angle}
     if order >= 1:
         force, torque = motion.dynamics.applied(name)
+        loads = (*pair(force), cells(torque))
+        # a pose that cannot be assembled has no loads either
+        known = motion.assembled
         part |= {
-            "fx_N": cells(force.real + 0.0),
-            "fy_N": cells(force.imag + 0.0),
-            "torque_N_m": cells(torque + 0.0),
+            key: [value if there else None for value, there in zip(column, known, strict=True)]
+            for key, column in zip(("fx_N", "fy_N", "torque_N_m"), loads, strict=True)
         }
     return part
 
 
 def _virtual(motion: Motion, name: str, j: int) -> Part:
     """The virtual velocities of a link for a unit of input j."""
-    z = motion.at(name, motion.dynamics.scene.rigid[name].center).coefficient(j)
-    turning = motion.link(name).coefficient(j)
-    return {
-        "vx_m_s": cells(z.real + 0.0),
-        "vy_m_s": cells(z.imag + 0.0),
-        "omega_rad_s": cells(turning + 0.0),
-    }
+    x, y = pair(motion.at(name, motion.dynamics.scene.rigid[name].center).coefficient(j))
+    return {"vx_m_s": x, "vy_m_s": y, "omega_rad_s": cells(motion.link(name).coefficient(j))}
 
 
 def _marks(motion: Motion, field: int | None) -> list[Mark]:
@@ -126,7 +123,7 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
                     turning = (
                         motion.link(link).omega if field is None else motion.link(link).coefficient(field)
                     )
-                    found.append(Mark(link, {"torque_N_m": [mark] * n, "omega_rad_s": cells(turning + 0.0)}))
+                    found.append(Mark(link, {"torque_N_m": [mark] * n, "omega_rad_s": cells(turning)}))
             continue
         i = next(i for i, g in enumerate(m.guides) if g.point == entry.slider)
         g = m.guides[i]
@@ -146,7 +143,7 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
                 velocity = (
                     base.complex(1) if field is None else base.coefficient(field)
                 ) + 1j * turning * slide * rail
-            cells_: Part = {"fvx_m_s": cells(velocity.real + 0.0), "fvy_m_s": cells(velocity.imag + 0.0)}
+            cells_: Part = dict(zip(("fvx_m_s", "fvy_m_s"), pair(velocity), strict=True))
             cells_["fx_N"] = [_share(name, sign * float(c)) for c in rail.real]
             cells_["fy_N"] = [_share(name, sign * float(c)) for c in rail.imag]
             found.append(Mark(link, cells_))
