@@ -72,7 +72,7 @@ def draw(measurements: Sequence[Measurement]) -> Figure:
     columns = min(3, len(panels))
     rows = -(-len(panels) // columns)
     wide = any(kind is None for _, _, kind in panels)
-    figure = Figure(figsize=((7.0 if wide else 4.8) * columns, 3.9 * rows), layout="constrained")
+    figure = Figure(figsize=((7.0 if wide else 4.8) * columns, 4.4 * rows), layout="constrained")
     every = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, (work, mine, kind) in zip(every, panels, strict=False):
         axes.set_title(work, fontsize=9)
@@ -130,10 +130,14 @@ def _curves(axes: Axes, measurements: list[Measurement], kind: Kind) -> None:
     axes.set_xlabel(across if kind in (COST, MEMORY, GROWTH) else kind.across, fontsize=8)
     axes.set_ylabel(kind.up, fontsize=8)
     axes.grid(color="0.9")
-    if len(series) > 3:  # it would hide what it explains
-        axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.02))
-    else:
-        axes.legend(fontsize=7)
+    # below the panel, where it hides nothing
+    axes.legend(
+        fontsize=7,
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.16),
+        ncols=2 if len(series) > 3 else 1,
+        frameon=False,
+    )
 
 
 def _a_decade(axes: Axes, values: list[float], way: str) -> None:
