@@ -409,7 +409,9 @@ def known_by_guess(m: Mechanism) -> tuple[dict[str, float], dict[str, complex]]:
     for g in m.guides:
         if g.turned is not None and g.on == GROUND:
             angles.setdefault(g.link, g.angle + g.turned)
-    for _ in range(len(m.links) + 1):
+    before = -1
+    while len(angles) + len(points) > before:
+        before = len(angles) + len(points)
         for name, link in m.links.items():
             here = [p for p in link.points if p in points]
             if name not in angles and len(here) >= 2:

@@ -260,7 +260,7 @@ class Motion:
                 return SlideMotion(self, i)
         raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
 
-    @property
+    @cached_property
     def assembled(self) -> NDArray[np.bool_]:
         """(n,) bool: which poses can be assembled."""
         targets = [key for g in self.assembly.plan.groups for key in self.assembly.plan.writes(g)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -26,25 +27,75 @@ class Measurement:
     units: float
     """The time as a multiple of the calibration loop's, measured in the same run."""
     error: float | None = None
+    """The worst error, over the size of what is sought."""
     aim_ns: float | None = None
     aim_error: float | None = None
+    floor: str | None = None
+    """What `ratio` is over: the same work's least possible time on this machine, measured in the same run."""
+    ratio: float | None = None
+    aim_ratio: float | None = None
+    condition: float | None = None
+    """The condition number of the problem, where that is what varies."""
+    bytes: float | None = None
+    """The most memory that a call held at once, its answer included."""
+    kernels: int | None = None
+    """How many steps of the solution were worked out."""
+    peer: bool = False
+    """Another package's time and error, for comparison."""
 
 
-def seconds(call: Callable[[], Any], budget: float) -> float:
+patience = 1.0
+"""How much of its budget each measurement takes; less is sooner done, and noisier."""
+
+
+def seconds(call: Callable[[], Any], budget: float, clock: Callable[[], float] = time.process_time) -> float:
     """Return the CPU time of one call: the least over repetitions that fill `budget` seconds."""
+    budget *= patience
+    _keep_memory()
+    start = clock()
     call()
-    start = time.process_time()
+    once = clock() - start
+    if once > max(budget, 2.0):
+        return once
+    start = clock()
     call()
-    once = max(time.process_time() - start, 1e-7)
+    once = max(clock() - start, 1e-7)
     repeat = max(1, int(2e-3 / once))
-    best, end = float("inf"), time.perf_counter() + budget
-    while True:
-        start = time.process_time()
+    best, end = once, time.perf_counter() + budget - once
+    while time.perf_counter() < end:
+        start = clock()
         for _ in range(repeat):
             call()
-        best = min(best, (time.process_time() - start) / repeat)
-        if time.perf_counter() > end:
-            return best
+        best = min(best, (clock() - start) / repeat)
+    return best
+
+
+@cache
+def _keep_memory() -> None:
+    """Let the C library keep what is freed.
+
+    Else each call of a repetition gets its memory anew from the system, page by page, which glibc stops doing once
+    the process has freed a block as large as this one.
+    """
+    bytearray(31 << 20)
+
+
+def peak(call: Callable[[], Any]) -> int:
+    """Return the most bytes that a call held at once (numpy's and Python's own), its answer included."""
+    call()  # what a first call imports and keeps is not counted
+    running = tracemalloc.is_tracing()
+    if not running:
+        tracemalloc.start()
+    try:
+        tracemalloc.reset_peak()
+        before = tracemalloc.get_traced_memory()[0]
+        answer = call()
+        held = tracemalloc.get_traced_memory()[1] - before
+        del answer
+        return held
+    finally:
+        if not running:
+            tracemalloc.stop()
 
 
 @cache
@@ -61,14 +112,26 @@ def measured(
     call: Callable[[], Any],
     *,
     size: int = 1,
-    error: float | None = None,
     budget: float = 0.2,
-    aim_ns: float | None = None,
-    aim_error: float | None = None,
+    **known: Any,
 ) -> Measurement:
-    """Time a call that works on `size` items."""
+    """Time a call that works on `size` items; `known` are further fields of the measurement."""
     ns = seconds(call, budget) / size * 1e9
-    return Measurement(domain, work, method, size, ns, ns / calibration(), error, aim_ns, aim_error)
+    return Measurement(domain, work, method, size, ns, ns / calibration(), **known)
+
+
+def worst(found: Any, true: Any, scale: float | None = None) -> float:
+    """Return the largest deviation of an answer from the reference, over the reference's largest entry or `scale`."""
+    true = np.asarray(true)
+    found = np.asarray(found).reshape(true.shape)
+    off = np.abs(found - true).max()
+    return float(off / (np.abs(true).max() if scale is None else scale))
+
+
+def around(found: Any, true: Any) -> float:
+    """Return the largest deviation of angles, rad, whole turns apart left out."""
+    off = np.asarray(found) - np.asarray(true)
+    return float(np.abs(off - 2 * np.pi * np.round(off / (2 * np.pi))).max())
 
 
 def reference(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""Rigid bodies: momentum of many states; free rotation, the heavy top and integration against extended precision."""
+"""Rotation in time: the closed form against integration, by the attitude, not only by what is conserved."""
 
 from __future__ import annotations
 
@@ -10,99 +10,132 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.bench.measure import Measurement, measured, reference
-from rigidbody3d import FreeBody, Motion, Top, integrate
+from rigidbody3d import FreeBody, Top, integrate
 from rigidbody3d.attitude import angle_between
 
-Array = NDArray[np.float64]
+Real = NDArray[np.float64]
 
 DOMAIN = "rotation"
 
 
 def measure(quick: bool) -> Iterator[Measurement]:
-    """Yield time and error of momentum and wrench, and of rotations in time."""
-    rng = np.random.default_rng(3)
-    states = 100_000 if quick else 1_000_000
-    I = np.diag([1.0, 2.0, 2.5]) - 0.1
-    w, alpha, a = rng.normal(size=(3, states, 3))
-    exact = _exact_rate(I, w[:50], alpha[:50])
-    for method, work in (("blocks", _blocks), ("einsum", _einsum)):
-        found = work(I, w[:50], alpha[:50], a[:50])[1]
-        error = float(np.abs(found - exact).max() / np.abs(exact).max())
-        call = partial(work, I, w, alpha, a)
-        yield measured(DOMAIN, "H, its rate and -m a", method, call, size=states, error=error, aim_ns=20)
-    for body in reference("rotation")["bodies"]:
-        inertia, omega, answers = body["inertia"], body["omega"], body["answers"]
-        times = np.array([answer["t_s"] for answer in answers])
-        wanted = np.array([answer["attitude"] for answer in answers])
-        many = np.linspace(0, 20, 1000 if quick else 10_000)
-        error = float(angle_between(FreeBody(inertia, omega).at(times).attitude, wanted).max())
+    """Yield time and error of free rotation: five bodies, many states, up to 10⁵ revolutions."""
+    known = reference("rotation")
+    for i, body in enumerate(known["bodies"]):
+        tolerances = (1e-3, 1e-6, 1e-9, 1e-12) if not quick else (1e-6, 1e-12) if i < 2 else ()
+        yield from _short(body, tolerances)
+    yield from _many((1, 100, 10_000) if quick else (1, 10, 100, 1000, 10_000, 100_000, 1_000_000))
+    yield from _top(1000 if quick else 10_000)
+    yield from _long(known["long"], 100 if quick else 1000)
+
+
+def attitude_error(found: Real, true: Real) -> float:
+    """Return the largest distance of unit quaternions, of which q and -q are one attitude."""
+    return float(
+        np.minimum(np.linalg.norm(found - true, axis=-1), np.linalg.norm(found + true, axis=-1)).max()
+    )
+
+
+def _exact(inertia: Any, omega: Any, times: Real) -> Real:
+    return FreeBody(inertia, omega).at(times).attitude
+
+
+def _integrated(inertia: Any, omega: Any, times: Real, method: str, rtol: float) -> Real:
+    return integrate(inertia, omega, t=times, method=method, rtol=rtol).attitude
+
+
+def _plain(inertia: Any, omega: Any, times: Real, method: str, rtol: float) -> Real:
+    """Euler's equations and q' = q·(0, ω)/2 handed to solve_ivp as they stand in the texts."""
+    from scipy.integrate import solve_ivp
+
+    a, b, c = inertia
+    first, second, third = (b - c) / a, (c - a) / b, (a - b) / c
+
+    def rates(_: float, y: Real) -> list[float]:
+        p, q, r, w, i, j, k = y.tolist()
+        return [
+            first * q * r,
+            second * r * p,
+            third * p * q,
+            (-i * p - j * q - k * r) / 2,
+            (w * p + j * r - k * q) / 2,
+            (w * q - i * r + k * p) / 2,
+            (w * r + i * q - j * p) / 2,
+        ]
+
+    start = [*omega, 1.0, 0.0, 0.0, 0.0]
+    run = solve_ivp(rates, (0.0, float(times.max())), start, method, times, rtol=rtol, atol=rtol * 1e-3)
+    return np.asarray(run.y[3:].T)
+
+
+def _short(body: Any, tolerances: tuple[float, ...]) -> Iterator[Measurement]:
+    work = f"attitude to 20 s, {body['name']}"
+    times = np.array([a["t_s"] for a in body["answers"]])
+    true = np.array([a["attitude"] for a in body["answers"]])
+    call = partial(_exact, body["inertia"], body["omega"], times)
+    yield measured(DOMAIN, work, "closed form", call, error=attitude_error(call(), true), budget=0.1)
+    ways = (
+        (f"{how}, {m}", solve, m)
+        for how, solve in (("integrated", _integrated), ("plain solve_ivp", _plain))
+        for m in ("DOP853", "RK45")
+    )
+    for name, solve, method in ways:
+        for rtol in tolerances:
+            if method == "RK45" and rtol < 1e-10:
+                continue
+            step = partial(solve, body["inertia"], body["omega"], times, method, rtol)
+            error = attitude_error(step(), true)
+            yield measured(DOMAIN, work, name, step, error=error, budget=0.02)
+
+
+def _many(sizes: tuple[int, ...]) -> Iterator[Measurement]:
+    body = FreeBody([1.0, 2.0, 3.0], [1.0, 0.1, 0.5])
+    for states in sizes:
+        times = np.linspace(0.0, 100.0, states)
+
+        def both(times: Real = times) -> tuple[Real, Real]:
+            state = body.at(times)
+            return state.omega, state.attitude
+
+        aim = 2000.0 if states == sizes[-1] else None
+        yield measured(DOMAIN, "ω and attitude of many states", "closed form", both, size=states, aim_ns=aim)
+
+
+def _top(states: int) -> Iterator[Measurement]:
+    top = Top([1, 1, 0.6], 1.2, [0.5, 1.0, 3.0], [0.8, 0.6, 0, 0])
+    times = np.linspace(0.0, 20.0, states)
+
+    def attitude() -> Real:
+        return np.asarray(top.at(times).attitude)
+
+    work = "heavy top, attitude of many states"
+    yield measured(DOMAIN, work, "closed form", attitude, size=states, aim_ns=2000.0)
+
+
+def _long(known: Any, integrated_periods: int) -> Iterator[Measurement]:
+    """Yield the attitude's error after up to 10⁵ periods; the aim is ε times the phase, 2π per period."""
+    work = "attitude after many revolutions"
+    for answer in known["answers"]:
+        times, true = np.array([answer["t_s"]]), np.array([answer["attitude"]])
+        periods = max(1, answer["periods"])
+        call = partial(_exact, known["inertia"], known["omega"], times)
         yield measured(
             DOMAIN,
-            f"free rotation: {body['name']}",
+            work,
             "closed form",
-            partial(_free, inertia, omega, many),
-            size=len(many),
-            error=error,
-            aim_ns=2000,
-            aim_error=1e-14 * (1 + 20 * float(np.linalg.norm(omega))),
+            call,
+            size=periods,
+            error=attitude_error(call(), true),
+            aim_error=float(np.finfo(float).eps) * 2 * np.pi * periods,
+            budget=0.05,
         )
-        for rtol in (1e-6, 1e-10, 1e-13):
-            run = partial(integrate, inertia, omega, t=times[-1:], rtol=rtol)
-            error = float(angle_between(run().attitude, wanted[-1:])[0])
-            yield measured(
-                DOMAIN,
-                f"free rotation: {body['name']}",
-                f"DOP853, {rtol:g}, one state",
-                run,
-                error=error,
-                budget=0.1,
-            )
-    many = np.linspace(0, 20, 1000 if quick else 10_000)
-    top = ([1, 1, 0.6], 1.2, [0.5, 1.0, 3.0], [0.8, 0.6, 0, 0])
-    yield measured(DOMAIN, "heavy top", "closed form", partial(_top, top, many), size=len(many), aim_ns=2000)
-
-
-def _blocks(I: Array, w: Array, alpha: Array, a: Array) -> tuple[Array, Array, Array]:
-    motion = Motion(I, w, alpha, mass=2.0, acceleration=a)
-    rate = motion.rate
-    return motion.momentum, rate, motion.inertia_force
-
-
-def _einsum(I: Array, w: Array, alpha: Array, a: Array) -> tuple[Array, Array, Array]:
-    H = np.einsum("ij,nj->ni", I, w)
-    return H, np.einsum("ij,nj->ni", I, alpha) + np.cross(w, H), -2.0 * a
-
-
-def _free(inertia: Any, omega: Any, t: Array) -> Array:
-    state = FreeBody(inertia, omega).at(t)
-    return state.omega + state.attitude[:, :3]
-
-
-def _top(given: Any, t: Array) -> Array:
-    return Top(*given).at(t).attitude
-
-
-def _exact_rate(I: Array, w: Array, alpha: Array) -> Array:
-    """I α + ω × I ω in rational numbers."""
-    from fractions import Fraction
-
-    tensor = [[Fraction(x) for x in row] for row in I.tolist()]
-    out = []
-    for spin, rate in zip(w.tolist(), alpha.tolist(), strict=True):
-        x = [Fraction(v) for v in spin]
-        r = [Fraction(v) for v in rate]
-        H = [sum(t * v for t, v in zip(row, x, strict=True)) for row in tensor]
-        out.append(
-            [
-                float(
-                    sum(t * v for t, v in zip(tensor[i], r, strict=True))
-                    + x[(i + 1) % 3] * H[(i + 2) % 3]
-                    - x[(i + 2) % 3] * H[(i + 1) % 3]
+        if answer["periods"] <= integrated_periods:
+            for name, solve in (("integrated", _integrated), ("plain solve_ivp", _plain)):
+                step = partial(solve, known["inertia"], known["omega"], times, "DOP853", 1e-13)
+                error = attitude_error(step(), true)
+                yield measured(
+                    DOMAIN, work, f"{name}, DOP853 at 1e-13", step, size=periods, error=error, budget=0.0
                 )
-                for i in range(3)
-            ]
-        )
-    return np.array(out)
 
 
 # --- random campaigns at singular places: the error, and the bound ε·(1 + phase) that the documentation states ---

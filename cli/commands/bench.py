@@ -20,10 +20,13 @@ if TYPE_CHECKING:
 
 # domain -> (module with a function `measure`, what it measures)
 DOMAINS = {
-    "mechanisms": ("cli.bench.mechanisms", "kinematics of a four-bar and of the Klann leg"),
+    "mechanisms": ("cli.bench.mechanisms", "mechanisms in motion, their torque and joint forces"),
+    "skipping": ("cli.bench.skipping", "what is saved where less is asked for"),
     "rotors": ("cli.bench.rotors", "corrections of rotors with known masses"),
-    "rotation": ("cli.bench.rotation", "momentum of many states, rotation of bodies in time"),
-    "field": ("cli.bench.field", "corrections from measured vibration, placement"),
+    "field": ("cli.bench.field", "corrections from measured vibration"),
+    "bodies": ("cli.bench.bodies", "angular momentum, its rate and inertia forces of rigid bodies"),
+    "rotation": ("cli.bench.rotation", "free rotation in closed form and integrated"),
+    "commands": ("cli.bench.commands", "whole commands from start to end"),
 }
 
 
@@ -32,6 +35,18 @@ def run(
         list[str] | None, typer.Argument(metavar="[NAME]...", help=f"Domains: {', '.join(DOMAINS)}.")
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Smaller sizes.")] = False,
+    peers: Annotated[
+        bool, typer.Option("--peers", help="The same work with other packages, where they are installed.")
+    ] = False,
+    docs: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.md",
+            help="Write tables into FILE.md, between its marks <!-- bench:DOMAIN --> and <!-- end -->, and pictures "
+            "into the folder pictures beside it.",
+            dir_okay=False,
+        ),
+    ] = None,
     stress: Annotated[
         str | None,
         typer.Option(metavar="TIME", help="Run the random campaigns for this long instead, such as 10min."),
@@ -64,17 +79,31 @@ def run(
             raise typer.BadParameter(
                 f"'{domain}': expected some of {', '.join(DOMAINS)}{nearest(domain, DOMAINS)}"
             )
-    measurements = list(_measure(name or list(DOMAINS), quick))
+    chosen = name or list(DOMAINS)
+    if docs is not None:
+        from cli.bench import page
+
+        page.check(docs, chosen)
+    measurements = list(_measure(chosen, quick, peers))
+    if docs is not None:
+        page.write(docs, measurements)
     columns: dict[str, list[Any]] = {
         "domain": [m.domain for m in measurements],
         "work": [m.work for m in measurements],
         "method": [m.method for m in measurements],
         "size": [m.size for m in measurements],
+        "condition": [m.condition for m in measurements],
         "time_ns": [m.ns for m in measurements],
         "time_units": [m.units for m in measurements],
         "error": [m.error for m in measurements],
         "aim_ns": [m.aim_ns for m in measurements],
         "aim_error": [m.aim_error for m in measurements],
+        "floor": [m.floor for m in measurements],
+        "ratio": [m.ratio for m in measurements],
+        "aim_ratio": [m.aim_ratio for m in measurements],
+        "memory_bytes": [m.bytes for m in measurements],
+        "kernel_calls": [m.kernels for m in measurements],
+        "peer": ["yes" if m.peer else "no" for m in measurements],
     }
     show(
         Shown(
@@ -94,11 +123,18 @@ def run(
     )
 
 
-def _measure(domains: list[str], quick: bool) -> Iterator[Measurement]:
+def _measure(domains: list[str], quick: bool, peers: bool) -> Iterator[Measurement]:
+    from cli.bench import measure as how
+
+    how.patience = 0.3 if quick else 1.0
     for domain in domains:
         module, line = DOMAINS[domain]
         print(f"measuring {domain}: {line}", file=sys.stderr)
         yield from import_module(module).measure(quick)
+        if peers:
+            from cli.bench import peers as others
+
+            yield from others.measure(domain, quick)
 
 
 def _stress(names: list[str], seconds: float, seed: int | None, *, text: bool, output: Path | None) -> None:
