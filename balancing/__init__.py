@@ -3,33 +3,65 @@
 An unbalance is a complex number m·r·e^{iθ} (kg·m, rad); corrections are what to ADD.
 """
 
-from balancing.amplitudes import AmplitudeFit, influence_from_amplitudes
-from balancing.confidence import Readings, spread
-from balancing.correction import CoincidentPlanes, Correction, Unbalances, correct
-from balancing.influence import (
-    Balance,
-    DependentPlanes,
-    DependentTrials,
-    Infeasible,
-    condition_number,
-    influence_coefficients,
-    least_squares,
-    plane_significance,
-    unseen,
-)
-from balancing.minimax import minimax
-from balancing.placement import Placement, drill_depth, place, place_from_stock, transfer
-from balancing.rotor import by_size
-from balancing.tolerance import GRADES, allocate, grade_value, permissible_unbalance
-from balancing.trial import (
-    ErrorBudget,
-    Indexed,
-    TrialEffect,
-    error_budget,
-    index_balancing,
-    trial_effect,
-    trial_unbalance,
-)
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from balancing.amplitudes import AmplitudeFit, influence_from_amplitudes
+    from balancing.confidence import Readings, spread
+    from balancing.correction import CoincidentPlanes, Correction, Unbalances, correct
+    from balancing.influence import (
+        Balance,
+        DependentPlanes,
+        DependentTrials,
+        Infeasible,
+        condition_number,
+        influence_coefficients,
+        least_squares,
+        plane_significance,
+        unseen,
+    )
+    from balancing.least_maximum import minimax
+    from balancing.placement import Placement, drill_depth, place, place_from_stock, transfer
+    from balancing.rotor import by_size
+    from balancing.tolerance import GRADES, allocate, grade_value, permissible_unbalance
+    from balancing.trial import (
+        ErrorBudget,
+        Indexed,
+        TrialEffect,
+        error_budget,
+        index_balancing,
+        trial_effect,
+        trial_unbalance,
+    )
+
+# A rotor with known masses needs none of what vibration needs: each module is loaded when a name of it is asked for.
+_HOMES = {
+    "balancing.amplitudes": "AmplitudeFit influence_from_amplitudes",
+    "balancing.confidence": "Readings spread",
+    "balancing.correction": "CoincidentPlanes Correction Unbalances correct",
+    "balancing.influence": "Balance DependentPlanes DependentTrials Infeasible condition_number influence_coefficients least_squares plane_significance unseen",
+    "balancing.least_maximum": "minimax",
+    "balancing.placement": "Placement drill_depth place place_from_stock transfer",
+    "balancing.rotor": "by_size",
+    "balancing.tolerance": "GRADES allocate grade_value permissible_unbalance",
+    "balancing.trial": "ErrorBudget Indexed TrialEffect error_budget index_balancing trial_effect trial_unbalance",
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'balancing' has no attribute '{name}'")
+    value = globals()[name] = getattr(import_module(_HOME[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME})
+
 
 __all__ = [
     "GRADES",

@@ -6,7 +6,7 @@ The vibration V_s at sensor s (and speed) answers linearly to the masses w_p in 
 
 with α_sp the influence coefficients: what a unit mass in plane p adds at sensor s. Trial masses tell α,
 and the corrections are the w for which r is small: by least squares here, by its largest component in
-`balancing.minimax`. A vibration, a mass, a coefficient is a complex number: size and phase, and both phases
+`balancing.least_maximum`. A vibration, a mass, a coefficient is a complex number: size and phase, and both phases
 are counted in one common sense.
 """
 
@@ -234,7 +234,7 @@ def least_squares(
     if max_mass is not None or max_residual is not None:
         if ridge:
             raise ValueError("ridge does not go with limits: the limits damp already")
-        from balancing.minimax import limited_least_squares
+        from balancing.least_maximum import limited_least_squares
 
         found = limited_least_squares(alpha, v, root, max_mass, max_residual)
         return Balance(alpha, v, found, w)

@@ -261,3 +261,12 @@ def test_rotors_with_planes_of_their_own() -> None:
     np.testing.assert_allclose(fix.unbalance[:, 1].real, [-1.0, -0.5, -(1.5 + 2.5) / 2], rtol=1e-15)
     assert correct([[1.0], [2.0]], 0.0, [0.0]).unbalance.tolist() == [[-1], [-2]]
     assert "1 rotor in 2 plane(s)" in repr(correct([1.0], 0.5, [0.0, 1.0]))
+
+
+def test_every_public_name_is_there() -> None:
+    import balancing
+
+    assert set(balancing.__all__) == set(balancing._HOME)
+    assert all(callable(getattr(balancing, name)) or name == "GRADES" for name in balancing.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'imbalance'"):
+        balancing.imbalance  # noqa: B018

@@ -169,7 +169,7 @@ def test_the_splitting_refuses_what_is_no_top(spin) -> None:
     assert "symmetric top" in done.stderr
 
 
-def test_an_absurd_phase_is_refused_not_integrated(dalembert: Dalembert, tmp_path: Path) -> None:
+def test_an_absurd_phase_is_refused_not_integrated(dalembert, tmp_path) -> None:
     (tmp_path / "body.toml").write_text("inertia = [1, 2, 3]\nomega = [1e59, 1, 2]\n")
     done = dalembert("spin", "body.toml", "--at", "5", "--method", "integrate")
     assert done.returncode == 1

@@ -110,7 +110,8 @@ def _fraction(x) -> Fraction:
 @settings(max_examples=60, deadline=None)
 @given(
     st.tuples(*[st.floats(0.05, 1)] * 3),
-    st.tuples(*[st.floats(-10, 10)] * 3),
+    # below 1e-60 rad/s the squares of the norms this test itself takes underflow
+    st.tuples(*[st.floats(-10, 10).filter(lambda x: x == 0 or abs(x) > 1e-60)] * 3),
     st.floats(-1000, 1000),
 )
 def test_momentum_and_energy_to_rounding(moments, omega, t) -> None:
