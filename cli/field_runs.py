@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError, quote
-from cli.known_masses import _number
+from cli.known_masses import number_names
 from cli.tables import Cells, Table, read
 from cli.units import UNITS, parse_number, phasor, to_si
 
@@ -112,7 +112,7 @@ def read_runs(path: str, *, lagging: bool, phaseless: bool, stored_unit: str | N
             f"or stored coefficients by --influence (the header is: {', '.join(table.header)})"
         )
     size = table.cells[both[0]] if both else None
-    names, rotor = _number(table.texts.get("rotor") or ["1"] * table.rows)
+    names, rotor = number_names(table.texts.get("rotor") or ["1"] * table.rows)
     unit = stored_unit or (size.unit if size else "kg")
     runs = Runs(
         table,
@@ -139,7 +139,7 @@ def _layouts(table: Table, rotor: Rows) -> Iterator[tuple[Rows, Rows]]:
         yield np.zeros(1, dtype=np.intp), order[None]
         return
     codes = [
-        _number(table.texts[name])[1] if name in table.texts else np.zeros(table.rows, dtype=np.intp)
+        number_names(table.texts[name])[1] if name in table.texts else np.zeros(table.rows, dtype=np.intp)
         for name in ("run", "sensor", "trial_plane", "trial_kept")
     ]
     speed = table.numbers.get("speed")

@@ -87,7 +87,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
             size = size / gravity
     angle = table.require("angle", "angle")
     z = table.require("z", "length") if needs_z else table.numbers.get("z")
-    names, rotor = _number(table.texts.get("rotor") or ["1"] * table.rows)
+    names, rotor = number_names(table.texts.get("rotor") or ["1"] * table.rows)
     radius_unit = radius.unit if radius is not None else None
     return Rotors(
         table,
@@ -102,7 +102,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
     )
 
 
-def _number(names: list[str]) -> tuple[list[str], NDArray[np.intp]]:
+def number_names(names: list[str]) -> tuple[list[str], NDArray[np.intp]]:
     """Number names in the order in which they first stand."""
     if len(names) >= LARGE:
         import pandas as pd

@@ -81,7 +81,7 @@ def run(
         mass_step=options.with_unit("--round-mass", round_mass, "mass", positive=True),
         angle_step=options.with_unit("--round-angle", round_angle, "angle", positive=True),
         center=options.quantity("--center-z", center_z, "length"),
-        tolerance=_tolerance(grade, speed, rotor_mass, permissible, bearings),
+        tolerance=tolerance_of(grade, speed, rotor_mass, permissible, bearings),
     )
     from cli.planes import from_options, from_table
 
@@ -90,7 +90,7 @@ def run(
     show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)
 
 
-def _tolerance(
+def tolerance_of(
     grade: str | None,
     speed: str | None,
     rotor_mass: str | None,

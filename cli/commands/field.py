@@ -154,10 +154,10 @@ def run(
         return
     if runs is None:
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
-    from cli.commands.balance import _tolerance
+    from cli.commands.balance import tolerance_of
     from cli.commands.place import places
 
-    tolerance = _tolerance(grade, speed, rotor_mass, permissible, None)
+    tolerance = tolerance_of(grade, speed, rotor_mass, permissible, None)
     limits = _limits(max_mass or [])
     ceiling = options.with_unit("--max-residual", max_residual, "amplitude", positive=True)
 

@@ -39,14 +39,14 @@ def draw(panels: Sequence[Panel], unit: str, *, remove: bool) -> Figure:
             axes.set_rlim(0, 1.12 * scale or 1.0)
             axes.tick_params(labelsize=8, colors="0.3")
             axes.set_rlabel_position(
-                _free_direction([*shares[:, column], shares[:, column].sum(), made[column]])
+                free_direction([*shares[:, column], shares[:, column].sum(), made[column]])
             )
             axes.grid(color="0.85")
             few = len(masses) <= 12
             for name, share in zip(masses, shares[:, column], strict=True):
-                _arrow(axes, share, scale, "0.45", 1.2, "-", name if few else "")
-            _arrow(axes, shares[:, column].sum(), scale, "black", 1.6, "--", "")
-            _arrow(axes, -made[column] if remove else made[column], scale, "tab:red", 2.6, "-", "")
+                arrow(axes, share, scale, "0.45", 1.2, "-", name if few else "")
+            arrow(axes, shares[:, column].sum(), scale, "black", 1.6, "--", "")
+            arrow(axes, -made[column] if remove else made[column], scale, "tab:red", 2.6, "-", "")
     handles = [
         Line2D([], [], color="0.45", lw=1.2, label="masses, their share in the plane"),
         Line2D([], [], color="black", lw=1.6, ls="--", label="resultant"),
@@ -59,9 +59,7 @@ def draw(panels: Sequence[Panel], unit: str, *, remove: bool) -> Figure:
     return figure
 
 
-def _arrow(
-    axes: Axes, value: complex, scale: float, color: str, width: float, style: str, label: str
-) -> None:
+def arrow(axes: Axes, value: complex, scale: float, color: str, width: float, style: str, label: str) -> None:
     if not abs(value) > 1e-9 * scale:
         return
     angle, size = float(np.angle(value)), abs(value)
@@ -90,7 +88,7 @@ def _arrow(
         )
 
 
-def _free_direction(vectors: Sequence[complex]) -> float:
+def free_direction(vectors: Sequence[complex]) -> float:
     """Return the direction, in degrees, in the middle of the widest gap between vectors: room for the scale."""
     angles = np.sort(np.degrees(np.angle([v for v in vectors if v])) % 360)
     if not len(angles):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.field_text import unit
-from cli.plots.balance import _arrow, _free_direction
+from cli.plots.balance import arrow, free_direction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,22 +32,22 @@ def draw(field: Field, rotors: Sequence[int]) -> Figure:
         scale = float(np.abs([before, after]).max()) or 1.0
         few = len(before) <= 16
         for channel, v, r in zip(solved.group.channels, before, after, strict=True):
-            _arrow(left, v, scale, "0.5", 1.4, "--", str(channel) if few else "")
-            _arrow(left, r, scale, "tab:red", 2.0, "-", "")
+            arrow(left, v, scale, "0.5", 1.4, "--", str(channel) if few else "")
+            arrow(left, r, scale, "tab:red", 2.0, "-", "")
             if 1e-9 * scale < abs(r) < 0.04 * scale:  # too short for an arrow
                 left.plot([np.angle(r)], [abs(r)], "o", color="tab:red", ms=4)
         left.set_title(f"{name}vibration, {unit(field)}", pad=16)
         left.set_rlim(0, 1.12 * scale)
-        left.set_rlabel_position(_free_direction([*before, *after]))
+        left.set_rlabel_position(free_direction([*before, *after]))
         masses = field._amount(solved.corrections[i])
         standing = field._amount(solved.standing[i])
         size = float(np.abs([*masses, *standing]).max()) or 1.0
         for plane, w, on in zip(solved.planes, masses, standing, strict=True):
-            _arrow(right, on, size, "0.5", 1.2, "--", "")
-            _arrow(right, w, size, "tab:red", 2.6, "-", plane)
+            arrow(right, on, size, "0.5", 1.2, "--", "")
+            arrow(right, w, size, "tab:red", 2.6, "-", plane)
         right.set_title(f"{name}corrections to ADD, {amounts}", pad=16)
         right.set_rlim(0, 1.12 * size)
-        right.set_rlabel_position(_free_direction([*masses, *standing]))
+        right.set_rlabel_position(free_direction([*masses, *standing]))
         for axes in (left, right):
             axes.tick_params(labelsize=8, colors="0.3")
             axes.grid(color="0.85")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.plots.balance import _arrow, _free_direction
+from cli.plots.balance import arrow, free_direction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +51,7 @@ def _panel(axes: Any, panel: Panel, unit: str, *, removed: bool) -> None:
     rim = 1.2 * scale
     axes.set_rlim(0, 1.95 * scale)
     axes.set_rticks([tick for tick in axes.get_yticks() if 0 < tick <= scale])
-    axes.set_rlabel_position(_free_direction([target, total]))
+    axes.set_rlabel_position(free_direction([target, total]))
     axes.tick_params(labelsize=8, colors="0.3")
     axes.grid(color="0.88")
     largest = max(masses) or 1.0
@@ -78,8 +78,8 @@ def _panel(axes: Any, panel: Panel, unit: str, *, removed: bool) -> None:
                 fontsize=9,
                 bbox={"fc": "white", "ec": "none", "pad": 0.6, "alpha": 0.85},
             )
-    _arrow(axes, target, scale, "0.45", 4.0, "-", "")
-    _arrow(axes, total, scale, "tab:red", 1.8, "-", "")
+    arrow(axes, target, scale, "0.45", 4.0, "-", "")
+    arrow(axes, total, scale, "tab:red", 1.8, "-", "")
     axes.set_title(
         f"{title}material to {'remove' if removed else 'add'}, {unit}; angles counter-clockwise",
         fontsize=10,
