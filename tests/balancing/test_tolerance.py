@@ -56,3 +56,13 @@ def test_groups_stay_small_enough_for_the_cache() -> None:
     assert sum(size > 16000 for size in sizes) >= len(sizes) - 1
     (one,) = by_size(np.zeros(40_000, dtype=np.intp))
     assert one[1].shape == (1, 65536)
+
+
+def test_shares_anywhere_along_the_shaft() -> None:
+    np.testing.assert_allclose(allocate(100, 5.4, 5, 6), [60, 40], rtol=1e-14)
+    np.testing.assert_allclose(allocate(100, -1.4, -1, -2), [60, 40], rtol=1e-14)
+    np.testing.assert_allclose(allocate(100, 6, 5, 6), [30, 70])
+    np.testing.assert_allclose(allocate(100, 5, 5, 6), [70, 30])
+    np.testing.assert_allclose(allocate(100, 4.8, 5, 6), [120, 30])
+    with pytest.raises(ValueError, match="positive"):
+        permissible_unbalance(1.0, 0.0, 1.0)
