@@ -284,7 +284,13 @@ class _Chooser:
 
     def _sign(self, group: Group, case: Case, st: State, signs: Mapping[str, int]) -> int:
         if group.kind == "PRP":
-            case.solve(st, 1, self.m.size)
+            try:
+                case.solve(st, 1, self.m.size)
+            except ZeroDivisionError:
+                raise AssemblyError(
+                    f"{group.name}: its two guides are parallel, so that its position is not determined; expected "
+                    "guides of different directions (`angle`)"
+                ) from None
             return 1
         found = self.solutions(group, case, st)
         if not found:

@@ -401,6 +401,8 @@ class _Reader:
             ]
         except (TypeError, ValueError):
             raise _wrong(f"{where} table", name, "numbers in every row") from None
+        if not all(math.hypot(abs(at), abs(force)) <= 1e60 for at, force in found):
+            raise _wrong(f"{where} table", name, "finite numbers in every row")
         if len(found) < 2 or any(not b[0] > a[0] for a, b in itertools.pairwise(found)):
             raise _wrong(f"{where} table", name, f"at least two rows with rising {column}")
         turns = (found[-1][0] - found[0][0]) / (2 * math.pi)

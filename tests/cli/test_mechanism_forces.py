@@ -350,3 +350,25 @@ def test_scissors_lift_in_closed_form(dalembert: Run) -> None:
         exact = -400 * 9.81 * x / math.sqrt(1.44 - x * x)
         assert pose["effort"]["input_force_N"] == pytest.approx(exact, rel=1e-12)
         assert pose["effort"]["virtual_work_force_N"] == pytest.approx(exact, rel=1e-12)
+
+
+@pytest.mark.parametrize("bad", ["800,-inf", "1e60242,6", "800,nan"])
+def test_a_force_table_holds_finite_numbers(bad: str, dalembert, tmp_path) -> None:
+    """Found by fuzzing: examples `engine` and `crank-press` with one number too large."""
+    assert dalembert("examples", "engine").returncode == 0
+    table = tmp_path / "gas.csv"
+    table.write_text(table.read_text() + bad + "\n")
+    done = dalembert("mechanism", "engine.toml", "--forces", "--at", "100deg")
+    assert done.returncode == 1
+    assert "expected" in done.stderr
+    assert "number" in done.stderr
+
+
+def test_parallel_guides_are_named(dalembert, tmp_path) -> None:
+    """Found by fuzzing: the scotch yoke whose slot lies along its guide."""
+    assert dalembert("examples", "scotch-yoke").returncode == 0
+    yoke = tmp_path / "yoke.toml"
+    yoke.write_text(yoke.read_text().replace("angle = 90\n", ""))
+    done = dalembert("mechanism", "yoke.toml", "--at", "60deg")
+    assert done.returncode == 1
+    assert "parallel" in done.stderr
