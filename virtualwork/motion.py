@@ -326,7 +326,9 @@ class Motion:
 
     def _error_estimate(self, order: int) -> Reals:
         """ε·condition·size, and what becomes of it in the rates; see `PointMotion.error_estimate`."""
-        eps, c, size = float(np.finfo(float).eps), self.condition, self.mechanism.size
+        c, size = self.condition, self.mechanism.size
+        # so close to a limit that rounding moves the pose by as much as is left, the second order counts
+        eps = float(np.finfo(float).eps) * (1 + 16 * float(np.finfo(float).eps) * c**2)
         near = np.ones_like(c)
         if any(len(where) for where in self.assembly.track.flips.values()):
             # lengths that differ by little more than rounding are taken for equal at a change point
