@@ -28,6 +28,7 @@ from virtualwork.mechanism import (
 )
 from virtualwork.quantity import EXPECTED, parse, scaled, unit
 
+LARGEST = 1e60  # SI: no quantity of a machine is larger, and no product of five of them overflows
 TABLES = {
     "name", "units", "ground", "links", "input", "guess", "slots", "sliders", "gears", "gravity", "forces",
     "torques", "springs", "torsion_springs", "motors", "friction", "source", "note",
@@ -89,7 +90,7 @@ class _Reader:
                     pass
         else:
             result = None
-        if result is None or not math.isfinite(result):
+        if result is None or not abs(result) <= LARGEST:
             raise _wrong(where, value, EXPECTED[kind][0])
         return result
 
@@ -401,7 +402,7 @@ class _Reader:
             ]
         except (TypeError, ValueError):
             raise _wrong(f"{where} table", name, "numbers in every row") from None
-        if not all(math.hypot(abs(at), abs(force)) <= 1e60 for at, force in found):
+        if not all(math.hypot(abs(at), abs(force)) <= LARGEST for at, force in found):
             raise _wrong(f"{where} table", name, "finite numbers in every row")
         if len(found) < 2 or any(not b[0] > a[0] for a, b in itertools.pairwise(found)):
             raise _wrong(f"{where} table", name, f"at least two rows with rising {column}")

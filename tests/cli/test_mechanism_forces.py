@@ -364,6 +364,17 @@ def test_a_force_table_holds_finite_numbers(bad: str, dalembert, tmp_path) -> No
     assert "number" in done.stderr
 
 
+def test_a_number_beyond_all_measure(dalembert, tmp_path) -> None:
+    """Found by fuzzing: a point of the Klann leg at 1e308 mm."""
+    assert dalembert("examples", "klann").returncode == 0
+    klann = tmp_path / "klann.toml"
+    assert "B = [0, 0]" in klann.read_text()
+    klann.write_text(klann.read_text().replace("B = [0, 0]", "B = [0, 1e308]"))
+    done = dalembert("mechanism", "klann.toml", "--at", "60deg")
+    assert done.returncode == 1
+    assert "1e+308" in done.stderr
+
+
 def test_parallel_guides_are_named(dalembert, tmp_path) -> None:
     """Found by fuzzing: the scotch yoke whose slot lies along its guide."""
     assert dalembert("examples", "scotch-yoke").returncode == 0
