@@ -268,12 +268,11 @@ def all_at_once(assembly: Assembly, inputs: tuple[float, ...], limit: int = 50) 
     with np.errstate(all="ignore"):
         x, closed = newton(group, st, merged, start, m.size, limit, table, damped=False)
         exact = assembly.state(inputs)
-        difference = max(
-            (
-                abs(float(np.angle(np.exp(1j * x[0, j]) / np.ravel(exact.turn[body])[0])))
-                for j, body in enumerate(group.angles)
-            ),
-            default=0.0,
-        )
+        # numpy's maximum keeps a NaN: where one link is not assembled there is nothing to compare with
+        away = [
+            np.abs(np.angle(np.exp(1j * x[0, j]) / np.ravel(exact.turn[body])[0]))
+            for j, body in enumerate(group.angles)
+        ]
+        difference = float(np.max(away, initial=0.0))
     names = (*group.angles, *(m.guides[g].point for g in group.slides))
     return AllAtOnce(names, len(group.angles), tuple(table), jacobian, bool(closed[0]), difference)

@@ -115,7 +115,7 @@ def newton_text(document: dict[str, Any]) -> str:
     return (
         f"Newton-Raphson, all loops at once, from the guess:\n{table}\nJacobian at the guess (x and y of each loop):\n"
         f"{shown}\nlargest difference to the assembly solved group by group: "
-        + ("none converged" if difference is None else f"{difference:.3g} rad")
+        + ("nothing to compare" if difference is None else f"{difference:.3g} rad")
     )
 
 

@@ -383,3 +383,16 @@ def test_parallel_guides_are_named(dalembert, tmp_path) -> None:
     done = dalembert("mechanism", "yoke.toml", "--at", "60deg")
     assert done.returncode == 1
     assert "parallel" in done.stderr
+
+
+def test_newton_where_the_pose_cannot_be_assembled(dalembert, tmp_path) -> None:
+    """Found by fuzzing: a Klann leg that no closed form assembles; its Newton-Raphson table has no difference."""
+    assert dalembert("examples", "klann").returncode == 0
+    klann = tmp_path / "klann.toml"
+    klann.write_text(klann.read_text().replace("E = [290, 230]", "E = [-7.575, 230]"))
+    done = dalembert("mechanism", "klann.toml", "--at", "60deg", "--newton", "--json")
+    assert done.returncode == 1
+    assert "RuntimeWarning" not in done.stderr
+    document = json.loads(done.stdout)
+    assert document["poses"][0]["assembled"] is False
+    assert document["newton_difference_rad"] is None
