@@ -109,7 +109,7 @@ def show(
         report = compare(shown.columns, shown.keys, str(expect), rtol)
         checked = f"{table_text(report.columns)}\n{report.summary}"
     if digits:
-        shown = replace(shown, columns=digits_that_hold(shown.columns, shown.errors()))
+        shown = _with_digits_that_hold(shown)
     if plot is not None and shown.figure is not None:
         write(plot, _picture(shown.figure, plot.suffix.lower()[1:]))
     if output is not None:
@@ -173,6 +173,16 @@ def _plain(value: Any) -> Any:
     if value is None or value != value:
         return ""
     return str(value).lower() if isinstance(value, bool) else value
+
+
+def _with_digits_that_hold(shown: Shown) -> Shown:
+    """Cut the CSV's columns, and those of the terminal's table that bear the same names."""
+    errors, table = shown.errors(), shown.table
+    return replace(
+        shown,
+        columns=digits_that_hold(shown.columns, errors),
+        table=None if table is None else lambda: digits_that_hold(table(), errors),
+    )
 
 
 def digits_that_hold(columns: Columns, errors: Columns) -> Columns:
