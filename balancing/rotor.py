@@ -38,7 +38,7 @@ def by_size(rotor: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], NDArray
     start = np.cumsum(count) - count
     width = np.maximum(count, 1)
     exponent = np.frexp(width - 0.5)[1]  # ⌈log₂ width⌉
-    for e in np.unique(exponent):
+    for e in np.flatnonzero(np.bincount(exponent)):  # np.unique would import numpy.ma
         size = 2 ** int(e)
         alike = np.flatnonzero(exponent == e)
         step = np.arange(size)

@@ -203,7 +203,7 @@ class _Balanced:
     def _groups(self) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]]:
         """Yield rotors of like size: their numbers, the places of their masses, the rows of their planes."""
         for group, masses in by_size(self.rotors.rotor):
-            for planes in np.unique(self.count[group]):
+            for planes in np.flatnonzero(np.bincount(self.count[group])):
                 same = self.count[group] == planes
                 yield group[same], masses[same], self.start[group[same], None] + np.arange(planes)
 
