@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.rotor import BLOCK
 from balancing.summation import exact_sum, two_product, two_sum
 
 if TYPE_CHECKING:
@@ -94,6 +95,13 @@ class Correction:
     @cached_property
     def unbalance(self) -> Complex:
         """The unbalance to ADD in each plane, (..., p), kg·m."""
+        rotors = len(self.moment) if self.moment.ndim > 1 else 1
+        if rotors > 1 and self.moment.size > 2 * BLOCK:  # in parts whose temporaries stay in the cache
+            step = max(1, BLOCK * rotors // self.moment.size)
+            parts = [slice(i, i + step) for i in range(0, rotors, step)]
+            return np.concatenate(
+                [Correction(self.moment[i], self.z[i], self.planes[i]).unbalance for i in parts]
+            )
         if self.planes.shape[-1] == 1:
             return -self.static[..., None]
         apart, square = self._distances
@@ -102,8 +110,11 @@ class Correction:
 
     @cached_property
     def _distances(self) -> tuple[Real, Real]:
-        """z_p - z_q, and Σ_{q<r} (z_q - z_r)²."""
-        apart = self.planes[..., :, None] - self.planes[..., None, :]
+        """z_p - z_q, and Σ_{q<r} (z_q - z_r)²; once where all rotors share their planes."""
+        planes = self.planes
+        if planes.size and not any(planes.strides[:-1]):
+            planes = planes[(0,) * (planes.ndim - 1)]
+        apart = planes[..., :, None] - planes[..., None, :]
         return apart, np.asarray(np.square(apart).sum(axis=(-1, -2)) / 2)
 
     @cached_property
@@ -253,7 +264,7 @@ def correct(moment: ArrayLike, z: ArrayLike = 0.0, planes: ArrayLike = (0.0,)) -
     if p.shape[-1] > 1:
         together = fix._distances[1] == 0
         if together.any():
-            raise CoincidentPlanes(together)
+            raise CoincidentPlanes(np.broadcast_to(together, lead))
     return fix
 
 

@@ -12,6 +12,7 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True)
@@ -118,6 +119,15 @@ def measured(
     """Time a call that works on `size` items; `known` are further fields of the measurement."""
     ns = seconds(call, budget) / size * 1e9
     return Measurement(domain, work, method, size, ns, ns / calibration(), **known)
+
+
+def exponent(sizes: ArrayLike, values: ArrayLike) -> float:
+    """Return p of value ~ size^p, fitted to the last three sizes.
+
+    >>> round(exponent([1, 10, 100, 1000], [50, 60, 600, 6000]), 12)
+    1.0
+    """
+    return float(np.polyfit(np.log(np.asarray(sizes)[-3:]), np.log(np.asarray(values)[-3:]), 1)[0])
 
 
 def worst(found: Any, true: Any, scale: float | None = None) -> float:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from cli.bench.measure import Measurement, calibration
+from cli.bench.measure import Measurement, calibration, exponent
 from cli.errors import DataError
 
 Column = tuple[str, Callable[[Measurement], str]]
@@ -123,8 +123,23 @@ def tables(measurements: Sequence[Measurement]) -> list[str]:
         filled = [(head, show) for head, show in columns if any(show(m) for m in mine)]
         rows = [(f"*{m.method}*" if m.peer else m.method, *(show(m) for _, show in filled)) for m in mine]
         heads = ("method", *(head for head, _ in filled))
-        out.append(f"**{work}**\n\n{_table(heads, 'l' + 'r' * len(filled), rows)}")
+        out.append(f"**{work}**\n\n{_table(heads, 'l' + 'r' * len(filled), rows)}{_growth(mine)}")
     return out
+
+
+def _growth(measurements: Sequence[Measurement]) -> str:
+    """Return a sentence on how time and memory of a call grow with its size, where it was measured at three and more."""
+    found = []
+    for method in dict.fromkeys(m.method for m in measurements):
+        mine = [m for m in measurements if m.method == method]
+        for what, grown in (
+            ("time", [(m.size, m.ns * m.size) for m in mine]),
+            ("memory", [(m.size, m.bytes) for m in mine if m.bytes]),
+        ):
+            if len({size for size, _ in grown}) > 2:
+                sizes, values = zip(*grown, strict=True)
+                found.append(f"{method}: {what} ~ size^{exponent(sizes, values):.2f}")
+    return f"\n\nOf a call, over the last three sizes: {'; '.join(found)}." if found else ""
 
 
 def time(ns: float) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import correct
-from cli.bench.measure import Measurement, measured
+from cli.bench.measure import Measurement, measured, peak
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -28,14 +28,9 @@ def measure(quick: bool) -> Iterator[Measurement]:
         z = rng.uniform(0, 0.09, (rotors, k))
         for method, solve in (("compensated", _ours), ("plain sums", _plain)):
             error = max(_error(u[i], z[i], planes, solve(u[i], z[i], planes)) for i in range(min(rotors, 20)))
-            yield measured(
-                DOMAIN,
-                "two planes, 5 masses each",
-                method,
-                partial(solve, u, z, planes),
-                size=rotors,
-                error=error,
-            )
+            call = partial(solve, u, z, planes)
+            work, held = "rotors of two planes, 5 masses each", float(peak(call))
+            yield measured(DOMAIN, work, method, call, size=rotors, error=error, bytes=held)
     # the same with a rotor that is balanced to 1e-12: where plain sums fail
     u = np.concatenate([u[0, :4], -u[0, :4] * (1 + 1e-12)])
     z = np.tile(z[0, :4], 2)
@@ -51,9 +46,9 @@ def measure(quick: bool) -> Iterator[Measurement]:
         places = np.linspace(0.0, 1.0, p)
         u = rng.normal(size=(100, 20)) + 1j * rng.normal(size=(100, 20))
         z = rng.uniform(0, 1, (100, 20))
-        yield measured(
-            DOMAIN, "planes, 20 masses each", f"{p} planes", partial(_ours, u, z, places), size=100
-        )
+        call = partial(_ours, u, z, places)
+        work, held = "planes of each of 100 rotors, 20 masses", float(peak(call))
+        yield measured(DOMAIN, work, "compensated", call, size=p, bytes=held)
 
 
 def _ours(u: Complex, z: Real, planes: Real) -> Complex:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cli.bench.measure import exponent
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
     from cli.bench.measure import Measurement
 
 MARKERS = "osD^vP*X<>hd"
-COUNTED = ("poses", "links", "revolutions", "rotors", "states")
+COUNTED = ("poses", "links", "revolutions", "rotors", "planes", "states", "points")
 LEAST = 1e-17  # where an exact answer is drawn
 
 
@@ -101,8 +103,7 @@ def _curves(axes: Axes, measurements: list[Measurement], kind: Kind) -> None:
         x, y = (np.array([f(m) for m in points], dtype=float) for f in (kind.x, kind.y))
         label = name
         if kind in (COST, MEMORY) and len(points) > 2:
-            tail = min(3, len(points))
-            label += f": size^{np.polyfit(np.log(x[-tail:]), np.log(y[-tail:]), 1)[0]:.2f}"
+            label += f": size^{exponent(x, y):.2f}"
         peer = points[0].peer
         axes.loglog(
             x,
@@ -126,7 +127,8 @@ def _curves(axes: Axes, measurements: list[Measurement], kind: Kind) -> None:
         _a_decade(axes, [kind.x(m) for m in measurements], "x")
     if kind is not COST and kind is not MEMORY:
         _a_decade(axes, [kind.y(m) for m in measurements if m.error is not None], "y")
-    across = next((f"{word} in one call" for word in COUNTED if word in measurements[0].work), kind.across)
+    named = [word for word in COUNTED if word in measurements[0].work]
+    across = f"{min(named, key=measurements[0].work.index)} in one call" if named else kind.across
     axes.set_xlabel(across if kind in (COST, MEMORY, GROWTH) else kind.across, fontsize=8)
     axes.set_ylabel(kind.up, fontsize=8)
     axes.grid(color="0.9")
