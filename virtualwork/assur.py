@@ -83,6 +83,10 @@ class _Planner:
         self.used: set[tuple[str, str]] = (
             set()
         )  # (joint, body) already spent to place a body or to close a loop
+        # long chains: what is done is not looked through again for every block
+        self.solved: set[str] = set()  # bodies whose angle the steps written so far give
+        self.settled: set[str] = set()  # placed bodies whose pins are placed too
+        self.joined: set[str] = set()  # bodies all of whose loops are closed
 
     def run(self) -> Plan:
         self.blocks = decompose(self.m)
@@ -134,15 +138,18 @@ class _Planner:
         for tie in ties:
             if not any(base in free for base, _ in tie.angle.bases):
                 self.steps.append(tie)
+                self.solved.add(tie.body)
         own = tuple(tie for tie in ties if any(base in free for base, _ in tie.angle.bases))
         self._settle()
         moving = {name for kind, name in block if kind in "xy"} - set(self.anchors)
         closures, trees = self._loops(moving, set(free) | {t.body for t in own})
         unknown = tuple(i for i in slides if i not in self.slides_known)
         if closures or free or unknown:
-            links = tuple(b for b in self.m.links if b in free or b in {t.body for t in own} or b in moving)
+            held = {*free, *(t.body for t in own), *moving}
+            links = tuple(b for b in self.m.links if b in held)
             group = Group(" + ".join(links), links, "Newton", tuple(free), unknown, tuple(closures), own)
             self.steps.append(replace(group, kind=self._kind(group)))
+            self.solved.update(group.members)
             self.slides_known.update(unknown)
         self.anchors.update(trees)
         self._settle()
@@ -254,27 +261,18 @@ class _Planner:
         while progress:
             progress = False
             for body in self.m.links:
-                if body not in self.anchors and body in self.angles and self._known(body):
+                if body not in self.anchors and body in self.solved:
                     found = self._attach(
                         body, set(self.anchors), lambda b, z: self._chain(b, z, self.anchors)
                     )
                     if found is not None:
                         self.anchors[body] = found
                         progress = True
-            for body in list(self.anchors):
+            for body in [b for b in self.anchors if b not in self.settled]:
+                self.settled.add(body)
                 for name, z in self.m.bodies[body].items():
                     if name in self.m.pins:
                         self._place(name, body, z)
-
-    def _known(self, body: str) -> bool:
-        """Is the angle of the body solved by the steps written so far?"""
-        done: set[str] = set()
-        for step in self.steps:
-            if isinstance(step, Turn):
-                done.add(step.body)
-            elif isinstance(step, Group):
-                done.update(step.members)
-        return body in done
 
     def _chain(self, body: str, z: complex, anchors: Mapping[str, Chain]) -> Chain:
         base, terms = anchors[body]
@@ -322,7 +320,11 @@ class _Planner:
         closures: list[Closure] = []
         # all loops at once: the driven links last, so that loops close over the passive side, as 003 writes them
         last = {str(e.link) for e in self.m.inputs} if self.merged else set()
-        queue = list(anchors)
+        # placed bodies matter where they meet what moves, or one that was placed since the last loops were closed
+        fresh = moving | (set(anchors) - self.joined)
+        pins = {name for body in fresh for name in self.m.bodies[body]}
+        queue = [body for body in anchors if not pins.isdisjoint(self.m.bodies[body])]
+        self.joined.update(anchors, moving)
         guides = [i for i in range(len(self.m.guides)) if (f"guide {i}", "") not in self.used]
 
         def chain(body: str, z: complex) -> Chain:

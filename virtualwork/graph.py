@@ -87,7 +87,8 @@ def decompose(m: Mechanism) -> Blocks:
     joints = sum(not row.is_input for row in rows)
     mobility = len(variables) - joints
     of_variable = _match(rows)
-    spare = [i for i in range(len(rows)) if i not in of_variable.values()]
+    matched = set(of_variable.values())
+    spare = [i for i in range(len(rows)) if i not in matched]
     _refuse_free(m, variables, rows, of_variable, mobility)
     if any(rows[i].is_input for i in spare):
         names = ", ".join(rows[i].label.removeprefix("input ") for i in spare if rows[i].is_input)
@@ -167,6 +168,7 @@ def _components(
     stack: list[Variable] = []
     on: set[Variable] = set()
     found: list[tuple[Variable, ...]] = []
+    place = {v: i for i, v in enumerate(variables)}
 
     def visit(root: Variable) -> None:
         work = [(root, iter(after[root]))]
@@ -196,7 +198,7 @@ def _components(
                         block.append(u)
                         if u == v:
                             break
-                    found.append(tuple(sorted(block, key=variables.index)))
+                    found.append(tuple(sorted(block, key=place.__getitem__)))
 
     for v in variables:
         if v not in index:
