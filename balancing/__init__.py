@@ -12,20 +12,18 @@ if TYPE_CHECKING:
     from balancing.amplitudes import AmplitudeFit, influence_from_amplitudes
     from balancing.confidence import Readings, spread
     from balancing.correction import CoincidentPlanes, Correction, Unbalances, correct
-    from balancing.influence import (
-        Balance,
+    from balancing.dependence import (
         DependentPlanes,
         DependentTrials,
-        Infeasible,
         condition_number,
-        influence_coefficients,
-        least_squares,
         plane_significance,
         unseen,
     )
+    from balancing.influence import Balance, Infeasible, influence_coefficients, least_squares
     from balancing.least_maximum import minimax
     from balancing.placement import Placement, drill_depth, place, place_from_stock, transfer
     from balancing.rotor import by_size
+    from balancing.rounding import influence_error
     from balancing.tolerance import GRADES, allocate, grade_value, permissible_unbalance
     from balancing.trial import (
         ErrorBudget,
@@ -42,10 +40,12 @@ _HOMES = {
     "balancing.amplitudes": "AmplitudeFit influence_from_amplitudes",
     "balancing.confidence": "Readings spread",
     "balancing.correction": "CoincidentPlanes Correction Unbalances correct",
-    "balancing.influence": "Balance DependentPlanes DependentTrials Infeasible condition_number influence_coefficients least_squares plane_significance unseen",
+    "balancing.dependence": "DependentPlanes DependentTrials condition_number plane_significance unseen",
+    "balancing.influence": "Balance Infeasible influence_coefficients least_squares",
     "balancing.least_maximum": "minimax",
     "balancing.placement": "Placement drill_depth place place_from_stock transfer",
     "balancing.rotor": "by_size",
+    "balancing.rounding": "influence_error",
     "balancing.tolerance": "GRADES allocate grade_value permissible_unbalance",
     "balancing.trial": "ErrorBudget Indexed TrialEffect error_budget index_balancing trial_effect trial_unbalance",
 }
@@ -87,6 +87,7 @@ __all__ = [
     "grade_value",
     "index_balancing",
     "influence_coefficients",
+    "influence_error",
     "influence_from_amplitudes",
     "least_squares",
     "minimax",

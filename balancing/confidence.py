@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.influence import _adjoint, influence_coefficients, least_squares
+from balancing.dependence import adjoint
+from balancing.influence import influence_coefficients, least_squares
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -145,13 +146,13 @@ class Readings:
         scale = 1 / np.linalg.norm(a, axis=0)
         q, r = np.linalg.qr(a * scale)
         inverse = np.linalg.inv(r) * scale[:, None]
-        gain = (inverse @ _adjoint(q))[:, : len(alpha)] * np.sqrt(weight)  # M αᴴ W, (p, s)
+        gain = (inverse @ adjoint(q))[:, : len(alpha)] * np.sqrt(weight)  # M αᴴ W, (p, s)
         share = self._share(w)
         linear = -gain[:, None, :] * share[:, None]  # (p, 1 + r, s)
         antilinear = np.zeros_like(linear)
         if self.trials is not None and self.trial_masses is not None:
             left = weight * (self.vibration + alpha @ w)
-            m, undo = inverse @ _adjoint(inverse), np.linalg.pinv(self.trial_masses)
+            m, undo = inverse @ adjoint(inverse), np.linalg.pinv(self.trial_masses)
             by_run = -(m @ undo.conj())[..., None] * left  # (p, r, s)
             # the ridge, too, follows the coefficients: λ² ‖α_p‖² w_p
             pull = (ridge**2 * w * alpha * weight[:, None]).T  # (p, s)

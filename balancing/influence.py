@@ -14,32 +14,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.dependence import (
+    EPS,
+    DependentPlanes,
+    DependentTrials,
+    adjoint,
+    columns_scaled,
+    condition_number,
+    require_independent,
+)
+
+if TYPE_CHECKING:
+    from balancing.rounding import Bounds
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-EPS = float(np.finfo(float).eps)
-
-
-class DependentPlanes(ValueError):
-    """The readings cannot tell the planes apart; `combination` is one that no sensor sees, `case` which rotor."""
-
-    def __init__(self, message: str, combination: Complex, case: tuple[int, ...] = ()) -> None:
-        self.combination = combination
-        self.case = case
-        super().__init__(message)
-
-
-class DependentTrials(ValueError):
-    """The trial runs do not tell the planes' effects apart; `combination` is one no run has tried."""
-
-    def __init__(self, message: str, combination: Complex, case: tuple[int, ...] = ()) -> None:
-        self.combination = combination
-        self.case = case
-        super().__init__(message)
 
 
 class Infeasible(ValueError):
@@ -64,6 +58,11 @@ class Balance:
     """The weights that were asked for, (..., s)."""
     bound: float | None = None
     """minimax alone: no corrections whatever leave less than this (from the dual problem)."""
+    ridge: float = 0.0
+    max_mass: Real | None = None
+    """The limits of the corrections that were asked for, (p,)."""
+    max_residual: Real | None = None
+    """The limits of the residual that were asked for, (s,)."""
 
     @cached_property
     def residual(self) -> Complex:
@@ -88,25 +87,74 @@ class Balance:
         """σ_max/σ_min of the coefficients after scaling the columns (see `condition_number`), (...)."""
         return condition_number(self.influence, self.weights)
 
-    def error_estimate(self) -> Real:
-        """Return a bound of the rounding error of `corrections` of a least-squares problem, (..., p), kg.
+    def error_estimate(
+        self,
+        quantity: str = "corrections",
+        *,
+        influence_error: ArrayLike | None = None,
+        initial_error: ArrayLike | None = None,
+    ) -> Real:
+        """Return a bound of the rounding error of a result, in its units and shape.
 
-        The data are taken as exact. Componentwise perturbation bound for least squares (Å. Björck, BIT 31 (1991)
-        238-244): |δw| ≤ c·ε·(|A⁺|(|A||w| + |V|) + |(AᴴA)⁻¹||Aᴴ||r|); the product with AᴴA is only a bound, nothing
-        is solved with it. Minimax and limited problems are judged by their objective: `residual_max` and `bound`.
+        Parameters
+        ----------
+        quantity
+            `corrections` (..., p), `residual` (..., s), `residual_max` or `residual_rms` (...): against those of the
+            exact solution.
+        influence_error, initial_error
+            Bounds of the errors of the coefficients (..., s, p) and of the vibration (..., s), which are carried on;
+            None: they are exact.
+
+        Notes
+        -----
+        Least squares: the componentwise perturbation bound of `balancing.rounding`. Limits and minimax: the optimality
+        conditions at the corrections as found (`balancing.optimality`); inf where the optimum is not unique or not
+        a smooth function of the data, with the reason in `error_reason`. Even then `residual_max` of minimax is
+        bounded, by its distance from `bound`.
+
+        Examples
+        --------
+        >>> fix = least_squares([[3, -2], [5, -2], [5, -3]], [1, -1, 0])
+        >>> bool((abs(fix.corrections - [17 / 21, 31 / 21]) <= fix.error_estimate()).all())
+        True
         """
-        if self.bound is not None:
-            raise ValueError("a minimax problem is judged by its objective: residual_max beside bound")
-        root = np.ones(self.initial.shape) if self.weights is None else np.sqrt(self.weights)
-        a, b, r = self.influence * root[..., None], self.initial * root, self.residual * root
-        q, upper = np.linalg.qr(a)
-        inverse = np.linalg.inv(upper)
-        size = np.abs(a)
-        fit = np.abs(inverse @ _adjoint(q)) @ (
-            size @ np.abs(self.corrections)[..., None] + np.abs(b)[..., None]
+        from balancing.rounding import gap_bound
+
+        both = tuple(
+            None if error is None else np.asarray(error, dtype=float)
+            for error in (influence_error, initial_error)
         )
-        rest = np.abs(inverse @ _adjoint(inverse)) @ (np.swapaxes(size, -1, -2) @ np.abs(r)[..., None])
-        return np.asarray(8 * EPS * (fit + rest)[..., 0])
+        bounds = self._bounds[0] if both == (None, None) else self._bounds_with(*both)[0]
+        if quantity == "corrections":
+            return bounds.solution
+        if quantity == "residual":
+            return bounds.residual
+        if quantity == "residual_max":
+            largest = bounds.residual.max(axis=-1)
+            if self.bound is not None and self.weights is None:
+                largest = np.minimum(largest, gap_bound(self, *both))
+            return np.asarray(largest)
+        if quantity == "residual_rms":
+            return np.asarray(np.sqrt(np.square(bounds.residual).mean(axis=-1)) + 8 * EPS * self.residual_rms)
+        raise ValueError(f"'{quantity}': expected corrections, residual, residual_max or residual_rms")
+
+    @property
+    def error_reason(self) -> str:
+        """Why `error_estimate` has no bound of the corrections; empty where it has one."""
+        return self._bounds[1]
+
+    @cached_property
+    def _bounds(self) -> tuple[Bounds, str]:
+        return self._bounds_with(None, None)
+
+    def _bounds_with(self, influence_error: Real | None, initial_error: Real | None) -> tuple[Bounds, str]:
+        from balancing.rounding import balance_bounds, unlimited
+
+        if unlimited(self):
+            return balance_bounds(self, influence_error, initial_error), ""
+        from balancing.optimality import optimum_bounds
+
+        return optimum_bounds(self, influence_error, initial_error)
 
 
 def influence_coefficients(initial: ArrayLike, trials: ArrayLike, trial_masses: ArrayLike) -> Complex:
@@ -163,13 +211,13 @@ def influence_coefficients(initial: ArrayLike, trials: ArrayLike, trial_masses: 
         raise ValueError(f"shapes do not fit: initial {v0.shape}, trials {v.shape}, trial_masses {t.shape}")
     runs, planes = t.shape[-2:]
     change = v - v0[..., None, :]
-    scaled, scale = _columns_scaled(t)
-    _require_independent(scaled, scale, runs, planes, "trial runs", DependentTrials)
+    scaled, scale = columns_scaled(t)
+    require_independent(scaled, scale, runs, planes, "trial runs", DependentTrials)
     if runs == planes:
         alpha = np.linalg.solve(scaled, np.broadcast_to(change, _lead(scaled, change) + change.shape[-2:]))
     else:
         q, r = np.linalg.qr(scaled)
-        alpha = np.linalg.solve(r, _adjoint(q) @ change)
+        alpha = np.linalg.solve(r, adjoint(q) @ change)
     return np.asarray(np.swapaxes(alpha * scale[..., None], -1, -2))
 
 
@@ -227,7 +275,7 @@ def least_squares(
     >>> (fix.corrections.real * 21).round(12)
     array([17., 31.])
     """
-    alpha, v, root = _checked(influence, initial, weights)
+    alpha, v, root = checked(influence, initial, weights)
     if ridge < 0 or not np.isfinite(ridge):
         raise ValueError("ridge must not be negative")
     w = None if weights is None else np.asarray(weights, dtype=float)
@@ -236,11 +284,10 @@ def least_squares(
             raise ValueError("ridge does not go with limits: the limits damp already")
         from balancing.least_maximum import limited_least_squares
 
-        found = limited_least_squares(alpha, v, root, max_mass, max_residual)
-        return Balance(alpha, v, found, w)
+        return limited_least_squares(Balance(alpha, v, v, w), root, max_mass, max_residual)
     a, b = (alpha, v) if root is None else (alpha * root[..., None], v * root)
     planes = alpha.shape[-1]
-    scaled, scale = _columns_scaled(a)
+    scaled, scale = columns_scaled(a)
     if ridge:
         norms = np.linalg.norm(scaled, axis=-2)
         largest = norms.max(axis=-1, keepdims=True)
@@ -259,102 +306,17 @@ def least_squares(
         b = np.take_along_axis(b, order, axis=-1)
     readings = scaled.shape[-2]
     if readings < planes:
-        _require_independent(scaled, scale, readings, planes, "readings", DependentPlanes)
+        require_independent(scaled, scale, readings, planes, "readings", DependentPlanes)
     q, r = np.linalg.qr(scaled)
-    sigma = _require_independent(r, scale, readings, planes, "readings", DependentPlanes)
-    x = np.linalg.solve(r, -(_adjoint(q) @ b[..., None]))[..., 0]
-    fix = Balance(alpha, v, np.asarray(x * scale + 0.0, dtype=complex), w)
+    sigma = require_independent(r, scale, readings, planes, "readings", DependentPlanes)
+    x = np.linalg.solve(r, -(adjoint(q) @ b[..., None]))[..., 0]
+    fix = Balance(alpha, v, np.asarray(x * scale + 0.0, dtype=complex), w, ridge=ridge)
     if not ridge:
         fix.__dict__["condition_number"] = sigma[..., 0] / sigma[..., -1]
     return fix
 
 
-def condition_number(influence: ArrayLike, weights: ArrayLike | None = None) -> Real:
-    """Return σ_max/σ_min of the coefficients: by what factor relative errors of readings can grow.
-
-    The columns are first brought within a factor of two of the largest by powers of two (without rounding),
-    so that a plane of small effect does not count as a dependent one. Shape (...); inf for dependent planes.
-
-    >>> float(condition_number([[1, 0], [0, 1000]]).round(3))
-    1.953
-    """
-    alpha = np.asarray(influence, dtype=complex)
-    if weights is not None:
-        alpha = alpha * np.sqrt(np.asarray(weights, dtype=float))[..., None]
-    scaled, _ = _columns_scaled(alpha)
-    if alpha.shape[-2] < alpha.shape[-1]:
-        return np.full(alpha.shape[:-2], np.inf)
-    sigma = np.linalg.svd(scaled, compute_uv=False)
-    low = sigma[..., -1]
-    dependent = low <= _threshold(*alpha.shape[-2:]) * sigma[..., 0]
-    return np.asarray(np.where(dependent, np.inf, sigma[..., 0] / np.where(dependent, 1.0, low)))
-
-
-def plane_significance(influence: ArrayLike, weights: ArrayLike | None = None) -> Real:
-    """Tell for each plane how much of its effect no other planes can bring about.
-
-    Returns
-    -------
-    ndarray
-        (..., p) in [0, 1]: the sine of the angle between a plane's column and all the others' span. 1: the
-        plane is independent of the others; near 0: the others can do what it does, and it should be left out.
-
-    Notes
-    -----
-    After Darlow, ASME 82-GT (1982), "non-independent balance planes". Every column is held against ALL the
-    others (of planes that are dependent only together, no two are alike). With A = QR the sine of column j
-    is 1/(‖a_j‖ ‖row j of R⁻¹‖).
-
-    Examples
-    --------
-    Three planes, of which the third does what the first two do together:
-
-    >>> plane_significance([[1, 0, 1], [0, 1, 1], [0, 0, 0.01]]).round(4)
-    array([0.01  , 0.01  , 0.0071])
-    """
-    alpha = np.asarray(influence, dtype=complex)
-    if weights is not None:
-        alpha = alpha * np.sqrt(np.asarray(weights, dtype=float))[..., None]
-    scaled, _ = _columns_scaled(alpha)
-    norms = np.linalg.norm(scaled, axis=-2)
-    unit = scaled / np.where(norms > 0, norms, 1.0)[..., None, :]
-    out = np.zeros(unit.shape[:-2] + unit.shape[-1:])
-    for j in range(unit.shape[-1]):
-        others = np.delete(unit, j, axis=-1)
-        # orthogonal complement by the SVD, so that others which depend on each other do no harm
-        u, sigma, _ = np.linalg.svd(others, full_matrices=False)
-        keep = sigma > _threshold(*unit.shape[-2:]) * sigma[..., :1]
-        left = unit[..., j]
-        for _ in range(2):  # twice is enough (Kahan, Parlett)
-            inside = np.where(keep, np.matvec(_adjoint(u), left), 0)
-            left = left - np.matvec(u, inside)
-        out[..., j] = np.linalg.norm(left, axis=-1)
-    return np.where(out > _threshold(*unit.shape[-2:]), np.minimum(out, 1.0), 0.0)
-
-
-def unseen(influence: ArrayLike, weights: ArrayLike | None = None) -> tuple[Complex, float]:
-    """Return the combination of planes that the readings see least, and how well they see it.
-
-    The combination is complex (p,), with its largest component 1; the second value is σ_min/σ_max of the
-    scaled coefficients (0 for a combination that cannot be seen).
-
-    >>> np.abs(unseen([[1, 2], [2, 4]])[0]).round(3)
-    array([1. , 0.5])
-    """
-    alpha = np.asarray(influence, dtype=complex)
-    if weights is not None:
-        alpha = alpha * np.sqrt(np.asarray(weights, dtype=float))[..., None]
-    scaled, scale = _columns_scaled(alpha)
-    _, sigma, vh = np.linalg.svd(scaled)
-    smallest = sigma[-1] / sigma[0] if len(sigma) == scaled.shape[1] and sigma[0] > 0 else 0.0
-    return _normed(vh[-1].conj() * scale), float(smallest)
-
-
-def _normed(direction: Complex) -> Complex:
-    return np.asarray(direction / direction[np.argmax(np.abs(direction) >= 0.999 * np.abs(direction).max())])
-
-
-def _checked(
+def checked(
     influence: ArrayLike, initial: ArrayLike, weights: ArrayLike | None
 ) -> tuple[Complex, Complex, Real | None]:
     """Return α, V and the square roots of the weights."""
@@ -370,62 +332,6 @@ def _checked(
     if not ((w >= 0) & (w < np.inf)).all() or not (w > 0).any():
         raise ValueError("weights must not be negative, and not all zero")
     return alpha, v, np.sqrt(w)
-
-
-def _columns_scaled(a: Complex) -> tuple[Complex, Real]:
-    """Return a·diag(scale) with columns within a factor of two of the largest, and the scale (powers of two)."""
-    re, im = a.real, a.imag
-    square = np.einsum("...sp,...sp->...p", re, re) + np.einsum("...sp,...sp->...p", im, im)
-    if square.min() > 1e-280 and square.max() < 1e280:
-        exponent = (
-            np.frexp(square.max(axis=-1, keepdims=True) / square)[1] - 1
-        ) >> 1  # ⌊log₂ of the norms' ratio⌋
-    else:  # the squares leave the range of numbers, or a column is zero
-        peak = np.maximum(np.abs(re), np.abs(im)).max(axis=-2)
-        highest = peak.max(axis=-1, keepdims=True)
-        exponent = np.where(peak > 0, np.frexp(highest)[1] - np.frexp(peak)[1], 0)
-    if not exponent.any():
-        return a, np.ones(square.shape)
-    scale = np.ldexp(1.0, exponent)
-    return a * scale[..., None, :], scale
-
-
-def _threshold(rows: int, columns: int) -> float:
-    """Below this ratio of singular values a combination of planes lies in the rounding of the data."""
-    return 64 * max(rows, columns) * EPS
-
-
-def _require_independent(
-    a: Complex,
-    scale: Real,
-    rows: int,
-    columns: int,
-    what: str,
-    error: type[DependentPlanes | DependentTrials],
-) -> Real:
-    """Return the singular values of scaled columns, or raise with the combination that is not seen."""
-    if rows >= columns:
-        sigma = np.linalg.svd(a, compute_uv=False)
-        bad = ~(sigma[..., -1] > _threshold(rows, columns) * sigma[..., 0])
-        if not bad.any():
-            return np.asarray(sigma)
-        case = tuple(int(i[0]) for i in np.nonzero(bad)) if bad.ndim else ()
-    else:
-        case = (0,) * (a.ndim - 2)
-    vh = np.linalg.svd(a[case])[2]
-    combination = _normed(vh[-1].conj() * np.broadcast_to(scale, a.shape[:-2] + scale.shape[-1:])[case])
-    planes = np.flatnonzero(np.abs(combination) > 1e-6).tolist()
-    if rows < columns:
-        message = f"{columns} planes need at least as many {what}, found {rows}"
-    elif len(planes) == 1:
-        message = f"the {what} do not show plane {planes[0]} at all"
-    else:
-        message = f"the {what} do not tell the planes {', '.join(map(str, planes))} apart"
-    raise error(message, combination, case)
-
-
-def _adjoint(a: Complex) -> Complex:
-    return np.swapaxes(a, -1, -2).conj()
 
 
 def _lead(*arrays: Complex) -> tuple[int, ...]:

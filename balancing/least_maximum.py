@@ -10,19 +10,15 @@ it). The dual solution y is the proof: for any y with αᴴy = 0 and Σ|y_s| = 1
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.cones import Cones, solve
-from balancing.influence import (
-    EPS,
-    Balance,
-    DependentPlanes,
-    Infeasible,
-    _checked,
-    _columns_scaled,
-    least_squares,
-)
+from balancing.dependence import EPS, DependentPlanes, columns_scaled
+from balancing.influence import Balance, Infeasible, checked, least_squares
+from balancing.rounding import roundings
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -74,7 +70,7 @@ def minimax(
     >>> fix.corrections.real.round(9), fix.residual_max.round(12), round(fix.bound, 12)
     (array([1. , 1.8]), np.float64(0.4), 0.4)
     """
-    alpha, v, _ = _checked(influence, initial, weights)
+    alpha, v, _ = checked(influence, initial, weights)
     if alpha.ndim != 2 or v.ndim != 1:
         raise ValueError(
             f"one rotor at a time: expected influence (s, p), initial (s,), found {alpha.shape}, {v.shape}"
@@ -90,23 +86,30 @@ def minimax(
     if not len(b):
         raise DependentPlanes("the readings show no plane at all", np.eye(alpha.shape[1], dtype=complex)[0])
     corrections, bound = _smallest(a, b, limit)
-    return Balance(alpha, v, corrections, w, max(bound, floor))
+    return Balance(alpha, v, corrections, w, max(bound, floor, 0.0), max_mass=_given(limit))
 
 
 def limited_least_squares(
-    alpha: Complex,
-    v: Complex,
-    root: Real | None,
-    max_mass: ArrayLike | None,
-    max_residual: ArrayLike | None,
-) -> Complex:
-    """Least squares with limits; see `balancing.least_squares`."""
+    problem: Balance, root: Real | None, max_mass: ArrayLike | None, max_residual: ArrayLike | None
+) -> Balance:
+    """Least squares with limits; see `balancing.least_squares`. The corrections of `problem` are not looked at."""
+    alpha, v = problem.influence, problem.initial
     if alpha.ndim != 2 or v.ndim != 1:
         raise ValueError("limits are for one rotor at a time: expected influence (s, p), initial (s,)")
     limit = _limits(max_mass, alpha.shape[1])
     ceiling = np.broadcast_to(np.inf if max_residual is None else np.asarray(max_residual, float), v.shape)
     if not (ceiling > 0).all():
         raise ValueError("max_residual must be positive")
+    found = _limited(alpha, v, root, limit, ceiling)
+    return replace(problem, corrections=found, max_mass=_given(limit), max_residual=_given(ceiling))
+
+
+def _given(limit: Real) -> Real | None:
+    return limit if np.isfinite(limit).any() else None
+
+
+def _limited(alpha: Complex, v: Complex, root: Real | None, limit: Real, ceiling: Real) -> Complex:
+    """Return the corrections of least squares within limits."""
     try:
         free = least_squares(alpha, v, None if root is None else root**2)
         if (np.abs(free.corrections) <= limit).all() and (np.abs(free.residual) <= ceiling).all():
@@ -129,7 +132,8 @@ def limited_least_squares(
     cones = [space.limits()]
     if capped.any():
         ratio = alpha[capped] / ceiling[capped, None]
-        cones.append((space.within(ratio), v[capped] / ceiling[capped], np.ones(int(capped.sum()))))
+        here = (v[capped] + alpha[capped] @ space.start) / ceiling[capped]
+        cones.append((space.within(ratio), here, np.ones(int(capped.sum()))))
     problem = Cones(
         np.concatenate([c[0] for c in cones]),
         np.concatenate([c[1] for c in cones]),
@@ -202,7 +206,9 @@ def _smallest(a: Complex, b: Complex, limit: Real) -> tuple[Complex, float]:
         if not np.isfinite(limit).any():
             y = y - q @ (q.conj().T @ y)
             y = y - q @ (q.conj().T @ y)
-            bound = float(np.vdot(y, c).real) / float(np.abs(y).sum()) * space.size
+            # less what rounding may have added
+            proof = float(np.vdot(y, c).real) / float(np.abs(y).sum())
+            bound = (proof - roundings(readings)) * space.size
         else:
             bound = space.bound(y, w)
     return w, max(bound, 0.0)
@@ -234,7 +240,7 @@ class _Space:
             rows = np.zeros((len(self.limited), a.shape[1]), dtype=complex)
             rows[np.arange(len(self.limited)), self.limited] = 1 / limit[self.limited]
             stack = np.concatenate([stack, rows])
-        stack, self.scale = _columns_scaled(stack)
+        stack, self.scale = columns_scaled(stack)
         self.q, self.r = np.linalg.qr(stack)
         readings = len(b)
         self.residuals = self.q[:readings], left / self.size
@@ -275,6 +281,8 @@ class _Space:
             total = float(np.abs(y).sum())
             if total > 0:
                 y = y / total
-                pull = np.abs(self.a.conj().T @ y)[self.limited]
-                best = max(best, float(np.vdot(y, self.b).real - pull @ self.limit[self.limited]))
+                pull = float(np.abs(self.a.conj().T @ y)[self.limited] @ self.limit[self.limited])
+                proof = float(np.vdot(y, self.b).real) - pull
+                # less what rounding may have added
+                best = max(best, proof - roundings(len(y)) * (float(np.abs(self.b).max()) + pull))
         return best

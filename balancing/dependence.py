@@ -1,0 +1,175 @@
+"""Do the readings tell the planes apart? Condition numbers, and the combinations of planes that no sensor sees.
+
+All of it is of coefficients whose columns are first brought to like size by powers of two: a plane of small effect
+does not count as a dependent one, and nothing is rounded.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+EPS = float(np.finfo(float).eps)
+
+
+class DependentPlanes(ValueError):
+    """The readings cannot tell the planes apart; `combination` is one that no sensor sees, `case` which rotor."""
+
+    def __init__(self, message: str, combination: Complex, case: tuple[int, ...] = ()) -> None:
+        self.combination = combination
+        self.case = case
+        super().__init__(message)
+
+
+class DependentTrials(ValueError):
+    """The trial runs do not tell the planes' effects apart; `combination` is one no run has tried."""
+
+    def __init__(self, message: str, combination: Complex, case: tuple[int, ...] = ()) -> None:
+        self.combination = combination
+        self.case = case
+        super().__init__(message)
+
+
+def condition_number(influence: ArrayLike, weights: ArrayLike | None = None) -> Real:
+    """Return σ_max/σ_min of the coefficients: by what factor relative errors of readings can grow.
+
+    The columns are first brought within a factor of two of the largest by powers of two (without rounding),
+    so that a plane of small effect does not count as a dependent one. Shape (...); inf for dependent planes.
+
+    >>> float(condition_number([[1, 0], [0, 1000]]).round(3))
+    1.953
+    """
+    alpha = np.asarray(influence, dtype=complex)
+    if weights is not None:
+        alpha = alpha * np.sqrt(np.asarray(weights, dtype=float))[..., None]
+    scaled, _ = columns_scaled(alpha)
+    if alpha.shape[-2] < alpha.shape[-1]:
+        return np.full(alpha.shape[:-2], np.inf)
+    sigma = np.linalg.svd(scaled, compute_uv=False)
+    low = sigma[..., -1]
+    dependent = low <= threshold(*alpha.shape[-2:]) * sigma[..., 0]
+    return np.asarray(np.where(dependent, np.inf, sigma[..., 0] / np.where(dependent, 1.0, low)))
+
+
+def plane_significance(influence: ArrayLike, weights: ArrayLike | None = None) -> Real:
+    """Tell for each plane how much of its effect no other planes can bring about.
+
+    Returns
+    -------
+    ndarray
+        (..., p) in [0, 1]: the sine of the angle between a plane's column and all the others' span. 1: the
+        plane is independent of the others; near 0: the others can do what it does, and it should be left out.
+
+    Notes
+    -----
+    After Darlow, ASME 82-GT (1982), "non-independent balance planes". Every column is held against ALL the
+    others (of planes that are dependent only together, no two are alike). With A = QR the sine of column j
+    is 1/(‖a_j‖ ‖row j of R⁻¹‖).
+
+    Examples
+    --------
+    Three planes, of which the third does what the first two do together:
+
+    >>> plane_significance([[1, 0, 1], [0, 1, 1], [0, 0, 0.01]]).round(4)
+    array([0.01  , 0.01  , 0.0071])
+    """
+    alpha = np.asarray(influence, dtype=complex)
+    if weights is not None:
+        alpha = alpha * np.sqrt(np.asarray(weights, dtype=float))[..., None]
+    scaled, _ = columns_scaled(alpha)
+    norms = np.linalg.norm(scaled, axis=-2)
+    unit = scaled / np.where(norms > 0, norms, 1.0)[..., None, :]
+    out = np.zeros(unit.shape[:-2] + unit.shape[-1:])
+    for j in range(unit.shape[-1]):
+        others = np.delete(unit, j, axis=-1)
+        # orthogonal complement by the SVD, so that others which depend on each other do no harm
+        u, sigma, _ = np.linalg.svd(others, full_matrices=False)
+        keep = sigma > threshold(*unit.shape[-2:]) * sigma[..., :1]
+        left = unit[..., j]
+        for _ in range(2):  # twice is enough (Kahan, Parlett)
+            inside = np.where(keep, np.matvec(adjoint(u), left), 0)
+            left = left - np.matvec(u, inside)
+        out[..., j] = np.linalg.norm(left, axis=-1)
+    return np.where(out > threshold(*unit.shape[-2:]), np.minimum(out, 1.0), 0.0)
+
+
+def unseen(influence: ArrayLike, weights: ArrayLike | None = None) -> tuple[Complex, float]:
+    """Return the combination of planes that the readings see least, and how well they see it.
+
+    The combination is complex (p,), with its largest component 1; the second value is σ_min/σ_max of the
+    scaled coefficients (0 for a combination that cannot be seen).
+
+    >>> np.abs(unseen([[1, 2], [2, 4]])[0]).round(3)
+    array([1. , 0.5])
+    """
+    alpha = np.asarray(influence, dtype=complex)
+    if weights is not None:
+        alpha = alpha * np.sqrt(np.asarray(weights, dtype=float))[..., None]
+    scaled, scale = columns_scaled(alpha)
+    _, sigma, vh = np.linalg.svd(scaled)
+    smallest = sigma[-1] / sigma[0] if len(sigma) == scaled.shape[1] and sigma[0] > 0 else 0.0
+    return _normed(vh[-1].conj() * scale), float(smallest)
+
+
+def _normed(direction: Complex) -> Complex:
+    return np.asarray(direction / direction[np.argmax(np.abs(direction) >= 0.999 * np.abs(direction).max())])
+
+
+def columns_scaled(a: Complex) -> tuple[Complex, Real]:
+    """Return a·diag(scale) with columns within a factor of two of the largest, and the scale (powers of two)."""
+    re, im = a.real, a.imag
+    square = np.einsum("...sp,...sp->...p", re, re) + np.einsum("...sp,...sp->...p", im, im)
+    if square.min() > 1e-280 and square.max() < 1e280:
+        exponent = (
+            np.frexp(square.max(axis=-1, keepdims=True) / square)[1] - 1
+        ) >> 1  # ⌊log₂ of the norms' ratio⌋
+    else:  # the squares leave the range of numbers, or a column is zero
+        peak = np.maximum(np.abs(re), np.abs(im)).max(axis=-2)
+        highest = peak.max(axis=-1, keepdims=True)
+        exponent = np.where(peak > 0, np.frexp(highest)[1] - np.frexp(peak)[1], 0)
+    if not exponent.any():
+        return a, np.ones(square.shape)
+    scale = np.ldexp(1.0, exponent)
+    return a * scale[..., None, :], scale
+
+
+def threshold(rows: int, columns: int) -> float:
+    """Below this ratio of singular values a combination of planes lies in the rounding of the data."""
+    return 64 * max(rows, columns) * EPS
+
+
+def require_independent(
+    a: Complex,
+    scale: Real,
+    rows: int,
+    columns: int,
+    what: str,
+    error: type[DependentPlanes | DependentTrials],
+) -> Real:
+    """Return the singular values of scaled columns, or raise with the combination that is not seen."""
+    if rows >= columns:
+        sigma = np.linalg.svd(a, compute_uv=False)
+        bad = ~(sigma[..., -1] > threshold(rows, columns) * sigma[..., 0])
+        if not bad.any():
+            return np.asarray(sigma)
+        case = tuple(int(i[0]) for i in np.nonzero(bad)) if bad.ndim else ()
+    else:
+        case = (0,) * (a.ndim - 2)
+    vh = np.linalg.svd(a[case])[2]
+    combination = _normed(vh[-1].conj() * np.broadcast_to(scale, a.shape[:-2] + scale.shape[-1:])[case])
+    planes = np.flatnonzero(np.abs(combination) > 1e-6).tolist()
+    if rows < columns:
+        message = f"{columns} planes need at least as many {what}, found {rows}"
+    elif len(planes) == 1:
+        message = f"the {what} do not show plane {planes[0]} at all"
+    else:
+        message = f"the {what} do not tell the planes {', '.join(map(str, planes))} apart"
+    raise error(message, combination, case)
+
+
+def adjoint(a: Complex) -> Complex:
+    """Return the conjugate transpose of matrices (..., m, n)."""
+    return np.swapaxes(a, -1, -2).conj()

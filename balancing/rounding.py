@@ -1,0 +1,192 @@
+"""Bounds of the rounding errors of influence coefficients and of least-squares corrections.
+
+With r = A x + b at the computed x, the error is (AᴴA)⁻¹Aᴴr: what this is as computed, and what the roundings of
+computing it can hide, by the componentwise perturbation bound of least squares (Å. Björck, BIT 31 (1991) 238-244),
+|·| of every component,
+
+    |δx| ≤ |(AᴴA)⁻¹ Aᴴ r| + |A⁺| (δA |x| + δb) + |(AᴴA)⁻¹| δAᴴ |r|,
+    |δr| ≤ |A (AᴴA)⁻¹ Aᴴ r| + |I − A A⁺| (δA |x| + δb) + |A⁺ᴴ| δAᴴ |r|.
+
+The same bound carries errors of the given data on, where they are known. The matrices stand in bounds only: nothing
+is solved with AᴴA. Corrections under limits, and those of the minimax problem, are in `balancing.optimality`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from balancing.dependence import EPS, adjoint, columns_scaled
+
+if TYPE_CHECKING:
+    from balancing.influence import Balance
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Bounds(NamedTuple):
+    """Bounds of a solution (..., n) and of its residual (..., m)."""
+
+    solution: Real
+    residual: Real
+
+
+def roundings(terms: int) -> float:
+    """Return by what share of its terms' size a computed sum of so many complex products can be wrong."""
+    return (terms / 4 + 2) * EPS
+
+
+def perturbed(a: Complex, b: Complex, x: Complex, r: Complex, da: Real, db: Real) -> Bounds:
+    """Bound the errors of x, the least-squares solution of A x + b = r ≈ 0, and of r; da, db: errors of A and b."""
+    lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1], x.shape[:-1])
+    # rows in the order of their size, columns of like size: then each row of A⁺ keeps its digits
+    order = np.argsort(-np.abs(a).max(axis=-1), axis=-1, kind="stable")
+    scaled, scale = columns_scaled(np.take_along_axis(a, order[..., None], axis=-2))
+    q, upper = np.linalg.qr(scaled)
+    q = np.take_along_axis(q, np.argsort(order, axis=-1)[..., None], axis=-2)
+    inverse: Complex = np.asarray(np.linalg.inv(upper) * scale[..., None], dtype=complex)
+    pseudo = inverse @ adjoint(q)
+    wrong = (da @ np.abs(x)[..., None])[..., 0] + db
+    pull = (np.swapaxes(da, -1, -2) @ np.abs(r)[..., None])[..., 0]
+    outside = np.eye(a.shape[-2]) - q @ adjoint(q)
+    # how far x is from the solution as far as it can be seen; R⁻ᴴ first: what is left is small there
+    off = np.matvec(inverse, np.matvec(adjoint(inverse), np.matvec(adjoint(a), r)))
+    solution = np.abs(off) + np.matvec(np.abs(pseudo), wrong)
+    solution = solution + np.matvec(np.abs(inverse @ adjoint(inverse)), pull)
+    left = (
+        np.abs(np.matvec(a, off))
+        + np.matvec(np.abs(outside), wrong)
+        + np.matvec(np.abs(adjoint(pseudo)), pull)
+    )
+    return Bounds(np.broadcast_to(solution, lead + x.shape[-1:]), np.broadcast_to(left, lead + r.shape[-1:]))
+
+
+def influence_error(
+    initial: ArrayLike,
+    trials: ArrayLike,
+    trial_masses: ArrayLike,
+    *,
+    reading_error: tuple[ArrayLike, ArrayLike] | None = None,
+    mass_error: ArrayLike | None = None,
+) -> Real:
+    """Return a bound of the rounding error of `influence_coefficients`, (..., s, p), amplitude per kg.
+
+    Parameters
+    ----------
+    initial, trials, trial_masses
+        As given to `influence_coefficients`: (..., s), (..., r, s), (..., r, p).
+    reading_error
+        Bounds of the errors of the readings, (initial, trials); None: they are exact. Where a trial run hardly
+        differs from the initial one they, and not the arithmetic, are what matters.
+    mass_error
+        Bounds of the errors of the trial masses, (..., r, p), kg; None: exact.
+
+    Notes
+    -----
+    The coefficients of each sensor solve T α = V_j - V_0 by least squares, see the module. How readings' own errors
+    grow is `condition_number(trial_masses)`.
+
+    Examples
+    --------
+    A difference of two exact readings has all its digits, however little they differ:
+
+    >>> bound = influence_error([1.0], [[1.0 + 2**-40]], [[1.0]])
+    >>> bool(bound[0, 0] < 1e-14 * 2**-40)
+    True
+    >>> float(influence_error([1.0], [[1.0 + 2**-40]], [[1.0]], reading_error=([1e-16], [[1e-16]]))[0, 0].round(17))
+    2e-16
+    """
+    from balancing.influence import influence_coefficients
+
+    v0, v = np.asarray(initial, dtype=complex), np.asarray(trials, dtype=complex)
+    t = np.asarray(trial_masses, dtype=complex)
+    alpha = influence_coefficients(v0, v, t)
+    change = np.swapaxes(v - v0[..., None, :], -1, -2)  # (..., s, r)
+    c = roundings(t.shape[-1])
+    off: Real = c * np.abs(change)
+    if reading_error is not None:
+        e0, e = (np.asarray(part, dtype=float) for part in reading_error)
+        off = off + np.swapaxes(e + e0[..., None, :], -1, -2)
+    of_masses = c * np.abs(t) + (0.0 if mass_error is None else np.asarray(mass_error, dtype=float))
+    each = t[..., None, :, :]
+    left = np.matvec(each, alpha) - change
+    return perturbed(each, -change, alpha, left, of_masses[..., None, :, :], off).solution
+
+
+def balance_bounds(fix: Balance, influence_error: Real | None, initial_error: Real | None) -> Bounds:
+    """Bound the errors of the corrections of a least-squares problem without limits, and of its residual."""
+    alpha, v, w = fix.influence, fix.initial, fix.corrections
+    sensors, planes = alpha.shape[-2:]
+    c = roundings(planes)
+    da = c * np.abs(alpha) + (0.0 if influence_error is None else influence_error)
+    db = c * np.abs(v) + (0.0 if initial_error is None else initial_error)
+    root = np.ones(v.shape) if fix.weights is None else np.sqrt(fix.weights)
+    a, b, r = alpha * root[..., None], v * root, fix.residual * root
+    da, db = da * root[..., None], db * root
+    if fix.ridge:
+        a, b, r, da, db = _damped(fix.ridge, a, b, r, da, db, w)
+    bounds = perturbed(a, b, w, r, da, db)
+    safe = np.where(root > 0, root, 1.0)
+    # a reading without weight takes no part: its residual follows the corrections
+    follows = np.matvec(np.abs(alpha), bounds.solution)
+    own = c * (np.abs(v) + np.matvec(np.abs(alpha), np.abs(w)))
+    if influence_error is not None:
+        own = own + np.matvec(influence_error, np.abs(w))
+    if initial_error is not None:
+        own = own + initial_error
+    left = np.where(root > 0, np.minimum(bounds.residual[..., :sensors] / safe, follows), follows)
+    return Bounds(bounds.solution, left + own)
+
+
+def _damped(
+    ridge: float, a: Complex, b: Complex, r: Complex, da: Real, db: Real, w: Complex
+) -> tuple[Complex, Complex, Complex, Real, Real]:
+    """Return the problem with the rows λ‖α_p‖ w_p of `ridge` below it."""
+    norms = np.linalg.norm(a, axis=-2)
+    norms = ridge * np.where(norms > 0, norms, norms.max(axis=-1, keepdims=True))
+    below = norms[..., None] * np.eye(a.shape[-1])
+    of_norms = ridge * np.linalg.norm(da, axis=-2)[..., None] * np.eye(a.shape[-1])
+    lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1])
+    zeros = np.zeros((*lead, a.shape[-1]))
+
+    def joined(one: NDArray[Any], other: NDArray[Any], axis: int) -> NDArray[Any]:
+        axes = -axis
+        shape = lead + one.shape[-axes:], lead + other.shape[-axes:]
+        return np.concatenate([np.broadcast_to(one, shape[0]), np.broadcast_to(other, shape[1])], axis=axis)
+
+    return (
+        joined(a, below, -2),
+        joined(b, zeros, -1),
+        joined(r, norms * w, -1),
+        joined(da, of_norms, -2),
+        joined(db, zeros, -1),
+    )
+
+
+def unlimited(fix: Balance) -> bool:
+    """Tell whether corrections are those of least squares: without limits, or where none holds them."""
+    if fix.bound is not None:
+        # a rotor that minimax balances to nothing is balanced by least squares
+        noise = np.abs(fix.influence) @ np.abs(fix.corrections) + np.abs(fix.initial)
+        if fix.bound > 0 or float(fix.residual_max) > 64 * EPS * float(noise.max()):
+            return False
+        return fix.max_mass is None or bool((np.abs(fix.corrections) < fix.max_mass * (1 - 1e-9)).all())
+    if fix.max_mass is not None and not (np.abs(fix.corrections) < fix.max_mass * (1 - 1e-9)).all():
+        return False
+    return fix.max_residual is None or bool((np.abs(fix.residual) < fix.max_residual * (1 - 1e-9)).all())
+
+
+def gap_bound(fix: Balance, influence_error: Real | None, initial_error: Real | None) -> Real:
+    """Bound the error of `residual_max` of a minimax problem by its distance from the dual bound."""
+    assert fix.bound is not None
+    size = np.abs(fix.corrections)
+    terms = np.abs(fix.initial) + np.abs(fix.influence) @ size
+    wrong = roundings(fix.influence.shape[-1]) * terms
+    if influence_error is not None:
+        wrong = wrong + influence_error @ size
+    if initial_error is not None:
+        wrong = wrong + initial_error
+    return np.asarray(max(float(fix.residual_max) - fix.bound, 0.0) + wrong.max())
