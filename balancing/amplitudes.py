@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+EPS = float(np.finfo(float).eps)
 
 STARTS = 24
 """Directions from which the fit is started: it has few minima, all found from so many."""
@@ -24,6 +28,49 @@ class AmplitudeFit:
     """√(mean square of fitted - read amplitude) over the trial runs, (s,)."""
     other: Complex
     """A second coefficient (s,) that fits (almost) as well, or NaN where the answer is unique."""
+    initial: Real
+    """The amplitudes it was found from, (s,), those of the trial runs (r, s), and the trial masses (r,), kg."""
+    trials: Real
+    trial_masses: Complex
+
+    @cached_property
+    def _at(self) -> _Normal:
+        """The normal equations at the coefficients, relative to each sensor's initial amplitude and to the masses."""
+        t = self.trial_masses / np.abs(self.trial_masses).max()
+        z = self.influence * np.abs(self.trial_masses).max() / self.initial
+        return _normal(z, (self.trials / self.initial).T, t)
+
+    @property
+    def condition_number(self) -> Real:
+        """By what factor relative errors of the readings can grow in the coefficient, (s,); inf where circles touch."""
+        at = self._at
+        gain = np.linalg.norm(at.gain(at.rows), axis=-2).max(axis=-1)  # largest |∂z/∂R| over the runs
+        size = np.abs(self.influence) * np.abs(self.trial_masses).max() / self.initial
+        return np.asarray(gain * (self.trials / self.initial).max(axis=0) / np.where(size > 0, size, np.nan))
+
+    def error_estimate(self, quantity: str = "influence") -> Real:
+        """Return a bound of the rounding error of `influence` or of `misfit`, (s,); the readings taken as exact.
+
+        With f_r = |O + α t_r| - R_r and J its derivatives the fit is where Jᵀf = 0: its value there as computed, with
+        what rounding hides of it, times the inverse of the exact second derivatives H. inf where H is singular: two
+        circles that touch, trials on a line through them.
+        """
+        at, c = self._at, 4 * EPS
+        f, length = np.abs(at.f), at.length
+        reach = 1 + np.abs(at.z)[:, None] * np.abs(at.t)
+        of_f = c * (reach + at.read)
+        of_rows = c * np.abs(at.t) * (1 + reach / np.where(length > 0, length, 1.0))
+        value = np.abs(at.gain(np.einsum("srk,sr->sk", at.rows, at.f)[:, None])[..., 0])
+        bound = value + np.einsum("skr,sr->sk", np.abs(at.gain(at.rows)), of_f)
+        bound = bound + np.einsum("skl,sr,sr->sk", np.abs(at.inverse), of_rows, f)
+        z = np.hypot(bound[:, 0], bound[:, 1])
+        unit = self.initial / np.abs(self.trial_masses).max()
+        if quantity == "influence":
+            return np.asarray(z * unit + c * np.abs(self.influence))
+        if quantity == "misfit":
+            each = of_f + np.abs(at.t) * z[:, None]
+            return np.asarray(np.sqrt(np.square(each).mean(axis=-1)) * self.initial + c * self.misfit)
+        raise ValueError(f"'{quantity}': expected influence or misfit")
 
 
 def influence_from_amplitudes(initial: ArrayLike, trials: ArrayLike, trial_masses: ArrayLike) -> AmplitudeFit:
@@ -86,7 +133,48 @@ def influence_from_amplitudes(initial: ArrayLike, trials: ArrayLike, trial_masse
         np.array([fit[0] for fit in found]) * o / unit,
         np.array([fit[1] for fit in found]) * o,
         np.array([fit[2] for fit in found]) * o / unit,
+        o,
+        reading,
+        t,
     )
+
+
+class _Normal(NamedTuple):
+    """Σ (|1 + z t_r| - R_r)² about z, for each of several z (n,): values f, rows of derivatives by (Re z, Im z)."""
+
+    z: Complex
+    t: Complex
+    read: Real
+    length: Real
+    f: Real
+    rows: Real
+    """(n, r, 2)."""
+    inverse: Real
+    """The inverse of the second derivatives, (n, 2, 2); inf where they are singular."""
+
+    def gain(self, rows: Real) -> Real:
+        """H⁻¹ times derivatives (n, r, 2): (n, 2, r)."""
+        return np.asarray(self.inverse @ np.swapaxes(rows, -1, -2))
+
+
+def _normal(z: Complex, read: Real, t: Complex) -> _Normal:
+    """Work out the normal equations at z (n,) for readings (n, r) or (r,)."""
+    y = 1 + z[:, None] * t
+    length = np.abs(y)
+    u = y / np.where(length > 0, length, 1.0)
+    f = length - read
+    # d|y| = Re(ū t dz): rows (Re, -Im) of ū t; the exact curvature |y|'' = (Im ū t dz)²/|y|
+    slope = u.conj() * t
+    rows = np.stack([slope.real, -slope.imag], axis=-1)
+    across = np.stack([slope.imag, slope.real], axis=-1)
+    bend = np.where(length > 1e-12, f / np.where(length > 0, length, 1.0), 0.0)
+    hessian = np.einsum("nrk,nrl->nkl", rows, rows) + np.einsum("nr,nrk,nrl->nkl", bend, across, across)
+    a, b, c = hessian[:, 0, 0], hessian[:, 0, 1], hessian[:, 1, 1]
+    det = a * c - b * b
+    sure = np.abs(det) > 64 * EPS * (np.abs(a * c) + b * b)
+    adjugate = np.stack([np.stack([c, -b], axis=-1), np.stack([-b, a], axis=-1)], axis=-2)
+    inverse = adjugate / np.where(sure, det, 1.0)[:, None, None]
+    return _Normal(z, t, read, length, f, rows, np.where(sure[:, None, None], inverse, np.inf))
 
 
 def _fit(read: Real, t: Complex) -> tuple[complex, float, complex]:
@@ -125,6 +213,7 @@ def _fit(read: Real, t: Complex) -> tuple[complex, float, complex]:
         if (np.abs(move).max(axis=1) <= 1e-15 * np.abs(z)).all():
             break
     best = int(np.argmin(cost))
+    z[best] = _finished(z[best], read, t)
     misfit = float(np.sqrt(cost[best] / len(t)))
     away = np.abs(z - z[best]) > 1e-3 * abs(z[best])
     rival: complex = complex(np.nan, np.nan)
@@ -134,6 +223,22 @@ def _fit(read: Real, t: Complex) -> tuple[complex, float, complex]:
         if np.sqrt(cost[second] / len(t)) <= max(2 * misfit, 1e-3 * float(np.abs(read).max())):
             rival = complex(z[second])
     return complex(z[best]), misfit, rival
+
+
+def _finished(z: complex, read: Real, t: Complex) -> complex:
+    """Finish by Newton's method on the gradient: the cost is flat near its minimum, and shows half of the digits."""
+    here = _normal(np.array([z]), read, t)
+    for _ in range(4):
+        pull = here.gain(np.einsum("nrk,nr->nk", here.rows, here.f)[:, None])[0, :, 0]
+        step = complex(pull[0], pull[1])
+        if not abs(step) < 1e-4 * abs(z):
+            break
+        there = _normal(np.array([z - step]), read, t)
+        last, new = (np.linalg.norm(np.einsum("rk,r->k", at.rows[0], at.f[0])) for at in (here, there))
+        if new >= last:
+            break
+        z, here = z - step, there
+    return z
 
 
 def _cost(z: Complex, read: Real, t: Complex) -> Real:

@@ -158,19 +158,80 @@ class Correction:
             _complex(exact_sum(_joined([*couple, product, error + lever_error * parts]), axis=-2)[0]),
         )
 
-    def error_estimate(self) -> Real:
-        """Return a bound of the rounding error of `unbalance`, (..., p), kg·m, the given data taken as exact.
+    def error_estimate(self, quantity: str = "unbalance", *, at: ArrayLike | None = None) -> Real:
+        """Return a bound of the rounding error of a result, the given data taken as exact.
 
-        The moments are rounded once, each product, sum and quotient once more; a sum that cancels between
-        planes keeps the error of its terms.
+        Parameters
+        ----------
+        quantity
+            `unbalance` (..., p), `static` (...), `couple` (...) about `at` (default: the first plane), `mass` at the
+            radius `at` (..., p), `angle` (..., p; π where it is not known), `residual_static`, `residual_couple` (...).
+        at
+            The plane of a couple, m, or the radius of masses, m.
+
+        Notes
+        -----
+        Sums are known to some 30 digits of their terms and rounded once; each product, sum and quotient once more; a
+        sum over planes that cancels keeps the error of its terms.
         """
         u = np.finfo(float).eps / 2
+        if quantity in ("static", "couple"):
+            if quantity == "static":
+                return np.asarray(2 * u * np.abs(self.static) + self._hidden)
+            about = self.planes[..., 0] if at is None else np.asarray(at, dtype=float)
+            return np.asarray(
+                2 * u * np.abs(self.couple(about)) + self._hidden_about(about[..., None])[..., 0]
+            )
+        if quantity in ("residual_static", "residual_couple"):
+            added = np.abs(self.unbalance)
+            terms = self._hidden + 4 * u * u * self.planes.shape[-1] * added.sum(axis=-1)
+            if quantity == "residual_static":
+                return np.asarray(2 * u * np.abs(self.residual.static) + terms)
+            lever = np.abs(self.planes - self.planes[..., :1])
+            terms = 8 * u * u * self.planes.shape[-1] * (lever * added).sum(axis=-1)
+            terms = terms + self._hidden_about(self.planes[..., :1])[..., 0]
+            return np.asarray(2 * u * np.abs(self.residual.couple) + terms)
+        size = np.abs(self.unbalance)
+        bound = self._unbalance_error
+        if quantity == "unbalance":
+            return bound
+        if quantity == "mass":
+            if at is None:
+                raise ValueError("mass: expected at, the radius")
+            radius = np.asarray(at, dtype=float)
+            return np.asarray((bound + 4 * u * size) / radius)
+        if quantity == "angle":
+            known = bound < size
+            turn = np.arcsin(np.where(known, bound / np.where(known, size, 1.0), 0.0))
+            return np.where(known, turn + 8 * u * np.pi, np.where((size > 0) | (bound > 0), np.pi, 0.0))
+        raise ValueError(
+            f"'{quantity}': expected unbalance, static, couple, mass, angle, residual_static or residual_couple"
+        )
+
+    @property
+    def _unbalance_error(self) -> Real:
+        u = np.finfo(float).eps / 2
         if self.planes.shape[-1] == 1:
-            return np.asarray(2 * u * np.abs(self.unbalance))
+            return np.asarray(2 * u * np.abs(self.unbalance) + self._hidden[..., None])
         apart, square = self._distances
         moments = np.abs(_complex(self._about(self.planes)[0]))
         terms = np.einsum("...pq,...q->...p", np.abs(apart), moments) / square[..., None]
-        return np.asarray((self.planes.shape[-1] + 6) * u * terms)
+        hidden = (
+            np.einsum("...pq,...q->...p", np.abs(apart), self._hidden_about(self.planes)) / square[..., None]
+        )
+        return np.asarray((self.planes.shape[-1] + 6) * u * terms + hidden)
+
+    @cached_property
+    def _hidden(self) -> Real:
+        """What a sum of pairs can hide: some 30 digits below its terms."""
+        u = np.finfo(float).eps / 2
+        return np.asarray(4 * u * u * self.moment.shape[-1] * np.abs(self.moment).sum(axis=-1))
+
+    def _hidden_about(self, z: Real) -> Real:
+        u = np.finfo(float).eps / 2
+        arms = np.abs(self.z)[..., None, :] + np.abs(z)[..., None]
+        size = np.abs(self.moment)[..., None, :]
+        return np.asarray(8 * u * u * self.moment.shape[-1] * (arms * size).sum(axis=-1))
 
     def mass(self, radius: ArrayLike) -> Real:
         """Return the masses to add at the radius (m) of each plane, (..., p), kg."""

@@ -12,6 +12,8 @@ from balancing.correction import correct
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+EPS = float(np.finfo(float).eps)
+
 
 @dataclass(frozen=True)
 class Placement:
@@ -25,6 +27,8 @@ class Placement:
     """The mass at each, (n,), kg; 0 for none."""
     bound: float = 0.0
     """No masses at these positions, within the limits, come nearer to the target than this, kg."""
+    free: tuple[int, ...] = ()
+    """The positions whose masses were worked out; the others are full, empty, or weights from stock."""
 
     @property
     def total(self) -> complex:
@@ -35,6 +39,29 @@ class Placement:
     def error(self) -> complex:
         """total - target, complex kg."""
         return self.total - self.target
+
+    @property
+    def condition_number(self) -> float:
+        """By what factor an error of the target can grow in a mass: one over the sine between the two that share it."""
+        if len(self.free) < 2:
+            return 1.0
+        one, other = self.angles[list(self.free)]
+        return float(1 / abs(np.sin(other - one)))
+
+    def error_estimate(self, quantity: str = "masses") -> Real:
+        """Return a bound of the rounding error of `masses` (n,), or of `total` or `error` (scalar), kg.
+
+        Target and angles are taken as exact. Two positions share what the full ones leave over the sine between them;
+        each of the terms is rounded. Weights from stock are as they are.
+        """
+        terms = abs(self.target) + float(self.masses.sum())
+        if quantity in ("total", "error"):
+            return np.asarray(4 * EPS * terms)
+        if quantity != "masses":
+            raise ValueError(f"'{quantity}': expected masses, total or error")
+        bound = np.zeros(len(self.masses))
+        bound[list(self.free)] = 4 * EPS * terms * self.condition_number
+        return bound
 
 
 def place(target: complex, angles: ArrayLike, max_mass: ArrayLike | None = None) -> Placement:
@@ -82,13 +109,12 @@ def place(target: complex, angles: ArrayLike, max_mass: ArrayLike | None = None)
         sines = np.abs(np.imag(np.roll(arms, -1) * arms.conj()))
         slimmest = float(sines[sines > 1e-9].min(initial=1.0))
         limit = np.where(np.isfinite(limit), limit, 4 * size / slimmest)  # more than any share can be
-    masses = _exact(goal, arms, limit)
-    if masses is None:
-        masses = _nearest(goal, arms, limit)
+    masses, free = _exact(goal, arms, limit) or _nearest(goal, arms, limit)
     found = np.zeros(n)
     found[order] = np.where(masses > 4e-15 * size, masses, 0.0)
     miss = abs(goal - complex((masses * arms).sum()))
-    return Placement(goal, theta, found, miss if miss > 1e-12 * size else 0.0)
+    bound = miss if miss > 1e-12 * size else 0.0
+    return Placement(goal, theta, found, bound, tuple(order[list(free)].tolist()))
 
 
 def _positions(angles: ArrayLike, max_mass: ArrayLike | None) -> tuple[Real, Real]:
@@ -104,13 +130,13 @@ def _positions(angles: ArrayLike, max_mass: ArrayLike | None) -> tuple[Real, Rea
     return theta, cap
 
 
-def _exact(goal: complex, arms: Complex, limit: Real) -> Real | None:
-    """Masses that add up to the goal, of the least sum; None where it is out of reach."""
+def _exact(goal: complex, arms: Complex, limit: Real) -> tuple[Real, tuple[int, ...]] | None:
+    """Masses that add up to the goal, of the least sum, and which of them were solved for; None out of reach."""
     n = len(arms)
     if n == 1:
         along = goal * arms[0].conjugate()
         fits = abs(along.imag) <= 1e-14 * abs(goal) and 0 <= along.real <= limit[0]
-        return np.array([along.real]) if fits else None
+        return (np.array([along.real]), (0,)) if fits else None
     full = np.concatenate([[0], np.cumsum(np.tile(limit * arms, 2))])
     amount = np.concatenate([[0], np.cumsum(np.tile(limit, 2))])
     best: tuple[float, int, int, float, float] | None = None
@@ -136,12 +162,12 @@ def _exact(goal: complex, arms: Complex, limit: Real) -> Real | None:
     between = (i + 1 + np.arange(inside)) % n
     masses[between] = limit[between]
     masses[i], masses[(i + inside + 1) % n] = at_first, at_last
-    return np.clip(masses, 0.0, limit)
+    return np.clip(masses, 0.0, limit), (i, (i + inside + 1) % n)
 
 
-def _nearest(goal: complex, arms: Complex, limit: Real) -> Real:
+def _nearest(goal: complex, arms: Complex, limit: Real) -> tuple[Real, tuple[int, ...]]:
     """The masses whose sum comes nearest to a goal out of reach: on an edge of the reachable polygon."""
-    best, found = np.inf, np.zeros(len(arms))
+    best, found, free = np.inf, np.zeros(len(arms)), 0
     for j, arm in enumerate(arms):
         for side in (1j, -1j):
             masses = np.where(np.real(arms * np.conj(side * arm)) > 1e-12, limit, 0.0)
@@ -150,8 +176,8 @@ def _nearest(goal: complex, arms: Complex, limit: Real) -> Real:
             masses[j] = min(max(((goal - base) * arm.conjugate()).real, 0.0), limit[j])
             miss = abs(goal - base - masses[j] * arm)
             if miss < best:
-                best, found = miss, masses
-    return found
+                best, found, free = miss, masses, j
+    return found, (free,)
 
 
 SUMS = 300_000

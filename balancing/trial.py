@@ -12,6 +12,8 @@ Complex = NDArray[np.complex128]
 
 STANDARD_GRAVITY = 9.80665
 
+EPS = float(np.finfo(float).eps)
+
 
 def trial_unbalance(
     rotor_mass: ArrayLike, speed: ArrayLike, planes: int = 1, share: float = 0.1
@@ -36,6 +38,10 @@ class TrialEffect(NamedTuple):
 
     amplitude: Real
     phase: Real
+
+    def error_estimate(self) -> TrialEffect:
+        """Return bounds of the rounding errors, the readings taken as exact: both are differences of readings."""
+        return TrialEffect(4 * EPS * (2 + self.amplitude), 4 * EPS * (1 + self.phase))
 
 
 def trial_effect(before: ArrayLike, after: ArrayLike) -> TrialEffect:
@@ -107,6 +113,11 @@ class ErrorBudget(NamedTuple):
     """At most this reading: within tolerance whatever the error."""
     reject: Real
     """More than this reading: beyond tolerance whatever the error."""
+
+    def error_estimate(self) -> ErrorBudget:
+        """Return bounds of the rounding errors, the given errors taken as exact (up to some ten of them)."""
+        bound = 8 * EPS * (self.error + self.reject)
+        return ErrorBudget(8 * EPS * self.error, bound, bound)
 
 
 def error_budget(permissible: ArrayLike, random: ArrayLike = (), systematic: ArrayLike = ()) -> ErrorBudget:
