@@ -48,14 +48,16 @@ class AmplitudeFit:
         size = np.abs(self.influence) * np.abs(self.trial_masses).max() / self.initial
         return np.asarray(gain * (self.trials / self.initial).max(axis=0) / np.where(size > 0, size, np.nan))
 
-    def error_estimate(self, quantity: str = "influence") -> Real:
-        """Return a bound of the rounding error of `influence` or of `misfit`, (s,); the readings taken as exact.
+    def error_estimate(self, quantity: str = "influence", *, data_error: float = 0.0) -> Real:
+        """Return a bound of the rounding error of `influence` or of `misfit`, (s,).
+
+        `data_error` is a bound of the relative errors of readings and trial masses, which are carried on; 0: exact.
 
         With f_r = |O + α t_r| - R_r and J its derivatives the fit is where Jᵀf = 0: its value there as computed, with
         what rounding hides of it, times the inverse of the exact second derivatives H. inf where H is singular: two
         circles that touch, trials on a line through them.
         """
-        at, c = self._at, 4 * EPS
+        at, c = self._at, 4 * EPS + data_error
         f, length = np.abs(at.f), at.length
         reach = 1 + np.abs(at.z)[:, None] * np.abs(at.t)
         of_f = c * (reach + at.read)

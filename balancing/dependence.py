@@ -173,3 +173,8 @@ def require_independent(
 def adjoint(a: Complex) -> Complex:
     """Return the conjugate transpose of matrices (..., m, n)."""
     return np.swapaxes(a, -1, -2).conj()
+
+
+def roundings(terms: int) -> float:
+    """Return by what share of its terms' size a computed sum of so many complex products can be wrong."""
+    return (terms / 4 + 2) * EPS

@@ -120,11 +120,12 @@ class Balance:
         """
         from balancing.rounding import gap_bound
 
-        both = tuple(
+        of_influence, of_initial = (
             None if error is None else np.asarray(error, dtype=float)
             for error in (influence_error, initial_error)
         )
-        bounds = self._bounds[0] if both == (None, None) else self._bounds_with(*both)[0]
+        exact = of_influence is None and of_initial is None
+        bounds = (self._bounds if exact else self._bounds_with(of_influence, of_initial))[0]
         if quantity == "corrections":
             return bounds.solution
         if quantity == "residual":
@@ -132,7 +133,7 @@ class Balance:
         if quantity == "residual_max":
             largest = bounds.residual.max(axis=-1)
             if self.bound is not None and self.weights is None:
-                largest = np.minimum(largest, gap_bound(self, *both))
+                largest = np.minimum(largest, gap_bound(self, of_influence, of_initial))
             return np.asarray(largest)
         if quantity == "residual_rms":
             return np.asarray(np.sqrt(np.square(bounds.residual).mean(axis=-1)) + 8 * EPS * self.residual_rms)

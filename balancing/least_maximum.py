@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.cones import Cones, solve
-from balancing.dependence import EPS, DependentPlanes, columns_scaled
+from balancing.dependence import EPS, DependentPlanes, columns_scaled, roundings
 from balancing.influence import Balance, Infeasible, checked, least_squares
-from balancing.rounding import roundings
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

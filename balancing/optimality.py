@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing.cones import real_rows
-from balancing.dependence import adjoint, columns_scaled
-from balancing.rounding import Bounds, roundings
+from balancing.dependence import adjoint, columns_scaled, roundings
+from balancing.rounding import Bounds
 
 if TYPE_CHECKING:
     from balancing.influence import Balance
@@ -163,7 +163,9 @@ class _Optimum:
         if with_t:
             slope[-1] = 1.0
         mu = np.linalg.lstsq(self.gradient.T, -slope, rcond=1e-13)[0]
-        if not mu.min() > WEAK * mu.max():
+        # of least squares the squares' own pull is what the limits hold against
+        strength = mu * np.linalg.norm(self.gradient, axis=1)
+        if not strength.min() > WEAK * max(float(strength.max()), float(np.linalg.norm(left))):
             raise _NotBounded("a limit or a reading is only just active: a little more, and it would not be")
         hessian = self.across.T @ ((mu / self.size)[:, None] * self.across)
         squares = np.concatenate(real_rows(rows.square @ undo))

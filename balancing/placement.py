@@ -52,7 +52,7 @@ class Placement:
         """Return a bound of the rounding error of `masses` (n,), or of `total` or `error` (scalar), kg.
 
         Target and angles are taken as exact. Two positions share what the full ones leave over the sine between them;
-        each of the terms is rounded. Weights from stock are as they are.
+        each of the terms is rounded. Weights from stock are as they are; several on one position are a sum.
         """
         terms = abs(self.target) + float(self.masses.sum())
         if quantity in ("total", "error"):
@@ -289,17 +289,17 @@ def place_from_stock(
 
 def _loads(weights: Real, pieces: int) -> tuple[Real, NDArray[np.intp]]:
     """Return what up to so many pieces can weigh together, ascending from 0, and the fewest pieces for each."""
-    fewest = {0.0: 0}
+    fewest = {"0": (0.0, 0)}
     for number in range(1, pieces + 1):
-        for load in [load for load, count in fewest.items() if count == number - 1]:
+        for load in [load for load, count in fewest.values() if count == number - 1]:
             for weight in weights.tolist():
                 # 1 + 1 + 1 and 1 + 2 weigh the same, whatever the last digit
-                total = float(f"{load + weight:.12g}") if load else weight
-                fewest.setdefault(total, number)
+                total = load + weight
+                fewest.setdefault(f"{total:.12g}", (total, number))
         if len(fewest) > 2000:
             raise ValueError("too many combinations of weights: expected fewer pieces a position")
-    loads = sorted(fewest)
-    return np.array(loads), np.array([fewest[load] for load in loads], dtype=np.intp)
+    loads, counts = zip(*sorted(fewest.values()), strict=True)
+    return np.array(loads), np.array(counts, dtype=np.intp)
 
 
 def drill_depth(

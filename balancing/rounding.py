@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import EPS, adjoint, columns_scaled
+from balancing.dependence import EPS, adjoint, columns_scaled, roundings
 
 if TYPE_CHECKING:
     from balancing.influence import Balance
@@ -32,11 +32,6 @@ class Bounds(NamedTuple):
 
     solution: Real
     residual: Real
-
-
-def roundings(terms: int) -> float:
-    """Return by what share of its terms' size a computed sum of so many complex products can be wrong."""
-    return (terms / 4 + 2) * EPS
 
 
 def perturbed(a: Complex, b: Complex, x: Complex, r: Complex, da: Real, db: Real) -> Bounds:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -24,6 +25,7 @@ class Field(Solver):
         """Return the result in every form."""
         from cli.field_text import afterword, notes
 
+        warnings = [*self.runs.warnings, *self.warnings]
         return Shown(
             document=self.document,
             columns=self.columns,
@@ -31,8 +33,15 @@ class Field(Solver):
             notes=lambda: notes(self),
             afterword=lambda: afterword(self),
             figure=self.figure,
-            warnings=[*self.runs.warnings, *self.warnings],
+            errors=lambda: self.errors(warnings),
+            warnings=warnings,
         )
+
+    def errors(self, warnings: list[str]) -> dict[str, Any]:
+        """Bounds of the rounding errors of the CSV's columns; what has none is said in the warnings."""
+        from cli.field_digits import errors
+
+        return errors(self, warnings)
 
     def figure(self) -> Any:
         """Draw the first rotors."""
@@ -52,24 +61,33 @@ class Field(Solver):
         return along, np.where(angle <= UNKNOWN_ANGLE, angle, np.nan)
 
     @cached_property
-    def columns(self) -> dict[str, Any]:
-        """The CSV: one row per rotor and plane."""
-        order = []
+    def _order(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rotor, plane and group of every correction, group by group; and the order of the CSV's rows."""
+        keys = []
         for k, solved in enumerate(self.solved):
             g, p = solved.corrections.shape
-            order.append(
+            keys.append(
                 np.stack(
-                    [
-                        np.repeat(solved.group.rotors, p),
-                        np.tile(np.arange(p), g),
-                        np.full(g * p, k),
-                    ]
+                    [np.repeat(solved.group.rotors, p), np.tile(np.arange(p), g), np.full(g * p, k)],
                 )
             )
-        keys = np.concatenate(order, axis=1)
-        sort = np.lexsort((keys[1], keys[0]))
-        flat = np.concatenate([solved.corrections.ravel() for solved in self.solved])[sort]
-        rotor, plane, group = (row[sort].tolist() for row in keys)
+        joined = np.concatenate(keys, axis=1)
+        return joined, np.lexsort((joined[1], joined[0]))
+
+    @property
+    def _keys(self) -> NDArray[np.intp]:
+        keys, order = self._order
+        return keys[:, order]
+
+    def rows(self, values: Sequence[NDArray[Any]]) -> NDArray[Any]:
+        """Put values of the groups, (g, p) each, into the CSV's order."""
+        return np.concatenate([value.ravel() for value in values])[self._order[1]]
+
+    @cached_property
+    def columns(self) -> dict[str, Any]:
+        """The CSV: one row per rotor and plane."""
+        flat = self.rows([solved.corrections for solved in self.solved])
+        rotor, plane, group = (row.tolist() for row in self._keys)
         rotors = self.runs.rotors
         columns: dict[str, Any] = {
             "rotor": [rotors[r] for r in rotor],
@@ -79,8 +97,8 @@ class Field(Solver):
         }
         if self.wanted.reading_error is not None:
             pairs = [self.uncertainty(solved) for solved in self.solved]
-            along = np.concatenate([pair[0].ravel() for pair in pairs if pair is not None])[sort]
-            angle = np.concatenate([pair[1].ravel() for pair in pairs if pair is not None])[sort]
+            along = self.rows([pair[0] for pair in pairs if pair is not None])
+            angle = self.rows([pair[1] for pair in pairs if pair is not None])
             columns[f"{self.runs.per}_uncertainty_{self.runs.mass_unit}"] = self._amount(along)
             columns["angle_uncertainty_deg"] = angle
         return columns

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -66,6 +66,8 @@ class Group:
     base: list[int]
     """For each trial run the run it is compared with: -1 is the initial run."""
     weights: Real | None
+    errors: Callable[[], tuple[Real, Real, Real]]
+    """Bounds of the errors of `initial`, `runs` and `on` against the decimals of the table; worked out when asked for."""
 
 
 @dataclass
@@ -249,9 +251,11 @@ class _Reader:
                 "or stored coefficients by --influence"
             )
         channels, places = self._channels(by_run[initial], first, of)
+        matches = []
         runs = np.empty((len(rotors), len(trials), len(channels)), dtype=complex)
         for j, trial in enumerate(trials):
             mine = self._match(trial.run, initial, by_run[trial.run], first, channels, of)
+            matches.append(mine)
             for s, members in enumerate(mine):
                 runs[:, j, s] = self.vibration[rows[:, members]].mean(axis=1)
         vibration = np.empty((len(rotors), len(channels)), dtype=complex)
@@ -276,9 +280,53 @@ class _Reader:
             weights = np.where(np.isnan(given), 1.0, given)
             if not (weights > 0).any(axis=1).all():
                 raise DataError(f"{self.table.file}: {of}all weights are zero: expected one that is positive")
+
+        def errors() -> tuple[Real, Real, Real]:
+            of_rows = self._vibration_error(rows)
+            of_runs = np.zeros(runs.shape)
+            for j, mine in enumerate(matches):
+                of_runs[:, j] = np.stack([of_rows[:, members].mean(axis=1) for members in mine], axis=1)
+            of_initial = np.stack([of_rows[:, members].mean(axis=1) for members in places], axis=1)
+            return of_initial, of_runs, self._mass_error(rows, trials, on.shape)
+
         return Group(
-            rotors, channels, planes, trials, vibration, runs, on, added, standing_masses, base, weights
+            rotors,
+            channels,
+            planes,
+            trials,
+            vibration,
+            runs,
+            on,
+            added,
+            standing_masses,
+            base,
+            weights,
+            errors,
         )
+
+    def _vibration_error(self, rows: Rows) -> Real:
+        """Bound the errors of readings and of their share in a mean, (g, n)."""
+        from cli.digits import EPS, vector_error
+
+        size = self.table.numbers["amplitude"].values
+        phase = self.table.numbers.get("phase")
+        error = vector_error(size, phase.values, phase.unit) if phase is not None else EPS * size
+        return np.asarray((error + rows.shape[1] * EPS / 2 * size)[rows])
+
+    def _mass_error(self, rows: Rows, trials: list[Trial], shape: tuple[int, ...]) -> Real:
+        """Bound the errors of what was on the rotor in each run, (g, r, p)."""
+        from cli.digits import vector_error
+
+        error = np.zeros(shape)
+        standing = np.zeros((shape[0], shape[2]))
+        for j, trial in enumerate(trials):
+            error[:, j] = standing
+            for plane, member, place in trial.masses:
+                size, turn, unit = self._mass(rows[:, member], place)
+                error[:, j, plane] += vector_error(size, turn, unit)
+            if trial.kept:
+                standing = error[:, j].copy()
+        return error
 
     def _warn(self, text: str) -> None:
         if text not in self.warnings:
@@ -340,6 +388,10 @@ class _Reader:
 
     def _masses(self, rows: Rows, place: int) -> Complex:
         """Return the masses (g,) that stand at one place of the cells in these rows, SI."""
+        return phasor(*self._mass(rows, place))
+
+    def _mass(self, rows: Rows, place: int) -> tuple[Real, Real, str]:
+        """Return the sizes (g,), SI, and the angles of these masses with their unit."""
         assert self.size is not None
         angle = self.table.cells.get("trial_angle")
         if angle is None:
@@ -351,7 +403,7 @@ class _Reader:
         if not (size > 0).all():
             row = int(rows[int(np.argmin(size > 0))])
             raise self.fail(row, self.size.header, self.size.values[row], "a positive trial mass")
-        return phasor(to_si(size, self.runs.per, self.size.unit), turn, angle.unit)
+        return np.asarray(to_si(size, self.runs.per, self.size.unit)), turn, angle.unit
 
     def _numbers(self, cells: Cells, rows: Rows, place: int, expected: str) -> Real:
         values = np.empty(len(rows))

@@ -110,7 +110,7 @@ class Solver:
 
     # -- solving -------------------------------------------------------------------------------------------
 
-    def _of(self, group: Group, i: int = 0) -> str:
+    def of(self, group: Group, i: int = 0) -> str:
         return f"rotor {self.runs.rotors[group.rotors[i]]}: " if self.several else ""
 
     def _solve(self, group: Group) -> Solved:
@@ -133,16 +133,16 @@ class Solver:
             try:
                 alpha = influence_coefficients(group.initial, group.runs, group.on)
             except DependentTrials as error:
-                raise DataError(self._of(group, *error.case) + self._trials_say(group, error)) from None
+                raise DataError(self.of(group, *error.case) + self._trials_say(group, error)) from None
         standing = np.zeros((len(group.rotors), len(planes)), dtype=complex)
         if wanted.from_here and self.stored is None:
             standing = group.kept
             if not standing.any():
-                self._warn(
+                self.warn(
                     "--from-here: no trial mass is kept on the rotor, so that it stands as in the initial run"
                 )
         here = initial + np.matvec(alpha, standing) if standing.any() else initial
-        limit = self._limits(planes)
+        limit = self.limits(planes)
         corrections, bounds, condition = self._corrections(group, planes, alpha, here, limit)
         residual = here + np.matvec(alpha, corrections)
         # below the rounding of its terms a residual is zero
@@ -155,7 +155,7 @@ class Solver:
             self._confidence(solved, runout)
         return solved
 
-    def _limits(self, planes: list[str]) -> Real | None:
+    def limits(self, planes: list[str]) -> Real | None:
         given = self.wanted.max_mass
         if not given:
             return None
@@ -177,13 +177,13 @@ class Solver:
             if len(beyond):
                 i = int(beyond[0])
                 unseen_one = unseen(alpha[i], None if weights is None else weights[i])[0]
-                raise DataError(self._of(group, i) + self._planes_say(planes, unseen_one))
+                raise DataError(self.of(group, i) + self._planes_say(planes, unseen_one))
         if wanted.objective == "least-squares" and limit is None and ceiling is None:
             try:
                 fix = least_squares(alpha, here, weights, ridge=wanted.ridge)
             except DependentPlanes as error:
                 raise DataError(
-                    self._of(group, *error.case[:1]) + self._planes_say(planes, error.combination)
+                    self.of(group, *error.case[:1]) + self._planes_say(planes, error.combination)
                 ) from None
             return fix.corrections, None, fix.condition_number
         if wanted.objective == "minimax":
@@ -232,7 +232,7 @@ class Solver:
             )
             if least > ceiling * (1 + 1e-9):
                 raise Infeasible(float(least))
-            self._warn(
+            self.warn(
                 "with these weights a residual is beyond --max-residual, which without them could be met"
             )
         return fix
@@ -242,12 +242,12 @@ class Solver:
         try:
             return solve()
         except DependentPlanes as error:
-            raise DataError(self._of(group, i) + self._planes_say(planes, error.combination)) from None
+            raise DataError(self.of(group, i) + self._planes_say(planes, error.combination)) from None
         except Infeasible as error:
             unit = self.runs.amplitude_unit
             with_limits = " with the limits of the masses" if self.wanted.max_mass else ""
             raise DataError(
-                f"{self._of(group, i)}no corrections{with_limits} leave every residual within {self.wanted.max_residual:g} "
+                f"{self.of(group, i)}no corrections{with_limits} leave every residual within {self.wanted.max_residual:g} "
                 f"{unit}: infeasible; the smallest limit that can be met is {error.smallest:.6g} {unit}"
             ) from None
 
@@ -255,7 +255,7 @@ class Solver:
         """The four-run method, rotor by rotor."""
         if len(group.planes) != 1:
             raise DataError(
-                f"{self._of(group)}the four-run method is for one plane, found {', '.join(group.planes)}: with more planes "
+                f"{self.of(group)}the four-run method is for one plane, found {', '.join(group.planes)}: with more planes "
                 "the phase must be measured"
             )
         fits = []
@@ -263,12 +263,12 @@ class Solver:
             try:
                 fit = influence_from_amplitudes(group.initial[i].real, group.runs[i].real, group.on[i, :, 0])
             except ValueError as error:
-                raise DataError(f"{self.runs.table.file}: {self._of(group, i)}{error}") from None
+                raise DataError(f"{self.runs.table.file}: {self.of(group, i)}{error}") from None
             fits.append(fit)
             unit = self.runs.amplitude_unit
             for channel, misfit, first in zip(group.channels, fit.misfit, group.initial[i].real, strict=True):
                 text = (
-                    f"{self._of(group, i)}sensor {channel}: the readings are inconsistent: no influence coefficient fits them "
+                    f"{self.of(group, i)}sensor {channel}: the readings are inconsistent: no influence coefficient fits them "
                     f"better than {misfit:.3g} {unit} (r.m.s.), {misfit / first:.0%} of the initial reading"
                 )
                 if misfit > 0.25 * first:
@@ -276,7 +276,7 @@ class Solver:
                         f"{self.runs.table.file}: {text}: expected four readings that fit one plane's effect"
                     )
                 if misfit > 0.05 * first:
-                    self._warn(text)
+                    self.warn(text)
         return fits
 
     def _confidence(self, solved: Solved, runout: Complex) -> None:
@@ -318,7 +318,7 @@ class Solver:
 
     def _limited_samples(self, solved: Solved, readings: Readings, weights: Real | None) -> Complex:
         """Draw corrections under limits or of the minimax problem: no formula, each draw is solved."""
-        limit, wanted = self._limits(solved.planes), self.wanted
+        limit, wanted = self.limits(solved.planes), self.wanted
         samples = []
         for alpha, v in readings.problem_samples(min(wanted.monte_carlo or 200, 1000)):
             standing = solved.standing[0]
@@ -331,13 +331,13 @@ class Solver:
 
     # -- what is to be said --------------------------------------------------------------------------------
 
-    def _warn(self, text: str) -> None:
+    def warn(self, text: str) -> None:
         if text not in self.warnings:
             self.warnings.append(text)
 
     def _more(self, count: int, what: str) -> None:
         if count > SHOWN:
-            self._warn(f"… and the same of {count - SHOWN} further rotors: {what}")
+            self.warn(f"… and the same of {count - SHOWN} further rotors: {what}")
 
     def _combination(self, names: list[str], combination: Complex) -> str:
         terms = []
@@ -377,7 +377,7 @@ class Solver:
         group, planes = solved.group, solved.planes
         still = np.flatnonzero(~np.abs(solved.initial).any(axis=1))
         for i in still[:SHOWN]:
-            self._warn(f"{self._of(group, int(i))}no vibration in the initial run: nothing to correct")
+            self.warn(f"{self.of(group, int(i))}no vibration in the initial run: nothing to correct")
         self._more(len(still), "no vibration in the initial run")
         doubtful = np.flatnonzero(~(solved.condition < 5)) if len(planes) > 1 else np.zeros(0, dtype=int)
         if len(doubtful):
@@ -388,8 +388,8 @@ class Solver:
             for k in rows[:SHOWN]:
                 named = [f"{planes[p]} ({share[k, p]:.2g})" for p in np.flatnonzero(weak[k])]
                 i = int(doubtful[k])
-                self._warn(
-                    f"{self._of(group, i)}planes nearly dependent: others bring about what these do but for the share in "
+                self.warn(
+                    f"{self.of(group, i)}planes nearly dependent: others bring about what these do but for the share in "
                     f"brackets: {', '.join(named)}; condition number {solved.condition[i]:.3g}, errors grow by as much: leave "
                     "one out, or damp with --ridge"
                 )
@@ -400,8 +400,8 @@ class Solver:
             for s, (first, rival) in enumerate(zip(group.initial[i], fit.other, strict=True)):
                 if rival == rival:
                     other = -first / rival
-                    self._warn(
-                        f"{self._of(group, i)}sensor {group.channels[s]}: two corrections fit the amplitudes; the other one is "
+                    self.warn(
+                        f"{self.of(group, i)}sensor {group.channels[s]}: two corrections fit the amplitudes; the other one is "
                         f"{self._amount(abs(other)):.6g} {self._unit} at {float(degrees(other)):.2f}°: a further trial run at "
                         "another angle decides"
                     )
@@ -410,15 +410,15 @@ class Solver:
             size = np.abs(solved.total) * (1.0 if self.runs.per == "unbalance" else self.wanted.radius or 1.0)
             good = np.flatnonzero((size <= whole / len(planes)).all(axis=1))
             for i in good[:SHOWN]:
-                self._warn(
-                    f"{self._of(group, int(i))}already within the permissible residual unbalance in every plane: stop, no "
+                self.warn(
+                    f"{self.of(group, int(i))}already within the permissible residual unbalance in every plane: stop, no "
                     "correction is needed"
                 )
             self._more(len(good), "already within the permissible residual unbalance")
         if self.wanted.max_residual is not None:
             fine = (np.abs(solved.initial) <= self.wanted.max_residual).all(axis=1)
             for i in np.flatnonzero(fine)[:SHOWN]:
-                self._warn(f"{self._of(group, int(i))}the initial vibration is within --max-residual already")
+                self.warn(f"{self.of(group, int(i))}the initial vibration is within --max-residual already")
             self._more(int(fine.sum()), "initial vibration within --max-residual already")
 
     def _thirty(self, group: Group) -> None:
@@ -432,8 +432,8 @@ class Solver:
             for i in np.flatnonzero(little)[:SHOWN]:
                 most = np.max(effect.amplitude[i])
                 turn = np.degrees(np.max(effect.phase[i]))
-                self._warn(
-                    f"{self._of(group, int(i))}run {trial.run}: the trial mass changed the vibration by {most:.0%} and {turn:.0f}° "
+                self.warn(
+                    f"{self.of(group, int(i))}run {trial.run}: the trial mass changed the vibration by {most:.0%} and {turn:.0f}° "
                     "at most: less than 30 % and 30°, its coefficients may be noise; expected a larger trial mass"
                 )
             self._more(int(little.sum()), f"run {trial.run} changed the vibration by less than 30 % and 30°")
@@ -458,7 +458,7 @@ class Solver:
             return []
         placed = place(complex(w), np.radians(self.wanted.places))
         if abs(placed.error) > 1e-9 * abs(w):
-            self._warn(f"a correction at {degrees(w):.4g}° cannot be reached from the places given")
+            self.warn(f"a correction at {degrees(w):.4g}° cannot be reached from the places given")
         return [
             (str(k + 1), self.wanted.places[k] % 360.0, float(mass))
             for k, mass in enumerate(placed.masses)

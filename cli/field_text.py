@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cli.digits import angle_text
 from cli.render import table_text
 from cli.units import degrees, from_si
 
@@ -47,7 +48,7 @@ def trials_lines(field: Field, solved: Solved, i: int) -> list[str]:
     lines = []
     for j, trial in enumerate(solved.group.trials):
         masses = " + ".join(
-            f"{field._amount(abs(t)):.6g} {field._unit} at {degrees(t):.6g}° in {plane}"
+            f"{field._amount(abs(t)):.6g} {field._unit} at {angle_text(degrees(t), '.6g')}° in {plane}"
             for plane, t in zip(solved.group.planes, solved.group.on[i, j], strict=True)
             if t
         )
@@ -192,7 +193,7 @@ def afterword(field: Field) -> str:
         solved = field.solved[k]
         name = f"rotor {field.runs.rotors[rotor]}: " if field.several else ""
         removal = ", ".join(
-            f"{plane} at {degrees(-w):.2f}°"
+            f"{plane} at {angle_text(degrees(-w), '.2f')}°"
             for plane, w in zip(solved.planes, solved.corrections[i], strict=True)
             if w
         )

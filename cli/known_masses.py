@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import GRADES, CoincidentPlanes, allocate, by_size, correct
+from cli.digits import EPS, angle_error, angle_text, size_error, vector_error
 from cli.errors import DataError, quote
 from cli.planes import Planes
 from cli.render import Shown
@@ -272,17 +273,36 @@ class _Balanced:
     def errors(self) -> dict[str, Any]:
         """Bounds of the rounding errors of the corrections: of the solution, and of the masses' own vectors."""
         rotors, row = self.rotors, self.rotor_of_row
-        size = np.bincount(rotors.rotor, np.abs(rotors.moment))
-        bound = self.rounding + 2 * np.finfo(float).eps * (size * self.growth)[row]
-        amount = np.abs(self.ideal)
+        angle = rotors.table.numbers["angle"]
+        wrong = np.bincount(rotors.rotor, vector_error(np.abs(rotors.moment), angle.values, angle.unit))
+        bound = self.rounding + (wrong * self.growth)[row] + self._of_places()[row]
+        radius = self.planes.radius[self.plane_of_row]
         return {
-            f"unbalance_{rotors.unbalance_unit}": from_si(bound, "unbalance", rotors.unbalance_unit),
-            f"mass_{rotors.mass_unit}": from_si(
-                bound / self.planes.radius[self.plane_of_row], "mass", rotors.mass_unit
+            f"unbalance_{rotors.unbalance_unit}": from_si(
+                size_error(self.ideal, bound), "unbalance", rotors.unbalance_unit
             ),
-            "weight_N": bound / self.planes.radius[self.plane_of_row] * self.wanted.gravity,
-            "angle_deg": np.degrees(np.divide(bound, amount, out=np.zeros_like(bound), where=amount > 0)),
+            f"mass_{rotors.mass_unit}": from_si(
+                size_error(self.ideal, bound) / radius, "mass", rotors.mass_unit
+            ),
+            "weight_N": size_error(self.ideal, bound) / radius * self.wanted.gravity,
+            "angle_deg": angle_error(self.ideal, bound, self.angle_deg),
         }
+
+    def _of_places(self) -> Real:
+        """Bounds of what the rounding of axial positions as written does to the corrections, for each rotor."""
+        rotors, n = self.rotors, len(self.rotors.names)
+        if rotors.z is None or self.planes.z is None:
+            return np.zeros(n)
+        z = self.planes.z[self.plane_of_row]
+        apart = np.maximum.reduceat(z, self.start) - np.minimum.reduceat(z, self.start)
+        # masses at one place are misplaced together
+        place = np.lexsort((rotors.z, rotors.rotor))
+        new = (np.diff(rotors.rotor[place]) != 0) | (np.diff(rotors.z[place]) != 0)
+        first = np.concatenate([[0], np.flatnonzero(new) + 1])
+        there = np.abs(np.add.reduceat(rotors.moment[place], first)) * np.abs(rotors.z[place[first]])
+        turned = np.bincount(rotors.rotor[place[first]], there, minlength=n)
+        turned += np.add.reduceat(np.abs(self.ideal) * np.abs(z), self.start)
+        return np.asarray(np.divide(2 * EPS * turned, apart, out=np.zeros(n), where=apart > 0))
 
     @property
     def _mass_kg(self) -> Real:
@@ -385,11 +405,11 @@ class _Balanced:
 
         for r, name in enumerate(self.rotors.names[:10]):
             lines.append(f"rotor {name}: {masses[r]} unbalance{'' if masses[r] == 1 else 's'}")
-            line = f"  initial   static {static(self.static[r])} at {degrees(self.static[r]):.2f}°"
+            line = f"  initial   static {static(self.static[r])} at {angle_text(degrees(self.static[r]), '.2f')}°"
             after = f"  residual  static {static(self.residual_static[r])}"
             if self.has_couple:
                 about = f"about z = {from_si(self.about[r], 'length', length):g} {length}"
-                line += f", couple {couple(self.couple[r])} at {degrees(self.couple[r]):.2f}° {about}"
+                line += f", couple {couple(self.couple[r])} at {angle_text(degrees(self.couple[r]), '.2f')}° {about}"
                 after += f", couple {couple(self.residual_couple[r])}"
             lines += [line, after]
         if len(self.rotors.names) > 10:

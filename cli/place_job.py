@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from balancing import Placement, drill_depth, place, place_from_stock, transfer
+from balancing import Placement, correct, drill_depth, place, place_from_stock, transfer
+from cli.digits import EPS, angle_error, angle_text, size_error, vector_error
 from cli.errors import DataError
 from cli.render import Shown
 from cli.units import degrees, from_si, phasor, to_si
@@ -48,6 +49,9 @@ def place_corrections(
         ),
         0j,
     )
+    wrong = float(
+        sum(vector_error(to_si(mass, "mass", unit), angle, turn) for (mass, unit), (angle, turn) in vectors)
+    )
     largest = max(float(to_si(mass, "mass", unit)) for (mass, unit), _ in vectors)
     if abs(target) <= 1e-15 * largest:
         target = 0j  # what rounding leaves of corrections that cancel
@@ -63,9 +67,23 @@ def place_corrections(
         at, planes = wanted.planes
         goals = list(zip(planes, transfer([goal], [at], planes).tolist(), strict=True))
     shares = [_place(z, share, wanted, warnings) for z, share in goals]
+
+    def goal_errors() -> list[float]:
+        """Bounds of the errors of the goals, in the shares' order."""
+        of_goal = (wrong + (len(vectors) + 4) * EPS * largest) * wanted.ratio
+        if wanted.planes is None:
+            return [of_goal]
+        at, planes = wanted.planes
+        # positions as written, and the lever's arms, are rounded too
+        over = correct([goal], [at], planes)
+        arms = np.array(planes)
+        reach = float(np.abs([at, *planes]).max() / np.ptp(arms))
+        bound = over.error_estimate() + float(over.amplification) * (of_goal + 4 * EPS * reach * abs(goal))
+        return [float(x) for x in bound]
+
     if opposite:
         warnings.append("material is drilled out opposite (+180°) to the mass that would be added")
-    return _Placed(target, shares, wanted, warnings).shown()
+    return _Placed(target, shares, wanted, warnings, goal_errors).shown()
 
 
 @dataclass(frozen=True)
@@ -137,6 +155,7 @@ class _Placed:
     shares: list[_Share]
     wanted: Wanted
     warnings: list[str]
+    goal_errors: Callable[[], list[float]]
 
     def __post_init__(self) -> None:
         self.used = [
@@ -189,8 +208,42 @@ class _Placed:
             notes=self.notes,
             afterword=self.afterword,
             figure=self.figure,
+            errors=self.errors,
             warnings=self.warnings,
         )
+
+    def errors(self) -> dict[str, Any]:
+        """Bounds of the rounding errors of the columns."""
+        unit, places = self.wanted.unit, self.wanted.places
+        of_goal = dict(zip(map(id, self.shares), self.goal_errors(), strict=True))
+        bounds, turns = [], []
+        for share, i in self.used:
+            placed, wrong = share.placed, of_goal[id(share)]
+            if places is None:
+                bounds.append(float(size_error(share.goal, wrong)))
+                turns.append(float(angle_error(share.goal, wrong, share.places[i] % 360.0)))
+                continue
+            # a place as written is rounded, as a share of a turn, and takes the whole with it
+            of_arm = EPS * (2 + np.abs(np.radians(places)).max())
+            terms = abs(share.goal) + float(placed.masses.sum())
+            growth = placed.condition_number if i in placed.free else 0.0
+            bound = placed.error_estimate()[i] + growth * (wrong + of_arm * terms)
+            bounds.append(float(size_error(placed.masses[i], bound)))
+            turns.append(2 * EPS * (360 + abs(places[i])))
+        out: dict[str, Any] = {
+            "angle_deg": turns,
+            f"mass_{unit}": [float(from_si(bound, "mass", unit)) for bound in bounds],
+        }
+        if self.wanted.drill is not None:
+            diameter, _, point = self.wanted.drill
+            deep = []
+            for depth, mass, bound in zip(self.depth, self.mass, bounds, strict=True):
+                assert depth is not None
+                # a depth grows no faster than the mass; the point's angle as written is rounded, times the radius
+                rounded = 8 * EPS * (depth + diameter * point)
+                deep.append(float(from_si(depth * bound / mass + rounded, "length", "mm")))
+            out["drill_depth_mm"] = deep
+        return out
 
     def document(self) -> dict[str, Any]:
         masses = [
@@ -216,7 +269,7 @@ class _Placed:
 
     def notes(self) -> str:
         lines = [
-            f"correction: {_show(abs(self.target), self.wanted)} at {degrees(self.target):.4g}° (angles counter-clockwise)"
+            f"correction: {_show(abs(self.target), self.wanted)} at {angle_text(degrees(self.target), '.4g')}° (angles counter-clockwise)"
         ]
         if self.wanted.ratio != 1:
             lines.append(f"at the other radius: {_show(abs(self.target) * self.wanted.ratio, self.wanted)}")
@@ -224,7 +277,7 @@ class _Placed:
             if share.z is not None:
                 lines.append(
                     f"in the plane z = {from_si(share.z, 'length', 'mm'):g} mm: {_show(abs(share.goal), self.wanted)} at "
-                    f"{degrees(share.goal):.4g}°"
+                    f"{angle_text(degrees(share.goal), '.4g')}°"
                 )
         remove = self.wanted.remove or self.wanted.drill is not None
         return "\n".join([*lines, f"material to {'REMOVE' if remove else 'ADD'}:"])
@@ -232,7 +285,7 @@ class _Placed:
     def afterword(self) -> str:
         whole = max(abs(share.goal) for share in self.shares)
         share = f" ({abs(self.error) / whole:.3%} of the correction)" if whole else ""
-        return f"error: {_show(abs(self.error), self.wanted)} at {degrees(self.error):.4g}°{share}"
+        return f"error: {_show(abs(self.error), self.wanted)} at {angle_text(degrees(self.error), '.4g')}°{share}"
 
     def figure(self) -> Any:
         from cli.plots.place import draw

@@ -17,8 +17,8 @@ import numpy as np
 MODULES = (
     "cli.bench.rotors",
     "cli.bench.linkages",
-    "cli.bench.field",
     "cli.bench.vibration",
+    "cli.bench.placing",
     "cli.bench.rotation",
     "cli.bench.turning",
 )

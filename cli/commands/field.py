@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli import options
-from cli.render import Expect, Json, Output, Plot, Rtol, Shown, Text, show, write
+from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show, write
 
 if TYPE_CHECKING:
     from cli.field_runs import Runs
@@ -112,6 +112,7 @@ def run(
     expect: Expect = None,
     rtol: Rtol = 1e-3,
     text: Text = False,
+    digits: Digits = False,
 ) -> None:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
@@ -146,7 +147,15 @@ def run(
     if influence is not None and from_here:
         raise options.bad("--from-here", "has no meaning with --influence: there are no trial masses")
     arm = options.quantity("--radius", radius, "length", positive=True)
-    shared = {"json": json, "output": output, "plot": plot, "expect": expect, "rtol": rtol, "text": text}
+    shared = {
+        "json": json,
+        "output": output,
+        "plot": plot,
+        "expect": expect,
+        "rtol": rtol,
+        "text": text,
+        "digits": digits,
+    }
     if suggest_trial:
         if runs is not None:
             raise options.bad("--suggest-trial", "is for the time before the first run: expected no RUNS")
@@ -313,6 +322,10 @@ def _suggestion(rotor_mass: str | None, speed: str | None, radius: float | None,
             "mass_g": [from_si(unbalance / radius, "mass", "g")],
             "radius_mm": [from_si(radius, "length", "mm")],
             "unbalance_g_mm": [from_si(unbalance, "unbalance", "g_mm")],
+        },
+        errors=lambda: {
+            "mass_g": [1e-14 * from_si(unbalance / radius, "mass", "g")],
+            "unbalance_g_mm": [1e-14 * from_si(unbalance, "unbalance", "g_mm")],
         },
         notes=lambda: "trial mass for each plane\nrule: " + rule,
     )

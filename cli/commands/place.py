@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cli import options
-from cli.render import Expect, Json, Output, Plot, Rtol, Text, show
+from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Text, show
 
 
 def run(
@@ -69,6 +69,7 @@ def run(
     expect: Expect = None,
     rtol: Rtol = 1e-3,
     text: Text = False,
+    digits: Digits = False,
 ) -> None:
     """Put a correction where masses can go: holes, blades, weights in stock, another radius, drilling.
 
@@ -119,7 +120,7 @@ def run(
         unit=vectors[0][0][1],
     )
     shown = job.place_corrections([(mass, angle) for mass, angle in vectors], wanted)
-    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text)
+    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)
 
 
 def _planes(at: float | None, text: str | None) -> tuple[float, list[float]] | None:
