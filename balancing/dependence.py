@@ -120,14 +120,17 @@ def _normed(direction: Complex) -> Complex:
 
 def columns_scaled(a: Complex) -> tuple[Complex, Real]:
     """Return a·diag(scale) with columns within a factor of two of the largest, and the scale (powers of two)."""
-    re, im = a.real, a.imag
-    square = np.einsum("...sp,...sp->...p", re, re) + np.einsum("...sp,...sp->...p", im, im)
-    if square.min() > 1e-280 and square.max() < 1e280:
+    size = np.abs(a)
+    square = np.einsum("...sp,...sp->...p", size, size)
+    low, high = square.min(), square.max()
+    if low > 1e-280 and high < 1e280:
+        if high < 4 * low:  # within a factor of two already
+            return a, np.ones(square.shape)
         exponent = (
             np.frexp(square.max(axis=-1, keepdims=True) / square)[1] - 1
         ) >> 1  # ⌊log₂ of the norms' ratio⌋
     else:  # the squares leave the range of numbers, or a column is zero
-        peak = np.maximum(np.abs(re), np.abs(im)).max(axis=-2)
+        peak = np.maximum(np.abs(a.real), np.abs(a.imag)).max(axis=-2)
         highest = peak.max(axis=-1, keepdims=True)
         exponent = np.where(peak > 0, np.frexp(highest)[1] - np.frexp(peak)[1], 0)
     if not exponent.any():

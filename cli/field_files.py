@@ -75,6 +75,11 @@ class Stored:
         sensor = texts.get("sensor") or ["1"] * self.table.rows
         plane = texts.get("plane") or ["1"] * self.table.rows
         planes = list(dict.fromkeys(plane[i] for i in mine))
+        speeds = {channel.speed for channel in channels}
+        if len(speeds) > 1 and np.isnan(self.speed[list(mine)]).any():
+            text = f"{self.table.file}: coefficients without a speed are used at each of {len(speeds)} speeds"
+            if text not in runs.warnings:
+                runs.warnings.append(text)
         alpha = np.full((len(channels), len(planes)), np.nan, dtype=complex)
         for s, channel in enumerate(channels):
             for p, name in enumerate(planes):

@@ -463,3 +463,13 @@ def test_the_split_onto_places(dalembert: Dalembert) -> None:
     assert len(parts) == 2
     assert abs(sum(parts) - fix["mass_kg"] * np.exp(1j * np.radians(fix["angle_deg"]))) < 1e-17
     assert dalembert("field", "-", "--blades", "3", "--positions", "0deg", stdin=FAN).returncode == 2
+
+
+def test_coefficients_without_a_speed_at_several_speeds_are_remarked(
+    dalembert: Dalembert, tmp_path: Path
+) -> None:
+    dalembert("field", "-", "--save-influence", "one.csv", stdin=FAN)
+    two = "run,sensor,speed_rpm,amplitude_um,phase_deg\n0,1,1500,3,20\n0,1,3000,4,30\n"
+    done = dalembert("field", "-", "--influence", "one.csv", stdin=two)
+    assert "coefficients without a speed are used at each of 2 speeds" in done.stderr
+    assert done.returncode == 0
