@@ -188,11 +188,18 @@ def _with_digits_that_hold(shown: Shown) -> Shown:
 def digits_that_hold(columns: Columns, errors: Columns) -> Columns:
     """Return columns with each number that has an error cut to the digits before it."""
     return {
-        name: [_cut(value, error) for value, error in zip(column, errors[name], strict=True)]
+        name: [
+            _below_a_turn(name, _cut(value, error)) for value, error in zip(column, errors[name], strict=True)
+        ]
         if name in errors
         else column
         for name, column in columns.items()
     }
+
+
+def _below_a_turn(name: str, value: Any) -> Any:
+    """Return an angle that was rounded up to a full turn as 0: output angles lie in [0, 360)."""
+    return 0.0 if name.endswith("_deg") and value == 360 else value
 
 
 def _cut(value: Any, error: float) -> Any:
@@ -209,11 +216,16 @@ def table_text(columns: Columns) -> str:
     printed = []
     for name, column in columns.items():
         values = [_plain(value) for value in column]
-        cells = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in values]
+        cells = [_six_digits(name, value) if isinstance(value, float) else str(value) for value in values]
         width = max(map(len, [name, *cells]))
         left = any(isinstance(value, str) and value for value in values)
         printed.append([cell.ljust(width) if left else cell.rjust(width) for cell in [name, *cells]])
     return "".join("  ".join(row).rstrip() + "\n" for row in zip(*printed, strict=True))
+
+
+def _six_digits(name: str, value: float) -> str:
+    cell = f"{value:.6g}"
+    return "0" if cell == "360" and value < 360 and name.endswith("_deg") else cell
 
 
 def _paragraphs(*parts: str) -> str:
