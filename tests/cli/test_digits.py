@@ -15,6 +15,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from cli.render import digits_that_hold, table_text
+
 Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 
 HEAD = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg"
@@ -245,3 +247,10 @@ def test_nothing_is_worked_out_without_the_option(tmp_path: Path) -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=True
     )
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_a_table_does_not_round_an_angle_to_a_full_turn() -> None:
+    table = table_text({"angle_deg": [359.99999999, 359.99, 360.0]})
+    assert table.split() == ["angle_deg", "0", "359.99", "360"]  # a given 360 stays
+    cut = digits_that_hold({"angle_deg": [359.99999999, 12.3456]}, {"angle_deg": [1e-3, 1e-3]})
+    assert list(cut["angle_deg"]) == [0.0, 12.35]
