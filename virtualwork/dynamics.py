@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from virtualwork.bearing import carried
 from virtualwork.dyads import Number, cross
 from virtualwork.errors import DescriptionError
+from virtualwork.joints import Joint
 from virtualwork.loads import Block, Scene, plus
 from virtualwork.mechanism import GROUND
-from virtualwork.reactions import Joint, Reactions
+from virtualwork.reactions import Reactions
 from virtualwork.work import effort, finished, write_effort
 
 if TYPE_CHECKING:
@@ -103,7 +105,7 @@ class Dynamics:
             The joint forces; default one side of every joint.
         """
         r, inputs = self.reactions, self.motion.mechanism.inputs
-        if self.statics is not None or self.scene.rubs or r.carried:
+        if self.statics is not None or self.scene.rubs or carried(self.scene):
             return
         if sides is None:
             sides = [(joint, joint.bodies[-1]) for joint in r.joints]

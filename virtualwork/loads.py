@@ -17,10 +17,12 @@ import numpy as np
 from virtualwork.dyads import Number, dot
 from virtualwork.mechanism import GROUND, Force, Mechanism, Spring, Torque, TorsionSpring
 from virtualwork.steps import Place, Term, combined
+from virtualwork.sums import Given, Row, Rows, Sum, Turned
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from virtualwork.bearing import Bearing
     from virtualwork.motion import Motion
     from virtualwork.state import Jets, State
     from virtualwork.steps import Plan
@@ -75,6 +77,34 @@ class Block:
         self.rates = scene.rates(rows, st.many) if self.one else (None, None)
         self.friction: dict[int, Number] = {}
         self._kept: dict[int, Number] = {}
+        self.rows_formed: dict[Row, tuple[float, Number]] = {}
+
+    def row(self, row: Row) -> tuple[float, Number]:
+        """A row's factor and array, formed once."""
+        found = self.rows_formed.get(row)
+        if found is None:
+            found = self.rows_formed[row] = row.form(self)
+        return found
+
+    def second(self, derivative: Callable[[Jets, int], Number]) -> tuple[float, Number]:
+        """ẍ = K q̈ + L q̇² of what has the derivatives K, L over the input: a factor and an array."""
+        if not self.one:
+            return 1.0, None if self.along is None else derivative(self.along, 2)
+        speed, rate = self.rates
+        normal = None if speed is None else derivative(self.by[0], 2)
+        tangential = None if rate is None else derivative(self.by[0], 1)
+        if tangential is None and isinstance(speed, float):
+            return speed * speed, normal  # one number for all poses: the array stays as it is
+        return 1.0, plus(
+            None if normal is None else normal * (speed * speed),
+            None if tangential is None else tangential * rate,
+        )
+
+    def forget(self, *, lasting: bool = False) -> None:
+        """Drop the arrays, or all but those that others will ask for."""
+        self._kept.clear()
+        kept = {row: found for row, found in self.rows_formed.items() if lasting and row.lasting}
+        self.rows_formed = kept
 
     def position(self, path: Path) -> Number:
         """P, complex."""
@@ -156,6 +186,10 @@ class Load:
         """Its value over a block: complex N, or N·m; None where it is zero."""
         raise NotImplementedError
 
+    def sum(self, acting: Acting) -> Sum:
+        """Its value as constants times rows."""
+        return Sum({acting.rows(Given, self): 1.0})
+
     @property
     def name(self) -> str:
         """How the ledger calls it."""
@@ -175,6 +209,9 @@ class Constant(Load):
     def value(self, block: Block) -> Number:
         return self.amount
 
+    def sum(self, acting: Acting) -> Sum:
+        return Sum({None: self.amount})
+
 
 @dataclass(frozen=True, eq=False)
 class Follower(Load):
@@ -184,6 +221,9 @@ class Follower(Load):
 
     def value(self, block: Block) -> Number:
         return self.amount * block.st.turn[self.body]
+
+    def sum(self, acting: Acting) -> Sum:
+        return Sum({acting.rows(Turned, self.body, None): self.amount})
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,6 +271,10 @@ class InertiaForce(Load):
         assert self.path is not None
         return block.acceleration(self.path, -self.mass)
 
+    def sum(self, acting: Acting) -> Sum:
+        assert self.path is not None
+        return acting.acceleration(self.path).times(-self.mass)
+
 
 @dataclass(frozen=True, eq=False)
 class InertiaTorque(Load):
@@ -241,6 +285,9 @@ class InertiaTorque(Load):
     def value(self, block: Block) -> Number:
         return block.alpha(self.body, -self.inertia)
 
+    def sum(self, acting: Acting) -> Sum:
+        return Sum({acting.rows.second("angle", self.body): -self.inertia})
+
 
 @dataclass(frozen=True, eq=False)
 class SpringEnd(Load):
@@ -249,6 +296,10 @@ class SpringEnd(Load):
     spring: Spring | None = None
     other: Path = (None, ())
     first: bool = True
+    mate: Load | None = None  # the other end, where it is on a link too
+
+    def sum(self, acting: Acting) -> Sum:
+        return super().sum(acting) if self.mate is None else self.mate.sum(acting).times(-1.0)
 
     def value(self, block: Block) -> Number:
         assert self.path is not None
@@ -275,6 +326,10 @@ class TorsionEnd(Load):
 
     spring: TorsionSpring | None = None
     sign: float = 1.0
+    mate: Load | None = None
+
+    def sum(self, acting: Acting) -> Sum:
+        return super().sum(acting) if self.mate is None else self.mate.sum(acting).times(-1.0)
 
     def value(self, block: Block) -> Number:
         assert self.spring is not None
@@ -307,32 +362,17 @@ class Rub(Load):
         return (self.place - center + along) * block.st.turn[self.body]
 
 
-class Scene:
-    """The loads of a mechanism over a motion; a load that is zero throughout is not in the list."""
+class Acting:
+    """What acts on a mechanism, at rest or moving; a load that is zero throughout is not in the list.
 
-    def __init__(self, motion: Motion, *, at_rest: bool = False) -> None:
-        self.motion = motion
-        self.mechanism: Mechanism = motion.mechanism
-        self.plan: Plan = motion.assembly.plan
-        self.at_rest = at_rest
+    It hangs on no motion: an assembly makes it once for rest and once for all motions.
+    """
+
+    def __init__(self, mechanism: Mechanism, plan: Plan, moves: bool) -> None:
+        self.mechanism, self.plan, self.moves = mechanism, plan, moves
+        self.rows = Rows()
         self._paths: dict[tuple[str, complex], Path] = {}
-        self._blocks: dict[tuple[str, ...], list[Block]] = {}
-        self._followed: dict[TorsionSpring, tuple[Reals, Reals]] = {}
-
-    @cached_property
-    def moves(self) -> bool:
-        """Whether anything moves at all: a speed or an acceleration that is not zero."""
-        return not self.at_rest and any(np.any(rate) for rates in self.motion._rates[:2] for rate in rates)
-
-    def rates(self, rows: slice, many: bool) -> tuple[Number, Number]:
-        """q̇ and q̈ of the one input over a block, None where zero."""
-        found: list[Number] = []
-        for rate in (self.motion._rates[0][0], self.motion._rates[1][0]):
-            if self.at_rest or (isinstance(rate, float) and rate == 0.0):
-                found.append(None)
-            else:
-                found.append(rate if isinstance(rate, float) else rate[rows] if many else float(rate[0]))
-        return found[0], found[1]
+        self._places = {step.node: step for step in plan.steps if isinstance(step, Place)}
 
     def path(self, body: str, z: complex) -> Path:
         """Where a point of a body lies: P[base] + Σ terms, as the order of solution places it."""
@@ -387,18 +427,20 @@ class Scene:
 
     def _spring(self, spring: Spring) -> list[Load]:
         ends = [self.path(*end) for end in spring.between]
-        return [
-            SpringEnd("spring", body, ends[k], z, spring, ends[1 - k], k == 0)
-            for k, (body, z) in enumerate(spring.between)
-            if body != GROUND
-        ]
+        found: list[Load] = []
+        for k, (body, z) in enumerate(spring.between):
+            if body != GROUND:
+                mate = found[0] if found else None
+                found.append(SpringEnd("spring", body, ends[k], z, spring, ends[1 - k], k == 0, mate))
+        return found
 
     def _torsion(self, torsion: TorsionSpring) -> list[Load]:
-        return [
-            TorsionEnd("torsion spring", body, None, 0j, torsion, sign)
-            for body, sign in zip(torsion.links, (1.0, -1.0), strict=True)
-            if body != GROUND
-        ]
+        found: list[Load] = []
+        for body, sign in zip(torsion.links, (1.0, -1.0), strict=True):
+            if body != GROUND:
+                mate = found[0] if found else None
+                found.append(TorsionEnd("torsion spring", body, None, 0j, torsion, sign, mate))
+        return found
 
     @cached_property
     def rubs(self) -> list[Rub]:
@@ -406,6 +448,118 @@ class Scene:
         from virtualwork.friction import loads
 
         return loads(self) if self.mechanism.friction and self.moves else []
+
+    @cached_property
+    def bearing(self) -> Bearing:
+        """How the loads bear on what moves, and how joint forces follow."""
+        from virtualwork.bearing import Bearing
+
+        return Bearing(self)
+
+    @cached_property
+    def everything(self) -> list[Load]:
+        """Loads and friction."""
+        return [*self.loads, *self.rubs]
+
+    def acceleration(self, path: Path) -> Sum:
+        """The acceleration of a point: Σ z·(s e^{iθ})″, from the point its body hangs on.
+
+        >>> from virtualwork.mechanism import Input, Link
+        >>> crank = Mechanism({"A": 0j}, {"crank": Link({"A": 0j})}, inputs=Input(link="crank"))
+        >>> acting = Acting(crank, crank.assembly.plan, moves=True)
+        >>> [(row.kind, row.name, z) for row, z in acting.acceleration(acting.path("crank", 0.5j)).items()]
+        [('turn', 'crank', 0.5j)]
+        """
+        base, terms = path
+        found = Sum()
+        step = None if base is None else self._places[base]
+        if step is not None and step.base in self._fixed and len(step.terms) == 1:
+            terms = combined(
+                (*step.terms, *terms)
+            )  # as many vectors as with the point, and the turning alone
+            base = None
+        if base is not None and base not in self._fixed:
+            found.add(Sum({self.rows.second("node", base): 1.0}))
+        for t in terms:
+            if t.body != GROUND or t.slide is not None:
+                found.add(Sum({self.rows.second("turn", t.body, t.slide): t.z}))
+        return found
+
+    @cached_property
+    def _fixed(self) -> set[str | None]:
+        """The points that do not move."""
+        found: set[str | None] = {None}
+        for node, step in self._places.items():
+            if step.base in found and all(t.body == GROUND and t.slide is None for t in step.terms):
+                found.add(node)
+        return found
+
+
+class Scene:
+    """The loads of a mechanism over a motion."""
+
+    def __init__(self, motion: Motion, *, at_rest: bool = False) -> None:
+        self.motion = motion
+        self.mechanism: Mechanism = motion.mechanism
+        self.plan: Plan = motion.assembly.plan
+        self.at_rest = at_rest
+        self.formed: set[str] = set()
+        self._blocks: dict[tuple[str, ...], list[Block]] = {}
+        self._followed: dict[TorsionSpring, tuple[Reals, Reals]] = {}
+
+    @cached_property
+    def acting(self) -> Acting:
+        """What acts, the same for all motions of an assembly."""
+        known = self.motion.assembly.acting
+        if self.moves not in known:
+            known[self.moves] = Acting(self.mechanism, self.plan, self.moves)
+        return known[self.moves]
+
+    @property
+    def bearing(self) -> Bearing:
+        """How the loads bear on what moves, and how joint forces follow."""
+        return self.acting.bearing
+
+    @cached_property
+    def drive(self) -> Reals:
+        """The effort at each input by virtual work, (n, k), as motors that other links carry need it."""
+        from virtualwork.work import effort
+
+        return effort(self)
+
+    @property
+    def loads(self) -> list[Load]:
+        """Every load that is not zero throughout, friction apart."""
+        return self.acting.loads
+
+    @property
+    def rubs(self) -> list[Rub]:
+        """The friction loads."""
+        return self.acting.rubs
+
+    @property
+    def rigid(self) -> dict[str, Rigid]:
+        """Mass properties of every link."""
+        return self.acting.rigid
+
+    def path(self, body: str, z: complex) -> Path:
+        """Where a point of a body lies."""
+        return self.acting.path(body, z)
+
+    @cached_property
+    def moves(self) -> bool:
+        """Whether anything moves at all: a speed or an acceleration that is not zero."""
+        return not self.at_rest and any(np.any(rate) for rates in self.motion._rates[:2] for rate in rates)
+
+    def rates(self, rows: slice, many: bool) -> tuple[Number, Number]:
+        """q̇ and q̈ of the one input over a block, None where zero."""
+        found: list[Number] = []
+        for rate in (self.motion._rates[0][0], self.motion._rates[1][0]):
+            if self.at_rest or (isinstance(rate, float) and rate == 0.0):
+                found.append(None)
+            else:
+                found.append(rate if isinstance(rate, float) else rate[rows] if many else float(rate[0]))
+        return found[0], found[1]
 
     def wound(self, block: Block, spring: TorsionSpring) -> Number:
         """θ_second − θ_first − free angle: within half a turn at the guess, and from there on followed continuously.
@@ -489,7 +643,7 @@ class Scene:
         ]
         for old in self._blocks.values():
             for block, before in zip(found, old, strict=True):
-                block._kept = before._kept
+                block._kept, block.rows_formed = before._kept, before.rows_formed
                 block.friction = before.friction
         self._blocks = {targets: found}
         return found

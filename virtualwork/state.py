@@ -254,6 +254,7 @@ class Jets:
         self.slide: dict[int, list[Number]] = {}
         self._turn: dict[str, list[Number]] = {GROUND: []}
         self._columns: dict[str, list[list[Number]]] = {}
+        self._inverse: dict[str, Number] = {}
 
     def rate(self, j: int, k: int) -> Number:
         """The k-th derivative of input j."""
@@ -296,7 +297,7 @@ class Jets:
     def slim(self) -> None:
         """Forget what is cheaper to form again than to keep over a long sweep."""
         self._turn = {GROUND: []}
-        self._columns = {}
+        self._columns, self._inverse = {}, {}
 
     def step(self, step: Step, k: int) -> None:
         """Carry one step on to derivatives of order k; the lower orders are known."""
@@ -363,13 +364,20 @@ class Jets:
             self._columns[group.name] = columns(group, self.st, self.plan)
         return self._columns[group.name]
 
+    def inverse(self, group: Group) -> Number:
+        """1/(c1 × c2) of a closed form's two columns, formed once for all orders and the joint forces."""
+        if group.name not in self._inverse:
+            c1, c2 = self.columns(group)[0]
+            self._inverse[group.name] = 1 / cross(c1, c2)
+        return self._inverse[group.name]
+
     def _group(self, group: Group, k: int) -> None:
         right = self.right_side(group, k)
         cols = self.columns(group)
         if group.kind != "Newton":
             (c1, c2), w = cols[0], right[0]
-            inverse = -1 / cross(c1, c2)
-            x: list[Number] = [cross(w, c2) * inverse, cross(c1, w) * inverse]
+            inverse = self.inverse(group)
+            x: list[Number] = [cross(c2, w) * inverse, cross(w, c1) * inverse]
         else:
             from virtualwork.newton import singular_poses, solve_columns
 
