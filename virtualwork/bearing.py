@@ -28,7 +28,7 @@ import numpy as np
 
 from virtualwork.dyads import Number
 from virtualwork.joints import Order, Side
-from virtualwork.loads import Acting, Block, Rub, plus, times
+from virtualwork.loads import Acting, Block, Rub
 from virtualwork.mechanism import GROUND
 from virtualwork.newton import stack
 from virtualwork.steps import Group, Place, Term, Turn
@@ -323,10 +323,11 @@ class Solved(Row):
         (c1, c2), (q1, q2) = cols[0], loads
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             inverse = _regular(block.by[0].inverse(group), c1, c2)
-            total = plus(
-                times(c2, None if q1 is None else q1 * inverse),
-                times(c1, None if q2 is None else q2 * -inverse),
-            )
+            # λ = i (c2 q1 − c1 q2)/(c1 × c2)
+            total = None if q1 is None else c2 * (q1 * inverse)
+            if q2 is not None:
+                other = c1 * (q2 * inverse)
+                total = -1.0 * other if total is None else total - other
         return 1.0, [1j * total]
 
 

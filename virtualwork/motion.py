@@ -268,10 +268,10 @@ class Motion:
         whole = np.ones(self.n, dtype=bool)
         for rows, st in self._rows():
             for g in self.assembly.plan.groups:
-                for body in g.angles:
-                    whole[rows] &= np.isfinite(st.turn[body])
-                for s in g.slides:
-                    whole[rows] &= np.isfinite(st.slide[s])
+                for value in (*(st.turn[body] for body in g.angles), *(st.slide[s] for s in g.slides)):
+                    # the sum of squares is finite where all of them are; else each is looked at
+                    if not np.isfinite(np.vdot(value, value)):
+                        whole[rows] &= np.isfinite(value)
         return np.asarray(whole & np.isfinite(self.inputs).all(axis=1))
 
     # --- forces -----------------------------------------------------------------------------------------------

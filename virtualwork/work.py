@@ -86,8 +86,10 @@ def write_effort(scene: Scene, block: Block, out: Reals) -> None:
                 value = bearing.value(block, load)
                 total = plus(total, value if isinstance(moved, float) and moved == 1 else times(value, moved))
         if total is not None:
+            np.negative(total, out=out[block.rows, j])
             bad = _singular(scene, block, j)
-            out[block.rows, j] = -total if bad is False else np.where(bad, np.nan, -total)
+            if bad is not False:
+                out[block.rows, j][bad] = np.nan
 
 
 def finished(scene: Scene, out: Reals) -> Reals:
