@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
+from weakref import proxy
 
 import numpy as np
 
@@ -72,7 +73,8 @@ class Block:
     def __init__(
         self, scene: Scene, i: int, rows: slice, st: State, along: Jets | None, by: list[Jets]
     ) -> None:
-        self.scene, self.rows, self.st, self.along, self.by = scene, rows, st, along, by
+        self.scene: Scene = proxy(scene)  # which holds its blocks
+        self.rows, self.st, self.along, self.by = rows, st, along, by
         self.one = len(by) == 1
         self.rates = scene.rates(rows, st.many) if self.one else (None, None)
         self.friction: dict[int, Number] = {}
