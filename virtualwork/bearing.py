@@ -324,10 +324,11 @@ class Solved(Row):
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             inverse = _regular(block.by[0].inverse(group), c1, c2)
             # λ = i (c2 q1 − c1 q2)/(c1 × c2)
-            total = None if q1 is None else c2 * (q1 * inverse)
-            if q2 is not None:
-                other = c1 * (q2 * inverse)
-                total = -1.0 * other if total is None else total - other
+            if q1 is None:
+                total = c1 * (q2 * -inverse)
+            else:
+                total = c2 * (q1 * inverse)
+                total = total if q2 is None else total - c1 * (q2 * inverse)
         return 1.0, [1j * total]
 
 

@@ -97,10 +97,7 @@ class Block:
         tangential = None if rate is None else derivative(self.by[0], 1)
         if tangential is None and isinstance(speed, float):
             return speed * speed, normal  # one number for all poses: the array stays as it is
-        return 1.0, plus(
-            None if normal is None else normal * (speed * speed),
-            None if tangential is None else tangential * rate,
-        )
+        return 1.0, plus(times(normal, times(speed, speed)), times(tangential, rate))
 
     def forget(self, *, lasting: bool = False) -> None:
         """Drop the arrays, or all but those that others will ask for."""

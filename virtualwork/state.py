@@ -391,9 +391,10 @@ class Jets:
         """Store the unknowns' k-th derivatives and those of the angles tied to them."""
         n = len(group.angles)
         for body in group.members:
-            self._normal.pop(body, None)
-        for known in [(body, j) for body, j in self._turn if j >= k and body in group.members]:
-            del self._turn[known]
+            for j in [j for known, j in self._turn if known == body and j >= k]:
+                del self._turn[body, j]
+            if k == 1:
+                self._normal.pop(body, None)
         for body, value in zip(group.angles, x[:n], strict=True):
             _put(self.angle, body, k, value)
         for g, value in zip(group.slides, x[n:], strict=True):
