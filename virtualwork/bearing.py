@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     ]  # lever (None: the point itself), sign, source of the force
 
 LONG = 4  # a sum on its way down a chain of links is formed where it has more rows than this, and is one row from there
+DEEP = 20  # groups; forming a row of one calls for that of the next, some ten calls deep for each
 PARALLEL = (
     1e-11  # sine of the angle between two columns below which the joint forces have no digit left that counts
 )
@@ -61,6 +62,7 @@ class Bearing:
         self._known: dict[Any, Sum] = {}
         self._on_group: dict[str, list[Sum]] = {}
         self._first: dict[Row, list[Row]] = {}
+        self._sides: dict[Side, Sum] = {}
         self._hung: dict[str, list[Hung]] = {}
         self._tied: dict[str, list[tuple[str, float]]] = {}
         self._hang()
@@ -73,11 +75,11 @@ class Bearing:
 
     def value(self, block: Block, terms: Sum) -> Number:
         """The array of a sum over a block; what a long chain of links passes on is formed from its far end."""
-        for row in terms:
-            if row is not None:
-                if row not in self._first:
+        if len(self.plan.groups) > DEEP:
+            for row in terms:
+                if row is not None and row not in self._first:
                     self._first[row] = [part for part in in_order(row) if part.lasting]
-                for part in self._first[row]:
+                for part in self._first[row] if row is not None else ():
                     block.row(part)
         return terms.value(block)
 
@@ -227,6 +229,11 @@ class Bearing:
 
     def side(self, side: Side) -> Sum:
         """The force of a joint on a body: the reaction of one that is known, or a row of its own."""
+        if side not in self._sides:
+            self._sides[side] = self._side(side)
+        return self._sides[side]
+
+    def _side(self, side: Side) -> Sum:
         joint, body = side
         if body == GROUND:
             total = Sum()
@@ -294,10 +301,13 @@ class Bearing:
 
     def couple(self, kind: str, i: int) -> Sum:
         """The torque of a guide, a gear or an input, from the bodies' ΣM = 0."""
-        total = Sum()
-        for body, factor in self.order.couple(kind, i).items():
-            total.add(self.rest(body), -factor)
-        return total
+        key = "couple", kind, i
+        if key not in self._known:
+            total = Sum()
+            for body, factor in self.order.couple(kind, i).items():
+                total.add(self.rest(body), -factor)
+            self._known[key] = total
+        return self._known[key]
 
 
 @dataclass(frozen=True, eq=False)
@@ -390,12 +400,12 @@ def carried(scene: Scene | Acting) -> list[tuple[str, int, float]]:
 
 def _regular(inverse: Number, c1: Number, c2: Number) -> Number:
     """1/(c1 × c2); NaN where two columns are parallel to rounding, for the joint forces have no value there."""
-    if np.ndim(inverse) == 0:
-        return inverse if abs(inverse) * abs(c1) * abs(c2) < 1 / PARALLEL else float("nan")
     # the norms over the block are above the largest entry: in most blocks they say that no pose is near
-    sizes = [np.vdot(v, v).real for v in (inverse, c1, c2) if np.ndim(v)]
-    if all(np.ndim(v) for v in (c1, c2)) and np.sqrt(np.prod(sizes)) < 1 / PARALLEL:
+    bound = np.vdot(inverse, inverse).real * np.vdot(c1, c1).real * np.vdot(c2, c2).real
+    if bound < 1 / PARALLEL**2:
         return inverse
+    if np.ndim(inverse) == 0:
+        return float("nan")
     return np.where(np.abs(inverse) * (np.abs(c1) * np.abs(c2)) < 1 / PARALLEL, inverse, np.nan)
 
 

@@ -13,8 +13,6 @@ from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from virtualwork.dyads import Number
 from virtualwork.mechanism import GROUND
 from virtualwork.steps import Term
@@ -64,38 +62,20 @@ class Sum(dict[Row | None, Any]):
     def value(self, block: Block) -> Number:
         """Its array over a block, or one number where it is the same at every pose; None where it is zero."""
         total: Number = None
-        own = False  # whether the array is ours to add to
         for row, c in self.items():
             if row is None:
-                continue
-            factor, v = block.row(row)
-            if v is None:
-                continue
-            c = c * factor
-            if isinstance(c, complex) and not c.imag:
-                c = c.real
-            if total is None:
-                total, own = (v, False) if c == 1 else (c * v, block.st.many)
-            elif own:
-                total = _into(total, v, c)
+                part = c
             else:
-                total = total + v if c == 1 else total - v if c == -1 else total + c * v
-                own = block.st.many
-        constant = self.get(None)
-        if constant is None:
-            return total
-        return constant if total is None else _into(total, constant, 1) if own else total + constant
-
-
-def _into(total: Number, v: Number, c: complex) -> Number:
-    """total + c·v, in place of the total where its array can hold it."""
-    if not isinstance(total, np.ndarray) or (
-        total.dtype != complex and (np.iscomplexobj(v) or isinstance(c, complex))
-    ):
-        return total + c * v
-    if c == -1:
-        return np.subtract(total, v, out=total)
-    return np.add(total, v if c == 1 else c * v, out=total)
+                factor, v = block.row(row)
+                if v is None:
+                    continue
+                c = c * factor
+                if c == -1 and total is not None:
+                    total = total - v
+                    continue
+                part = v if c == 1 else c * v
+            total = part if total is None else total + part
+        return total
 
 
 @dataclass(frozen=True, eq=False)
