@@ -59,6 +59,7 @@ class Bearing:
         self.acting, self.rows = acting, acting.rows
         self.mechanism, self.plan = acting.mechanism, acting.plan
         self.order = Order(self.mechanism, self.plan)
+        self._deep = len(self.plan.groups) > DEEP
         self._known: dict[Any, Sum] = {}
         self._on_group: dict[str, list[Sum]] = {}
         self._first: dict[Row, list[Row]] = {}
@@ -75,7 +76,7 @@ class Bearing:
 
     def value(self, block: Block, terms: Sum) -> Number:
         """The array of a sum over a block; what a long chain of links passes on is formed from its far end."""
-        if len(self.plan.groups) > DEEP:
+        if self._deep:
             for row in terms:
                 if row is not None and row not in self._first:
                     self._first[row] = [part for part in in_order(row) if part.lasting]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -113,17 +113,16 @@ class Dynamics:
         n, k = self.motion.n, len(inputs)
         work, euler = np.zeros((n, k)), np.zeros((n, k))
 
-        def others(block: Block) -> Number:
+        def efforts(block: Block) -> None:
             if "effort" not in self.__dict__:
                 write_effort(self.scene, block, work)
             for j in range(k):
                 value = r.effort(block, j)
                 if value is not None:
                     euler[block.rows, j] = value
-            return None
 
         forms = [partial(r.joint_force, joint=joint, body=body) for joint, body in wanted]
-        *found, _ = r.over(*forms, others, kind=complex)
+        found = r.over(*forms, kind=complex, also=efforts)
         for (joint, body), force in zip(wanted, found, strict=True):
             self._forces[joint.key, body] = force
         if self.scene.lost is not None:
@@ -180,7 +179,9 @@ class Dynamics:
         here = [found for found in self.joints_named(joint) if on in found.bodies]
         if not here:
             raise DescriptionError(f"link '{on}' has no joint at '{joint}'")
-        total: Any = sum(self.joint_force(found, on) for found in here)
+        total, *others = (self.joint_force(found, on) for found in here)
+        for force in others:
+            total = total + force
         return pairs(total)
 
     @cached_property

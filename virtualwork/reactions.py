@@ -80,8 +80,16 @@ class Reactions:
         """The scene's blocks, with what all joints' places hang on."""
         return self.scene.blocks(self.keys)
 
-    def over(self, *forms: Callable[[Block], Number], kind: type = float) -> list[Any]:
-        """Quantities over all blocks, formed block by block together; NaN where a pose is not assembled."""
+    def over(
+        self,
+        *forms: Callable[[Block], Number],
+        kind: type = float,
+        also: Callable[[Block], None] | None = None,
+    ) -> list[Any]:
+        """Quantities over all blocks, formed block by block together; NaN where a pose is not assembled.
+
+        `also` is called with each block while what they are made of is there.
+        """
         n = self.scene.motion.n
         found: list[Any] = [np.empty(n, dtype=kind) for _ in forms]
 
@@ -89,6 +97,8 @@ class Reactions:
             for out, form in zip(found, forms, strict=True):
                 value = form(block)
                 out[block.rows] = 0.0 if value is None else value
+            if also is not None:
+                also(block)
             if n > BLOCK:  # over a long sweep what the quantities were made of is not kept
                 block.forget(lasting=True)
 
