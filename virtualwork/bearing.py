@@ -28,7 +28,7 @@ import numpy as np
 
 from virtualwork.dyads import Number
 from virtualwork.joints import Order, Side
-from virtualwork.loads import Acting, Block, Rub
+from virtualwork.loads import Acting, Rub
 from virtualwork.mechanism import GROUND
 from virtualwork.newton import stack
 from virtualwork.steps import Group, Place, Term, Turn
@@ -38,7 +38,7 @@ from virtualwork.work import carrier
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from virtualwork.loads import Scene
+    from virtualwork.scene import Block, Scene
 
     Reals = NDArray[np.float64]
     Hung = tuple[

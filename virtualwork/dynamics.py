@@ -12,9 +12,10 @@ from virtualwork.bearing import carried
 from virtualwork.dyads import Number, cross
 from virtualwork.errors import DescriptionError
 from virtualwork.joints import Joint
-from virtualwork.loads import Block, Scene, plus
+from virtualwork.loads import plus
 from virtualwork.mechanism import GROUND
 from virtualwork.reactions import Reactions
+from virtualwork.scene import Block, Scene
 from virtualwork.work import effort, finished, write_effort
 
 if TYPE_CHECKING:

@@ -14,9 +14,10 @@ import numpy as np
 from virtualwork.dyads import Number, dot
 from virtualwork.errors import DescriptionError
 from virtualwork.joints import Joint, joints
-from virtualwork.loads import Acting, Rub, Scene, plus, times
+from virtualwork.loads import Acting, Rub, plus, times
 from virtualwork.mechanism import GROUND
 from virtualwork.reactions import Reactions
+from virtualwork.scene import Scene
 from virtualwork.steps import Term, combined
 
 if TYPE_CHECKING:

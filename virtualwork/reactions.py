@@ -11,13 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from virtualwork.bearing import carried
 from virtualwork.dyads import Number, dot
-from virtualwork.loads import BLOCK, Block, Scene, path_reads, plus
+from virtualwork.joints import Joint, Side
+from virtualwork.loads import path_reads, plus
 from virtualwork.mechanism import GROUND
+from virtualwork.scene import BLOCK, Block, Scene
 
 if TYPE_CHECKING:
-    from virtualwork.joints import Joint, Side
     from virtualwork.mechanism import Mechanism
+
+__all__ = ["Joint", "Reactions"]
 
 
 class Reactions:
@@ -90,6 +94,8 @@ class Reactions:
 
         `also` is called with each block while what they are made of is there.
         """
+        if carried(self.scene):
+            _ = self.scene.drive  # over all poses, before the blocks are solved one by one
         n = self.scene.motion.n
         found: list[Any] = [np.empty(n, dtype=kind) for _ in forms]
 

@@ -18,7 +18,8 @@ from virtualwork.mechanism import GROUND
 from virtualwork.steps import Term
 
 if TYPE_CHECKING:
-    from virtualwork.loads import Block, Load
+    from virtualwork.loads import Load
+    from virtualwork.scene import Block
     from virtualwork.state import Jets
 
 

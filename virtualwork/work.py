@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.dyads import Number, dot
-from virtualwork.loads import BLOCK, Acting, Block, Load, Scene, SpringEnd, TorsionEnd, plus, times
+from virtualwork.loads import Acting, Load, SpringEnd, TorsionEnd, plus, times
 from virtualwork.mechanism import GROUND
+from virtualwork.scene import BLOCK, Block, Scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
