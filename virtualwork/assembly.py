@@ -22,6 +22,7 @@ from virtualwork.state import Case, State, place
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from virtualwork.loads import Acting
     from virtualwork.mechanism import Mechanism
     from virtualwork.track import Track
 
@@ -56,6 +57,7 @@ class Assembly:
         self.warnings = warnings
         self.cases = {g.name: Case(g, dict(plan_.directions)) for g in plan_.groups if g.kind != "Newton"}
         self._needed: dict[frozenset[str], tuple[Step, ...]] = {}
+        self.acting: dict[bool, Acting] = {}  # the loads at rest and in motion, for all motions
 
     @classmethod
     def from_guess(cls, m: Mechanism) -> Assembly:

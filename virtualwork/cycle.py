@@ -10,7 +10,8 @@ import numpy as np
 
 from virtualwork.dyads import Number
 from virtualwork.equilibrium import potential_of
-from virtualwork.loads import Block, SpringEnd, TorsionEnd, path_reads, plus, times
+from virtualwork.loads import SpringEnd, TorsionEnd, path_reads, plus, times
+from virtualwork.scene import Block
 from virtualwork.work import power
 
 if TYPE_CHECKING:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from virtualwork.bearing import carried
 from virtualwork.dyads import Number, cross
 from virtualwork.errors import DescriptionError
-from virtualwork.loads import Block, Scene, plus
+from virtualwork.joints import Joint
+from virtualwork.loads import plus
 from virtualwork.mechanism import GROUND
-from virtualwork.reactions import Joint, Reactions
+from virtualwork.reactions import Reactions
+from virtualwork.scene import Block, Scene
 from virtualwork.work import effort, finished, write_effort
 
 if TYPE_CHECKING:
@@ -103,7 +106,7 @@ class Dynamics:
             The joint forces; default one side of every joint.
         """
         r, inputs = self.reactions, self.motion.mechanism.inputs
-        if self.statics is not None or self.scene.rubs or r.carried:
+        if self.statics is not None or self.scene.rubs or carried(self.scene):
             return
         if sides is None:
             sides = [(joint, joint.bodies[-1]) for joint in r.joints]
@@ -111,17 +114,16 @@ class Dynamics:
         n, k = self.motion.n, len(inputs)
         work, euler = np.zeros((n, k)), np.zeros((n, k))
 
-        def others(block: Block) -> Number:
+        def efforts(block: Block) -> None:
             if "effort" not in self.__dict__:
                 write_effort(self.scene, block, work)
             for j in range(k):
                 value = r.effort(block, j)
                 if value is not None:
                     euler[block.rows, j] = value
-            return None
 
         forms = [partial(r.joint_force, joint=joint, body=body) for joint, body in wanted]
-        *found, _ = r.over(*forms, others, kind=complex)
+        found = r.over(*forms, kind=complex, also=efforts)
         for (joint, body), force in zip(wanted, found, strict=True):
             self._forces[joint.key, body] = force
         if self.scene.lost is not None:
@@ -178,7 +180,9 @@ class Dynamics:
         here = [found for found in self.joints_named(joint) if on in found.bodies]
         if not here:
             raise DescriptionError(f"link '{on}' has no joint at '{joint}'")
-        total: Any = sum(self.joint_force(found, on) for found in here)
+        total, *others = (self.joint_force(found, on) for found in here)
+        for force in others:
+            total = total + force
         return pairs(total)
 
     @cached_property

@@ -16,12 +16,10 @@ import numpy as np
 
 from virtualwork.dyads import Number, dot
 from virtualwork.loads import (
-    Block,
     Constant,
     Follower,
     Load,
     Path,
-    Scene,
     SpringEnd,
     Tabled,
     TorsionEnd,
@@ -30,6 +28,7 @@ from virtualwork.loads import (
     times,
 )
 from virtualwork.mechanism import GROUND
+from virtualwork.scene import Block, Scene
 from virtualwork.work import power
 
 if TYPE_CHECKING:

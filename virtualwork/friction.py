@@ -13,9 +13,11 @@ import numpy as np
 
 from virtualwork.dyads import Number, dot
 from virtualwork.errors import DescriptionError
-from virtualwork.loads import Rub, Scene, plus, times
+from virtualwork.joints import Joint, joints
+from virtualwork.loads import Acting, Rub, plus, times
 from virtualwork.mechanism import GROUND
-from virtualwork.reactions import Joint, Reactions, joints
+from virtualwork.reactions import Reactions
+from virtualwork.scene import Scene
 from virtualwork.steps import Term, combined
 
 if TYPE_CHECKING:
@@ -25,10 +27,10 @@ LIMIT = 200  # iterations; each gains a factor of some μ r / l
 CLOSE = 1e-14  # relative change at which a pose has converged
 
 
-def pairs(scene: Scene) -> list[tuple[Joint, str, str, float, float]]:
+def pairs(scene: Scene | Acting) -> list[tuple[Joint, str, str, float, float]]:
     """What rubs: (joint, body, the body it rubs on, coefficient, radius)."""
     found = []
-    known = joints(scene)
+    known = joints(scene.mechanism)
     for i, entry in enumerate(scene.mechanism.friction, 1):
         here = [joint for joint in known if joint.name == entry.joint]
         if not here:
@@ -45,7 +47,7 @@ def pairs(scene: Scene) -> list[tuple[Joint, str, str, float, float]]:
     return found
 
 
-def loads(scene: Scene) -> list[Rub]:
+def loads(scene: Acting) -> list[Rub]:
     """The friction loads of a scene, each pair's two sides."""
     found: list[Rub] = []
     m = scene.mechanism
@@ -80,11 +82,13 @@ def settle(scene: Scene) -> tuple[int, NDArray[np.bool_]]:
     rubbing = pairs(scene)
     converged = np.zeros(n, dtype=bool)
     count = 0
+    reactions = Reactions(scene)
     while count < LIMIT:
         count += 1
-        reactions = Reactions(scene)
         converged[:] = True
+        scene.__dict__.pop("drive", None)
         for block in reactions.blocks():
+            block.forget()
             change: Number = 0.0
             scale: Number = 0.0
             fresh: dict[int, Number] = {}
@@ -111,4 +115,8 @@ def settle(scene: Scene) -> tuple[int, NDArray[np.bool_]]:
             converged[block.rows] = ~(change > CLOSE * 8) & np.isfinite(scale)
         if (converged | ~scene.motion.assembled).all():
             break
+    for block in reactions.blocks():
+        block.forget()
+    scene.__dict__.pop("drive", None)
+    scene.formed.clear()
     return count, converged

@@ -7,7 +7,6 @@ Everything else, virtual work and joint reactions, reads this list.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -17,17 +16,17 @@ import numpy as np
 from virtualwork.dyads import Number, dot
 from virtualwork.mechanism import GROUND, Force, Mechanism, Spring, Torque, TorsionSpring
 from virtualwork.steps import Place, Term, combined
+from virtualwork.sums import Given, Rows, Sum, Turned
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from virtualwork.motion import Motion
-    from virtualwork.state import Jets, State
+    from virtualwork.bearing import Bearing
+    from virtualwork.scene import Block
     from virtualwork.steps import Plan
 
     Reals = NDArray[np.float64]
 
-BLOCK = 8192  # up to so many poses there is nothing to keep in cache
 Path = tuple[str | None, tuple[Term, ...]]  # a point of a body: P[base] + Σ terms
 
 
@@ -61,85 +60,6 @@ def rigid(m: Mechanism, body: str) -> Rigid:
     return Rigid(mass, center, sum(i + w * abs(z - center) ** 2 for w, z, i in parts))
 
 
-class Block:
-    """A block of poses as the loads see it: positions, velocity coefficients, velocities, accelerations.
-
-    A derivative that is identically zero is None.
-    """
-
-    def __init__(
-        self, scene: Scene, i: int, rows: slice, st: State, along: Jets | None, by: list[Jets]
-    ) -> None:
-        self.scene, self.rows, self.st, self.along, self.by = scene, rows, st, along, by
-        self.one = len(by) == 1
-        self.rates = scene.rates(rows, st.many) if self.one else (None, None)
-        self.friction: dict[int, Number] = {}
-        self._kept: dict[int, Number] = {}
-
-    def position(self, path: Path) -> Number:
-        """P, complex."""
-        base, terms = path
-        return self.st.point[base] + self.st.sum(terms) if terms else self.st.point[base]
-
-    def coefficient(self, path: Path, j: int) -> Number:
-        """∂P/∂q_j, complex."""
-        return self.by[j].vector(*path, 1)
-
-    def turning(self, body: str, j: int) -> Number:
-        """∂θ/∂q_j."""
-        return None if body == GROUND else self.by[j].angle[body][0]
-
-    def velocity(self, path: Path) -> Number:
-        """Ṗ, complex."""
-        if self.one:
-            return times(self.by[0].vector(*path, 1), self.rates[0])
-        return None if self.along is None else self.along.vector(*path, 1)
-
-    def acceleration(self, path: Path, factor: float = 1.0) -> Number:
-        """P̈ = K q̈ + L q̇², complex, times a factor."""
-        if not self.one:
-            return None if self.along is None else times(self.along.vector(*path, 2), factor)
-        speed, rate = self.rates
-        return plus(
-            None if speed is None else times(self.by[0].vector(*path, 2), speed * speed * factor),
-            None if rate is None else times(self.by[0].vector(*path, 1), rate * factor),
-        )
-
-    def omega(self, body: str) -> Number:
-        """ω."""
-        if body == GROUND:
-            return None
-        if self.one:
-            return times(self.by[0].angle[body][0], self.rates[0])
-        return None if self.along is None else self.along.angle[body][0]
-
-    def alpha(self, body: str, factor: float = 1.0) -> Number:
-        """α, times a factor."""
-        if body == GROUND:
-            return None
-        if not self.one:
-            return None if self.along is None else times(self.along.angle[body][1], factor)
-        speed, rate = self.rates
-        return plus(
-            times(self.by[0].angle[body][1], None if speed is None else speed * speed * factor),
-            times(self.by[0].angle[body][0], None if rate is None else rate * factor),
-        )
-
-    def slide_rate(self, guide: int) -> Number:
-        """ṡ of a guide."""
-        if self.one:
-            return times(self.by[0].slide[guide][0], self.rates[0])
-        return None if self.along is None else self.along.slide[guide][0]
-
-    def keep(self, load: Load) -> Number:
-        """A load's value, formed once; friction anew at each iterate."""
-        if isinstance(load, Rub):
-            return load.value(self)
-        if id(load) not in self._kept:
-            self._kept[id(load)] = load.value(self)
-        return self._kept[id(load)]
-
-
 @dataclass(frozen=True, eq=False)
 class Load:
     """A force (complex) at a point of a body, or a torque (real) on it where `path` is None.
@@ -155,6 +75,10 @@ class Load:
     def value(self, block: Block) -> Number:
         """Its value over a block: complex N, or N·m; None where it is zero."""
         raise NotImplementedError
+
+    def sum(self, acting: Acting) -> Sum:
+        """Its value as constants times rows."""
+        return Sum({acting.rows(Given, self): 1.0})
 
     @property
     def name(self) -> str:
@@ -175,6 +99,9 @@ class Constant(Load):
     def value(self, block: Block) -> Number:
         return self.amount
 
+    def sum(self, acting: Acting) -> Sum:
+        return Sum({None: self.amount})
+
 
 @dataclass(frozen=True, eq=False)
 class Follower(Load):
@@ -184,6 +111,9 @@ class Follower(Load):
 
     def value(self, block: Block) -> Number:
         return self.amount * block.st.turn[self.body]
+
+    def sum(self, acting: Acting) -> Sum:
+        return Sum({acting.rows(Turned, self.body, None): self.amount})
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,6 +161,10 @@ class InertiaForce(Load):
         assert self.path is not None
         return block.acceleration(self.path, -self.mass)
 
+    def sum(self, acting: Acting) -> Sum:
+        assert self.path is not None
+        return acting.acceleration(self.path).times(-self.mass)
+
 
 @dataclass(frozen=True, eq=False)
 class InertiaTorque(Load):
@@ -241,6 +175,9 @@ class InertiaTorque(Load):
     def value(self, block: Block) -> Number:
         return block.alpha(self.body, -self.inertia)
 
+    def sum(self, acting: Acting) -> Sum:
+        return Sum({acting.rows.second("angle", self.body): -self.inertia})
+
 
 @dataclass(frozen=True, eq=False)
 class SpringEnd(Load):
@@ -249,6 +186,10 @@ class SpringEnd(Load):
     spring: Spring | None = None
     other: Path = (None, ())
     first: bool = True
+    mate: Load | None = None  # the other end, where it is on a link too
+
+    def sum(self, acting: Acting) -> Sum:
+        return super().sum(acting) if self.mate is None else self.mate.sum(acting).times(-1.0)
 
     def value(self, block: Block) -> Number:
         assert self.path is not None
@@ -275,6 +216,10 @@ class TorsionEnd(Load):
 
     spring: TorsionSpring | None = None
     sign: float = 1.0
+    mate: Load | None = None
+
+    def sum(self, acting: Acting) -> Sum:
+        return super().sum(acting) if self.mate is None else self.mate.sum(acting).times(-1.0)
 
     def value(self, block: Block) -> Number:
         assert self.spring is not None
@@ -307,32 +252,17 @@ class Rub(Load):
         return (self.place - center + along) * block.st.turn[self.body]
 
 
-class Scene:
-    """The loads of a mechanism over a motion; a load that is zero throughout is not in the list."""
+class Acting:
+    """What acts on a mechanism, at rest or moving; a load that is zero throughout is not in the list.
 
-    def __init__(self, motion: Motion, *, at_rest: bool = False) -> None:
-        self.motion = motion
-        self.mechanism: Mechanism = motion.mechanism
-        self.plan: Plan = motion.assembly.plan
-        self.at_rest = at_rest
+    It hangs on no motion: an assembly makes it once for rest and once for all motions.
+    """
+
+    def __init__(self, mechanism: Mechanism, plan: Plan, moves: bool) -> None:
+        self.mechanism, self.plan, self.moves = mechanism, plan, moves
+        self.rows = Rows()
         self._paths: dict[tuple[str, complex], Path] = {}
-        self._blocks: dict[tuple[str, ...], list[Block]] = {}
-        self._followed: dict[TorsionSpring, tuple[Reals, Reals]] = {}
-
-    @cached_property
-    def moves(self) -> bool:
-        """Whether anything moves at all: a speed or an acceleration that is not zero."""
-        return not self.at_rest and any(np.any(rate) for rates in self.motion._rates[:2] for rate in rates)
-
-    def rates(self, rows: slice, many: bool) -> tuple[Number, Number]:
-        """q̇ and q̈ of the one input over a block, None where zero."""
-        found: list[Number] = []
-        for rate in (self.motion._rates[0][0], self.motion._rates[1][0]):
-            if self.at_rest or (isinstance(rate, float) and rate == 0.0):
-                found.append(None)
-            else:
-                found.append(rate if isinstance(rate, float) else rate[rows] if many else float(rate[0]))
-        return found[0], found[1]
+        self._places = {step.node: step for step in plan.steps if isinstance(step, Place)}
 
     def path(self, body: str, z: complex) -> Path:
         """Where a point of a body lies: P[base] + Σ terms, as the order of solution places it."""
@@ -387,18 +317,20 @@ class Scene:
 
     def _spring(self, spring: Spring) -> list[Load]:
         ends = [self.path(*end) for end in spring.between]
-        return [
-            SpringEnd("spring", body, ends[k], z, spring, ends[1 - k], k == 0)
-            for k, (body, z) in enumerate(spring.between)
-            if body != GROUND
-        ]
+        found: list[Load] = []
+        for k, (body, z) in enumerate(spring.between):
+            if body != GROUND:
+                mate = found[0] if found else None
+                found.append(SpringEnd("spring", body, ends[k], z, spring, ends[1 - k], k == 0, mate))
+        return found
 
     def _torsion(self, torsion: TorsionSpring) -> list[Load]:
-        return [
-            TorsionEnd("torsion spring", body, None, 0j, torsion, sign)
-            for body, sign in zip(torsion.links, (1.0, -1.0), strict=True)
-            if body != GROUND
-        ]
+        found: list[Load] = []
+        for body, sign in zip(torsion.links, (1.0, -1.0), strict=True):
+            if body != GROUND:
+                mate = found[0] if found else None
+                found.append(TorsionEnd("torsion spring", body, None, 0j, torsion, sign, mate))
+        return found
 
     @cached_property
     def rubs(self) -> list[Rub]:
@@ -407,113 +339,50 @@ class Scene:
 
         return loads(self) if self.mechanism.friction and self.moves else []
 
-    def wound(self, block: Block, spring: TorsionSpring) -> Number:
-        """θ_second − θ_first − free angle: within half a turn at the guess, and from there on followed continuously.
+    @cached_property
+    def bearing(self) -> Bearing:
+        """How the loads bear on what moves, and how joint forces follow."""
+        from virtualwork.bearing import Bearing
 
-        Where the inputs alone fix both angles they are taken as they are, whole turns included. With several inputs
-        the angle lies within half a turn of free.
-        """
-        st, (a, b) = block.st, spring.links
-        known = [self.plan.angles[body] for body in (a, b)]
-        if all(not angle.bases and angle.phase is None for angle in known):
-            return (st.affine(known[1]) - spring.free_angle) - st.affine(known[0])
-        relative = st.turn[b] * np.conj(st.turn[a]) * complex(np.exp(-1j * spring.free_angle))
-        within = np.angle(relative)
-        if len(st.inputs) == 1:
-            q, unwrapped = self._unwound(spring)
-            rough = np.interp(np.asarray(st.inputs[0], dtype=float), q, unwrapped)
-            within = within + 2 * np.pi * np.round((rough - within) / (2 * np.pi))
-        return within if block.st.many else float(within)
-
-    def _unwound(self, spring: TorsionSpring) -> tuple[Reals, Reals]:
-        """The relative angle of a torsion spring followed from the guess, roughly: only its whole turns are used."""
-        if spring not in self._followed:
-            inputs, at = self.motion.inputs[:, 0], self.mechanism.at[0]
-            low, high = min(float(np.nanmin(inputs)), at), max(float(np.nanmax(inputs)), at)
-            slide = self.mechanism.inputs[0].is_slide
-            step = self.mechanism.size / 720 if slide else 2 * np.pi / 720
-            q = np.linspace(low, high, min(20000, 2 + int((high - low) / step)))
-            along = type(self.motion)(self.motion.assembly, q)
-            a, b = (along.angle(body) if body != GROUND else np.zeros(len(q)) for body in spring.links)
-            relative = np.angle(np.exp(1j * (b - a - spring.free_angle)))
-            there = np.isfinite(relative)
-            path = np.unwrap(relative[there])
-            if len(path):
-                start = int(np.argmin(np.abs(q[there] - at)))
-                path = path + (relative[there][start] - path[start])
-                q = q[there]
-            self._followed[spring] = (q, path) if len(path) else (q, np.zeros(len(q)))
-        return self._followed[spring]
-
-    # --- solving ----------------------------------------------------------------------------------------------
-    def reads(self, loads: Iterable[Load]) -> set[str]:
-        """What the loads' points and bodies hang on."""
-        keys: set[str] = set()
-        for load in loads:
-            keys.add(f"angle:{load.body}")
-            for path in (load.path, load.other if isinstance(load, SpringEnd) else None):
-                if path is not None:
-                    keys |= path_reads(path)
-            if isinstance(load, TorsionEnd) and load.spring is not None:
-                keys |= {f"angle:{body}" for body in load.spring.links}
-        return {key for key in keys if key != f"angle:{GROUND}"}
-
-    def _targets(self, keys: Iterable[str]) -> tuple[tuple[str, ...], int]:
-        targets = tuple(sorted(self.reads([*self.loads, *self.rubs]) | set(keys)))
-        if not targets:  # nothing acts: any one thing that moves will do
-            targets = self.plan.writes(next(step for step in self.plan.steps if not isinstance(step, Place)))
-        inertial = self.moves and any(isinstance(load, InertiaForce | InertiaTorque) for load in self.loads)
-        return targets, 2 if inertial else 1
-
-    def blocks(self, keys: Iterable[str] = ()) -> list[Block]:
-        """The blocks of poses, with everything solved that the loads and `keys` hang on."""
-        motion = self.motion
-        targets, order = self._targets(keys)
-        if targets in self._blocks:
-            return self._blocks[targets]
-        k = len(self.mechanism.inputs)
-        along = None
-        if k == 1:
-            by = [motion._solve(targets, order)]
-        else:
-            by = [motion._solve(targets, 1, j) for j in range(k)]
-            along = motion._solve(targets, order) if self.moves else None
-        return self._kept_blocks(targets, by, along)
-
-    def _kept_blocks(
-        self, targets: tuple[str, ...], by: list[list[Jets]], along: list[Jets] | None
-    ) -> list[Block]:
-        found = [
-            Block(self, i, rows, st, None if along is None else along[i], [jets[i] for jets in by])
-            for i, (rows, st) in enumerate(self.motion._rows())
-        ]
-        for old in self._blocks.values():
-            for block, before in zip(found, old, strict=True):
-                block._kept = before._kept
-                block.friction = before.friction
-        self._blocks = {targets: found}
-        return found
-
-    def each(self, keys: Iterable[str], form: Callable[[Block], None]) -> None:
-        """Form something over every block; of a single input while the block is still in cache from its solution."""
-        targets, order = self._targets(keys)
-        if len(self.mechanism.inputs) > 1 or targets in self._blocks or self.motion.n <= BLOCK:
-            for block in self.blocks(keys):
-                form(block)
-            return
-
-        def then(i: int) -> None:
-            if targets not in self._blocks:
-                self._kept_blocks(targets, [self.motion._jets[-1]], None)
-            form(self._blocks[targets][i])
-
-        self.motion._solve(targets, order, then=then)
+        return Bearing(self)
 
     @cached_property
-    def lost(self) -> NDArray[np.bool_] | None:
-        """(n,): the poses that are not assembled; None where all are."""
-        there = self.motion.assembled
-        return None if there.all() else ~there
+    def everything(self) -> list[Load]:
+        """Loads and friction."""
+        return [*self.loads, *self.rubs]
+
+    def acceleration(self, path: Path) -> Sum:
+        """The acceleration of a point: Σ z·(s e^{iθ})″, from the point its body hangs on.
+
+        >>> from virtualwork.mechanism import Input, Link
+        >>> crank = Mechanism({"A": 0j}, {"crank": Link({"A": 0j})}, inputs=Input(link="crank"))
+        >>> acting = Acting(crank, crank.assembly.plan, moves=True)
+        >>> [(row.kind, row.name, z) for row, z in acting.acceleration(acting.path("crank", 0.5j)).items()]
+        [('turn', 'crank', 0.5j)]
+        """
+        base, terms = path
+        found = Sum()
+        step = None if base is None else self._places[base]
+        if step is not None and step.base in self._fixed and len(step.terms) == 1:
+            terms = combined(
+                (*step.terms, *terms)
+            )  # as many vectors as with the point, and the turning alone
+            base = None
+        if base is not None and base not in self._fixed:
+            found.add(Sum({self.rows.second("node", base): 1.0}))
+        for t in terms:
+            if t.body != GROUND or t.slide is not None:
+                found.add(Sum({self.rows.second("turn", t.body, t.slide): t.z}))
+        return found
+
+    @cached_property
+    def _fixed(self) -> set[str | None]:
+        """The points that do not move."""
+        found: set[str | None] = {None}
+        for node, step in self._places.items():
+            if step.base in found and all(t.body == GROUND and t.slide is None for t in step.terms):
+                found.add(node)
+        return found
 
 
 def path_reads(path: Path) -> set[str]:

@@ -23,6 +23,7 @@ What virtual work stands on (the plane as complex numbers, arrays over the n pos
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -268,10 +269,10 @@ class Motion:
         whole = np.ones(self.n, dtype=bool)
         for rows, st in self._rows():
             for g in self.assembly.plan.groups:
-                for body in g.angles:
-                    whole[rows] &= np.isfinite(st.turn[body])
-                for s in g.slides:
-                    whole[rows] &= np.isfinite(st.slide[s])
+                for value in (*(st.turn[body] for body in g.angles), *(st.slide[s] for s in g.slides)):
+                    # the sum of squares is finite where all of them are; else each is looked at
+                    if not np.isfinite(np.vdot(value, value)):
+                        whole[rows] &= np.isfinite(value)
         return np.asarray(whole & np.isfinite(self.inputs).all(axis=1))
 
     # --- forces -----------------------------------------------------------------------------------------------
@@ -280,7 +281,10 @@ class Motion:
         """All forces of this motion, each formed when first asked for."""
         from virtualwork.dynamics import Dynamics
 
-        return Dynamics(self)
+        self._states()
+        # the forces hold this motion's solution and not the motion, which holds them: in a ring of references the
+        # arrays of every motion would wait for the garbage collector
+        return Dynamics(copy(self))
 
     @property
     def effort(self) -> Reals:
@@ -406,7 +410,9 @@ class Motion:
                     self._advance(i, which, missing)
                 except (ZeroDivisionError, OverflowError):  # one pose on Python numbers at a singular place
                     states[i] = State([np.array([q]) for q in st.inputs], many=True)
-                    self._jets = {w: [self._jet(s, b, w) for b, s in enumerate(states)] for w in self._jets}
+                    self._jets.update(
+                        {w: [self._jet(s, b, w) for b, s in enumerate(states)] for w in self._jets}
+                    )
                     for step, k in self.solved:
                         for w in list(self._jets) if k else [-2]:
                             if (id(step), k, w) in self._done:

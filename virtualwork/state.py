@@ -72,10 +72,10 @@ class State:
 
     def affine(self, angle: Angle) -> Number:
         """const + Σ k·input, the part of an angle that needs no other angle."""
-        value: Number = angle.const
+        value: Number = angle.const or None
         for j, k in angle.inputs:
-            value = value + (self.inputs[j] if k == 1.0 else k * self.inputs[j])
-        return value
+            value = _add(value, self.inputs[j] if k == 1.0 else k * self.inputs[j])
+        return 0.0 if value is None else value
 
     def rotate(self, angle: Angle) -> Number:
         """e^{iθ} of an angle tied to others; whole-number ratios are powers, no angle is formed."""
@@ -203,22 +203,19 @@ def columns(group: Group, st: State, plan: Plan) -> list[list[Number]]:
     rows = []
     for closure in group.closures:
         row: list[Number] = []
-        vectors = []
-        for t in closure.terms:
-            v = t.z * st.turn[t.body]
-            vectors.append((t, v, v if t.slide is None else v * st.slide[t.slide]))
         for angle in group.angles:
             c: Number = None
-            for t, _, full in vectors:
+            for t in closure.terms:
                 r = ratio(plan, group, t.body, angle)
                 if r:
-                    c = _add(c, _scale(r, full))
-            row.append(0j if c is None else 1j * c)
+                    v = (1j * r * t.z) * st.turn[t.body]
+                    c = _add(c, v if t.slide is None else v * st.slide[t.slide])
+            row.append(0j if c is None else c)
         for g in group.slides:
             c = None
-            for t, bare, _ in vectors:
+            for t in closure.terms:
                 if t.slide == g:
-                    c = _add(c, bare)
+                    c = _add(c, t.z * st.turn[t.body])
             row.append(0j if c is None else c)
         rows.append(row)
     return rows
@@ -252,8 +249,10 @@ class Jets:
         self.angle: dict[str, list[Number]] = {GROUND: []}
         self.point: dict[str | None, list[Number]] = {None: []}
         self.slide: dict[int, list[Number]] = {}
-        self._turn: dict[str, list[Number]] = {GROUND: []}
+        self._turn: dict[tuple[str, int], Number] = {}
+        self._normal: dict[str, Number] = {}
         self._columns: dict[str, list[list[Number]]] = {}
+        self._inverse: dict[str, Number] = {}
 
     def rate(self, j: int, k: int) -> Number:
         """The k-th derivative of input j."""
@@ -263,15 +262,17 @@ class Jets:
         """(e^{iθ})⁽ᵏ⁾ with θ⁽ᵏ⁾ replaced by `top`."""
         theta = self.angle[body]
         if k == 2 and theta[0] is not None:
-            # the commonest case, −ω²·e^{iθ}, in one step
-            normal = -(theta[0] * theta[0]) * self.st.turn[body]
+            # the commonest case, (iα − ω²)·e^{iθ}, in one step; the right side of a group asks for its second part first
+            if body not in self._normal:
+                self._normal[body] = -(theta[0] * theta[0]) * self.st.turn[body]
+            normal = self._normal[body]
             return normal if top is None else normal + 1j * (top * self.st.turn[body])
         total: Number = None
         for j in range(k - 1):
             if theta[j] is not None:
                 total = _add(total, _scale(comb(k - 1, j), _scale(theta[j], self.turn(body, k - 1 - j))))
         if top is not None:
-            total = _add(total, top * self.st.turn[body])
+            total = _add(total, _scale(top, self.st.turn[body]))
         return None if total is None else 1j * total
 
     def turn(self, body: str, k: int) -> Number:
@@ -280,11 +281,9 @@ class Jets:
             return self.st.turn[body]
         if body == GROUND:
             return None
-        known = self._turn.setdefault(body, [])
-        while len(known) < k:
-            order = len(known) + 1
-            known.append(self.turn_partial(body, order, self.angle[body][order - 1]))
-        return known[k - 1]
+        if (body, k) not in self._turn:
+            self._turn[body, k] = self.turn_partial(body, k, self.angle[body][k - 1])
+        return self._turn[body, k]
 
     def vector(self, base: str | None, terms: tuple[Term, ...], k: int) -> Number:
         """The k-th derivative of P[base] + Σ terms."""
@@ -295,8 +294,7 @@ class Jets:
 
     def slim(self) -> None:
         """Forget what is cheaper to form again than to keep over a long sweep."""
-        self._turn = {GROUND: []}
-        self._columns = {}
+        self._turn, self._normal, self._columns, self._inverse = {}, {}, {}, {}
 
     def step(self, step: Step, k: int) -> None:
         """Carry one step on to derivatives of order k; the lower orders are known."""
@@ -363,13 +361,20 @@ class Jets:
             self._columns[group.name] = columns(group, self.st, self.plan)
         return self._columns[group.name]
 
+    def inverse(self, group: Group) -> Number:
+        """1/(c1 × c2) of a closed form's two columns, formed once for all orders and the joint forces."""
+        if group.name not in self._inverse:
+            c1, c2 = self.columns(group)[0]
+            self._inverse[group.name] = 1 / cross(c1, c2)
+        return self._inverse[group.name]
+
     def _group(self, group: Group, k: int) -> None:
         right = self.right_side(group, k)
         cols = self.columns(group)
         if group.kind != "Newton":
             (c1, c2), w = cols[0], right[0]
-            inverse = -1 / cross(c1, c2)
-            x: list[Number] = [cross(w, c2) * inverse, cross(c1, w) * inverse]
+            inverse = self.inverse(group)
+            x: list[Number] = [cross(c2, w) * inverse, cross(w, c1) * inverse]
         else:
             from virtualwork.newton import singular_poses, solve_columns
 
@@ -386,7 +391,10 @@ class Jets:
         """Store the unknowns' k-th derivatives and those of the angles tied to them."""
         n = len(group.angles)
         for body in group.members:
-            del self._turn.setdefault(body, [])[k - 1 :]
+            for j in [j for known, j in self._turn if known == body and j >= k]:
+                del self._turn[body, j]
+            if k == 1:
+                self._normal.pop(body, None)
         for body, value in zip(group.angles, x[:n], strict=True):
             _put(self.angle, body, k, value)
         for g, value in zip(group.slides, x[n:], strict=True):

@@ -19,8 +19,9 @@ from virtualwork.mechanism import GROUND
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from virtualwork.joints import Joint
     from virtualwork.mechanism import Mechanism
-    from virtualwork.reactions import Joint, Reactions
+    from virtualwork.reactions import Reactions
 
     Reals = NDArray[np.float64]
     Column = tuple[

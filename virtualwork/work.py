@@ -6,6 +6,9 @@ d'Alembert's principle (Riul, unit II, eqs. 3 and 5, divided by the input's own 
     τ_j + Σ F·K_j + Σ T κ_j = 0,      F, T with the inertia loads −m a_G and −I α.
 
 Joint forces do no work and do not appear. A load whose point cannot move has no K and is never evaluated.
+
+Every K_j is Σ i z e^{iθ} κ_j over the links between the ground and the point. The effort gathers the loads by links
+first, Q_θ = Σ T + Σ (z e^{iθ}) × F, and is −Σ Q_θ κ_j; the ledger takes the loads one by one.
 """
 
 from __future__ import annotations
@@ -15,8 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.dyads import Number, dot
-from virtualwork.loads import BLOCK, Block, Load, Scene, SpringEnd, TorsionEnd, plus, times
+from virtualwork.loads import Acting, Load, SpringEnd, TorsionEnd, plus, times
 from virtualwork.mechanism import GROUND
+from virtualwork.scene import BLOCK, Block, Scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -66,7 +70,7 @@ def effort(scene: Scene) -> Reals:
     def work(block: Block) -> None:
         write_effort(scene, block, out)
         if scene.motion.n > BLOCK:
-            block._kept.clear()
+            block.forget(lasting=True)
 
     scene.each((), work)
     return finished(scene, out)
@@ -74,15 +78,19 @@ def effort(scene: Scene) -> Reals:
 
 def write_effort(scene: Scene, block: Block, out: Reals) -> None:
     """The generalized forces over one block."""
+    bearing = scene.bearing
     for j in range(out.shape[1]):
         total: Number = None
-        for load in scene.loads:
-            total = plus(total, power(load, block, j))
-        for rub in scene.rubs:
-            total = plus(total, power(rub, block, j))
+        for body, guide, load in bearing.working:
+            moved = block.by[j].slide[guide][0] if body is None else block.turning(body, j)
+            if moved is not None:  # what cannot move is not evaluated
+                value = bearing.value(block, load)
+                total = plus(total, value if isinstance(moved, float) and moved == 1 else times(value, moved))
         if total is not None:
+            np.negative(total, out=out[block.rows, j])
             bad = _singular(scene, block, j)
-            out[block.rows, j] = -total if bad is False else np.where(bad, np.nan, -total)
+            if bad is not False:
+                out[block.rows, j][bad] = np.nan
 
 
 def finished(scene: Scene, out: Reals) -> Reals:
@@ -100,14 +108,15 @@ def _singular(scene: Scene, block: Block, j: int) -> Any:
     for group in scene.plan.groups:
         for body in group.angles:
             known = block.by[j].angle.get(body)
-            if known and known[0] is not None:
-                fast = np.abs(known[0])
-                if not np.max(fast) * reach < 1e13:
-                    found = found | ~(fast * reach < 1e13)
+            if not known or known[0] is None:
+                continue
+            # the norm over the block is above its largest entry: in most blocks it says that no link is so fast
+            if not np.sqrt(np.vdot(known[0], known[0])) * reach < 1e13:
+                found = found | ~(np.abs(known[0]) * reach < 1e13)
     return found
 
 
-def carrier(scene: Scene, j: int) -> str:
+def carrier(scene: Scene | Acting, j: int) -> str:
     """The body that feels the reaction of input j's torque: the carrier of its motor, else what it is driven on."""
     entry = scene.mechanism.inputs[j]
     return next((m.carrier for m in scene.mechanism.motors if m.drives == entry.link), entry.on)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cli.bench.measure import Measurement, measured, seconds
 from cli.bench.scenes import loaded_klann
-from virtualwork import dyads, loads, state
+from virtualwork import bearing, dyads, loads, state, sums
 from virtualwork.mechanism import Mechanism
 from virtualwork.motion import Motion
 from virtualwork.reactions import Reactions
@@ -45,9 +45,11 @@ def kernels() -> set[CodeType]:
         state.Jets.step,
         Reactions.on_side,
     ]
-    found += [
-        kind.value for kind in vars(loads).values() if isinstance(kind, type) and hasattr(kind, "value")
+    kinds = [
+        kind for module in (loads, sums, bearing) for kind in vars(module).values() if isinstance(kind, type)
     ]
+    found += [kind.value for kind in kinds if issubclass(kind, loads.Load)]
+    found += [kind.form for kind in kinds if issubclass(kind, sums.Row)]
     return {function.__code__ for function in found}
 
 

@@ -148,6 +148,8 @@ def test_loads_that_do_no_work_are_never_evaluated() -> None:
     scene = motion.dynamics.scene
     kept = [value for block in scene.blocks() for value in block._kept.values() if value is not None]
     assert not kept  # no load was evaluated: each acts where nothing moves, or its rate is zero
+    rows = [value for block in scene.blocks() for _, value in block.rows_formed.values() if value is not None]
+    assert not rows  # nor anything else
     works, workless, _ = ledger(scene)
     assert "crank: weight" in workless
     assert "rocker: applied force" in workless

@@ -1,0 +1,108 @@
+"""Forces on demand: what is formed once, long chains, many blocks, and what is given back."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from virtualwork import Guess, Input, Link, Mechanism
+from virtualwork.mechanism import Motor
+from virtualwork.scene import Block
+
+SWEEP = np.linspace(0, 2 * np.pi, 361)
+
+
+def four_bar() -> Mechanism:
+    """A crank-rocker with masses off the lines of its pins."""
+    return Mechanism(
+        ground={"A": 0j, "D": 0.1},
+        links={
+            "crank": Link({"A": 0j, "B": 0.04}, 1.0, 0.01 + 0.003j, 1e-3),
+            "coupler": Link({"B": 0j, "C": 0.12}, 2.0, 0.04 + 0.01j, 2e-3),
+            "rocker": Link({"D": 0j, "C": 0.08}, 1.5, 0.03 - 0.01j, 1e-3),
+        },
+        inputs=Input(link="crank"),
+        guess=Guess(at=(0.7,), angles={"coupler": 0.3, "rocker": 1.0}),
+        gravity=-9.81j,
+    )
+
+
+def test_what_is_formed_for_one_joint_force_serves_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The loop's forces are solved once for each block, however the joint forces are asked for."""
+    from virtualwork.bearing import Solved
+
+    count = 0
+    solve = Solved.form
+
+    def counted(self: Solved, block: Block) -> Any:
+        nonlocal count
+        count += 1
+        return solve(self, block)
+
+    monkeypatch.setattr(Solved, "form", counted)
+    sweep = np.linspace(0.0, 6.0, 20_000)  # three blocks
+    m = four_bar()
+    motion = m.motion(sweep, 10.0)
+    one_by_one = [motion.reaction(pin, on) for pin, on in (("A", "crank"), ("B", "coupler"), ("D", "rocker"))]
+    assert count == 3
+    together = m.motion(sweep, 10.0)
+    together.dynamics.solve()
+    assert count == 6
+    for pin, on, alone in zip("ABD", ("crank", "coupler", "rocker"), one_by_one, strict=True):
+        assert (together.reaction(pin, on) == alone).all()
+
+
+def test_a_long_chain_has_joint_forces() -> None:
+    """Sixty four-bars in a row: each passes on what the next ones bear on it, however deep that goes."""
+    ground = {"A": 0j} | {f"D{i}": 0.1 * (i + 1) + 0j for i in range(60)}
+    links = {"crank": Link({"A": 0j, "B": 0.04}, 1.0, 0.02, 1e-3)}
+    angles, before = {}, "B"
+    for i in range(60):
+        links[f"coupler{i}"] = Link({before: 0j, f"C{i}": 0.12 if i == 0 else 0.1}, 1.0, 0.05, 1e-3)
+        links[f"rocker{i}"] = Link({f"D{i}": 0j, f"C{i}": 0.08}, 1.0, 0.03, 1e-3)
+        angles |= {f"coupler{i}": 0.3 if i == 0 else 0.0, f"rocker{i}": 1.0}
+        before = f"C{i}"
+    m = Mechanism(
+        ground, links, inputs=Input(link="crank"), guess=Guess(at=(0.7,), angles=angles), gravity=-9.81j
+    )
+    motion = m.motion(np.linspace(0.0, 6.0, 7), 10.0)
+    gap = np.abs(motion.dynamics.newton_euler[:, 0] - motion.effort).max()
+    assert gap <= 1e-14 * np.abs(motion.effort).max() * 60
+    force, _ = motion.dynamics.shaking
+    feet = [("A", "crank"), *((f"D{i}", f"rocker{i}") for i in range(60))]
+    on_ground = -sum(motion.reaction(pin, link) for pin, link in feet)
+    assert np.abs(on_ground - force).max() <= 1e-13 * np.abs(force).max() * 60
+
+
+def test_the_forces_of_a_motion_go_with_it() -> None:
+    """No ring of references: the arrays are given back at once, not when the garbage collector comes."""
+    motion = four_bar().motion(SWEEP, 10.0)
+    motion.reaction("A", on="crank")
+    dynamics, scene = weakref.ref(motion.dynamics), weakref.ref(motion.dynamics.scene)
+    alone = motion.dynamics
+    gc.disable()
+    try:
+        del motion
+        assert np.isfinite(alone.newton_euler).all()  # the forces need only the solution, which they hold
+        del alone
+        assert dynamics() is None
+        assert scene() is None
+    finally:
+        gc.enable()
+
+
+def test_a_motor_on_another_link_over_many_blocks() -> None:
+    """What a carried motor does to its carrier is known before the blocks are solved one after the other."""
+    m = replace(four_bar(), motors=[Motor("rocker", "crank")])
+    q = np.linspace(0.0, 6.0, 10_000)
+    motion, few = m.motion(q, 3.0), m.motion(q[::999], 3.0)
+    for pin, on in (("A", "crank"), ("D", "rocker")):
+        force = motion.reaction(pin, on)
+        assert np.abs(force[::999] - few.reaction(pin, on)).max() <= 1e-13 * np.abs(force).max()
+    gap = np.abs(motion.dynamics.newton_euler - motion.dynamics.effort).max()
+    assert gap <= 1e-13 * np.abs(motion.dynamics.effort).max()
