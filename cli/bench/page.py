@@ -6,9 +6,13 @@ import platform
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cli.bench.measure import Measurement, calibration, exponent
 from cli.errors import DataError
+
+if TYPE_CHECKING:
+    from cli.bench.stress import Tally
 
 Column = tuple[str, Callable[[Measurement], str]]
 
@@ -44,10 +48,39 @@ def write(path: Path, measurements: Sequence[Measurement]) -> None:
         parts = [conditions(), f"![Measurements of the domain {domain}]({picture.as_posix()})", *tables(mine)]
         text = _put(text, domain, "\n\n".join(parts))
     if block("aims").search(text):
-        known = {m.group(1) for m in re.finditer(r"<!-- bench:([\w-]+) -->", text)} - {"aims"}
+        known = {m.group(1) for m in re.finditer(r"<!-- bench:([\w-]+) -->", text)} - {"aims", "stress"}
         if known == {m.domain for m in measurements}:
             text = _put(text, "aims", f"{conditions()}\n\n{aims(measurements)}")
     path.write_text(text, encoding="utf-8")
+
+
+def write_stress(path: Path, tallies: Sequence[Tally]) -> None:
+    """Write the table of the random campaigns into its block."""
+    rows = [
+        (
+            t.name,
+            t.line,
+            f"{len(t.ratios):,}",
+            f"{100 * t.bounded:.4g} %",
+            f"{t.worst:.2g}",
+            str(t.seed),
+            f"{t.slack:.2g}",
+        )
+        for t in tallies
+    ]
+    heads = (
+        "campaign",
+        "cases",
+        "answers",
+        "within the estimate",
+        "worst error over estimate",
+        "its seed",
+        "median estimate over error",
+    )
+    table = _table(heads, "llrrrrr", rows)
+    path.write_text(
+        _put(path.read_text(encoding="utf-8"), "stress", f"{conditions()}\n\n{table}"), encoding="utf-8"
+    )
 
 
 def _put(text: str, name: str, content: str) -> str:
