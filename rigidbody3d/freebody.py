@@ -271,14 +271,18 @@ class _Motion:
         self._I, self._scale = np.concatenate([I1, I2, I3], axis=1), scale
         self._general = bodies
         self.m1[bodies] = self._p.m1[:, 0]
-        # the node's angle: |H| a3 t + weight·(third(u) - third(u0)), third with parameter n
+        # the node's angle: |H| a3 t + weight·third(u), third with parameter n; where n is large it is |H| a1 t less
+        # an arctangent and a smooth rest, since n sn²/(1 + n sn²) is then all but constant (see _node)
         total = np.sqrt(H1**2 + H2**2 + H3**2)
         self._total = total
-        self._drift = total / I3
-        ratio = np.where(self._large, c3 / c1, 0.0)
-        self._n = np.where(self._large, ratio, d23 / np.where(d12 > 0, d12, 1.0))
-        weight = np.where(self._large, ratio * d13, (d23 / np.where(d12 > 0, d12, 1.0)) * d13)
-        self._weight = total * weight / self._rate
+        n = np.where(self._large, c3 / c1, d23 / np.where(d12 > 0, d12, 1.0))
+        self._sharp = n > 1
+        self._drift = total / np.where(self._sharp, I1, I3)
+        whole = total * d13 / self._rate
+        self._n = np.where(self._sharp, self._p.m / n, n)
+        self._weight = np.where(self._sharp, -whole, whole) * self._n
+        self._steep = np.sqrt((1 + n) * (1 + self._p.m / n))
+        self._arc = np.where(self._sharp, -whole / self._steep, 0.0)
         self._drift, self._rate = self._drift * scale, self._rate * scale
         with np.errstate(over="ignore"):
             self.period[bodies] = (4 * self._p.quarter / self._rate)[:, 0]
@@ -301,8 +305,16 @@ class _Motion:
         return jacobi(self._u0 + self._rate * t, self._p)
 
     def _node(self, at: Jacobi) -> Array:
-        turns = np.where(np.isinf(self._p.quarter), 0.0, 2 * at.turns * self._third_quarter)
-        return np.asarray(self._weight * (turns + third(at, self._p, self._n)))
+        """The periodic part of the node's angle and its mean, but for |H| a3 t or |H| a1 t.
+
+        Where n > 1, ∫ du/(1 + n sn²) = arctan(g sn/(cn dn))/g + (m/n) ∫ sn²/(1 + (m/n) sn²) du with g² =
+        (1 + n)(1 + m/n): DLMF 19.7.8. Its arctangent and that of Euler's third angle cancel as angles, not as
+        large numbers, where the momentum passes near the first axis.
+        """
+        turns = np.where(np.isinf(self._p.quarter), 0.0, at.turns)
+        smooth = 2 * turns * self._third_quarter + third(at, self._p, self._n)
+        angle = np.arctan2(self._steep * at.sn, at.cn * at.dn) + np.pi * turns
+        return np.asarray(self._weight * smooth + self._arc * angle)
 
     def _momentum(self, at: Jacobi) -> tuple[Array, Array, Array]:
         """H1, H2, H3 in principal axes, without the sign (-1)ⁿ of the half turns for the two that have it."""
