@@ -155,17 +155,17 @@ class Motion:
     @cached_property
     def linear_momentum(self) -> Array:
         """m v_G, (..., 3), kg·m/s."""
-        return np.asarray(self.mass[..., None] * self.velocity)
+        return _scaled(self.mass, self.velocity)
 
     @cached_property
     def force(self) -> Array:
         """m a_G, the external force that the motion asks for, (..., 3), N."""
-        return np.asarray(self.mass[..., None] * self.acceleration)
+        return _scaled(self.mass, self.acceleration)
 
     @cached_property
     def inertia_force(self) -> Array:
         """d'Alembert's inertia force, -m a_G, (..., 3), N."""
-        return np.asarray(-self.mass[..., None] * self.acceleration)
+        return _scaled(-self.mass, self.acceleration)
 
     @cached_property
     def inertia_wrench(self) -> Wrench:
@@ -222,22 +222,45 @@ def _times(I: Array, w: Array) -> Array:
 def _momentum_and_rate(I: Array, w: Array, alpha: Array) -> tuple[Array, Array]:
     """I ω and I α + ω × I ω for states (..., 3) of one tensor, in blocks that stay in the cache."""
     flat, turn = w.reshape(-1, 3), alpha.reshape(-1, 3)
-    transposed = np.ascontiguousarray(I.T)
+    transposed, gyroscopic = np.ascontiguousarray(I.T), _gyroscopic(I)
     momentum, rate = np.empty_like(flat), np.empty_like(flat)
+    most = min(BLOCK, len(flat))
+    columns, products, terms = np.empty((3, most)), np.empty((6, most)), np.empty((most, 3))
     for s in range(0, len(flat), BLOCK):
-        part = slice(s, s + BLOCK)
+        part, size = slice(s, s + BLOCK), min(BLOCK, len(flat) - s)
+        spin, pairs = columns[:, :size], products[:, :size]
         np.matmul(flat[part], transposed, out=momentum[part])
         np.matmul(turn[part], transposed, out=rate[part])
-        x, y, z = np.ascontiguousarray(flat[part].T)
-        h = np.ascontiguousarray(momentum[part].T)
-        cross = np.empty_like(h)
-        swap = np.empty_like(x)
-        for out, a, b, p, q in ((0, y, z, 2, 1), (1, z, x, 0, 2), (2, x, y, 1, 0)):
-            np.multiply(a, h[p], out=cross[out])
-            np.multiply(b, h[q], out=swap)
-            cross[out] -= swap
-        rate[part] += cross.T
+        # products of components of ω as rows: whole columns of a block in one stroke
+        spin[...] = flat[part].T
+        np.multiply(spin, spin, out=pairs[:3])
+        for row, (a, b) in enumerate(_PAIRS, 3):
+            np.multiply(spin[a], spin[b], out=pairs[row])
+        rate[part] += np.matmul(pairs.T, gyroscopic, out=terms[:size])
     return momentum.reshape(w.shape), rate.reshape(w.shape)
+
+
+_PAIRS = ((1, 2), (2, 0), (0, 1))
+
+
+def _gyroscopic(I: Array) -> Array:
+    """The coefficients of ω × I ω in ωx², ωy², ωz², ωy ωz, ωz ωx, ωx ωy, (6, 3): Euler's (I_zz - I_yy) ωy ωz …."""
+    out = np.zeros((6, 3))
+    for x, (y, z) in enumerate(_PAIRS):
+        out[y, x], out[z, x] = I[z, y], -I[y, z]
+        out[3 + x, x], out[3 + y, x], out[3 + z, x] = I[z, z] - I[y, y], -I[y, x], I[z, x]
+    return out
+
+
+def _scaled(factor: Array, vectors: Array) -> Array:
+    """A factor (...) times vectors (..., 3); many in blocks, since numpy goes through each column by itself."""
+    if vectors.ndim != 2 or factor.shape != vectors.shape[:1] or len(vectors) <= BLOCK:
+        return np.asarray(factor[..., None] * vectors)
+    out = np.empty_like(vectors)
+    for s in range(0, len(vectors), BLOCK):
+        part = slice(s, s + BLOCK)
+        np.multiply(factor[part, None], vectors[part], out=out[part])
+    return out
 
 
 # --- percussion ---
