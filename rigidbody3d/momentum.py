@@ -13,10 +13,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from rigidbody3d.rounding import BodyError
 
 Array = NDArray[np.float64]
 
@@ -75,6 +78,8 @@ class Motion:
     center: Array
     velocity: Array
     acceleration: Array
+    pivot: Array | None
+    """The point fixed in space that velocity and acceleration were worked out from; None: they are given."""
 
     def __init__(
         self,
@@ -101,6 +106,7 @@ class Motion:
         keep("center", center, 3)
         keep("velocity", velocity, 3)
         keep("acceleration", acceleration, 3)
+        object.__setattr__(self, "pivot", None)
         object.__setattr__(self, "frame_omega", None)
         if frame_omega is not None:
             keep("frame_omega", frame_omega, 3)
@@ -188,6 +194,29 @@ class Motion:
         """Return Ḣ about a point fixed in space, Ḣ_G + (G - P) × m a_G, (..., 3), N·m: the moment needed there."""
         return np.asarray(self.rate + np.cross(self.center - np.asarray(point, dtype=float), self.force))
 
+    def error_estimate(self, of: str, point: ArrayLike | None = None, body: BodyError | None = None) -> Array:
+        """Return a bound of the rounding error of a quantity, in its shape and unit.
+
+        Parameters
+        ----------
+        of
+            Its name: momentum, rate, transport, relative, tensor_rate, linear_momentum, force, inertia_force,
+            inertia_moment, energy, momentum_about, rate_about, true_alpha.
+        point
+            What momentum_about and rate_about are about, (..., 3), m.
+        body
+            Bounds of the errors of mass, centre and tensor, where they were worked out (`Body.error_estimate`).
+
+        Examples
+        --------
+        >>> disk = Motion(np.diag([1.0, 1.0, 2.0]), [0, 4, 12.0], frame_omega=[0, 4.0, 0])
+        >>> bool((disk.error_estimate("rate") < 1e-12).all())
+        True
+        """
+        from rigidbody3d import rounding
+
+        return rounding.motion(self, of, point, body)
+
     @classmethod
     def about_fixed_point(
         cls,
@@ -201,15 +230,15 @@ class Motion:
         frame_omega: ArrayLike | None = None,
     ) -> Motion:
         """Return the motion of a body that turns about a point fixed in space: v = ω × r, a = α × r + ω × v."""
-        w, r = (
-            np.asarray(omega, dtype=float),
-            np.asarray(center, dtype=float) - np.asarray(point, dtype=float),
-        )
+        w, pivot = np.asarray(omega, dtype=float), np.asarray(point, dtype=float)
+        r = np.asarray(center, dtype=float) - pivot
         true = np.asarray(alpha, dtype=float)
         if frame_omega is not None:
             true = true + np.cross(np.asarray(frame_omega, dtype=float), w)
         v = np.cross(w, r)
-        return cls(inertia, w, alpha, frame_omega, mass, center, v, np.cross(true, r) + np.cross(w, v))
+        motion = cls(inertia, w, alpha, frame_omega, mass, center, v, np.cross(true, r) + np.cross(w, v))
+        object.__setattr__(motion, "pivot", pivot)
+        return motion
 
 
 def _times(I: Array, w: Array) -> Array:

@@ -21,6 +21,7 @@ MODULES = (
     "cli.bench.vibration",
     "cli.bench.rotation",
     "cli.bench.turning",
+    "cli.bench.solids",
 )
 
 Trial = Callable[[np.random.Generator], list[tuple[float, float]]]
