@@ -73,6 +73,12 @@ def _power(v: Array, a: Bounded, n: Bounded) -> Array:
     return np.asarray(np.abs(n.value) * (spread + UNIT * np.abs(v)))
 
 
+# what these give of numbers with errors are such numbers, of which numpy's own types know nothing
+_cos: Any = np.cos
+_sqrt: Any = np.sqrt
+_hypot: Any = np.hypot
+_arctan2: Any = np.arctan2
+
 _SPREAD: dict[np.ufunc, Callable[..., Any]] = {
     np.add: lambda v, a, b: a.error + b.error,
     np.subtract: lambda v, a, b: a.error + b.error,
@@ -229,7 +235,8 @@ def principal(moments: Array, axes: Array, tensor: ArrayLike) -> tuple[Array, Ar
     with np.errstate(divide="ignore"):
         swing = np.where(gap > 0, push / np.where(gap > 0, gap, 1.0), np.inf)
     swing = np.minimum(np.where(np.eye(3, dtype=bool), 0.0, swing), 2.0)
-    bound = swing @ size + 4 * EPS * size + EPS * swing.sum(axis=-1, keepdims=True)
+    back = np.minimum(np.square(swing).sum(axis=-1, keepdims=True) / 2, 2.0)
+    bound = swing @ size + back * size + 4 * EPS * size + EPS * swing.sum(axis=-1, keepdims=True)
     # an axis points where its largest component is positive: undecided where two of opposite sign are as large
     largest = np.sort(size, axis=-1)[..., -1:]
     rivals = (size + bound >= largest - bound.max(axis=-1, keepdims=True)) & (size > 0)
@@ -349,3 +356,27 @@ def shaft(of: Shaft, what: str) -> Array:
         },
         what,
     )
+
+
+# --- gyroscopes ---
+
+
+def steady(I1: Array, I3: Array, mgl: Array, tilt: Array, spin: Array) -> tuple[Bounded, Bounded]:
+    """Return the slow and the fast rate of steady precession with their errors."""
+    B = Bounded(I3) * spin
+    c: Bounded = _cos(Bounded(tilt))
+    # a right angle given in radians is one to rounding
+    c = c.moved(lambda x: np.where(np.abs(c.value) < 1e-16, 0.0, x))
+    square = B * B - 4 * I1 * mgl * c
+    large = B + np.where(B.value < 0, -1.0, 1.0) * _sqrt(square)
+    slow = 2 * Bounded(mgl) / large
+    return slow.moved(lambda x: np.where(mgl == 0, 0.0, x)), large / (2 * I1 * c)
+
+
+def cones(I1: Array, I3: Array, w: Array) -> tuple[Bounded, ...]:
+    """Return the cones of a free symmetric body with their errors."""
+    across, along = _hypot(Bounded(w[..., 0]), w[..., 1]), Bounded(w[..., 2])
+    ahead = abs(along)
+    space = _arctan2(abs(Bounded(I1) - I3) * across * ahead, I1 * across**2 + I3 * along**2)
+    precession = _hypot(across, I3 * along / I1)
+    return space, _arctan2(across, ahead), precession, along * (Bounded(I1) - I3) / I1

@@ -164,6 +164,18 @@ class TopState:
             (self._moments * self.omega**2).sum(axis=-1) / 2 + mgl * (w * w + z * z - x * x - y * y)
         )
 
+    def error_estimate(self, of: str = "attitude") -> Array:
+        """Return a bound of the rounding error of a quantity, the given data as exact.
+
+        Parameters
+        ----------
+        of
+            "attitude", as an angle (..., n), rad; "omega" or "momentum", (..., n, 3); "energy", (..., n).
+        """
+        from rigidbody3d import rounding_in_time
+
+        return rounding_in_time.top(self, of)
+
     @property
     def _moments(self) -> Array:
         I = np.asarray(self.top.inertia, dtype=float)
@@ -203,7 +215,9 @@ class _Motion:
         self.quarter = tuple(third_complete(self.p, n) for n in self.n)
         a, b = q[:, :1] + 1j * q[:, 3:], q[:, 1:2] + 1j * q[:, 2:3]
         w1, w2 = omega[:, :1], omega[:, 1:2]
-        at = jacobi(self.begin, self.p)
+        # from sn and cn as given: near the vertical the phases turn too fast to be had from a rounded argument
+        dn = np.sqrt(self.p.m1 + self.p.m * c["cn"] ** 2)
+        at = Jacobi(np.zeros_like(dn), self.begin, c["sn"], c["cn"], dn)
         start = self._phases(at)
         half = 0.5j
         # where α or β is zero its direction is that of its rate, just before or just after as rounding has it
@@ -267,7 +281,8 @@ class _Motion:
                 c["plus_arc"] * arc + c["plus_rest"] * smooth,
                 c["plus_line"] * (at.r - n * smooth),
             )
-        sn = np.where(at.sn == 0, 1e-150, at.sn)
+        # zero has a side: just before the turning point, or just after
+        sn = np.where(at.sn == 0, np.copysign(1e-150, at.sn), at.sn)
         arc = np.arctan2(c["minus_g"] * sn, at.cn * at.dn)
         return np.where(
             sharp,
