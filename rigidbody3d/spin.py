@@ -45,8 +45,8 @@ class Trajectory:
     mgl: float
     evaluations: int
     """How often the equations of motion were evaluated (for the splitting: stages)."""
-    coarser: Callable[[], Trajectory] | None = field(default=None, repr=False, compare=False)
-    """The same motion with steps twice as long."""
+    finer: Callable[[], Trajectory] | None = field(default=None, repr=False, compare=False)
+    """The same motion with steps half as long."""
 
     @cached_property
     def omega(self) -> Array:
@@ -62,10 +62,10 @@ class Trajectory:
         return np.asarray((body * self.omega).sum(axis=-1) / 2 + self.mgl * (w * w + z * z - x * x - y * y))
 
     @cached_property
-    def _coarser(self) -> Trajectory:
-        if self.coarser is None:
-            raise ValueError("an estimate needs the coarser run that `integrate` offers")
-        return self.coarser()
+    def _finer(self) -> Trajectory:
+        if self.finer is None:
+            raise ValueError("an estimate needs the finer run that `integrate` offers")
+        return self.finer()
 
     def error_estimate(self, of: str = "attitude") -> Array:
         """Return an estimate of the error, of the method and of rounding together.
@@ -77,8 +77,8 @@ class Trajectory:
 
         Notes
         -----
-        The motion is integrated once more with steps twice as long (for scipy's methods: a tolerance 256 times as
-        large), at half the cost. The step's own tolerance says little about the drift of many turns.
+        The motion is integrated once more with steps half as long, at twice the cost: the tolerance of a step says
+        little about the drift of many turns.
 
         Examples
         --------
@@ -88,7 +88,7 @@ class Trajectory:
         """
         from rigidbody3d import rounding_in_time
 
-        return rounding_in_time.integrated(self, self._coarser, of)
+        return rounding_in_time.integrated(self, self._finer, of)
 
 
 MOST = 10_000_000  # steps: some quarter of an hour
@@ -106,6 +106,8 @@ def integrate(
     method: str = "DOP853",
     rtol: float = 1e-13,
     steps_per_turn: float = 60,
+    refine: int = 1,
+    longest: float = math.inf,
 ) -> Trajectory:
     """Integrate the rotation of a body under a torque from time zero to each of the times.
 
@@ -132,6 +134,10 @@ def integrate(
         Relative tolerance of a scipy method.
     steps_per_turn
         Steps of the splitting per turn of the fastest motion.
+    refine
+        Each of these steps is cut into as many.
+    longest
+        No step of a scipy method is longer, s.
 
     Raises
     ------
@@ -166,11 +172,13 @@ def integrate(
             or tensor[0, 0] != tensor[1, 1]
         ):
             raise ValueError("the splitting is for a symmetric top, its axis body z, under its weight alone")
-        H, q, count = _split(tensor[0, 0], tensor[2, 2], mgl, H0, q0, time, steps_per_turn)
-        coarser = partial(again, steps_per_turn=steps_per_turn / 2)
-        return Trajectory(time, H, q, tensor, mgl, count, coarser)
-    solved = _solve(tensor, np.asarray(omega, dtype=float), H0, q0, time, torque, frame, mgl, method, rtol)
-    return Trajectory(time, *solved[:2], tensor, mgl, solved[2], partial(again, rtol=256 * rtol))
+        H, q, count = _split(tensor[0, 0], tensor[2, 2], mgl, H0, q0, time, steps_per_turn, refine)
+        finer = partial(again, steps_per_turn=steps_per_turn, refine=2 * refine)
+        return Trajectory(time, H, q, tensor, mgl, count, finer)
+    w0 = np.asarray(omega, dtype=float)
+    H, q, count, step = _solve(tensor, w0, H0, q0, time, torque, frame, mgl, method, rtol, longest)
+    finer = partial(again, longest=step / 2, rtol=rtol / 256)
+    return Trajectory(time, H, q, tensor, mgl, count, finer)
 
 
 def _solve(
@@ -184,7 +192,8 @@ def _solve(
     mgl: float,
     method: str,
     rtol: float,
-) -> tuple[Array, Array, int]:
+    longest: float,
+) -> tuple[Array, Array, int, float]:
     import scipy.integrate
 
     (a, b, c), (d, e, f), (g, h, i) = np.linalg.inv(tensor).tolist()
@@ -244,7 +253,8 @@ def _solve(
         # The error estimate of a step says little about the drift of many turns: at the finest tolerance
         # never less than 40 steps a turn, at a coarser one as many fewer as order eight allows.
         rate = max(float(np.linalg.norm(omega)), math.sqrt(abs(mgl) / tensor.diagonal().min()))
-        longest = 2 * math.pi / rate / 40 * (max(rtol, 1e-13) / 1e-13) ** 0.125 if rate else np.inf
+        if rate:
+            longest = min(longest, 2 * math.pi / rate / 40 * (max(rtol, 1e-13) / 1e-13) ** 0.125)
         planned = float(np.abs(time[order]).max()) / longest
         if planned > MOST:
             raise ValueError(
@@ -274,11 +284,12 @@ def _solve(
             count += last.nfev
         count += solver.nfev
     out[time == 0] = start
-    return out[:, :3] * size, quaternion.normalize(out[:, 3:]), count
+    mean = reach / steps if steps else math.inf
+    return out[:, :3] * size, quaternion.normalize(out[:, 3:]), count, mean
 
 
 def _split(
-    I1: float, I3: float, mgl: float, H0: Array, q0: Array, time: Array, per_turn: float
+    I1: float, I3: float, mgl: float, H0: Array, q0: Array, time: Array, per_turn: float, refine: int
 ) -> tuple[Array, Array, int]:
     rate = max(float(np.linalg.norm(H0)) / min(I1, I3), math.sqrt(abs(mgl) / I1))
     longest = 2 * math.pi / rate / per_turn if rate else math.inf
@@ -289,7 +300,7 @@ def _split(
         side = np.flatnonzero(time >= 0) if sign > 0 else np.flatnonzero(time < 0)
         for index in side[np.argsort(np.abs(time[side]), kind="stable")]:
             gap = float(time[index]) - now
-            steps = math.ceil(abs(gap) / longest) if gap else 0
+            steps = refine * math.ceil(abs(gap) / longest) if gap else 0
             for _ in range(steps):
                 for stage in STAGES:
                     _free_and_kick(state, stage * gap / steps, I1, I3, mgl)

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from decimal import Decimal, localcontext
 from fractions import Fraction
+from operator import mul
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidbody3d import FreeBody, FreeState, Top, TopState
+from rigidbody3d import FreeBody, FreeState, Top, TopState, Trajectory
 
 Real = NDArray[np.float64]
 Pairs = list[tuple[float, float]]
 State = list[int]
 
-BITS = 192
+BITS = 160
 ONE = 1 << BITS
 ORDER = 34
 
@@ -34,7 +36,7 @@ def _step(inertia: list[int], mgl: int, state: State, left: int) -> tuple[State,
     w, q = c[:3], c[3:]
 
     def product(x: list[int], y: list[int]) -> int:
-        return sum(a * b for a, b in zip(x, reversed(y), strict=True)) >> BITS
+        return sum(map(mul, x, reversed(y))) >> BITS
 
     for n in range(ORDER):
         torque = [0, 0, 0]
@@ -84,7 +86,32 @@ def taylor(
     return [Fraction(x, ONE) * fast for x in state[:3]], [Fraction(x, ONE) for x in state[3:]]
 
 
-def compare(found: FreeState | TopState, omega: list[Fraction], q: list[Fraction]) -> Pairs:
+def exact_period(inertia: Any, omega: Any) -> Fraction:
+    """Return the period of ω of a free body to 50 digits: 4 K/λ, by the arithmetic-geometric mean."""
+    pairs = sorted(zip(map(Fraction, inertia), map(Fraction, omega), strict=True))
+    (I1, w1), (I2, w2), (I3, w3) = pairs
+    # in units of ω, whose powers would overflow the digits
+    fast = _power_of_two(max(abs(float(w)) for w in (w1, w2, w3)))
+    w1, w2, w3 = w1 / fast, w2 / fast, w3 / fast
+    low, high = I1 * (I2 - I1) * w1**2, I3 * (I3 - I2) * w3**2
+    c3 = (I1 * (I3 - I1) * w1**2 + I2 * (I3 - I2) * w2**2) / I3
+    c1 = (I3 * (I3 - I1) * w3**2 + I2 * (I2 - I1) * w2**2) / I1
+    big = max(c3 * (I2 - I1) / (I1 * I2), c1 * (I3 - I2) / (I2 * I3))
+    m1 = (I3 - I1) / (I1 * I3) * abs(low - high) / I2 / big
+    with localcontext() as context:
+        context.prec = 60
+        a, b = Decimal(1), _decimal(m1).sqrt()
+        while abs(a - b) > Decimal(10) ** -55:
+            a, b = (a + b) / 2, (a * b).sqrt()
+        pi = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
+        return Fraction(2 * pi / a / _decimal(big).sqrt()) / fast
+
+
+def _decimal(x: Fraction) -> Decimal:
+    return Decimal(x.numerator) / Decimal(x.denominator)
+
+
+def compare(found: FreeState | TopState | Trajectory, omega: list[Fraction], q: list[Fraction]) -> Pairs:
     """Return errors and bounds of a state at one time: its attitude, and the component of ω worst for its bound."""
     mine = [Fraction(float(x)) for x in found.attitude[0]]
     length = Fraction(float(sum(x * x for x in q)) ** 0.5)
@@ -147,6 +174,10 @@ def _separatrix(rng: np.random.Generator) -> Pairs:
     return _free(np.array([I1, I2, I3]), omega, _time(rng, omega))
 
 
+def _dot(a: list[Fraction], b: list[Fraction]) -> Fraction:
+    return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
+
+
 def _oblique(rng: np.random.Generator) -> Pairs:
     """Tensors in oblique axes, two moments in half the cases nearly equal: against principal axes in fractions."""
     # a rational rotation, so that the tensor of doubles has doubles as principal moments all but exactly
@@ -169,11 +200,11 @@ def _oblique(rng: np.random.Generator) -> Pairs:
     time = _time(rng, spin)
     found = FreeBody(tensor, spin).at(np.array([time]))
     inward = [[Fraction(int(R[j, i]), size) for j in range(3)] for i in range(3)]
-    omega = [sum(a * Fraction(float(b)) for a, b in zip(row, spin, strict=True)) for row in inward]
+    omega = [_dot(row, [Fraction(float(x)) for x in spin]) for row in inward]
     own, q = taylor([Fraction(int(m)) * size**2 for m in moments], omega, time)
-    back = [sum(inward[j][i] * own[j] for j in range(3)) for i in range(3)]
+    back = [_dot([row[i] for row in inward], own) for i in range(3)]
     # the turn of the principal axes, seen in the given ones: the same angle about the turned axis
-    vector = [sum(inward[j][i] * q[1 + j] for j in range(3)) for i in range(3)]
+    vector = [_dot([row[i] for row in inward], q[1:]) for i in range(3)]
     return compare(found, back, [q[0], *vector])
 
 
