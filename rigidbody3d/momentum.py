@@ -194,7 +194,13 @@ class Motion:
         """Return Ḣ about a point fixed in space, Ḣ_G + (G - P) × m a_G, (..., 3), N·m: the moment needed there."""
         return np.asarray(self.rate + np.cross(self.center - np.asarray(point, dtype=float), self.force))
 
-    def error_estimate(self, of: str, point: ArrayLike | None = None, body: BodyError | None = None) -> Array:
+    def error_estimate(
+        self,
+        of: str,
+        point: ArrayLike | None = None,
+        body: BodyError | None = None,
+        given: float = 0.0,
+    ) -> Array:
         """Return a bound of the rounding error of a quantity, in its shape and unit.
 
         Parameters
@@ -206,6 +212,9 @@ class Motion:
             What momentum_about and rate_about are about, (..., 3), m.
         body
             Bounds of the errors of mass, centre and tensor, where they were worked out (`Body.error_estimate`).
+        given
+            By how much of themselves the velocities, accelerations and points may be off, as numbers that were
+            read in other units are.
 
         Examples
         --------
@@ -215,7 +224,7 @@ class Motion:
         """
         from rigidbody3d import rounding
 
-        return rounding.motion(self, of, point, body)
+        return rounding.motion(self, of, point, body, given)
 
     @classmethod
     def about_fixed_point(

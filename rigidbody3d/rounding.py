@@ -179,7 +179,7 @@ def turn(inertia: Bounded, rotation: Bounded) -> Bounded:
     return whole.sum(axis=-2)
 
 
-def turned(body: Body, rotation: Array, about: Array | None, error: float = 0.0) -> BodyError:
+def turned(body: Body, rotation: Array, about: Array | None, error: ArrayLike = 0.0) -> BodyError:
     """Bound a body turned by a rotation matrix whose entries have an error."""
     old, R = numbers(body), Bounded(rotation, error)
     center = old.center if about is None else about + times(R, old.center - about)
@@ -248,19 +248,21 @@ def principal(moments: Array, axes: Array, tensor: ArrayLike) -> tuple[Array, Ar
 # --- momentum ---
 
 
-def motion(of: Motion, what: str, point: ArrayLike | None, error: BodyError | None) -> Array:
+def motion(
+    of: Motion, what: str, point: ArrayLike | None, error: BodyError | None, given: float = 0.0
+) -> Array:
     """Bound a quantity of a motion, (...) or (..., 3): its formula on numbers with errors."""
     e = error or BodyError(*(np.zeros(()) for _ in range(3)))
     I, m, center = Bounded(of.inertia, e.inertia), Bounded(of.mass, e.mass), Bounded(of.center, e.center)
-    w, frame = of.omega, of.frame_omega
-    alpha = Bounded(of.alpha) if frame is None else of.alpha + cross(Bounded(frame), w)
-    v, a = Bounded(of.velocity), Bounded(of.acceleration)
+    w, own, v, a = (_read(x, given) for x in (of.omega, of.alpha, of.velocity, of.acceleration))
+    frame = None if of.frame_omega is None else _read(of.frame_omega, given)
+    alpha = own if frame is None else own + cross(frame, w)
     if of.pivot is not None:  # the centre of mass follows the body
-        r = center - of.pivot
-        v = cross(Bounded(w), r)
-        a = cross(alpha, r) + cross(Bounded(w), v)
+        r = center - _read(of.pivot, given)
+        v = cross(w, r)
+        a = cross(alpha, r) + cross(w, v)
     m3 = m[..., None]
-    slip = Bounded(w) - (w if frame is None else frame)
+    slip = w - (w if frame is None else frame)
 
     def momentum() -> Bounded:
         return times(I, w)
@@ -274,7 +276,7 @@ def motion(of: Motion, what: str, point: ArrayLike | None, error: BodyError | No
         return whole
 
     def lever() -> Bounded:
-        arm: Bounded = center - np.asarray(point, dtype=float)
+        arm: Bounded = center - _read(point, given)
         return arm
 
     formulas: dict[str, Callable[[], Bounded]] = {
@@ -282,7 +284,7 @@ def motion(of: Motion, what: str, point: ArrayLike | None, error: BodyError | No
         "true_alpha": lambda: alpha,
         "rate": rate,
         "transport": lambda: cross(w if frame is None else frame, momentum()),
-        "relative": lambda: times(I, of.alpha) if frame is None else times(I, of.alpha) + change(),
+        "relative": lambda: times(I, own) if frame is None else times(I, own) + change(),
         "tensor_rate": lambda: momentum() * 0.0 if frame is None else change(),
         "linear_momentum": lambda: m3 * v,
         "force": lambda: m3 * a,
@@ -301,26 +303,31 @@ def _named(formulas: dict[str, Callable[[], Bounded]], what: str) -> Array:
     return np.array(formulas[what]().error)
 
 
+def _read(given: Any, relative: float) -> Bounded:
+    """Numbers that may be off by as much of themselves."""
+    value = np.asarray(given, dtype=float)
+    return Bounded(value, relative * np.abs(value))
+
+
 # --- shafts ---
 
 
-def shaft(of: Shaft, what: str) -> Array:
+def shaft(of: Shaft, what: str, given: float = 0.0) -> Array:
     """Bound a quantity of a shaft, in its shape; of a complex one: the size of its error."""
     m, c, I = numbers(of.body)
-    z1, z2 = of.bearings[..., 0], of.bearings[..., 1]
-    g = np.asarray(of.gravity)
-    weight = m[..., None] * g
+    z1, z2 = (_read(of.bearings[..., i], given) for i in range(2))
+    weight = m[..., None] * _read(of.gravity, given)
     U = m[..., None] * c[..., :2]  # x and y as the last axis
-    push, pull = -(Bounded(of.speed) * of.speed), Bounded(of.speed_rate)
+    push, pull = -(_read(of.speed, given) ** 2), _read(of.speed_rate, given)
 
-    def moment(z: Array) -> Bounded:
+    def moment(z: Bounded) -> Bounded:
         products = -stack([I[..., 0, 2], I[..., 1, 2]])
         whole: Bounded = products + U * (c[..., 2] - z)[..., None]
         return whole
 
     def unbalance() -> Bounded:
-        first = moment(z2) / (Bounded(z1) - z2)[..., None]
-        second = moment(z1) / (Bounded(z2) - z1)[..., None]
+        first = moment(z2) / (z1 - z2)[..., None]
+        second = moment(z1) / (z2 - z1)[..., None]
         return stack([first, second], axis=-2)
 
     def size(vector: Bounded) -> Bounded:
@@ -336,7 +343,7 @@ def shaft(of: Shaft, what: str) -> Array:
         for here, other in ((z1, z2), (z2, z1)):
             lever = (c[..., 2] - other)[..., None]
             turning = weight[..., :2] * lever - c[..., :2] * weight[..., 2:]
-            forces.append(turning / (Bounded(here) - other)[..., None])
+            forces.append(turning / (here - other)[..., None])
         return stack(forces, axis=-2)
 
     def drive() -> Bounded:

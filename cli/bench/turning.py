@@ -36,7 +36,8 @@ def _step(inertia: list[int], mgl: int, state: State, left: int) -> tuple[State,
     w, q = c[:3], c[3:]
 
     def product(x: list[int], y: list[int]) -> int:
-        return sum(map(mul, x, reversed(y))) >> BITS
+        total: int = sum(map(mul, x, reversed(y)))
+        return total >> BITS
 
     for n in range(ORDER):
         torque = [0, 0, 0]
