@@ -226,7 +226,7 @@ def _reading(
     inertia: Array,
 ) -> BodyError:
     """Bound what is off in the parts before they are turned: numbers as read, and their shapes' formulas."""
-    from rigidbody3d.rounding import Bounded, BodyError, shaped
+    from rigidbody3d.rounding import BodyError, Bounded, shaped
 
     masses, tensors = READ * np.abs(mass), READ * np.abs(inertia)
     centers = READ * np.abs(center)

@@ -8,7 +8,8 @@ else is rounded a few times and keeps its last digits.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from rigidbody3d.freebody import FreeBody, FreeState
     from rigidbody3d.spin import Trajectory
     from rigidbody3d.top import TopState
+
 
 Array = NDArray[np.float64]
 
@@ -91,30 +93,38 @@ def _of_tensor(state: FreeState, of: str, tensor: ArrayLike) -> Array | float:
 
     body = state.body
     total: Array | float = 0.0
-    here = getattr(state, of) if of != "attitude" else state.attitude
-    for other in _perturbed(body, tensor):
-        there = getattr(FreeBody(other, body.omega, body.attitude).at(state.time), of)
-        if of == "attitude":
-            total = total + quaternion.angle_between(there, here)
-        elif of == "energy":
-            total = total + np.abs(there - here)
-        else:
-            total = total + np.sqrt(np.square(there - here).sum(axis=-1, keepdims=True))
+    for other in _perturbed(body.inertia, tensor):
+        total = total + _change(FreeBody(other, body.omega, body.attitude).at(state.time), state, of)
     return total
 
 
-def _perturbed(body: FreeBody, tensor: ArrayLike) -> list[Array]:
-    """The tensors with one entry off each; none where the tensor is diagonal and exact."""
-    I = np.asarray(body.inertia, dtype=float)
+class _State(Protocol):
+    """A state in time, of whatever kind."""
+
+    @property
+    def attitude(self) -> Array: ...
+
+
+def _change(there: _State, here: _State, of: str) -> Array:
+    """How far two states are apart: an angle, the size of a vector (..., 1), a difference."""
+    if of == "attitude":
+        return quaternion.angle_between(there.attitude, here.attitude)
+    off = np.abs(getattr(there, of) - getattr(here, of))
+    return np.asarray(off if of == "energy" else np.sqrt(np.square(off).sum(axis=-1, keepdims=True)))
+
+
+def _perturbed(inertia: ArrayLike, tensor: ArrayLike, axes: bool = True) -> list[Array]:
+    """The tensors with one entry off each; none where the tensor is exact and, if axes are sought, diagonal."""
+    I = np.asarray(inertia, dtype=float)
     E = np.asarray(tensor, dtype=float)
     if I.ndim == 1 or I.shape[-2:] != (3, 3):
         if not E.any():
             return []
         I = I[..., None, :] * np.eye(3)
     E = np.broadcast_to(E, I.shape)
-    size = np.abs(I).max(axis=(-1, -2), keepdims=True)
-    oblique = (I * np.eye(3) != I).any(axis=(-1, -2), keepdims=True)
-    E = E + np.where(oblique, 4 * EPS * size, 0.0)
+    if axes:
+        oblique = (I * np.eye(3) != I).any(axis=(-1, -2), keepdims=True)
+        E = E + np.where(oblique, 4 * EPS * np.abs(I).max(axis=(-1, -2), keepdims=True), 0.0)
     if not E.any():
         return []
     # a moment of zero, of a thin rod, shall not become negative
@@ -137,7 +147,7 @@ def free_body(body: FreeBody, of: str, tensor: ArrayLike) -> Array:
     here = getattr(body, of)
     size = np.sqrt(np.square(here).sum(axis=-1, keepdims=True)) if of == "momentum" else np.abs(here)
     total = FEW * np.where(np.isfinite(size), size, 0.0)
-    for other in _perturbed(body, tensor):
+    for other in _perturbed(body.inertia, tensor):
         there = getattr(FreeBody(other, body.omega, body.attitude), of)
         with np.errstate(invalid="ignore"):
             change = np.where(there == here, 0.0, np.abs(there - here))
@@ -148,8 +158,24 @@ def free_body(body: FreeBody, of: str, tensor: ArrayLike) -> Array:
 # --- tops ---
 
 
-def top(state: TopState, of: str) -> Array:
-    """Bound attitude (..., n), omega or momentum (..., n, 3), or energy (..., n) of a heavy top."""
+def top(state: TopState, of: str, moments: ArrayLike) -> Array:
+    """Bound attitude (..., n), omega or momentum (..., n, 3), or energy (..., n) of a heavy top.
+
+    `moments` bounds the errors of the moments of inertia, (..., 3): each in turn is put off by as much.
+    """
+    from rigidbody3d.top import Top
+
+    bound = _top(state, of)
+    E, given = np.asarray(moments, dtype=float), state.top
+    for entry in ([1.0, 1.0, 0.0], [0.0, 0.0, 1.0]) if E.any() else ():
+        I = np.asarray(given.inertia, dtype=float)
+        I = np.diagonal(I, axis1=-2, axis2=-1) if I.shape[-2:] == (3, 3) else I
+        other = Top(I + E * entry, given.mgl, given.omega, given.attitude).at(state.time)
+        bound = bound + _change(other, state, of)
+    return np.asarray(bound)
+
+
+def _top(state: TopState, of: str) -> Array:
     from rigidbody3d.elliptic import jacobi
 
     if of not in ("attitude", "omega", "momentum", "energy"):
@@ -207,22 +233,26 @@ def top(state: TopState, of: str) -> Array:
 # --- integration ---
 
 
-def integrated(run: Trajectory, finer: Trajectory, of: str) -> Array:
+def integrated(run: Trajectory, finer: Trajectory, of: str, tensor: ArrayLike) -> Array:
     """Bound an integrated rotation by another one with twice as many steps.
 
     Both methods are at least of the sixth order: the finer run is off by some 2 % of the coarser one's error, or by
     rounding alone. Twice their difference leaves room where the error does not yet follow that law. Rounding adds
-    up as a random walk.
+    up as a random walk. Errors of the tensor's entries are counted by putting off each in turn.
     """
     if of not in ("attitude", "omega", "momentum", "energy"):
         raise _wrong(of, "attitude", "omega", "momentum", "energy")
     walk = FEW * (1 + np.sqrt(run.evaluations))
+    here: Any = getattr(run, of)
+    bound = 2 * _change(finer, run, of)
     if of == "attitude":
-        return np.asarray(2 * quaternion.angle_between(finer.attitude, run.attitude) + walk)
-    here, there = getattr(run, of), getattr(finer, of)
-    if of == "energy":
-        return np.asarray(2 * np.abs(there - here) + walk * (np.abs(here) + abs(run.mgl)))
-    size = np.sqrt(np.square(here).sum(axis=-1, keepdims=True))
-    return np.asarray(
-        2 * np.sqrt(np.square(there - here).sum(axis=-1, keepdims=True)) + walk * size + 0 * here
-    )
+        bound = bound + walk
+    elif of == "energy":
+        bound = bound + walk * (np.abs(here) + abs(run.mgl))
+    else:
+        bound = bound + walk * np.sqrt(np.square(here).sum(axis=-1, keepdims=True)) + 0 * here
+    again = run.finer
+    if isinstance(again, partial):
+        for other in _perturbed(again.args[0], tensor, axes=False):
+            bound = bound + _change(again.func(other, *again.args[1:], **again.keywords), finer, of)
+    return np.asarray(bound)

@@ -67,13 +67,15 @@ class Trajectory:
             raise ValueError("an estimate needs the finer run that `integrate` offers")
         return self.finer()
 
-    def error_estimate(self, of: str = "attitude") -> Array:
+    def error_estimate(self, of: str = "attitude", tensor: ArrayLike = 0.0) -> Array:
         """Return an estimate of the error, of the method and of rounding together.
 
         Parameters
         ----------
         of
             "attitude", as an angle (n,), rad; "omega" or "momentum", (n, 3); "energy", (n,).
+        tensor
+            Bounds of the errors of the tensor's own entries, (3, 3), kg·m²: a further run for each.
 
         Notes
         -----
@@ -88,7 +90,7 @@ class Trajectory:
         """
         from rigidbody3d import rounding_in_time
 
-        return rounding_in_time.integrated(self, self._finer, of)
+        return rounding_in_time.integrated(self, self._finer, of, tensor)
 
 
 MOST = 10_000_000  # steps: some quarter of an hour

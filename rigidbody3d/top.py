@@ -164,17 +164,19 @@ class TopState:
             (self._moments * self.omega**2).sum(axis=-1) / 2 + mgl * (w * w + z * z - x * x - y * y)
         )
 
-    def error_estimate(self, of: str = "attitude") -> Array:
+    def error_estimate(self, of: str = "attitude", moments: ArrayLike = 0.0) -> Array:
         """Return a bound of the rounding error of a quantity, the given data as exact.
 
         Parameters
         ----------
         of
             "attitude", as an angle (..., n), rad; "omega" or "momentum", (..., n, 3); "energy", (..., n).
+        moments
+            Bounds of the errors of the moments of inertia, (..., 3), kg·m², where they were worked out.
         """
         from rigidbody3d import rounding_in_time
 
-        return rounding_in_time.top(self, of)
+        return rounding_in_time.top(self, of, moments)
 
     @property
     def _moments(self) -> Array:
