@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigidbody3d import attitude as quaternion
+from rigidbody3d.doubled import weighted_difference
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
 from rigidbody3d.inertia import principal
 
@@ -269,7 +270,7 @@ class _Motion:
         # 2E - |H|²/I3 and |H|²/I1 - 2E, as sums; and their weighted difference, whose sign tells the axis circled
         c3 = (I1 * (I3 - I1) * w1**2 + I2 * (I3 - I2) * w2**2) / I3
         c1 = (I3 * (I3 - I1) * w3**2 + I2 * (I2 - I1) * w2**2) / I1
-        apart = _weighted_difference(I1, I2, I3, w1, w3) / I2
+        apart = weighted_difference(I1, I2, I3, w1, w3) / I2
         self._large = apart <= 0  # circles the axis of the largest moment
         big = np.where(self._large, d23 * c1, d12 * c3)
         small = np.where(self._large, d12 * c3, d23 * c1)
@@ -398,41 +399,3 @@ class _Motion:
 def _cyclic(count: int) -> Array:
     """The turn that brings the first axis to the third place: e1 -> Z, e2 -> X, e3 -> Y."""
     return np.broadcast_to([0.5, -0.5, -0.5, -0.5], (count, 4))
-
-
-def _weighted_difference(I1: Array, I2: Array, I3: Array, w1: Array, w3: Array) -> Array:
-    """I1 (I2-I1) ω1² - I3 (I3-I2) ω3² in doubled precision: on the separatrix it is all cancellation."""
-    first = _double_product(I1, I2, w1, -1.0)
-    last = _double_product(I3, I2, w3, 1.0)
-    s, e = _two_sum(first[0], -last[0])
-    return s + (e + (first[1] - last[1]))
-
-
-def _double_product(a: Array, b: Array, w: Array, sign: float) -> tuple[Array, Array]:
-    """a · sign·(a - b) · w², as a pair."""
-    d, d_rest = _two_sum(sign * a, -sign * b)
-    p, p_rest = _two_product(a, d)
-    p_rest = p_rest + a * d_rest
-    q, q_rest = _two_product(w, w)
-    r, r_rest = _two_product(p, q)
-    return r, r_rest + (p * q_rest + p_rest * q)
-
-
-def _two_sum(a: Array, b: Array) -> tuple[Array, Array]:
-    """The rounded sum and its rounding error (Knuth, TAOCP 2, 4.2.2, theorem B)."""
-    s = a + b
-    c = s - a
-    return s, (a - (s - c)) + (b - c)
-
-
-def _two_product(a: Array, b: Array) -> tuple[Array, Array]:
-    """The rounded product and its rounding error (Dekker, Numer. Math. 18, 1971, 224-242)."""
-    p = a * b
-    a1, b1 = _upper(a), _upper(b)
-    a2, b2 = a - a1, b - b1
-    return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
-
-
-def _upper(a: Array) -> Array:
-    c = 134217729.0 * a  # 2²⁷ + 1
-    return c - (c - a)

@@ -171,7 +171,7 @@ class Motion:
     @cached_property
     def inertia_force(self) -> Array:
         """d'Alembert's inertia force, -m a_G, (..., 3), N."""
-        return _scaled(-self.mass, self.acceleration)
+        return _scaled(self.mass, self.acceleration, -1.0)
 
     @cached_property
     def inertia_wrench(self) -> Wrench:
@@ -290,14 +290,14 @@ def _gyroscopic(I: Array) -> Array:
     return out
 
 
-def _scaled(factor: Array, vectors: Array) -> Array:
+def _scaled(factor: Array, vectors: Array, sign: float = 1.0) -> Array:
     """A factor (...) times vectors (..., 3); many in blocks, since numpy goes through each column by itself."""
     if vectors.ndim != 2 or factor.shape != vectors.shape[:1] or len(vectors) <= BLOCK:
-        return np.asarray(factor[..., None] * vectors)
+        return np.asarray((sign * factor)[..., None] * vectors)
     out = np.empty_like(vectors)
     for s in range(0, len(vectors), BLOCK):
         part = slice(s, s + BLOCK)
-        np.multiply(factor[part, None], vectors[part], out=out[part])
+        np.multiply((sign * factor[part])[:, None], vectors[part], out=out[part])
     return out
 
 

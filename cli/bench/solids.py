@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError
-from rigidbody3d import Body, Motion, Shaft, cones, principal, steady_precession
+from rigidbody3d import Body, Motion, Shaft, principal
 from rigidbody3d.inertia import compose, turn
 
 try:
@@ -267,54 +267,11 @@ def _shaft(rng: np.random.Generator) -> Pairs:
     return [_worst(getattr(shaft, name), true, shaft.error_estimate(name)) for name, true in answers]
 
 
-def _precession(rng: np.random.Generator) -> Pairs:
-    """Steady precession near the least spin that allows it, near the vertical and the right angle; cones too."""
-    if mp is None:
-        raise DataError("this campaign needs mpmath: install dalembert with its extra, dalembert[test]")
-    I1, I3 = 10.0 ** rng.uniform(-12, 12) * rng.uniform(0.1, 1, 2)
-    mgl = 10.0 ** rng.uniform(-12, 12)
-    tilt = rng.choice([0.0, np.pi / 2]) + rng.choice([-1, 1]) * 10.0 ** rng.uniform(-9, 0)
-    least = 2 * np.sqrt(I1 * mgl * max(np.cos(tilt), 1e-6)) / I3
-    spin = least * (1 + 10.0 ** rng.uniform(-16, 1)) * rng.choice([-1, 1])
-    omega = rng.normal(size=3) * 10.0 ** rng.uniform(-9, 9, 3)
-    rates, found = steady_precession(I1, I3, mgl, tilt, spin), cones(I1, I3, omega)
-    with mp.workdps(50):
-        a, b, g, c, w = (
-            mp.mpf(float(I1)),
-            mp.mpf(float(I3)),
-            mp.mpf(mgl),
-            mp.cos(mp.mpf(float(tilt))),
-            mp.mpf(spin),
-        )
-        root = (b * w) ** 2 - 4 * a * g * c
-        large = b * w + mp.sign(w) * mp.sqrt(max(root, 0))
-        x, y, z = map(mp.mpf, omega.tolist())
-        across = mp.hypot(x, y)
-        true = [
-            mp.atan2(abs(a - b) * across * abs(z), a * across**2 + b * z**2),
-            mp.atan2(across, abs(z)),
-            mp.hypot(across, b * z / a),
-            z * (a - b) / a,
-        ]
-        pairs = [
-            (float(abs(mp.mpf(float(f)) - t)), float(e))
-            for f, t, e in zip(found, true, found.error_estimate(), strict=True)
-        ]
-        if root >= 0 and np.isfinite(rates.slow):
-            true = [2 * g / large, large / (2 * a * c)]
-            pairs += [
-                (float(abs(mp.mpf(float(f)) - t)), float(e))
-                for f, t, e in zip(rates, true, rates.error_estimate(), strict=True)
-            ]
-    return pairs
-
-
 CAMPAIGNS: dict[str, tuple[str, Callable[[np.random.Generator], Pairs]]] = {
     "bodies of parts": ("holes that leave 1e-1 … 1e-14, parts far away, scales 1e-12 … 1e12", _composition),
     "thin walls": ("a box less a box, walls of 0.3 … 1e-12 of it, turned", _shapes),
     "nearly equal principal moments": ("two moments that differ by 1e-1 … 1e-15", _near_moments),
     "nearly flat masses": ("particles near a plane or a line, to 1e-1 … 1e-8 of their size", _flat),
     "momentum of bodies of parts": ("with holes, far parts, and rates that nearly vanish", _momentum),
-    "steady precession and cones": ("near the least spin, the vertical and the right angle", _precession),
     "shafts with attached parts": ("with holes, far parts, and bearings close together", _shaft),
 }

@@ -22,6 +22,7 @@ MODULES = (
     "cli.bench.rotation",
     "cli.bench.turning",
     "cli.bench.solids",
+    "cli.bench.gyroscopes",
 )
 
 Trial = Callable[[np.random.Generator], list[tuple[float, float]]]
