@@ -59,7 +59,7 @@ def free(state: FreeState, of: str, tensor: ArrayLike) -> Array:
         )
     if len(motion._general):
         begin = 1 + np.abs(motion._u0)
-        late[motion._general] = 2 * begin / motion._rate + 4 * way
+        late[motion._general] = 3 * begin / motion._rate + 4 * way
         node = np.abs(motion._node(motion._jacobi(t))) + np.abs(motion._node(motion._jacobi(np.zeros(1))))
         angle[motion._general] = begin + 4 * (np.abs(motion._drift) + motion._rate) * way + 3 * node
     shape = (*lead, len(t)) if state.time.ndim else lead
@@ -76,9 +76,9 @@ def free(state: FreeState, of: str, tensor: ArrayLike) -> Array:
         found = (bound @ np.abs(axes)).reshape(*shape, 3)
     else:
         # both stay what they were however late the state is
-        size = FEW * 2 * np.abs(body.energy)
+        size = FEW * 3 * np.abs(body.energy)
         if of == "momentum":
-            size = FEW * 2 * np.sqrt(np.square(body.momentum).sum(axis=-1))
+            size = FEW * 3 * np.sqrt(np.square(body.momentum).sum(axis=-1))
         found = np.zeros(shape) + (size[..., None] if state.time.ndim else size)
         found = found[..., None] + np.zeros(3) if of == "momentum" else found
     return np.asarray(found + _of_tensor(state, of, tensor))
@@ -187,7 +187,7 @@ def _top(state: TopState, of: str) -> Array:
     plus, minus = motion._phases(at)
     start = motion._phases(jacobi(motion.begin, motion.p))
     begin = 1 + np.abs(motion.begin)
-    late = 2 * begin / motion.rate + 4 * way
+    late = 3 * begin / motion.rate + 4 * way
     runs = sum(np.abs(x) for x in (plus, minus, *start)) + np.abs(motion.extra) * way
     angle = begin + 4 * motion.rate * way + 3 * runs
     if len(motion.simple):
