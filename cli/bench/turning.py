@@ -57,8 +57,11 @@ def _step(inertia: list[int], mgl: int, state: State, left: int) -> tuple[State,
         ]
         for series, value in zip(c, new, strict=True):
             series.append(value // (n + 1))
-    last = max(abs(series[-1]) for series in c) / ONE
-    reach = (1e-42 / last) ** (1 / ORDER) if last > 0 else np.inf
+    # by several of the last terms: one alone may happen to be next to nothing
+    reach = np.inf
+    for n in range(ORDER - 3, ORDER + 1):
+        size = max(abs(series[n]) for series in c) / ONE
+        reach = min(reach, (1e-42 / size) ** (1 / n) if size > 0 else np.inf)
     h = left if abs(left) <= reach * ONE else _fixed(np.copysign(reach, left))
     advanced = []
     for series in c:
@@ -82,8 +85,11 @@ def taylor(
     moments = [_fixed(Fraction(x) / heavy) for x in inertia]
     state = [*(_fixed(Fraction(x) / fast) for x in omega), *map(_fixed, attitude)]
     left, push = _fixed(Fraction(time) * fast), _fixed(Fraction(mgl) / (heavy * fast * fast))
+    length = sum(x * x for x in state[3:])
     while left:
         state, left = _step(moments, push, state, left)
+    if abs(sum(x * x for x in state[3:]) - length) > length >> 100:
+        raise ArithmeticError("the series has lost the length of the quaternion")
     return [Fraction(x, ONE) * fast for x in state[:3]], [Fraction(x, ONE) for x in state[3:]]
 
 
