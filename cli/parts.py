@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +17,13 @@ from cli.units import UNITS, cosine_sine, to_si
 from rigidbody3d import Body, check, compose, inertia_of, load_mesh, measure_of, mesh, tensor
 from rigidbody3d.shapes import SHAPES
 
+if TYPE_CHECKING:
+    from rigidbody3d.rounding import BodyError
+
 Array = NDArray[np.float64]
 
+READ = 2 * float(np.finfo(float).eps)
+"""By how much of itself a number may be off once it is read and put into SI: three roundings, and one to spare."""
 LENGTHS = ("radius", "inner_radius", "length", "width", "height", "depth")
 MOMENTS = ("ixx", "iyy", "izz")
 PRODUCTS = ("ixy", "ixz", "iyz")
@@ -63,16 +71,22 @@ def read_parts(path: str) -> Parts:
     center = np.stack([np.nan_to_num(values.get(axis, np.zeros(table.rows))) for axis in "xyz"], axis=-1)
     folder = Path() if path == "-" else Path(path).parent
     warnings = list(table.warnings)
+    rows: list[dict[str, float]] = []
+    meshes: dict[int, Callable[[], tuple[float, float]]] = {}
     for index, shape in enumerate(table.texts["shape"]):
         row = {key: float(column[index]) for key, column in values.items() if not np.isnan(column[index])}
+        rows.append(row)
         if shape.lower() == MESH:
-            mass[index], own, inertia[index] = _mesh(table, index, row, folder)
+            mass[index], own, inertia[index], meshes[index] = _mesh(table, index, row, folder)
             if not row.keys() & {"x", "y", "z"}:  # it stays where the file has it
                 center[index] = own
         else:
             mass[index], inertia[index] = _part(table, index, shape.lower(), row, warnings, name[index])
     rotation = turns @ _along(table, values)
-    each = Body(mass, center, inertia).turned(rotation)
+    shapes = [shape.lower() for shape in table.texts["shape"]]
+    drawn = Body(mass, center, inertia, partial(_reading, shapes, rows, meshes, mass, center, inertia))
+    turned = drawn.turned(rotation)
+    each = replace(turned, rounding=partial(_turning, drawn, rotation, table))
     total = mass.sum()
     if not total > 0:
         raise DataError(
@@ -84,7 +98,7 @@ def read_parts(path: str) -> Parts:
         raise DataError(
             f"{table.file}: no body is made of these parts: {verdict.reason}: is a hole outside its part?"
         )
-    return Parts(table.file, name, [shape.lower() for shape in table.texts["shape"]], each, whole, warnings)
+    return Parts(table.file, name, shapes, each, whole, warnings)
 
 
 def _part(
@@ -134,8 +148,10 @@ def _part(
     return mass, given
 
 
-def _mesh(table: Table, index: int, row: dict[str, float], folder: Path) -> tuple[float, Array, Array]:
-    """Return mass, centre of mass and tensor of a closed mesh from a file."""
+def _mesh(
+    table: Table, index: int, row: dict[str, float], folder: Path
+) -> tuple[float, Array, Array, Callable[[], tuple[float, float]]]:
+    """Return mass, centre of mass and tensor of a closed mesh from a file, and what bounds their rounding."""
     cell = table.texts.get("file", [""] * table.rows)[index]
     unit = table.texts.get("file_unit", [""] * table.rows)[index]
     if not cell:
@@ -148,7 +164,8 @@ def _mesh(table: Table, index: int, row: dict[str, float], folder: Path) -> tupl
         raise table.error(index, "shape", MESH, "with it a mass, or a positive density_kg_m3")
     try:
         vertices, faces = load_mesh(str(folder / cell))
-        volume, center, inertia = mesh(to_si(vertices, "length", unit), faces)
+        vertices = to_si(vertices, "length", unit)
+        volume, center, inertia = mesh(vertices, faces)
     except ImportError:
         raise DataError(
             f"{table.file}: a mesh needs trimesh: install dalembert with its extra, dalembert[mesh]"
@@ -156,7 +173,18 @@ def _mesh(table: Table, index: int, row: dict[str, float], folder: Path) -> tupl
     except ValueError as error:
         raise table.error(index, "file", cell, f"a closed mesh: {error}") from None
     density = row["density"] if "density" in row else row["mass"] / float(volume)
-    return density * float(volume), center, density * inertia
+    rough = partial(_rough, vertices, faces, float(volume))
+    return density * float(volume), center, density * inertia, rough
+
+
+def _rough(vertices: Array, faces: NDArray[np.int64], volume: float) -> tuple[float, float]:
+    """Return by how much, of the volume, the sum over a mesh's faces may be off, and how far its corners lie."""
+    corners = vertices[faces]
+    spread = corners - vertices[np.unique(faces)].mean(axis=0)
+    reach = float(np.sqrt(np.square(spread).sum(axis=-1)).max())
+    # a corner moves by its own rounding, and all that its faces sweep with it
+    sizes = np.abs(np.linalg.det(spread)) + reach**2 * READ * np.abs(corners).max()
+    return READ * len(faces) * float(sizes.sum()) / volume, reach
 
 
 def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimensions: dict[str, float]) -> float:
@@ -187,6 +215,53 @@ def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimension
     if mass == 0:
         raise table.error(index, header, f"{row[key]:g}", "a mass that is not zero: this shape has no volume")
     return mass
+
+
+def _reading(
+    shapes: list[str],
+    rows: list[dict[str, float]],
+    meshes: dict[int, Callable[[], tuple[float, float]]],
+    mass: Array,
+    center: Array,
+    inertia: Array,
+) -> BodyError:
+    """Bound what is off in the parts before they are turned: numbers as read, and their shapes' formulas."""
+    from rigidbody3d.rounding import BodyError, Bounded, shaped
+
+    masses, tensors = READ * np.abs(mass), READ * np.abs(inertia)
+    centers = READ * np.abs(center)
+    for i, (shape, row) in enumerate(zip(shapes, rows, strict=True)):
+        if i in meshes:
+            rough, reach = meshes[i]()
+            masses[i] += rough * np.abs(mass[i])
+            centers[i] += rough * reach
+            tensors[i] += rough * np.abs(mass[i]) * reach**2
+        if shape not in SHAPES:
+            continue
+        known = SHAPES[shape]
+        names = known.dimensions + known.optional
+        given = {key: Bounded(row[key], READ * row[key]) for key in names if key in row}
+        given |= {key: Bounded(0.0) for key in known.optional if key not in row}
+        m = Bounded(mass[i], masses[i])
+        if "mass" not in row and known.measure is not None:
+            m = Bounded(row[DENSITIES[known.thin]], masses[i] / mass[i] * row[DENSITIES[known.thin]])
+            m = m * known.measure(**given)
+        masses[i], tensors[i] = m.error, shaped(shape, m, given).error
+    return BodyError(masses, centers, tensors)
+
+
+def _turning(drawn: Body, rotation: Array, table: Table) -> BodyError:
+    """Bound the parts as turned: a matrix of zeros and ones is exact, another has its angles' own rounding."""
+    from rigidbody3d.rounding import turned
+
+    angle = np.zeros(table.rows)
+    for name in ("rx", "ry", "rz"):
+        if name in table.numbers:
+            column = table.numbers[name]
+            angle += np.abs(np.nan_to_num(to_si(column.values, "angle", column.unit)))
+    plain = np.isin(rotation, (-1.0, 0.0, 1.0)).all(axis=(-1, -2))
+    off = np.where(plain, 0.0, READ * (4 + angle))
+    return turned(drawn, rotation, None, np.broadcast_to(off[:, None, None], rotation.shape))
 
 
 def _turns(table: Table) -> Array:

@@ -59,6 +59,7 @@ def solve(path: str, wanted: Wanted) -> Shown:
         table=answer.table,
         notes=answer.notes,
         figure=answer.figure,
+        errors=answer.errors,
         warnings=[*answer.parts.warnings, *answer.warnings()],
     )
 
@@ -284,6 +285,12 @@ class Answer:
                 ):
                     rows[column].append(cell)
         return rows
+
+    def errors(self) -> Columns:
+        """Return bounds of the rounding errors of what is shown."""
+        from cli.body_digits import errors
+
+        return errors(self)
 
     def notes(self) -> str:
         """Say which conventions hold."""

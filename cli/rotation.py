@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from cli.errors import DataError, nearest
 from cli.render import Columns, Shown
 from cli.units import LARGEST
-from rigidbody3d import FreeBody, FreeState, Top, TopState, Trajectory, check, integrate, principal
+from rigidbody3d import Body, FreeBody, FreeState, Top, TopState, Trajectory, check, integrate, principal
 from rigidbody3d import cones as cones_of
 from rigidbody3d import sleeping_threshold as threshold_of
 from rigidbody3d import steady_precession as steady_of
@@ -41,6 +42,8 @@ class Given:
     torque: Array | None
     frame: str
     warnings: list[str]
+    rounded: Callable[[], Array] | None = None
+    """Bounds of the errors of the tensor of a body made of parts, (3, 3)."""
 
 
 def read_body(path: str) -> Given:
@@ -62,6 +65,7 @@ def read_body(path: str) -> Given:
             raise DataError(f"{file}: [top] holds mgl = weight times distance, N·m, and nothing else")
         mgl = float(_numbers(file, "top.mgl", top["mgl"], ()))
     warnings: list[str] = []
+    rounded: Callable[[], Array] | None = None
     if ("inertia" in document) == ("parts" in document):
         raise DataError(f'{file}: expected inertia = [I1, I2, I3] (or a matrix) or parts = "parts.csv"')
     if "parts" in document:
@@ -72,7 +76,9 @@ def read_body(path: str) -> Given:
         folder = Path() if path == "-" else Path(path).parent
         parts = read_parts(str(folder / document["parts"]))
         warnings += parts.warnings
-        inertia = parts.whole.inertia if mgl is None else parts.whole.about([0.0, 0.0, 0.0])
+        about = None if mgl is None else [0.0, 0.0, 0.0]
+        inertia = parts.whole.inertia if about is None else parts.whole.about(about)
+        rounded = partial(_tensor_error, parts.whole, about)
     else:
         inertia = _numbers(file, "inertia", document["inertia"], (3,), (3, 3))
     try:
@@ -106,7 +112,12 @@ def read_body(path: str) -> Given:
         None if torque is None else _numbers(file, "torque", torque, (3,)),
         frame,
         warnings,
+        rounded,
     )
+
+
+def _tensor_error(body: Body, about: list[float] | None) -> Array:
+    return body.error_estimate(about).inertia
 
 
 def _numbers(file: str, key: str, value: Any, *shapes: tuple[int, ...]) -> Array:
@@ -139,6 +150,7 @@ def solve(path: str, times: list[float], method: str | None, integrator: str) ->
         columns=answer.columns(),
         notes=answer.notes,
         figure=answer.figure,
+        errors=answer.errors,
         warnings=[*answer.given.warnings, *answer.warnings()],
     )
 
@@ -315,6 +327,24 @@ class Answer:
         columns["energy_J"] = s.energy
         plain: dict[str, Any] = {name: np.asarray(column) + 0.0 for name, column in columns.items()}
         return plain
+
+    def errors(self) -> Columns:
+        """Return bounds of the rounding errors, of an integration of its method too, in the columns of the CSV."""
+        s, rounded = self.states, self.given.rounded
+        tensor = np.zeros((3, 3)) if rounded is None else rounded()
+        if isinstance(s, TopState):
+            # two moments that differ by rounding were taken as one
+            between = np.abs(np.diff(np.diag(_tensor(self.given.inertia))[:2]))[0] / 2
+            off = np.diag(tensor) + [between, between, 0.0]
+            found = {of: s.error_estimate(of, off) for of in ("omega", "attitude", "momentum", "energy")}
+        else:
+            found = {of: s.error_estimate(of, tensor) for of in ("omega", "attitude", "momentum", "energy")}
+        columns: dict[str, Any] = {f"omega_{a}_rad_s": found["omega"][:, i] for i, a in enumerate("xyz")}
+        # a turn by an angle moves a quaternion by half of it
+        columns |= {f"attitude_{a}": found["attitude"] / 2 for a in "wxyz"}
+        columns |= {f"momentum_{a}_kg_m2_s": found["momentum"][:, i] for i, a in enumerate("xyz")}
+        columns["energy_J"] = found["energy"]
+        return columns
 
     def notes(self) -> str:
         """Say what is constant in the motion."""

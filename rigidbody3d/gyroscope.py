@@ -24,11 +24,26 @@ def gyroscopic_couple(momentum: ArrayLike, frame_omega: ArrayLike) -> Array:
     return np.asarray(np.cross(np.asarray(frame_omega, dtype=float), np.asarray(momentum, dtype=float)))
 
 
-class Steady(NamedTuple):
-    """The two rates of steady precession, rad/s; NaN where the spin is too slow for any."""
-
+class _Rates(NamedTuple):
     slow: Array
     fast: Array
+
+
+class Steady(_Rates):
+    """The two rates of steady precession, `.slow` and `.fast`, rad/s; NaN where the spin is too slow for any."""
+
+    given: tuple[Array, ...]
+    """I1, I3, m g l, tilt and spin."""
+
+    def error_estimate(self) -> tuple[Array, Array]:
+        """Return bounds of the rounding errors of both rates, (...), rad/s.
+
+        Where the two nearly coincide, at the least spin that allows them, the square root leaves half the digits.
+        """
+        from rigidbody3d import rounding
+
+        slow, fast = rounding.steady(*self.given)
+        return slow.error, fast.error
 
 
 def steady_precession(
@@ -68,7 +83,9 @@ def steady_precession(
         large = B + np.where(B < 0, -1.0, 1.0) * np.sqrt(np.where(square < 0, np.nan, square))
         slow = np.where(a == 0, 0.0 * large, 2 * a / large)
         fast = large / (2 * I1 * c)
-    return Steady(np.asarray(slow), np.asarray(fast))
+    found = Steady(np.asarray(slow), np.asarray(fast))
+    found.given = I1, I3, a, theta, w
+    return found
 
 
 def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) -> Array:
@@ -85,17 +102,29 @@ def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) 
     return np.asarray(2 * np.sqrt(np.maximum(a, 0.0) * I1) / I3)
 
 
-class Cones(NamedTuple):
-    """The cones of a free symmetric body: half angles, rad, and rates, rad/s."""
-
+class _Cones(NamedTuple):
     space: Array
-    """Angle between ω and H: the cone fixed in space."""
     body: Array
-    """Angle between ω and the axis of the body: the cone fixed in it."""
     precession: Array
-    """Rate at which the axis goes round H, |H|/I1."""
     spin: Array
-    """Rate of the body about its axis relative to the precessing plane, ω3 (I1 - I3)/I1."""
+
+
+class Cones(_Cones):
+    """The cones of a free symmetric body: half angles, rad, and rates, rad/s.
+
+    `.space` is the angle between ω and H, the cone fixed in space; `.body` that between ω and the axis of the body,
+    the cone fixed in it; `.precession` the rate at which the axis goes round H, |H|/I1; `.spin` the rate of the body
+    about its axis relative to the precessing plane, ω3 (I1 - I3)/I1.
+    """
+
+    given: tuple[Array, ...]
+    """I1, I3 and ω."""
+
+    def error_estimate(self) -> tuple[Array, ...]:
+        """Return bounds of the rounding errors of the four, (...): small beside each, since nothing here cancels."""
+        from rigidbody3d import rounding
+
+        return tuple(x.error for x in rounding.cones(*self.given))
 
 
 def cones(transverse: ArrayLike, axial: ArrayLike, omega: ArrayLike) -> Cones:
@@ -123,9 +152,11 @@ def cones(transverse: ArrayLike, axial: ArrayLike, omega: ArrayLike) -> Cones:
     w = np.asarray(omega, dtype=float)
     across, along = np.hypot(w[..., 0], w[..., 1]), w[..., 2]
     space = np.arctan2(np.abs(I1 - I3) * across * np.abs(along), I1 * across**2 + I3 * along**2)
-    return Cones(
+    found = Cones(
         space,
         np.arctan2(across, np.abs(along)),
         np.hypot(across, I3 * along / I1),
         np.asarray(along * (I1 - I3) / I1),
     )
+    found.given = I1, I3, w
+    return found

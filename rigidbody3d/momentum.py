@@ -13,10 +13,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from rigidbody3d.rounding import BodyError
 
 Array = NDArray[np.float64]
 
@@ -75,6 +78,8 @@ class Motion:
     center: Array
     velocity: Array
     acceleration: Array
+    pivot: Array | None
+    """The point fixed in space that velocity and acceleration were worked out from; None: they are given."""
 
     def __init__(
         self,
@@ -101,6 +106,7 @@ class Motion:
         keep("center", center, 3)
         keep("velocity", velocity, 3)
         keep("acceleration", acceleration, 3)
+        object.__setattr__(self, "pivot", None)
         object.__setattr__(self, "frame_omega", None)
         if frame_omega is not None:
             keep("frame_omega", frame_omega, 3)
@@ -155,17 +161,17 @@ class Motion:
     @cached_property
     def linear_momentum(self) -> Array:
         """m v_G, (..., 3), kg·m/s."""
-        return np.asarray(self.mass[..., None] * self.velocity)
+        return _scaled(self.mass, self.velocity)
 
     @cached_property
     def force(self) -> Array:
         """m a_G, the external force that the motion asks for, (..., 3), N."""
-        return np.asarray(self.mass[..., None] * self.acceleration)
+        return _scaled(self.mass, self.acceleration)
 
     @cached_property
     def inertia_force(self) -> Array:
         """d'Alembert's inertia force, -m a_G, (..., 3), N."""
-        return np.asarray(-self.mass[..., None] * self.acceleration)
+        return _scaled(self.mass, self.acceleration, -1.0)
 
     @cached_property
     def inertia_wrench(self) -> Wrench:
@@ -188,6 +194,38 @@ class Motion:
         """Return Ḣ about a point fixed in space, Ḣ_G + (G - P) × m a_G, (..., 3), N·m: the moment needed there."""
         return np.asarray(self.rate + np.cross(self.center - np.asarray(point, dtype=float), self.force))
 
+    def error_estimate(
+        self,
+        of: str,
+        point: ArrayLike | None = None,
+        body: BodyError | None = None,
+        given: float = 0.0,
+    ) -> Array:
+        """Return a bound of the rounding error of a quantity, in its shape and unit.
+
+        Parameters
+        ----------
+        of
+            Its name: momentum, rate, transport, relative, tensor_rate, linear_momentum, force, inertia_force,
+            inertia_moment, energy, momentum_about, rate_about, true_alpha.
+        point
+            What momentum_about and rate_about are about, (..., 3), m.
+        body
+            Bounds of the errors of mass, centre and tensor, where they were worked out (`Body.error_estimate`).
+        given
+            By how much of themselves the velocities, accelerations and points may be off, as numbers that were
+            read in other units are.
+
+        Examples
+        --------
+        >>> disk = Motion(np.diag([1.0, 1.0, 2.0]), [0, 4, 12.0], frame_omega=[0, 4.0, 0])
+        >>> bool((disk.error_estimate("rate") < 1e-12).all())
+        True
+        """
+        from rigidbody3d import rounding
+
+        return rounding.motion(self, of, point, body, given)
+
     @classmethod
     def about_fixed_point(
         cls,
@@ -201,15 +239,15 @@ class Motion:
         frame_omega: ArrayLike | None = None,
     ) -> Motion:
         """Return the motion of a body that turns about a point fixed in space: v = ω × r, a = α × r + ω × v."""
-        w, r = (
-            np.asarray(omega, dtype=float),
-            np.asarray(center, dtype=float) - np.asarray(point, dtype=float),
-        )
+        w, pivot = np.asarray(omega, dtype=float), np.asarray(point, dtype=float)
+        r = np.asarray(center, dtype=float) - pivot
         true = np.asarray(alpha, dtype=float)
         if frame_omega is not None:
             true = true + np.cross(np.asarray(frame_omega, dtype=float), w)
         v = np.cross(w, r)
-        return cls(inertia, w, alpha, frame_omega, mass, center, v, np.cross(true, r) + np.cross(w, v))
+        motion = cls(inertia, w, alpha, frame_omega, mass, center, v, np.cross(true, r) + np.cross(w, v))
+        object.__setattr__(motion, "pivot", pivot)
+        return motion
 
 
 def _times(I: Array, w: Array) -> Array:
@@ -222,22 +260,45 @@ def _times(I: Array, w: Array) -> Array:
 def _momentum_and_rate(I: Array, w: Array, alpha: Array) -> tuple[Array, Array]:
     """I ω and I α + ω × I ω for states (..., 3) of one tensor, in blocks that stay in the cache."""
     flat, turn = w.reshape(-1, 3), alpha.reshape(-1, 3)
-    transposed = np.ascontiguousarray(I.T)
+    transposed, gyroscopic = np.ascontiguousarray(I.T), _gyroscopic(I)
     momentum, rate = np.empty_like(flat), np.empty_like(flat)
+    most = min(BLOCK, len(flat))
+    columns, products, terms = np.empty((3, most)), np.empty((6, most)), np.empty((most, 3))
     for s in range(0, len(flat), BLOCK):
-        part = slice(s, s + BLOCK)
+        part, size = slice(s, s + BLOCK), min(BLOCK, len(flat) - s)
+        spin, pairs = columns[:, :size], products[:, :size]
         np.matmul(flat[part], transposed, out=momentum[part])
         np.matmul(turn[part], transposed, out=rate[part])
-        x, y, z = np.ascontiguousarray(flat[part].T)
-        h = np.ascontiguousarray(momentum[part].T)
-        cross = np.empty_like(h)
-        swap = np.empty_like(x)
-        for out, a, b, p, q in ((0, y, z, 2, 1), (1, z, x, 0, 2), (2, x, y, 1, 0)):
-            np.multiply(a, h[p], out=cross[out])
-            np.multiply(b, h[q], out=swap)
-            cross[out] -= swap
-        rate[part] += cross.T
+        # products of components of ω as rows: whole columns of a block in one stroke
+        spin[...] = flat[part].T
+        np.multiply(spin, spin, out=pairs[:3])
+        for row, (a, b) in enumerate(_PAIRS, 3):
+            np.multiply(spin[a], spin[b], out=pairs[row])
+        rate[part] += np.matmul(pairs.T, gyroscopic, out=terms[:size])
     return momentum.reshape(w.shape), rate.reshape(w.shape)
+
+
+_PAIRS = ((1, 2), (2, 0), (0, 1))
+
+
+def _gyroscopic(I: Array) -> Array:
+    """The coefficients of ω × I ω in ωx², ωy², ωz², ωy ωz, ωz ωx, ωx ωy, (6, 3): Euler's (I_zz - I_yy) ωy ωz …."""
+    out = np.zeros((6, 3))
+    for x, (y, z) in enumerate(_PAIRS):
+        out[y, x], out[z, x] = I[z, y], -I[y, z]
+        out[3 + x, x], out[3 + y, x], out[3 + z, x] = I[z, z] - I[y, y], -I[y, x], I[z, x]
+    return out
+
+
+def _scaled(factor: Array, vectors: Array, sign: float = 1.0) -> Array:
+    """A factor (...) times vectors (..., 3); many in blocks, since numpy goes through each column by itself."""
+    if vectors.ndim != 2 or factor.shape != vectors.shape[:1] or len(vectors) <= BLOCK:
+        return np.asarray((sign * factor)[..., None] * vectors)
+    out = np.empty_like(vectors)
+    for s in range(0, len(vectors), BLOCK):
+        part = slice(s, s + BLOCK)
+        np.multiply((sign * factor[part])[:, None], vectors[part], out=out[part])
+    return out
 
 
 # --- percussion ---

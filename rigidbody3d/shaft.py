@@ -139,6 +139,31 @@ class Shaft:
         about = self.body.inertia[..., 2, 2] + self.body.mass * (c[..., 0] ** 2 + c[..., 1] ** 2)
         return np.asarray(about * self.speed_rate - (c[..., 0] * weight[..., 1] - c[..., 1] * weight[..., 0]))
 
+    def error_estimate(self, of: str, given: float = 0.0) -> Array:
+        """Return a bound of the rounding error of a quantity, in its shape and unit; of a complex one: of its size.
+
+        Parameters
+        ----------
+        of
+            Its name: dynamic, static, axial, drive_torque, unbalance, static_unbalance.
+        given
+            By how much of themselves speed, gravity and the places of the bearings may be off.
+
+        Notes
+        -----
+        With what the body itself has from how it was made (`Body.error_estimate`).
+
+        Examples
+        --------
+        >>> from rigidbody3d import Body
+        >>> rotor = Body(4.0, [1e-3, 0.0, 1.0], np.diag([1.0, 1.0, 0.1]))
+        >>> bool((Shaft(rotor, (0.0, 2.0), 100.0).error_estimate("dynamic") < 1e-13).all())
+        True
+        """
+        from rigidbody3d import rounding
+
+        return rounding.shaft(self, of, given)
+
     def with_masses(self, unbalance: ArrayLike, z: ArrayLike) -> Array:
         """Return the dynamic forces with further unbalances (..., k) at z (k,) on the shaft, (..., 2, 2), N.
 

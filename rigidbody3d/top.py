@@ -18,7 +18,6 @@ differences: they are worked out once per top with 200 digits.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from decimal import Decimal, localcontext
 from functools import cached_property
 from typing import Any
 
@@ -27,11 +26,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
+from rigidbody3d.top_roots import constants
 
 Array = NDArray[np.float64]
 
 BLOCK = 8192
-DIGITS = 200
 
 
 @dataclass(frozen=True)
@@ -164,6 +163,20 @@ class TopState:
             (self._moments * self.omega**2).sum(axis=-1) / 2 + mgl * (w * w + z * z - x * x - y * y)
         )
 
+    def error_estimate(self, of: str = "attitude", moments: ArrayLike = 0.0) -> Array:
+        """Return a bound of the rounding error of a quantity, the given data as exact.
+
+        Parameters
+        ----------
+        of
+            "attitude", as an angle (..., n), rad; "omega" or "momentum", (..., n, 3); "energy", (..., n).
+        moments
+            Bounds of the errors of the moments of inertia, (..., 3), kg·m², where they were worked out.
+        """
+        from rigidbody3d import rounding_in_time
+
+        return rounding_in_time.top(self, of, moments)
+
     @property
     def _moments(self) -> Array:
         I = np.asarray(self.top.inertia, dtype=float)
@@ -184,7 +197,7 @@ class _Motion:
         self.upside = mgl < 0
         q = np.where(self.upside[:, None], quaternion.compose([0.0, 1.0, 0.0, 0.0], q), q)
         rows = [
-            _constants(float(I[b, 0]), float(I[b, 2]), abs(float(mgl[b])), omega[b], q[b])
+            constants(float(I[b, 0]), float(I[b, 2]), abs(float(mgl[b])), omega[b], q[b])
             for b in range(self.count)
         ]
         c = {name: np.array([[row[name]] for row in rows]) for name in rows[0]} if rows else {}
@@ -203,7 +216,9 @@ class _Motion:
         self.quarter = tuple(third_complete(self.p, n) for n in self.n)
         a, b = q[:, :1] + 1j * q[:, 3:], q[:, 1:2] + 1j * q[:, 2:3]
         w1, w2 = omega[:, :1], omega[:, 1:2]
-        at = jacobi(self.begin, self.p)
+        # from sn and cn as given: near the vertical the phases turn too fast to be had from a rounded argument
+        dn = np.sqrt(self.p.m1 + self.p.m * c["cn"] ** 2)
+        at = Jacobi(np.zeros_like(dn), self.begin, c["sn"], c["cn"], dn)
         start = self._phases(at)
         half = 0.5j
         # where α or β is zero its direction is that of its rate, just before or just after as rounding has it
@@ -267,7 +282,8 @@ class _Motion:
                 c["plus_arc"] * arc + c["plus_rest"] * smooth,
                 c["plus_line"] * (at.r - n * smooth),
             )
-        sn = np.where(at.sn == 0, 1e-150, at.sn)
+        # zero has a side: just before the turning point, or just after
+        sn = np.where(at.sn == 0, np.copysign(1e-150, at.sn), at.sn)
         arc = np.arctan2(c["minus_g"] * sn, at.cn * at.dn)
         return np.where(
             sharp,
@@ -311,119 +327,3 @@ class _Motion:
 
 def _unit(z: NDArray[Any]) -> NDArray[np.complex128]:
     return np.asarray(np.exp(1j * np.angle(z)))
-
-
-def _constants(I1: float, I3: float, mgl: float, omega: Array, q: Array) -> dict[str, float]:
-    """The roots of the cubic and what follows from them, each rounded once from 200 digits."""
-    with localcontext() as context:
-        context.prec = DIGITS
-        A, C, a = Decimal(I1), Decimal(I3), Decimal(mgl)
-        w1, w2, w3 = map(Decimal, omega.tolist())
-        w, x, y, z = map(Decimal, q.tolist())
-        norm = w * w + x * x + y * y + z * z
-        up, down = (w * w + z * z) / norm, (x * x + y * y) / norm  # (1 ± u)/2
-        g1, g2 = 2 * (x * z - w * y) / norm, 2 * (y * z + w * x) / norm
-        across = A * (w1 * g1 + w2 * g2)
-        plus, minus = across + 2 * C * w3 * up, across - 2 * C * w3 * down  # Lz ± L3
-        swing = w1 * w1 + w2 * w2
-        u = up - down
-        still = swing == 0 and (up == 0 or down == 0)
-        if still or a == 0:
-            return _uniform(up, down)
-        L3, Lz = C * w3, (plus + minus) / 2
-        k = 1 / (2 * a * A)
-        e = A * swing / (2 * a) + u
-        c2, c1, c0 = -e - k * L3 * L3, -1 + 2 * k * Lz * L3, e - k * Lz * Lz
-        u3 = _largest_root(c2, c1, c0)
-        s = -c2 - u3
-        product = c1 - u3 * s
-        half = max(s * s / 4 - product, Decimal(0)).sqrt()
-        u1, u2 = max(s / 2 - half, Decimal(-1)), min(s / 2 + half, Decimal(1))
-        u1, u2, u3 = min(u1, u), max(u2, u), max(u3, Decimal(1))
-        above, below, beyond = 1 + u1, 1 - u2, u3 - 1
-        tiny = Decimal(10) ** (-DIGITS // 2 + 5)
-        if plus == 0:
-            above = Decimal(0)
-        if minus == 0:
-            if below < beyond or below < tiny:
-                below = Decimal(0)
-            if beyond < below or beyond < tiny:
-                beyond = Decimal(0)
-        u1, u2, u3 = above - 1, 1 - below, 1 + beyond
-        span, wide = u2 - u1, u3 - u1
-        if span < tiny:  # steady precession
-            span = Decimal(0)
-        m, m1 = span / wide, (below + beyond) / wide
-        rate = (a * wide / (2 * A)).sqrt()
-        scale = 2 * A * rate
-        sn2 = min(max((u - u1) / span, Decimal(0)), Decimal(1)) if span else Decimal(0)
-        rising = g1 * w2 - g2 * w1 >= 0
-        sn, cn = sn2.sqrt(), (1 - sn2).sqrt()
-        return {
-            "still": 0.0,
-            "m": float(m),
-            "m1": float(m1),
-            "rate": float(rate),
-            "span": float(span),
-            "above": float(above),
-            "below": float(below),
-            "plus": float(plus),
-            "minus": float(minus),
-            "sn": float(sn if rising else -sn),
-            "cn": float(cn),
-            **_phase(plus, above, span, m * above / span if span else Decimal(0), m, scale, "plus"),
-            **_phase(minus, below, m * beyond, below / beyond if beyond else Decimal(0), m, scale, "minus"),
-        }
-
-
-def _phase(
-    push: Decimal, least: Decimal, wide: Decimal, inverse: Decimal, m: Decimal, scale: Decimal, name: str
-) -> dict[str, float]:
-    """The weights of one phase: push/(scale·least) ∫ du/(1 + n sn²), n = wide/least, and m/n = inverse."""
-    root = (least * (least + wide) * (1 + inverse)).sqrt()
-    line = push / (scale * least) if least else Decimal(0)
-    if name == "plus":
-        arc = push / (scale * root) if root else Decimal(1)
-        rest = push * m / (scale * wide) if wide else Decimal(0)
-    else:
-        # (1 + m/n)/G, and the weight of the straight part where the turn is sharp: m/n of `line`
-        arc = push * (1 + inverse) / (scale * root) if root else Decimal(1)
-        rest = Decimal(0)
-        if wide and least * least * m < wide * wide:
-            line = push * m / (scale * wide)
-    n = float(wide / least) if least and wide < least * Decimal(10) ** 290 else 1e290 if wide else 0.0
-    g = 1e200 if n >= 1e290 else float(((1 + wide / least) * (1 + inverse)).sqrt()) if least else 1.0
-    if not wide and not least:  # on the way to the sleeping position β keeps its direction
-        arc = Decimal(0)
-    return {
-        f"n_{name}": n,
-        f"{name}_g": g,
-        f"{name}_line": float(line),
-        f"{name}_arc": float(arc),
-        f"{name}_rest": float(rest),
-    }
-
-
-def _uniform(up: Decimal, down: Decimal) -> dict[str, float]:
-    """The constants of a top that needs none: its weight has no lever, or it stands or hangs still."""
-    flat = {f"{name}_{sign}": 0.0 for name in ("n",) for sign in ("plus", "minus")}
-    flat |= {f"{sign}_{name}": 0.0 for name in ("g", "line", "arc", "rest") for sign in ("plus", "minus")}
-    return flat | {
-        "still": 1.0, "m": 1.0, "m1": 0.0, "rate": 1.0, "span": 0.0, "sn": 0.0, "cn": 1.0, "plus": 0.0, "minus": 0.0,
-        "above": float(2 * up), "below": float(2 * down),
-    }  # fmt: skip
-
-
-def _largest_root(c2: Decimal, c1: Decimal, c0: Decimal) -> Decimal:
-    """The largest root of u³ + c2 u² + c1 u + c0 with three real ones: Newton from the right never overshoots."""
-    u = 1 + max(abs(c2), abs(c1), abs(c0))
-    for _ in range(1000):
-        slope = (3 * u + 2 * c2) * u + c1
-        value = ((u + c2) * u + c1) * u + c0
-        if slope <= 0 or value <= 0:
-            break
-        step = value / slope
-        u -= step
-        if step <= abs(u) * Decimal(10) ** (5 - DIGITS):
-            break
-    return u

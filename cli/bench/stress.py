@@ -21,6 +21,8 @@ MODULES = (
     "cli.bench.placing",
     "cli.bench.rotation",
     "cli.bench.turning",
+    "cli.bench.solids",
+    "cli.bench.gyroscopes",
 )
 
 Trial = Callable[[np.random.Generator], list[tuple[float, float]]]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli import options
-from cli.render import Expect, Json, Output, Plot, Rtol, Text, show
+from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Text, show
 
 if TYPE_CHECKING:
     from cli.rigid_body import ShaftWanted
@@ -65,6 +65,7 @@ def run(
     expect: Expect = None,
     rtol: Rtol = 1e-3,
     text: Text = False,
+    digits: Digits = False,
 ) -> None:
     """Put a body together from parts: mass, centre of mass, inertia; its angular momentum and what its motion asks for.
 
@@ -102,7 +103,16 @@ def run(
         ):
             if given is not None:
                 raise options.bad(flag, "a shaft turns about z at --speed and --speed-rate")
-    show(job.solve(parts, wanted), json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text)
+    show(
+        job.solve(parts, wanted),
+        json=json,
+        output=output,
+        plot=plot,
+        expect=expect,
+        rtol=rtol,
+        text=text,
+        digits=digits,
+    )
 
 
 def _shaft(

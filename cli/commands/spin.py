@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from cli import options
-from cli.render import Expect, Json, Output, Plot, Rtol, Text, show
+from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Text, show
 
 
 class Method(StrEnum):
@@ -49,6 +49,7 @@ def run(
     expect: Expect = None,
     rtol: Rtol = 1e-3,
     text: Text = False,
+    digits: Digits = False,
 ) -> None:
     """Turn a body through time: angular velocity, attitude, momentum and energy at any instant.
 
@@ -63,7 +64,7 @@ def run(
         raise options.bad("--at", "expected --time or --at, not both")
     times = options.time_range("--time", time) if time is not None else [_time(text) for text in at or ["0"]]
     shown = job.solve(body, times, method.value if method else None, integrator.value)
-    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text)
+    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)
 
 
 def _time(text: str) -> float:

@@ -1,0 +1,193 @@
+"""Bounds of rounding errors: against fractions and series, never less than the error, and no work unless asked for."""
+
+from __future__ import annotations
+
+import pickle
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from rigidbody3d import Body, FreeBody, Motion, Shaft, Top, compose, integrate, principal, rounding, tensor
+from rigidbody3d.attitude import angle_between
+from rigidbody3d.rounding import EPS, Bounded
+
+
+def turned(found, exact) -> float:
+    """Return the angle between an attitude and exact components."""
+    length = Fraction(float(sum(x * x for x in exact)) ** 0.5)
+    sign = 1 if sum(Fraction(float(a)) * b for a, b in zip(found, exact, strict=True)) > 0 else -1
+    pairs = zip(found, exact, strict=True)
+    return 2 * float(sum((sign * Fraction(float(a)) - b / length) ** 2 for a, b in pairs)) ** 0.5
+
+
+@pytest.mark.parametrize(
+    ("inertia", "omega", "t"),
+    [
+        # near the separatrix of a body whose two lower or upper moments are all but equal: the difference of two
+        # angles of the size of 1/√(I2 - I1) left five digits of seven here
+        ([1.0, 1 + 3.9e-14, 1.5], [0.7, -0.9, 1.1e-7], 5.0),
+        ([1.0, 1 + 1.7e-10, 1.5], [0.3, 1.2, -7e-6], 5.0),
+        ([1 + 2.5e-8, 1.0, 0.4], [1.3, 0.2, 1e-4], 4.0),
+        ([1.0, 1 + 2.6e-5, 1.7], [0.9, -0.1, 2e-3], 3.0),
+    ],
+)
+def test_nearly_symmetric_bodies_near_the_separatrix(inertia, omega, t, taylor) -> None:
+    state = FreeBody(inertia, omega).at([t])
+    true = taylor(inertia, omega, [1, 0, 0, 0], t)
+    assert turned(state.attitude[0], true[1]) < state.error_estimate()[0] < 150 * EPS
+    off = [abs(float(Fraction(float(a)) - b)) for a, b in zip(state.omega[0], true[0], strict=True)]
+    assert (off <= state.error_estimate("omega")[0]).all()
+
+
+@pytest.mark.parametrize("tilt", [1e-4, 1e-7, 1e-9])
+@pytest.mark.parametrize("push", [0.0, 0.03])
+def test_a_top_that_starts_next_to_the_upright(tilt, push, taylor) -> None:
+    # its phases turn by π within a time of the order of the tilt: seven digits of the attitude were lost
+    q0 = [np.cos(tilt / 2), np.sin(tilt / 2), 0.0, 0.0]
+    inertia, mgl, omega, t = [1.0, 1.0, 0.5], 1.3, [push, 0.02, 4.1], 0.8
+    state = Top(inertia, mgl, omega, q0).at([t])
+    true = taylor(inertia, omega, q0, t, gravity=mgl)
+    assert turned(state.attitude[0], true[1]) < state.error_estimate()[0] < 1e-13
+    off = [abs(float(Fraction(float(a)) - b)) for a, b in zip(state.omega[0], true[0], strict=True)]
+    assert (off <= state.error_estimate("omega")[0]).all()
+
+
+def test_bounds_follow_each_operation() -> None:
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(1, 2, (2, 50))
+    exact = [Fraction(a) / 3 - Fraction(b) * Fraction(a) for a, b in zip(x.tolist(), y.tolist(), strict=True)]
+    for found in (Bounded(x) / 3 - Bounded(y) * x, -(Bounded(y) * x - Bounded(x) / 3)):
+        off = [abs(Fraction(a) - b) for a, b in zip(found.value.tolist(), exact, strict=True)]
+        assert (np.array(off, dtype=float) <= found.error).all()
+    assert np.isinf((1 / Bounded(1e-17, 1e-16)).error)
+    root = np.sqrt(Bounded(1e-20, 1e-16))
+    assert 1e-8 <= root.error < 2e-8
+    with pytest.raises(TypeError):
+        np.exp(Bounded(1.0))
+
+
+def test_axes_of_moments_that_rounding_cannot_tell_apart_may_be_anything() -> None:
+    # the second axis has no component along x, and in truth 0.04
+    near = tensor(1, 1, 1, 1e-16, 1e-16, 1e-16)
+    found = principal(near)
+    bound = found.error_estimate()
+    assert (bound.axes[1:] + np.abs(found.axes[1:]) >= 0.5).all()
+    assert found.condition.max() > 1e14
+    apart = principal(np.diag([1.0, 2.0, 4.0]))
+    assert apart.error_estimate().axes.max() < 3e-14
+    np.testing.assert_allclose(apart.condition, [4, 4, 2])
+    # off by as much as the tensor is: rotated by it over the gap
+    E = np.zeros((3, 3))
+    E[0, 1] = E[1, 0] = 1e-6
+    assert 1e-6 <= apart.error_estimate(E).axes[0, 1] < 1.1e-6
+    assert (principal(np.zeros((3, 3))).error_estimate().axes <= 2).all()
+
+
+def test_the_sign_of_an_axis_is_undecided_between_two_equal_components() -> None:
+    # (1, -1)/√2: which of the two is the larger, and so the positive one, is rounding
+    bound = principal(tensor(2, 2, 5, ixy=-1)).error_estimate().axes
+    assert (bound[0, :2] == 2).any() or (bound[1, :2] == 2).any()
+
+
+def test_what_a_body_is_made_of_shows_in_its_bounds() -> None:
+    outer, left = 0.3, 1e-9
+    hole = Body.of("cylinder", [1.0, -(1 - left)], radius=outer, length=[2.0, 2.0])
+    ring = compose(hole)
+    assert (ring.error_estimate().inertia.diagonal() > 1e-8 * ring.inertia.diagonal()).all()
+    whole = Body.of("cylinder", 1.0, radius=outer, length=2.0)
+    assert (whole.error_estimate().inertia.diagonal() < 1e-15 * whole.inertia.diagonal().max()).all()
+    far = whole.moved([1e8, 0, 0]).turned([[0, -1, 0], [1, 0, 0], [0, 0, 1]], about=[0, 0, 0])
+    error = far.error_estimate()
+    assert 1e8 * EPS / 2 <= error.center.max() < 1e8 * 8 * EPS
+    assert far.error_estimate(about=[0, 0, 0]).inertia.max() > 1
+    given = Body(np.array(1.0), np.ones(3), np.eye(3)).error_estimate()
+    assert not any(x.any() for x in given)
+
+
+def test_nothing_is_worked_out_for_bounds_unless_asked_for(monkeypatch) -> None:
+    for name in ("composed", "of_shape", "turned", "moved", "numbers"):
+        monkeypatch.setattr(rounding, name, lambda *_, **__: pytest.fail("not asked for"))
+    parts = Body.of("sphere", [1.0, 2.0], center=[[0, 0, 0], [1, 0, 0]], radius=0.5)
+    body = compose(parts.moved([0, 0, 1]).turned(np.eye(3)))
+    Shaft(body, (0, 1), 3.0).dynamic  # noqa: B018
+    Motion(body.inertia, [1, 2, 3.0]).rate  # noqa: B018
+
+
+def test_bodies_with_bounds_can_be_stored() -> None:
+    body = compose(Body.of("rod", [1.0, 1.0], center=[[0, 0, 1], [0, 0, 2]], length=1.0))
+    again = pickle.loads(pickle.dumps(body))
+    np.testing.assert_array_equal(again.error_estimate().inertia, body.error_estimate().inertia)
+
+
+def test_many_bodies_states_and_shafts_have_the_bounds_of_each() -> None:
+    rng = np.random.default_rng(8)
+    mass, center = rng.uniform(1, 2, (4, 3)), rng.normal(size=(4, 3, 3))
+    inertia = np.eye(3) * rng.uniform(1, 2, (4, 3))[..., None, None]
+    whole = compose(Body(mass, center, inertia), axis=1)
+    omega, alpha = rng.normal(size=(2, 4, 3))
+    motion = Motion(whole.inertia, omega, alpha, [0, 0, 1.0], whole.mass, whole.center)
+    shaft = Shaft(whole, (-1, 1), 10.0, 2.0, (0, -9.81, 1))
+    error = whole.error_estimate()
+    for i in range(4):
+        one = compose(Body(mass[i], center[i], inertia[i]))
+        own = one.error_estimate()
+        for a, b in zip(own, error, strict=True):
+            np.testing.assert_allclose(a, b[i], rtol=1e-12)
+        single = Motion(one.inertia, omega[i], alpha[i], [0, 0, 1.0], one.mass, one.center)
+        for of in ("momentum", "rate", "relative", "transport", "tensor_rate", "energy", "rate_about"):
+            many = motion.error_estimate(of, [1, 2, 3], error)
+            assert many.shape == ((4,) if of == "energy" else (4, 3))
+            np.testing.assert_allclose(single.error_estimate(of, [1, 2, 3], own), many[i], rtol=1e-12)
+        alone = Shaft(one, (-1, 1), 10.0, 2.0, (0, -9.81, 1))
+        for of in ("dynamic", "static", "unbalance", "static_unbalance", "axial", "drive_torque"):
+            np.testing.assert_allclose(alone.error_estimate(of), shaft.error_estimate(of)[i], rtol=1e-12)
+
+
+def test_states_in_time_have_bounds_of_their_own_shapes() -> None:
+    inertia = np.array([[1.0, 2, 3], [1, 1, 2]])
+    many = FreeBody(inertia, [[0.3, 0.1, 1.0]]).at([0.0, 1.0, 1e6])
+    top = Top([1, 1, 0.5], [1.0, -1.0], [0.1, 0.2, 3.0], [0.9, 0.1, 0.2, 0.3]).at([0.0, 1.0])
+    for state, lead in ((many, (2, 3)), (many.body.at(2.0), (2,)), (top, (2, 2)), (top.top.at(1.0), (2,))):
+        for of in ("attitude", "energy"):
+            assert state.error_estimate(of).shape == lead
+        for of in ("omega", "momentum"):
+            assert state.error_estimate(of).shape == (*lead, 3)
+        with pytest.raises(ValueError, match="expected one of attitude"):
+            state.error_estimate("speed")
+    late = many.error_estimate()
+    assert (late[:, 2] > 1e4 * late[:, 0]).all()
+    assert (many.error_estimate("momentum")[:, 2] == many.error_estimate("momentum")[:, 0]).all()
+    assert many.body.error_estimate().shape == (2,)
+    with pytest.raises(ValueError, match="expected one of period"):
+        many.body.error_estimate("attitude")
+    with pytest.raises(ValueError, match="expected one of momentum"):
+        Motion(np.eye(3), [1, 2, 3.0]).error_estimate("speed")
+
+
+def test_a_tensor_that_was_worked_out_carries_its_errors_on() -> None:
+    tilted = tensor(2.0, 3.0, 4.0, ixy=0.3)
+    body = FreeBody(tilted, [1.0, 0.2, 0.1])
+    off = np.full((3, 3), 1e-9)
+    state = body.at([50.0])
+    for of in ("attitude", "omega", "momentum", "energy"):
+        assert state.error_estimate(of, off).max() > 1e3 * state.error_estimate(of).max()
+    # another tensor within that: no further off than the bound, and the bound no idle one
+    other = FreeBody(tilted + 1e-9 * np.eye(3), [1.0, 0.2, 0.1]).at([50.0])
+    apart = float(angle_between(other.attitude, state.attitude)[0])
+    assert apart < state.error_estimate(tensor=off)[0] < 1e4 * apart
+    assert body.error_estimate("period", off) > 1e3 * body.error_estimate("period")
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK45", "splitting"])
+@pytest.mark.parametrize("t", [0.3, 4.0])
+def test_an_integration_knows_its_own_error(method, t, taylor) -> None:
+    inertia, omega, mgl = [1.0, 1.0, 0.6], [0.5, 1.0, 3.0], 1.2
+    run = integrate(inertia, omega, t=[t], mgl=mgl, method=method, rtol=1e-8, steps_per_turn=15)
+    true = taylor(inertia, omega, [1, 0, 0, 0], t, gravity=mgl)
+    assert turned(run.attitude[0], true[1]) <= run.error_estimate()[0]
+    off = [abs(float(Fraction(float(a)) - b)) for a, b in zip(run.omega[0], true[0], strict=True)]
+    assert (off <= run.error_estimate("omega")[0]).all()
+    assert run.error_estimate()[0] < 1e-4
+    assert run.error_estimate("momentum").shape == (1, 3)
+    assert run.error_estimate("energy").shape == (1,)
