@@ -55,7 +55,10 @@ def campaigns() -> dict[str, tuple[str, Trial]]:
     """Return every campaign by name."""
     found: dict[str, tuple[str, Trial]] = {}
     for module in MODULES:
-        found |= import_module(module).CAMPAIGNS
+        more = import_module(module).CAMPAIGNS
+        if not found.keys().isdisjoint(more):
+            raise ValueError(f"two campaigns of one name: {', '.join(found.keys() & more.keys())}")
+        found |= more
     return found
 
 
