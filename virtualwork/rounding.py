@@ -141,7 +141,8 @@ class Rounding:
         own: dict[str, Any] = dict.fromkeys(self.share, 0.0)
         for tie in self.ties:
             own[tie.body] = self._own(tie.angle, own, st)
-        return {body: ROUNDINGS * EPS + self._length[body] + own[body] for body in self.share}
+        found = {body: ROUNDINGS * EPS + self._length[body] + own[body] for body in self.share}
+        return found | {GROUND: EPS / 2}
 
     def _own(self, angle: Angle, own: dict[str, Any], st: State) -> Any:
         """The rounding of const + Σ k·input + Σ r·θ_base, the bases' own among it."""
@@ -163,6 +164,7 @@ class Rounding:
         if len(self._solved) <= order:
             u, rows = len(self.angles) + len(self.slides), 2 * len(self.loops)
             found = [np.zeros((self.n, u)) for _ in range(order + 1)]
+            self._tau = np.zeros((self.n, u))
             step = max(1, ENTRIES // max(1, u * rows))
             with np.errstate(all="ignore"):
                 for start in range(0, self.n if u else 0, step):
@@ -171,6 +173,12 @@ class Rounding:
                         whole[part] = some
             self._solved = found
         return self._solved[order]
+
+    @property
+    def tau(self) -> Reals:
+        """The second-order step of every unknown as a share of its first, (n, unknowns); from 1/2 on, at a limit."""
+        self.unknowns(0)
+        return self._tau
 
     def _some(self, order: int, rows: slice) -> list[Reals]:
         """The bounds over some poses, orders 0 … order."""
@@ -192,6 +200,7 @@ class Rounding:
             for k in range(order + 1)
         ]
         high, low = self._second(jets, back, bounds[0], scale)
+        self._tau[rows] = high
         return [bounds[0] * _kept(high, low), *(b * _grown(high, k) for k, b in enumerate(bounds[1:], 1))]
 
     def _jacobian(self, jets: Jets, m: int, n: int) -> Reals:
@@ -272,13 +281,11 @@ class Rounding:
         return made[order]
 
     def _angle(self, body: str, k: int) -> Reals:
-        total = np.zeros(self.n)
         if body == GROUND:
-            return total
-        for column, r in self.share[body].items():
-            total += abs(r) * self.unknowns(k)[:, column]
+            return np.zeros(self.n)
         if k == 0:
-            return total + self._relative[body] + EPS * np.abs(np.angle(self._state.turn[body]))
+            return self.rotation(body) + EPS / 2 * np.abs(np.angle(self._state.turn[body]))
+        total = self._moved(body, k)
         total += ROUNDINGS * EPS * np.abs(self.motion.angle_derivative(body, k))
         for tie in self.ties:
             if tie.body == body:
@@ -317,6 +324,10 @@ class Rounding:
                         ]
             out: Reals = total + EPS * np.abs(_sum(jets, terms, order))
         return out
+
+    def rotation(self, body: str) -> Reals:
+        """Bound of the error of a link's e^{iθ}, (n,)."""
+        return self._moved(body, 0) + self._relative[body]
 
     def _moved(self, body: str, k: int) -> Reals:
         """What the unknowns' errors do to an angle."""

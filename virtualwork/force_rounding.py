@@ -1,0 +1,315 @@
+"""Bounds of the rounding errors of forces: effort, joint forces, shaking force; dimensions, loads and inputs exact.
+
+Loads inherit the errors of the points and links on which they act (see `virtualwork.rounding`): −m a_G that of a_G, a
+spring those of its ends. By virtual work τ = −Σ F·K, so that
+
+    |δτ| ≤ Σ |δF||K| + |F||δK| + ε|F||K|,
+
+with K the velocities for a unit speed of the input. Joint forces solve the equilibrium of all links, A f + b = 0;
+what the computed f̂ leave there, with the errors of the entries, bounds them (N. J. Higham, Accuracy and Stability of
+Numerical Algorithms, 2nd ed., §7.2):
+
+    |δf| ≤ |A⁻¹|·(|A f̂ + b̂| + |δA||f̂| + |δb| + ε(|A||f̂| + |b|)).
+
+Joint friction exchanges loads and forces until neither changes; its poses have no estimate (infinite).
+"""
+
+from __future__ import annotations
+
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from virtualwork.loads import Follower, InertiaForce, InertiaTorque, SpringEnd, Tabled, TorsionEnd
+from virtualwork.mechanism import GROUND
+from virtualwork.rounding import ENTRIES, EPS, _grown, _inverse
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from virtualwork.dynamics import Dynamics
+    from virtualwork.loads import Load
+    from virtualwork.motion import Motion
+    from virtualwork.reactions import Joint
+
+    Reals = NDArray[np.float64]
+
+EXTERNAL = ("weight", "inertia force", "inertia torque", "applied force", "applied torque")
+
+
+class ForceErrors:
+    """Bounds of the rounding errors of forces, under the names of what they bound; each is formed when asked for.
+
+    `Dynamics.error_estimate` makes one.
+    """
+
+    def __init__(self, dynamics: Dynamics) -> None:
+        self.dynamics = dynamics
+        self.motion: Motion = dynamics.motion
+        self.mechanism = self.motion.mechanism
+        self.rounding = self.motion.rounding
+        self.scene = dynamics.scene
+        self.n = self.motion.n
+        self._known: dict[int, tuple[Any, Reals]] = {}
+
+    # --- loads ------------------------------------------------------------------------------------------------------
+    def load(self, load: Load) -> tuple[Any, Reals]:
+        """A load's value and the bound of its error, each (n,)."""
+        if id(load) not in self._known:
+            value = np.zeros(self.n, float if load.path is None else complex)
+            for block in self.scene.blocks():
+                found = load.value(block)
+                if found is not None:
+                    value[block.rows] = found
+            with np.errstate(all="ignore"):
+                self._known[id(load)] = value, self._error(load, np.abs(value))
+        return self._known[id(load)]
+
+    def _error(self, load: Load, size: Reals) -> Reals:
+        r = self.rounding
+        own = EPS / 2 * size
+        if isinstance(load, InertiaForce):
+            return own + load.mass * r.point(load.body, load.place, None, 2)
+        if isinstance(load, InertiaTorque):
+            return own + load.inertia * r.angle(load.body, 2)
+        if isinstance(load, Follower):
+            return own + size * r.rotation(load.body)
+        if isinstance(load, Tabled):
+            at = np.array([row[0] for row in load.table])
+            force = np.array([row[1] for row in load.table])
+            steep = float(np.max(np.abs(np.diff(force) / np.diff(at)), initial=0.0))
+            q = np.abs(self.motion.inputs[:, 0])
+            read = 2 * EPS * float(np.abs(force).max()) + EPS * steep * (q + np.abs(at).max())
+            return own + read + (size * r.rotation(load.body) if load.link_axes else 0.0)
+        if isinstance(load, SpringEnd):
+            return own + self._spring(load)
+        if isinstance(load, TorsionEnd):
+            s = load.spring
+            assert s is not None
+            turned = sum(s.stiffness * (r.angle(body) + 4 * EPS * np.pi) for body in s.links)
+            if s.damping and self.scene.moves:
+                turned = turned + sum(s.damping * r.angle(body, 1) for body in s.links)
+            return own + np.asarray(turned) + EPS * s.stiffness * abs(s.free_angle)
+        return own
+
+    def _spring(self, load: SpringEnd) -> Reals:
+        """Of k(1 − l₀/l)d + c(d·ḋ/l²)d."""
+        s, r = load.spring, self.rounding
+        assert s is not None
+        ends = [self.motion.at(body, z) for body, z in s.between]
+        moved = sum(r.point(body, z) for body, z in s.between)
+        d = np.abs(ends[1].complex(0) - ends[0].complex(0))
+        slack = s.free_length / d if s.free_length else np.zeros(self.n)
+        error: Any = s.stiffness * ((np.abs(1 - slack) + slack) * moved + 4 * EPS * s.free_length)
+        if s.damping and self.scene.moves:
+            rate = np.abs(ends[1].complex(1) - ends[0].complex(1))
+            error = error + s.damping * (3 * rate * moved / d + sum(r.point(b, z, None, 1) for b, z in s.between))
+        return np.asarray(error)
+
+    # --- by virtual work ----------------------------------------------------------------------------------------------
+    @cached_property
+    def effort(self) -> Reals:
+        """Of `Dynamics.effort`, (n, k)."""
+        k = len(self.mechanism.inputs)
+        out = np.zeros((self.n, k))
+        for j in range(k):
+            unit = self._unit(j)
+            for load in self.scene.loads:
+                if load.body == GROUND:
+                    continue
+                value, error = self.load(load)
+                if load.path is None:
+                    moved = unit.angle_derivative(load.body, 1)
+                    lost = unit.rounding.angle(load.body, 1)
+                else:
+                    moved = unit.point_derivative(load.body, load.place, 1)
+                    lost = unit.rounding.point(load.body, load.place, None, 1)
+                out[:, j] += error * np.abs(moved) + np.abs(value) * (lost + EPS / 2 * np.abs(moved))
+        return self._settled(self._through(out))
+
+    def _unit(self, j: int) -> Motion:
+        """The motion at a unit speed of input j alone."""
+        k = len(self.mechanism.inputs)
+        speed = 1.0 if k == 1 else np.eye(k)[j]
+        rest = 0.0 if k == 1 else np.zeros(k)
+        inputs = self.motion.inputs[:, 0] if k == 1 else self.motion.inputs
+        return type(self.motion)(self.motion.assembly, inputs, speed, rest, rest)
+
+    def _through(self, force: Reals) -> Reals:
+        """Through motors that sit on another body than `on`; see `work.through_carriers`."""
+        from virtualwork.work import carrier
+
+        inputs = self.mechanism.inputs
+        k = len(inputs)
+        moved = [j for j, e in enumerate(inputs) if not e.is_slide and carrier(self.scene, j) != e.on]
+        if not moved:
+            return force
+        matrix = np.broadcast_to(np.eye(k), (self.n, k, k)).copy()
+        wrong = np.zeros((self.n, k, k))
+        for i in range(k):
+            unit = self._unit(i)
+            for j in moved:
+                ends = str(inputs[j].link), carrier(self.scene, j)
+                matrix[:, i, j] = unit.angle_derivative(ends[0], 1) - unit.angle_derivative(ends[1], 1)
+                wrong[:, i, j] = sum(unit.rounding.angle(body, 1) for body in ends)
+        total = force + (wrong @ np.abs(self.dynamics.effort)[..., None])[..., 0]
+        return np.asarray((np.abs(_inverse(matrix)) @ total[..., None])[..., 0])
+
+    # --- by Newton and Euler ------------------------------------------------------------------------------------------
+    @cached_property
+    def _unknowns(self) -> tuple[list[Any], Reals, Reals]:
+        """The unknown forces of all links, their sizes and bounds, (n, unknowns); torques divided by the size."""
+        from virtualwork.statics import Statics
+
+        d = self.dynamics
+        statics = d.statics or Statics(d.reactions)
+        a, b = statics._system()
+        value = d.statics.solved[0] if d.statics is not None else self._found(statics)
+        known = np.nan_to_num(value)
+        found = np.full(value.shape, np.nan)
+        step = max(1, ENTRIES // max(1, a.shape[1] * a.shape[2]))
+        with np.errstate(all="ignore"):
+            wrong = self._entries(statics, known)
+            for start in range(0, self.n, step):
+                rows = slice(start, start + step)
+                f = known[rows][..., None]
+                left = wrong[rows] + EPS / 2 * ((np.abs(a[rows]) @ np.abs(f))[..., 0] + np.abs(b[rows]))
+                left += np.abs((a[rows] @ f)[..., 0] + b[rows])
+                found[rows] = (np.abs(_inverse(a[rows])) @ left[..., None])[..., 0]
+            tau = self.rounding.tau.max(axis=1, initial=0.0)
+            found *= _grown(tau, 1)[:, None]
+        return statics.unknowns, value, self._settled(found)
+
+    def _found(self, statics: Any) -> Reals:
+        """The unknowns as the reactions found them."""
+        d, r, m = self.dynamics, self.dynamics.reactions, self.mechanism
+        out = np.zeros((self.n, len(statics.unknowns)))
+        for i, (kind, key, body) in enumerate(statics.unknowns):
+            if kind in ("fx", "fy"):
+                force = d.joint_force(r.by_key[key], body)
+                out[:, i] = force.real if kind == "fx" else force.imag
+            elif kind == "normal":
+                joint = r.by_key[key]
+                (rail,) = r.over(partial(r.rail, guide=joint.guide), kind=complex)
+                force = d.joint_force(joint, m.guides[joint.guide].link)  # type: ignore[index]
+                out[:, i] = (np.conj(1j * rail) * force).real
+            elif kind == "moment":
+                joint = r.by_key[key]
+                out[:, i] = d.joint_moment(joint, m.guides[joint.guide].link) / statics.size  # type: ignore[index]
+            elif kind == "gear":
+                (value,) = r.over(partial(r.couple, kind="gear", i=int(key)))
+                out[:, i] = value / statics.size
+            else:
+                out[:, i] = d.newton_euler[:, int(key)] / (1.0 if kind == "force" else statics.size)
+        return out
+
+    def _entries(self, statics: Any, known: Reals) -> Reals:
+        """|δA||f̂| + |δb|: what wrong places, directions and loads do to each equation, (n, equations)."""
+        m, r, motion = self.mechanism, self.rounding, self.motion
+        links, size = list(m.links), statics.size
+        column = {unknown: i for i, unknown in enumerate(statics.unknowns)}
+        equations = 3 * len(links) + 2 * sum(
+            joint.guide is None and GROUND not in joint.bodies for joint in self.dynamics.reactions.joints
+        )
+        out = np.zeros((self.n, equations))
+        center = {body: self.scene.rigid[body].center for body in links}
+        turned = {body: r.rotation(body) for body in [GROUND, *links]}
+
+        def put(body: str, force: Any, bent: Any, lever: Any) -> None:
+            """A force wrong by `bent`, its moment by `lever`."""
+            i = 3 * links.index(body)
+            out[:, i] += bent
+            out[:, i + 1] += bent
+            out[:, i + 2] += lever / size
+
+        for load in self.scene.loads:
+            if load.body == GROUND:
+                continue
+            value, error = self.load(load)
+            if load.path is None:
+                put(load.body, 0.0, 0.0, error)
+                continue
+            arm = abs(load.place - center[load.body])
+            put(load.body, value, error, arm * (error + np.abs(value) * turned[load.body]))
+        for carrying, _ in self.dynamics.reactions.carried:
+            put(carrying, 0.0, 0.0, self.effort.sum(axis=1))
+        for joint in self.dynamics.reactions.joints:
+            if joint.guide is None:
+                for body in joint.bodies:
+                    if body != GROUND:
+                        force = np.hypot(
+                            known[:, column["fx", joint.key, body]], known[:, column["fy", joint.key, body]]
+                        )
+                        arm = abs(m.links[body].points[joint.name] - center[body])
+                        put(body, force, 0.0, force * arm * turned[body])
+                continue
+            g = m.guides[joint.guide]
+            force = np.abs(known[:, column["normal", joint.key, ""]])
+            for j, entry in enumerate(m.inputs):
+                if entry.slider == g.point:
+                    force = force + np.abs(known[:, column["force", str(j), ""]])
+            bent = force * turned[g.on]
+            arm = abs(m.links[g.link].points[g.point] - center[g.link])
+            put(g.link, force, bent, arm * (bent + force * turned[g.link]))
+            if g.on != GROUND:
+                through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
+                slide = motion.slide_derivative(joint.guide, 0)
+                arm = abs(complex(through) - center[g.on]) + np.abs(slide)
+                put(g.on, force, bent, 2 * arm * bent + force * r.slide(joint.guide))
+        return out
+
+    @cached_property
+    def newton_euler(self) -> Reals:
+        """Of `Dynamics.newton_euler`, (n, k)."""
+        names = [("force" if e.is_slide else "torque", str(j), "") for j, e in enumerate(self.mechanism.inputs)]
+        return np.stack([self._of(name) for name in names], axis=1)
+
+    def _of(self, unknown: Any) -> Reals:
+        unknowns, value, bounds = self._unknowns
+        i = unknowns.index(unknown)
+        scale = self.mechanism.size if unknown[0] in ("moment", "gear", "torque") else 1.0
+        return np.asarray(scale * (bounds[:, i] + EPS * np.abs(value[:, i])))
+
+    def joint_force(self, joint: Joint, body: str) -> Reals:
+        """Of `Dynamics.joint_force`, (n,): the length of the error."""
+        if joint.guide is None:
+            if body == GROUND:
+                others = [self.joint_force(joint, other) for other in joint.bodies if other != GROUND]
+                return np.asarray(sum(others))
+            return np.hypot(self._of(("fx", joint.key, body)), self._of(("fy", joint.key, body)))
+        unknowns, value, _ = self._unknowns
+        normal = np.abs(value[:, unknowns.index(("normal", joint.key, ""))])
+        on = self.mechanism.guides[joint.guide].on
+        return np.asarray(self._of(("normal", joint.key, "")) + normal * (self.rounding.rotation(on)))
+
+    def joint_moment(self, joint: Joint, body: str) -> Reals:
+        """Of `Dynamics.joint_moment`, (n,)."""
+        if joint.guide is None or not self.mechanism.guides[joint.guide].is_slider:
+            return np.zeros(self.n)
+        return self._of(("moment", joint.key, ""))
+
+    def reaction(self, joint: str, on: str) -> Reals:
+        """Of `Dynamics.reaction`, (n,): the length of the error."""
+        here = [found for found in self.dynamics.joints_named(joint) if on in found.bodies]
+        return np.asarray(sum(self.joint_force(found, on) for found in here))
+
+    @cached_property
+    def shaking(self) -> tuple[Reals, Reals]:
+        """Of `Dynamics.shaking`: the length of the force's error (n,), and the moment's (n,)."""
+        force, moment = np.zeros(self.n), np.zeros(self.n)
+        for load in self.scene.loads:
+            if load.kind not in EXTERNAL or load.body == GROUND:
+                continue
+            value, error = self.load(load)
+            if load.path is None:
+                moment += error + EPS * np.abs(value)
+                continue
+            at = np.abs(self.motion.point_derivative(load.body, load.place, 0))
+            force += error + EPS * np.abs(value)
+            moment += at * (error + EPS / 2 * np.abs(value))
+            moment += np.abs(value) * self.rounding.point(load.body, load.place)
+        return self._settled(force), self._settled(moment)
+
+    def _settled(self, bounds: Reals) -> Reals:
+        return np.full_like(bounds, np.inf) if self.scene.rubs else bounds
