@@ -179,6 +179,7 @@ class ForceErrors:
                 found[rows] = (np.abs(_inverse(a[rows])) @ left[..., None])[..., 0]
             tau = self.rounding.tau.max(axis=1, initial=0.0)
             found *= _grown(tau, 1)[:, None]
+        found[~np.isfinite(wrong).all(axis=1) & np.isfinite(value).all(axis=1)] = np.inf
         return statics.unknowns, value, self._settled(found)
 
     def _found(self, statics: Any) -> Reals:

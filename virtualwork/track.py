@@ -117,13 +117,20 @@ class Track:
             while self.high < high:
                 self._scan(self.high, self.high + self.length)
                 self.high += self.length
-                if first and self._repeats and not any(len(f) for f in self.flips.values()):
-                    self.settled = True
+                if first and self._seen_all():
                     return
                 first = False
             while self.low > low:
                 self._scan(self.low - self.length, self.low)
                 self.low -= self.length
+                if first and self._seen_all():
+                    return
+                first = False
+
+    def _seen_all(self) -> bool:
+        """Whether the one turn looked through says it all."""
+        self.settled = self._repeats and not any(len(f) for f in self.flips.values())
+        return self.settled
 
     def sign(self, group: Group, q: Number) -> Number:
         """The sign of the group's Jacobian at inputs q."""
