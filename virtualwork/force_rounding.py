@@ -52,6 +52,7 @@ class ForceErrors:
         self.scene = dynamics.scene
         self.n = self.motion.n
         self._known: dict[int, tuple[Any, Reals]] = {}
+        self._units: dict[int, Motion] = {}
 
     # --- loads ------------------------------------------------------------------------------------------------------
     def load(self, load: Load) -> tuple[Any, Reals]:
@@ -114,7 +115,7 @@ class ForceErrors:
         k = len(self.mechanism.inputs)
         out = np.zeros((self.n, k))
         for j in range(k):
-            unit = self._unit(j)
+            unit = self.unit(j)
             for load in self.scene.loads:
                 if load.body == GROUND:
                     continue
@@ -128,13 +129,17 @@ class ForceErrors:
                 out[:, j] += error * np.abs(moved) + np.abs(value) * (lost + EPS / 2 * np.abs(moved))
         return self._settled(self._through(out))
 
-    def _unit(self, j: int) -> Motion:
+    def unit(self, j: int) -> Motion:
         """The motion at a unit speed of input j alone."""
-        k = len(self.mechanism.inputs)
-        speed = 1.0 if k == 1 else np.eye(k)[j]
-        rest = 0.0 if k == 1 else np.zeros(k)
-        inputs = self.motion.inputs[:, 0] if k == 1 else self.motion.inputs
-        return type(self.motion)(self.motion.assembly, inputs, speed, rest, rest)
+        if j not in self._units:
+            k = len(self.mechanism.inputs)
+            speed = 1.0 if k == 1 else np.eye(k)[j]
+            rest = 0.0 if k == 1 else np.zeros(k)
+            inputs = self.motion.inputs[:, 0] if k == 1 else self.motion.inputs
+            unit = type(self.motion)(self.motion.assembly, inputs, speed, rest, rest)
+            unit.input_error = self.motion.input_error
+            self._units[j] = unit
+        return self._units[j]
 
     def _through(self, force: Reals) -> Reals:
         """Through motors that sit on another body than `on`; see `work.through_carriers`."""
@@ -148,7 +153,7 @@ class ForceErrors:
         matrix = np.broadcast_to(np.eye(k), (self.n, k, k)).copy()
         wrong = np.zeros((self.n, k, k))
         for i in range(k):
-            unit = self._unit(i)
+            unit = self.unit(i)
             for j in moved:
                 ends = str(inputs[j].link), carrier(self.scene, j)
                 matrix[:, i, j] = unit.angle_derivative(ends[0], 1) - unit.angle_derivative(ends[1], 1)
@@ -310,6 +315,21 @@ class ForceErrors:
             force += error + EPS * np.abs(value)
             moment += at * (error + EPS / 2 * np.abs(value))
             moment += np.abs(value) * self.rounding.point(load.body, load.place)
+        return self._settled(force), self._settled(moment)
+
+    def applied(self, link: str) -> tuple[Reals, Reals]:
+        """Of `Dynamics.applied`: the length of the force's error (n,), and the moment's (n,)."""
+        force, moment = np.zeros(self.n), np.zeros(self.n)
+        center = self.scene.rigid[link].center
+        for load in self.scene.loads:
+            if load.body != link or load.kind in ("weight", "inertia force", "inertia torque"):
+                continue
+            value, error = self.load(load)
+            if load.path is None:
+                moment += error
+                continue
+            force += error + EPS / 2 * np.abs(value)
+            moment += abs(load.place - center) * (error + np.abs(value) * self.rounding.rotation(link))
         return self._settled(force), self._settled(moment)
 
     def _settled(self, bounds: Reals) -> Reals:

@@ -186,6 +186,8 @@ class Motion:
     Attributes
     ----------
     inputs : array (n, k)
+    input_error : float or array (n, k)
+        Bound of the inputs' own errors, for the estimates of rounding errors: 0 where they are exact as given.
     solved : list of (step, order)
         What has been worked out so far; order 0 is position.
     """
@@ -218,6 +220,7 @@ class Motion:
             self._given(value, [getattr(e, name) for e in m.inputs])
             for name, value in (("speed", speed), ("acceleration", acceleration), ("jerk", jerk))
         ]
+        self.input_error: ArrayLike = 0.0
         self.solved: list[tuple[Step, int]] = []
         self._done: set[tuple[int, int, int]] = set()
         self._blocks: list[State] | None = None

@@ -30,7 +30,7 @@ import numpy as np
 
 from virtualwork.mechanism import GROUND
 from virtualwork.state import Jets, State
-from virtualwork.steps import Angle, Group, Place, Term, Turn, combined
+from virtualwork.steps import Angle, Group, Place, Slide, Term, Turn, combined
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -63,6 +63,8 @@ class Rounding:
         self.share: dict[str, dict[int, float]] = {GROUND: {}}  # ∂θ_body/∂x
         self.chains: dict[str | None, Chain] = {None: ((), ())}
         self.ties: list[Turn] = []
+        self.given: Reals = np.broadcast_to(np.asarray(motion.input_error, dtype=float), motion.inputs.shape)
+        self.driven = {step.guide: step.input for step in self.plan.steps if isinstance(step, Slide)}
         for step in self.plan.steps:
             if isinstance(step, Turn):
                 self._tie(step)
@@ -148,6 +150,8 @@ class Rounding:
         """The rounding of const + Σ k·input + Σ r·θ_base, the bases' own among it."""
         plain = len(angle.inputs) == 1 and angle.inputs[0][1] == 1.0
         error: Any = 0.0
+        for j, k in angle.inputs:
+            error = error + abs(k) * self.given[:, j]
         if not plain:
             error = error + EPS * (abs(angle.const) + sum(abs(k * st.inputs[j]) for j, k in angle.inputs))
         for base, r in angle.bases:
@@ -238,6 +242,8 @@ class Rounding:
         for t in terms:
             relative = self._relative[t.body]
             noise = noise + sizes.term(t, k) * (relative if np.ndim(relative) == 0 else relative[rows])
+            if t.slide in self.driven:
+                noise = noise + abs(t.z) * sizes.turn(t.body, k) * self.given[rows, self.driven[t.slide]]
         for node in nodes:
             noise = noise + EPS * np.abs(_sum(jets, self.chains[node][0], k))
         return noise
@@ -297,7 +303,7 @@ class Rounding:
     def slide(self, guide: int, order: int = 0) -> Reals:
         """Bound of the error of a slide (m) or of its rates, (n,)."""
         if guide not in self.slides:
-            return np.zeros(self.n)
+            return np.array(self.given[:, self.driven[guide]]) if order == 0 else np.zeros(self.n)
         found = self.unknowns(order)[:, len(self.angles) + self.slides.index(guide)]
         return found + EPS * np.abs(self.motion.slide_derivative(guide, order))
 
