@@ -381,7 +381,9 @@ class Balanced:
         for *head, power, _ in self._terms(index):
             yield (*head, power)  # type: ignore[misc]
 
-    def _terms(self, index: int, *, bounds: bool = False) -> Iterator[tuple[str, str, str, float | None, float]]:
+    def _terms(
+        self, index: int, *, bounds: bool = False
+    ) -> Iterator[tuple[str, str, str, float | None, float]]:
         """Yield the terms of a step with the bounds of their rounding errors (0 where not asked for)."""
         step = self.states.steps[index]
         group, place = self.where[index]
@@ -400,7 +402,13 @@ class Balanced:
                 term = states.terms[kind]
                 for i, row in enumerate(rows):
                     if term.works[(*here, i)]:
-                        yield of, self.states.links[row], kind, float(term.power[(*here, i)]), error(kind, (*here, i))
+                        yield (
+                            of,
+                            self.states.links[row],
+                            kind,
+                            float(term.power[(*here, i)]),
+                            error(kind, (*here, i)),
+                        )
                     elif term.workless[(*here, i)]:
                         yield of, self.states.links[row], kind, None, 0.0
             for j, unknown in enumerate(step.unknowns):

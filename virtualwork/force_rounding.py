@@ -71,9 +71,9 @@ class ForceErrors:
         r = self.rounding
         own = EPS / 2 * size
         if isinstance(load, InertiaForce):
-            return own + load.mass * r.point(load.body, load.place, None, 2)
+            return np.asarray(own + load.mass * r.point(load.body, load.place, None, 2))
         if isinstance(load, InertiaTorque):
-            return own + load.inertia * r.angle(load.body, 2)
+            return np.asarray(own + load.inertia * r.angle(load.body, 2))
         if isinstance(load, Follower):
             return own + size * r.rotation(load.body)
         if isinstance(load, Tabled):
@@ -88,10 +88,13 @@ class ForceErrors:
         if isinstance(load, TorsionEnd):
             s = load.spring
             assert s is not None
-            turned = sum(s.stiffness * (r.angle(body) + 4 * EPS * np.pi) for body in s.links)
-            if s.damping and self.scene.moves:
-                turned = turned + sum(s.damping * r.angle(body, 1) for body in s.links)
-            return own + np.asarray(turned) + EPS * s.stiffness * abs(s.free_angle)
+            formed = 2 * np.pi + abs(s.free_angle) + np.abs(self.motion.inputs).sum(axis=1)
+            turned = own + EPS * s.stiffness * formed
+            for body in s.links:
+                turned = turned + s.stiffness * r.rotation(body)
+                if s.damping and self.scene.moves:
+                    turned = turned + s.damping * r.angle(body, 1)
+            return turned
         return own
 
     def _spring(self, load: SpringEnd) -> Reals:
@@ -105,13 +108,20 @@ class ForceErrors:
         error: Any = s.stiffness * ((np.abs(1 - slack) + slack) * moved + 4 * EPS * s.free_length)
         if s.damping and self.scene.moves:
             rate = np.abs(ends[1].complex(1) - ends[0].complex(1))
-            error = error + s.damping * (3 * rate * moved / d + sum(r.point(b, z, None, 1) for b, z in s.between))
+            error = error + s.damping * (
+                3 * rate * moved / d + sum(r.point(b, z, None, 1) for b, z in s.between)
+            )
         return np.asarray(error)
 
     # --- by virtual work ----------------------------------------------------------------------------------------------
     @cached_property
     def effort(self) -> Reals:
         """Of `Dynamics.effort`, (n, k)."""
+        return self._settled(self._through(self.generalized))
+
+    @cached_property
+    def generalized(self) -> Reals:
+        """Of the generalized forces Σ F·K_j, (n, k): the effort, but for motors that sit on another body than `on`."""
         k = len(self.mechanism.inputs)
         out = np.zeros((self.n, k))
         for j in range(k):
@@ -120,6 +130,7 @@ class ForceErrors:
                 if load.body == GROUND:
                     continue
                 value, error = self.load(load)
+                moved: Any
                 if load.path is None:
                     moved = unit.angle_derivative(load.body, 1)
                     lost = unit.rounding.angle(load.body, 1)
@@ -127,7 +138,7 @@ class ForceErrors:
                     moved = unit.point_derivative(load.body, load.place, 1)
                     lost = unit.rounding.point(load.body, load.place, None, 1)
                 out[:, j] += error * np.abs(moved) + np.abs(value) * (lost + EPS / 2 * np.abs(moved))
-        return self._settled(self._through(out))
+        return out
 
     def unit(self, j: int) -> Motion:
         """The motion at a unit speed of input j alone."""
@@ -222,7 +233,7 @@ class ForceErrors:
         center = {body: self.scene.rigid[body].center for body in links}
         turned = {body: r.rotation(body) for body in [GROUND, *links]}
 
-        def put(body: str, force: Any, bent: Any, lever: Any) -> None:
+        def put(body: str, bent: Any, lever: Any) -> None:
             """A force wrong by `bent`, its moment by `lever`."""
             i = 3 * links.index(body)
             out[:, i] += bent
@@ -234,12 +245,12 @@ class ForceErrors:
                 continue
             value, error = self.load(load)
             if load.path is None:
-                put(load.body, 0.0, 0.0, error)
+                put(load.body, 0.0, error)
                 continue
             arm = abs(load.place - center[load.body])
-            put(load.body, value, error, arm * (error + np.abs(value) * turned[load.body]))
+            put(load.body, error, arm * (error + np.abs(value) * turned[load.body]))
         for carrying, _ in self.dynamics.reactions.carried:
-            put(carrying, 0.0, 0.0, self.effort.sum(axis=1))
+            put(carrying, 0.0, self.effort.sum(axis=1))
         for joint in self.dynamics.reactions.joints:
             if joint.guide is None:
                 for body in joint.bodies:
@@ -248,7 +259,7 @@ class ForceErrors:
                             known[:, column["fx", joint.key, body]], known[:, column["fy", joint.key, body]]
                         )
                         arm = abs(m.links[body].points[joint.name] - center[body])
-                        put(body, force, 0.0, force * arm * turned[body])
+                        put(body, 0.0, force * arm * turned[body])
                 continue
             g = m.guides[joint.guide]
             force = np.abs(known[:, column["normal", joint.key, ""]])
@@ -256,19 +267,21 @@ class ForceErrors:
                 if entry.slider == g.point:
                     force = force + np.abs(known[:, column["force", str(j), ""]])
             bent = force * turned[g.on]
-            arm = abs(m.links[g.link].points[g.point] - center[g.link])
-            put(g.link, force, bent, arm * (bent + force * turned[g.link]))
+            lever = abs(m.links[g.link].points[g.point] - center[g.link])
+            put(g.link, bent, lever * (bent + force * turned[g.link]))
             if g.on != GROUND:
                 through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
                 slide = motion.slide_derivative(joint.guide, 0)
                 arm = abs(complex(through) - center[g.on]) + np.abs(slide)
-                put(g.on, force, bent, 2 * arm * bent + force * r.slide(joint.guide))
+                put(g.on, bent, 2 * arm * bent + force * r.slide(joint.guide))
         return out
 
     @cached_property
     def newton_euler(self) -> Reals:
         """Of `Dynamics.newton_euler`, (n, k)."""
-        names = [("force" if e.is_slide else "torque", str(j), "") for j, e in enumerate(self.mechanism.inputs)]
+        names = [
+            ("force" if e.is_slide else "torque", str(j), "") for j, e in enumerate(self.mechanism.inputs)
+        ]
         return np.stack([self._of(name) for name in names], axis=1)
 
     def _of(self, unknown: Any) -> Reals:

@@ -43,10 +43,14 @@ if TYPE_CHECKING:
 
 EPS = float(np.finfo(float).eps)
 ROUNDINGS = 1.0  # roundings that a term collects, at worst, on its way into a sum: e^{iθ}, z·e^{iθ}, the sum
-FLOOR = 1e-13  # a singular value is not taken for smaller: the second order decides there, and does not see it
+FLOOR = (
+    1e-13  # a singular value is not taken for smaller: the second order decides there, and does not see it
+)
 ENTRIES = 1 << 21  # so many entries of one matrix over all poses are worked on at once
 
-Chain = tuple[tuple[Term, ...], tuple[str, ...]]  # a point from the ground: its terms, and the points on the way
+Chain = tuple[
+    tuple[Term, ...], tuple[str, ...]
+]  # a point from the ground: its terms, and the points on the way
 
 
 class Rounding:
@@ -131,9 +135,7 @@ class Rounding:
             if body != GROUND:
                 jets.angle[body] = [self.motion.angle_derivative(body, k)[rows] for k in range(1, order + 1)]
         for guide in st.slide:
-            jets.slide[guide] = [
-                self.motion.slide_derivative(guide, k)[rows] for k in range(1, order + 1)
-            ]
+            jets.slide[guide] = [self.motion.slide_derivative(guide, k)[rows] for k in range(1, order + 1)]
         return jets
 
     @cached_property
@@ -156,10 +158,9 @@ class Rounding:
             error = error + EPS * (abs(angle.const) + sum(abs(k * st.inputs[j]) for j, k in angle.inputs))
         for base, r in angle.bases:
             error = error + abs(r) * own[base]
-            if abs(r) != 1.0:
-                error = error + EPS * abs(r) * (1 + self._unwound[base])
-            else:
-                error = error + EPS
+            # an angle times a ratio is rounded as large as it is, whole turns and all
+            formed = 1.0 if abs(r) == 1.0 else abs(r) * (1 + self._unwound[base])
+            error = error + EPS * formed
         return error
 
     # --- the unknowns -------------------------------------------------------------------------------------------
@@ -233,9 +234,7 @@ class Rounding:
             out[:, 2 * i + 1] = np.abs(np.imag(0.0 if left is None else left)) + noise
         return out
 
-    def _noise(
-        self, jets: Jets, rows: slice, terms: tuple[Term, ...], nodes: tuple[str, ...], k: int
-    ) -> Any:
+    def _noise(self, jets: Jets, rows: slice, terms: tuple[Term, ...], nodes: tuple[str, ...], k: int) -> Any:
         """The rounding of a sum of terms, and of the points on the way."""
         sizes = Sizes(jets)
         noise: Any = 0.0
@@ -258,7 +257,7 @@ class Rounding:
         weak = np.argmax(np.square(back).sum(axis=1), axis=1)
         step = np.take_along_axis(back, weak[:, None, None], axis=2)[..., 0]
         step *= np.min(first / np.maximum(np.abs(step), 1e-300), axis=1)[:, None]
-        parts = []
+        parts: list[Reals] = []
         for move in (first * scale, step * scale):
             sized = not parts
             bent = np.zeros((n, len(self.loops)), complex)
@@ -290,7 +289,7 @@ class Rounding:
         if body == GROUND:
             return np.zeros(self.n)
         if k == 0:
-            return self.rotation(body) + EPS / 2 * np.abs(np.angle(self._state.turn[body]))
+            return np.asarray(self.rotation(body) + EPS / 2 * np.abs(np.angle(self._state.turn[body])))
         total = self._moved(body, k)
         total += ROUNDINGS * EPS * np.abs(self.motion.angle_derivative(body, k))
         for tie in self.ties:
@@ -325,15 +324,17 @@ class Rounding:
                         total += c * np.abs(_value(jets, t, order - j)) * turned
                     if t.slide in self.slides:
                         bare = _value(jets, Term(t.z, t.body), order - j)
-                        total += c * np.abs(bare) * self.unknowns(j)[
-                            :, len(self.angles) + self.slides.index(t.slide)
-                        ]
+                        total += (
+                            c
+                            * np.abs(bare)
+                            * self.unknowns(j)[:, len(self.angles) + self.slides.index(t.slide)]
+                        )
             out: Reals = total + EPS * np.abs(_sum(jets, terms, order))
         return out
 
     def rotation(self, body: str) -> Reals:
         """Bound of the error of a link's e^{iθ}, (n,)."""
-        return self._moved(body, 0) + self._relative[body]
+        return np.asarray(self._moved(body, 0) + self._relative[body])
 
     def _moved(self, body: str, k: int) -> Reals:
         """What the unknowns' errors do to an angle."""
@@ -382,14 +383,18 @@ def _sum(jets: Jets, terms: tuple[Term, ...], k: int) -> Any:
 
 
 def _kept(high: Reals, low: Reals) -> Reals:
-    """The same for a position, which errs by no more than √κ, and a quarter for the third order."""
+    """The same for a position, which errs by no more than √κ, and a half for the third order."""
     # (1 − √(1 − 2τ))/τ without cancellation
     near = 2 / (1 + np.sqrt(np.maximum(1 - 2 * high, 0.0)))
-    return np.where(high < 0.5, near, np.minimum(2.0, 1.25 * np.sqrt(2 / np.maximum(low, 0.5))))
+    return np.where(high < 0.5, near, np.minimum(2.0, 1.6 * np.sqrt(2 / np.maximum(low, 0.5))))
 
 
 def _grown(tau: Reals, k: int) -> Reals:
-    """How much more than the first order a derivative errs, where the second-order step is a share τ of the first."""
+    """How much more than the first order a derivative errs, where the second-order step is a share τ of the first.
+
+    τ is taken a quarter larger, for the third order.
+    """
+    tau = 1.25 * tau
     grown = np.expm1((0.5 - k) * np.log1p(-2 * tau)) / ((2 * k - 1) * np.maximum(tau, 1e-30))
     return np.where(tau < 1e-12, 1.0, np.where(tau < 0.5, grown, np.inf))
 

@@ -9,10 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from cli.bench.exact import DIGITS, Exact, mp, need_mpmath
+from cli.bench.exact import DIGITS, Exact, need_mpmath
 from virtualwork import Guess, Input, Link, Mechanism, MechanismError
 from virtualwork.mechanism import Gear, Guide
 from virtualwork.motion import Motion
+
+try:
+    import mpmath as mp
+except ImportError:  # an extra of the tests: only campaigns need it
+    mp = None
 
 Pairs = list[tuple[float, float]]
 Generator = np.random.Generator
@@ -204,7 +209,9 @@ def _triad(rng: Generator, near: float, scale: float) -> tuple[Mechanism, float]
 def _geared_five_bar(rng: Generator, at: float, scale: float) -> Mechanism | None:
     """A five-bar whose second crank is geared to the first, −1/3 or ±1 or 2."""
     ratio = float(rng.choice([-1 / 3, -1.0, 1.0, 2.0]))
-    a, b, c, e, d = (scale * rng.uniform(*span) for span in [(0.2, 0.5), (1, 2), (1, 2), (0.2, 0.5), (0.6, 1.4)])
+    a, b, c, e, d = (
+        scale * rng.uniform(*span) for span in [(0.2, 0.5), (1, 2), (1, 2), (0.2, 0.5), (0.6, 1.4)]
+    )
     start = float(rng.uniform(-3, 3))
     first = a * complex(math.cos(at), math.sin(at))
     second = d + e * complex(math.cos(start), math.sin(start))
@@ -239,7 +246,9 @@ def _klann() -> Mechanism:
 # --- campaigns --------------------------------------------------------------------------------------------------------
 
 
-def _near(make: Callable[[Generator, float, float], tuple[Mechanism, float]], low: float, rng: Generator) -> Pairs:
+def _near(
+    make: Callable[[Generator, float, float], tuple[Mechanism, float]], low: float, rng: Generator
+) -> Pairs:
     """A mechanism at a distance 10^low … 0.1 from a singular place."""
     need_mpmath()
     scale, near = _scale(rng), _away(rng, low)
@@ -372,8 +381,14 @@ def _forces(rng: Generator) -> Pairs:
 
 CAMPAIGNS = {
     "near-singular triads": ("Stephenson six-bars 1e-1 … 1e-12 from a singular triad", _near_triad),
-    "slider-cranks": ("driven at crank or piston, 1e-1 … 1e-15 from a dead point", partial(_near, _slider_crank, -15)),
-    "turning blocks": ("inverted slider-cranks 1e-1 … 1e-15 from a limit", partial(_near, _turning_block, -15)),
+    "slider-cranks": (
+        "driven at crank or piston, 1e-1 … 1e-15 from a dead point",
+        partial(_near, _slider_crank, -15),
+    ),
+    "turning blocks": (
+        "inverted slider-cranks 1e-1 … 1e-15 from a limit",
+        partial(_near, _turning_block, -15),
+    ),
     "geared five-bars": ("gears of −1/3, ±1 and 2", _gears),
     "Klann legs": ("anywhere", _legs),
     "phases at the wrap": ("four-bars at ±π and at up to 10⁴ turns", _wrap),

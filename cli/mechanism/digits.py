@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -125,7 +125,11 @@ def of_states(job: Job) -> dict[str, Column]:
         k = LINK.index(key)
         return _cells(_of_link(job, along if k == 1 else motion, link, k))
 
-    known = [key for key in states.ORDER if key not in ("step", "branch", "field", "link", "mass_kg", "inertia_kg_m2")]
+    known = [
+        key
+        for key in states.ORDER
+        if key not in ("step", "branch", "field", "link", "mass_kg", "inertia_kg_m2")
+    ]
     found: dict[str, Column] = {key: [] for key in known}
     for place, row in rows:
         guide = None if place.mark is None else place.mark.guide
@@ -149,5 +153,3 @@ def _guided(motion: Motion, guide: int, link: str) -> Reals:
     carried = motion.at(link, through).error_estimate(1)
     turned = slide * (r.angle(link, 1) + omega * r.rotation(link)) + omega * r.slide(guide)
     return np.asarray(carried + turned)
-
-
