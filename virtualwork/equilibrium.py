@@ -75,8 +75,8 @@ class Equilibrium:
         rest = Rest(self.mechanism, np.array([self.inputs]))
         error = rest.motion.dynamics.error_estimate().generalized[0]
         stiffness = rest.hessian()[0]
-        # the search ends where a step is below the last digits of the input, or of the interval searched
-        own = 2 * EPS * np.maximum(np.abs(self.inputs), 2 * np.pi / SAMPLES)
+        # the search ends where half a bracket, or a step, is below two units in the last digit
+        own = 4 * EPS * np.maximum(np.abs(self.inputs), 2 * np.pi / SAMPLES)
         try:
             moved = np.abs(np.linalg.inv(stiffness)) @ error
         except np.linalg.LinAlgError:

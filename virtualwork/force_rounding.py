@@ -82,14 +82,15 @@ class ForceErrors:
             steep = float(np.max(np.abs(np.diff(force) / np.diff(at)), initial=0.0))
             q = np.abs(self.motion.inputs[:, 0])
             read = 2 * EPS * float(np.abs(force).max()) + EPS * steep * (q + np.abs(at).max())
-            return own + read + (size * r.rotation(load.body) if load.link_axes else 0.0)
+            turning = size * r.rotation(load.body) if load.link_axes else 0.0
+            return np.asarray(own + read + turning)
         if isinstance(load, SpringEnd):
             return own + self._spring(load)
         if isinstance(load, TorsionEnd):
             s = load.spring
             assert s is not None
             formed = 2 * np.pi + abs(s.free_angle) + np.abs(self.motion.inputs).sum(axis=1)
-            turned = own + EPS * s.stiffness * formed
+            turned: Reals = own + EPS * s.stiffness * formed
             for body in s.links:
                 turned = turned + s.stiffness * r.rotation(body)
                 if s.damping and self.scene.moves:
@@ -180,6 +181,10 @@ class ForceErrors:
 
         d = self.dynamics
         statics = d.statics or Statics(d.reactions)
+        poses = max(1, 4 * ENTRIES // len(statics.unknowns) ** 2)
+        if self.n > poses:
+            parts = [self._part(slice(i, i + poses))._unknowns for i in range(0, self.n, poses)]
+            return statics.unknowns, *(np.concatenate([part[i] for part in parts]) for i in (1, 2))  # type: ignore
         a, b = statics._system()
         value = d.statics.solved[0] if d.statics is not None else self._found(statics)
         known = np.nan_to_num(value)
@@ -197,6 +202,20 @@ class ForceErrors:
             found *= _grown(tau, 1)[:, None]
         found[~np.isfinite(wrong).all(axis=1) & np.isfinite(value).all(axis=1)] = np.inf
         return statics.unknowns, value, self._settled(found)
+
+    def _part(self, rows: slice) -> ForceErrors:
+        """The same over some of the poses: the equations of all would not fit into memory."""
+        motion = self.motion
+        part = type(motion)(
+            motion.assembly, motion.inputs[rows] if len(self.mechanism.inputs) > 1 else motion.inputs[rows, 0]
+        )
+        part._rates = [
+            [rate if isinstance(rate, float) else rate[rows] for rate in rates] for rates in motion._rates
+        ]
+        part.input_error = np.broadcast_to(np.asarray(motion.input_error, dtype=float), motion.inputs.shape)[
+            rows
+        ]
+        return part.dynamics.error_estimate()
 
     def _found(self, statics: Any) -> Reals:
         """The unknowns as the reactions found them."""
@@ -255,11 +274,9 @@ class ForceErrors:
             if joint.guide is None:
                 for body in joint.bodies:
                     if body != GROUND:
-                        force = np.hypot(
-                            known[:, column["fx", joint.key, body]], known[:, column["fy", joint.key, body]]
-                        )
-                        arm = abs(m.links[body].points[joint.name] - center[body])
-                        put(body, 0.0, force * arm * turned[body])
+                        x, y = (known[:, column[axis, joint.key, body]] for axis in ("fx", "fy"))
+                        lever = abs(m.links[body].points[joint.name] - center[body])
+                        put(body, 0.0, np.hypot(x, y) * lever * turned[body])
                 continue
             g = m.guides[joint.guide]
             force = np.abs(known[:, column["normal", joint.key, ""]])
@@ -272,8 +289,8 @@ class ForceErrors:
             if g.on != GROUND:
                 through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
                 slide = motion.slide_derivative(joint.guide, 0)
-                arm = abs(complex(through) - center[g.on]) + np.abs(slide)
-                put(g.on, bent, 2 * arm * bent + force * r.slide(joint.guide))
+                reach = abs(complex(through) - center[g.on]) + np.abs(slide)
+                put(g.on, bent, 2 * reach * bent + force * r.slide(joint.guide))
         return out
 
     @cached_property
