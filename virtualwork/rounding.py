@@ -192,6 +192,10 @@ class Rounding:
         scale = np.array([1 / self.size] * len(self.angles) + [1.0] * len(self.slides))
         j = [self._jacobian(jets, m, n) * scale for m in range(order + 1)]
         residual = [self._residual(jets, rows, k, n) for k in range(order + 1)]
+        # a group that has no pose, or no rates, takes none from those before it
+        unknown = [self._unknown(j[k], residual[k]) for k in range(order + 1)]
+        for matrix in (*j, *residual):
+            matrix[~np.isfinite(matrix)] = 0.0
         back = -_inverse(j[0])
         a: list[list[Reals]] = []
         for k in range(order + 1):
@@ -206,7 +210,24 @@ class Rounding:
         ]
         high, low = self._second(jets, back, bounds[0], scale)
         self._tau[rows] = high
-        return [bounds[0] * _kept(high, low), *(b * _grown(high, k) for k, b in enumerate(bounds[1:], 1))]
+        found = [bounds[0] * _kept(high, low), *(b * _grown(high, k) for k, b in enumerate(bounds[1:], 1))]
+        for k, bound in enumerate(found):
+            bound[np.any(unknown[: k + 1], axis=0)] = np.nan
+        return found
+
+    def _unknown(self, j: Reals, residual: Reals) -> NDArray[np.bool_]:
+        """Which unknowns belong to a group with a loop that is no number, (n, unknowns)."""
+        bad = ~(np.isfinite(j).all(axis=2) & np.isfinite(residual))
+        out = np.zeros((len(j), j.shape[2]), dtype=bool)
+        row = 0
+        for g in self.groups:
+            lost = bad[:, row : row + 2 * len(g.closures)].any(axis=1)
+            row += 2 * len(g.closures)
+            own = [self.angles.index(a) for a in g.angles] + [
+                len(self.angles) + self.slides.index(s) for s in g.slides
+            ]
+            out[:, own] |= lost[:, None]
+        return out
 
     def _jacobian(self, jets: Jets, m: int, n: int) -> Reals:
         """The m-th time derivative of J, (n, 2·loops, unknowns)."""
