@@ -217,7 +217,7 @@ class Rounding:
 
     def _unknown(self, j: Reals, residual: Reals) -> NDArray[np.bool_]:
         """Which unknowns belong to a group with a loop that is no number, (n, unknowns)."""
-        bad = ~(np.isfinite(j).all(axis=2) & np.isfinite(residual))
+        bad: NDArray[np.bool_] = np.asarray(~(np.isfinite(j).all(axis=2) & np.isfinite(residual)))
         out = np.zeros((len(j), j.shape[2]), dtype=bool)
         row = 0
         for g in self.groups:
