@@ -217,11 +217,11 @@ class Rounding:
 
     def _unknown(self, j: Reals, residual: Reals) -> NDArray[np.bool_]:
         """Which unknowns belong to a group with a loop that is no number, (n, unknowns)."""
-        bad: NDArray[np.bool_] = np.asarray(~(np.isfinite(j).all(axis=2) & np.isfinite(residual)))
+        bad: Any = ~(np.isfinite(j).all(axis=2) & np.isfinite(residual))
         out = np.zeros((len(j), j.shape[2]), dtype=bool)
         row = 0
         for g in self.groups:
-            lost = bad[:, row : row + 2 * len(g.closures)].any(axis=1)
+            lost = np.any(bad[:, row : row + 2 * len(g.closures)], axis=1)
             row += 2 * len(g.closures)
             own = [self.angles.index(a) for a in g.angles] + [
                 len(self.angles) + self.slides.index(s) for s in g.slides
@@ -293,6 +293,7 @@ class Rounding:
                     curve = value * turned**2
                     bent[:, i] += np.abs(curve) + np.abs(along) if sized else along - curve
             pairs = np.repeat(np.abs(bent), 2, axis=1) if sized else bent.view(float)
+            pairs[~np.isfinite(pairs)] = 0.0
             matrix = np.abs(back) if sized else back
             second = np.abs(matrix @ pairs[..., None])[..., 0]
             parts.append(np.divide(second, first, out=np.zeros_like(second), where=first > 0))
