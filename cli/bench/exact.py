@@ -48,15 +48,17 @@ class Exact:
         The pose.
     order : int
         Of the highest time derivative.
+    inputs : sequence of mpf, optional
+        The inputs, where a double is not exactly what is meant.
     """
 
-    def __init__(self, motion: Motion, i: int = 0, order: int = 2) -> None:
+    def __init__(self, motion: Motion, i: int = 0, order: int = 2, inputs: Series | None = None) -> None:
         need_mpmath()
         self.m: Mechanism = motion.mechanism
         self.order = order
         self.links = list(self.m.links)
         with mp.workdps(DIGITS):
-            self._start(motion, i)
+            self._start(motion, i, inputs)
             self.closed = self._close()
             if self.closed:
                 for k in range(1, order + 1):
@@ -64,11 +66,11 @@ class Exact:
                     self._set(self._solve(right), k)
 
     # --- coordinates ----------------------------------------------------------------------------------------------
-    def _start(self, motion: Motion, i: int) -> None:
+    def _start(self, motion: Motion, i: int, inputs: Series | None) -> None:
         rates = [[np.broadcast_to(r, motion.n)[i] for r in of] for of in motion._rates]
         self.drive: list[Series] = []
         for j, _ in enumerate(self.m.inputs):
-            series = [mp.mpf(float(motion.inputs[i, j]))]
+            series = [mp.mpf(float(motion.inputs[i, j])) if inputs is None else inputs[j]]
             series += [mp.mpf(float(rates[k - 1][j])) / math.factorial(k) for k in range(1, 4)]
             self.drive.append(series[: self.order + 1])
         self.theta: dict[str, Series] = {GROUND: [mp.mpf(0)] * (self.order + 1)}
