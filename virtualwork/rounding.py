@@ -154,13 +154,15 @@ class Rounding:
         error: Any = 0.0
         for j, k in angle.inputs:
             error = error + abs(k) * self.given[:, j]
+        # the constant of a gear is itself a difference of angles of this size
+        error = error + EPS * abs(angle.const)
         if not plain:
-            error = error + EPS * (abs(angle.const) + sum(abs(k * st.inputs[j]) for j, k in angle.inputs))
+            error = error + EPS * (abs(angle.const) + 2 * sum(abs(k * st.inputs[j]) for j, k in angle.inputs))
         for base, r in angle.bases:
             error = error + abs(r) * own[base]
             # an angle times a ratio is rounded as large as it is, whole turns and all
-            formed = 1.0 if abs(r) == 1.0 else abs(r) * (1 + self._unwound[base])
-            error = error + EPS * formed
+            turned = 1.0 if abs(r) == 1.0 else abs(r) * (1 + self._unwound[base])
+            error = error + EPS * turned
         return error
 
     # --- the unknowns -------------------------------------------------------------------------------------------

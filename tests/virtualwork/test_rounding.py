@@ -280,6 +280,10 @@ def test_nothing_is_loaded_for_estimates_unless_asked() -> None:
         (linkages._near_change_point, 1358),
         # forces so near a dead point that no digit is known: infinite, not NaN
         (groups._forces, 34),
+        # a gear whose constant is a difference of larger angles
+        (groups._gears, 1255),
+        (groups._gears, 1604),
+        (groups._gears, 1768),
         (groups._forces, 53),
     ],
 )
