@@ -247,7 +247,21 @@ class Dynamics:
         return force, moment
 
     def error_estimate(self) -> ForceErrors:
-        """Return bounds of the rounding errors of all forces, under the names of what they bound."""
+        """Return bounds of the rounding errors of all forces, under the names of what they bound.
+
+        Dimensions, loads and inputs are taken as exact. With joint friction there are none: infinite.
+
+        Examples
+        --------
+        A weight of 2·9.81 N on an arm of 0.5 m at 60°:
+
+        >>> from virtualwork.mechanism import Input, Link, Mechanism
+        >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="arm"),
+        ...                 gravity=-9.81j)
+        >>> found = arm.motion(np.pi / 3).dynamics
+        >>> bool(abs(found.effort[0, 0] - 4.905) <= found.error_estimate().effort[0, 0] < 1e-14)
+        True
+        """
         from virtualwork.force_rounding import ForceErrors
 
         if self._errors is None:

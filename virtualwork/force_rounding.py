@@ -23,7 +23,8 @@ import numpy as np
 
 from virtualwork.loads import Follower, InertiaForce, InertiaTorque, SpringEnd, Tabled, TorsionEnd
 from virtualwork.mechanism import GROUND
-from virtualwork.rounding import ENTRIES, EPS, _grown, _inverse
+from virtualwork.perturbation import grown, inverse
+from virtualwork.rounding import ENTRIES, EPS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -171,7 +172,7 @@ class ForceErrors:
                 matrix[:, i, j] = unit.angle_derivative(ends[0], 1) - unit.angle_derivative(ends[1], 1)
                 wrong[:, i, j] = sum(unit.rounding.angle(body, 1) for body in ends)
         total = force + (wrong @ np.abs(self.dynamics.effort)[..., None])[..., 0]
-        return np.asarray((np.abs(_inverse(matrix)) @ total[..., None])[..., 0])
+        return np.asarray((np.abs(inverse(matrix)) @ total[..., None])[..., 0])
 
     # --- by Newton and Euler ------------------------------------------------------------------------------------------
     @cached_property
@@ -197,9 +198,9 @@ class ForceErrors:
                 f = known[rows][..., None]
                 left = wrong[rows] + EPS / 2 * ((np.abs(a[rows]) @ np.abs(f))[..., 0] + np.abs(b[rows]))
                 left += np.abs((a[rows] @ f)[..., 0] + b[rows])
-                found[rows] = (np.abs(_inverse(a[rows])) @ left[..., None])[..., 0]
+                found[rows] = (np.abs(inverse(a[rows])) @ left[..., None])[..., 0]
             tau = self.rounding.tau.max(axis=1, initial=0.0)
-            found *= _grown(tau, 1)[:, None]
+            found *= grown(tau, 1)[:, None]
         found[~np.isfinite(wrong).all(axis=1) & np.isfinite(value).all(axis=1)] = np.inf
         return statics.unknowns, value, self._settled(found)
 

@@ -90,6 +90,16 @@ class PointMotion:
 
         It is the length of the error, in the unit of the quantity; the dimensions and the input are taken as exact.
         Infinite where no digit is known, within rounding of a limit of the input. See `virtualwork.rounding`.
+
+        Examples
+        --------
+        A crank of length 1 at 60°: y = √3/2.
+
+        >>> from virtualwork.mechanism import Input, Link, Mechanism
+        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
+        >>> point = crank.motion(np.pi / 3).point("P")
+        >>> bool(abs(point.position[0, 1] - np.sqrt(0.75)) <= point.error_estimate()[0] < 1e-15)
+        True
         """
         return self._motion.rounding.point(self._body, self._z, self._node, order)
 

@@ -11,13 +11,8 @@ commute, (J·δx)⁽ᵏ⁾ = −ρ_k, so that by Leibniz's rule
 
     J·δx⁽ᵏ⁾ = −ρ_k − Σ_{j<k} C(k, j)·J⁽ᵏ⁻ʲ⁾·δx⁽ʲ⁾,      every δx⁽ᵏ⁾ = Σ_j A_kj·ρ_j,  |δx⁽ᵏ⁾| ≤ Σ_j |A_kj|·|ρ_j|.
 
-Close to a limit of the input the second order counts. With f = h² − c for the loop, c uncertain by κ, h = √c, and
-τ = κ/2h² the ratio of the second-order step to the first, h^(1−2k) changes by no more than
-
-    ((1 − 2τ)^(1/2 − k) − 1)/((2k − 1)τ)    times what the first order says;
-
-from τ = 1/2 on the pose may lie on the limit itself: its position errs by no more than √κ = √(2/τ) times the first
-order, and of its rates no digit is known. The given data, dimensions and inputs, are taken as exact.
+Close to a limit the second order counts too: see `virtualwork.perturbation`. The given data, dimensions and inputs,
+are taken as exact.
 """
 
 from __future__ import annotations
@@ -29,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.mechanism import GROUND
+from virtualwork.perturbation import Sizes, grown, inverse, kept, sum_of, value_of
 from virtualwork.state import Jets, State
 from virtualwork.steps import Angle, Group, Place, Slide, Term, Turn, combined
 
@@ -198,7 +194,7 @@ class Rounding:
         unknown = [self._unknown(j[k], residual[k]) for k in range(order + 1)]
         for matrix in (*j, *residual):
             matrix[~np.isfinite(matrix)] = 0.0
-        back = -_inverse(j[0])
+        back = -inverse(j[0])
         a: list[list[Reals]] = []
         for k in range(order + 1):
             row = []
@@ -212,7 +208,7 @@ class Rounding:
         ]
         high, low = self._second(jets, back, bounds[0], scale)
         self._tau[rows] = high
-        found = [bounds[0] * _kept(high, low), *(b * _grown(high, k) for k, b in enumerate(bounds[1:], 1))]
+        found = [bounds[0] * kept(high, low), *(b * grown(high, k) for k, b in enumerate(bounds[1:], 1))]
         for k, bound in enumerate(found):
             bound[np.any(unknown[: k + 1], axis=0)] = np.nan
         return found
@@ -236,13 +232,13 @@ class Rounding:
         out = np.zeros((n, 2 * len(self.loops), len(self.angles) + len(self.slides)))
         for i, (terms, _) in enumerate(self.loops):
             for t in terms:
-                turned = 1j * _value(jets, t, m)
+                turned = 1j * value_of(jets, t, m)
                 for column, r in self.share[t.body].items():
                     out[:, 2 * i, column] += r * np.real(turned)
                     out[:, 2 * i + 1, column] += r * np.imag(turned)
                 if t.slide in self.slides:
                     column = len(self.angles) + self.slides.index(t.slide)
-                    along = _value(jets, Term(t.z, t.body), m)
+                    along = value_of(jets, Term(t.z, t.body), m)
                     out[:, 2 * i, column] += np.real(along)
                     out[:, 2 * i + 1, column] += np.imag(along)
         return out
@@ -267,7 +263,7 @@ class Rounding:
             if t.slide in self.driven:
                 noise = noise + abs(t.z) * sizes.turn(t.body, k) * self.given[rows, self.driven[t.slide]]
         for node in nodes:
-            noise = noise + EPS * np.abs(_sum(jets, self.chains[node][0], k))
+            noise = noise + EPS * np.abs(sum_of(jets, self.chains[node][0], k))
         return noise
 
     def _second(self, jets: Jets, back: Reals, first: Reals, scale: Reals) -> tuple[Reals, Reals]:
@@ -286,7 +282,7 @@ class Rounding:
             bent = np.zeros((n, len(self.loops)), complex)
             for i, (terms, _) in enumerate(self.loops):
                 for t in terms:
-                    value, bare = _value(jets, t, 0), _value(jets, Term(t.z, t.body), 0)
+                    value, bare = value_of(jets, t, 0), value_of(jets, Term(t.z, t.body), 0)
                     share = self.share[t.body].items()
                     turned = sum((abs(r) if sized else r) * move[:, column] for column, r in share)
                     along: Any = 0.0
@@ -345,15 +341,15 @@ class Rounding:
                     c = comb(order, j)
                     if t.body != GROUND:
                         turned = self._moved(t.body, j)
-                        total += c * np.abs(_value(jets, t, order - j)) * turned
+                        total += c * np.abs(value_of(jets, t, order - j)) * turned
                     if t.slide in self.slides:
-                        bare = _value(jets, Term(t.z, t.body), order - j)
+                        bare = value_of(jets, Term(t.z, t.body), order - j)
                         total += (
                             c
                             * np.abs(bare)
                             * self.unknowns(j)[:, len(self.angles) + self.slides.index(t.slide)]
                         )
-            out: Reals = total + EPS * np.abs(_sum(jets, terms, order))
+            out: Reals = total + EPS * np.abs(sum_of(jets, terms, order))
         return out
 
     def rotation(self, body: str) -> Reals:
@@ -366,77 +362,3 @@ class Rounding:
         for column, r in self.share[body].items():
             total += abs(r) * self.unknowns(k)[:, column]
         return total
-
-
-class Sizes:
-    """The sizes of jets: every product by the sizes of its factors, every sum without cancellation."""
-
-    def __init__(self, jets: Jets) -> None:
-        self.jets = jets
-        self._turn: dict[str, list[Any]] = {}
-
-    def turn(self, body: str, k: int) -> Any:
-        """Of the k-th derivative of e^{iθ}."""
-        if k == 0:
-            return 1.0
-        if body == GROUND:
-            return 0.0
-        known = self._turn.setdefault(body, [1.0])
-        rates = self.jets.angle[body]
-        while len(known) <= k:
-            m = len(known)
-            known.append(sum(comb(m - 1, j) * np.abs(rates[j]) * known[m - 1 - j] for j in range(m)))
-        return known[k]
-
-    def term(self, t: Term, k: int) -> Any:
-        """Of the k-th derivative of z·s·e^{iθ}."""
-        if t.slide is None:
-            return abs(t.z) * self.turn(t.body, k)
-        s = [self.jets.st.slide[t.slide], *self.jets.slide[t.slide]]
-        return abs(t.z) * sum(comb(k, j) * np.abs(s[j]) * self.turn(t.body, k - j) for j in range(k + 1))
-
-
-def _value(jets: Jets, t: Term, k: int) -> Any:
-    value = jets.vector(None, (t,), k)
-    return 0.0 if value is None else value
-
-
-def _sum(jets: Jets, terms: tuple[Term, ...], k: int) -> Any:
-    value = jets.vector(None, terms, k)
-    return 0.0 if value is None else value
-
-
-def _kept(high: Reals, low: Reals) -> Reals:
-    """The same for a position, which errs by no more than √κ, and a half for the third order."""
-    # (1 − √(1 − 2τ))/τ without cancellation
-    near = 2 / (1 + np.sqrt(np.maximum(1 - 2 * high, 0.0)))
-    return np.where(high < 0.5, near, np.minimum(2.0, 1.6 * np.sqrt(2 / np.maximum(low, 0.5))))
-
-
-def _grown(tau: Reals, k: int) -> Reals:
-    """How much more than the first order a derivative errs, where the second-order step is a share τ of the first.
-
-    τ is taken a quarter larger, for the third order.
-    """
-    tau = 1.25 * tau
-    grown = np.expm1((0.5 - k) * np.log1p(-2 * tau)) / ((2 * k - 1) * np.maximum(tau, 1e-30))
-    return np.where(tau < 1e-12, 1.0, np.where(tau < 0.5, grown, np.inf))
-
-
-def _inverse(j: Reals) -> Reals:
-    """J⁻¹ (of least squares with redundant loops); a singular value below FLOOR of the largest is taken as FLOOR."""
-    out = np.full((len(j), j.shape[2], j.shape[1]), np.nan)
-    good: Any = np.isfinite(j).all(axis=(1, 2))
-    if j.shape[1] == j.shape[2]:
-        try:
-            out[good] = np.linalg.inv(j[good])
-        except np.linalg.LinAlgError:
-            out[good] = np.nan
-        with np.errstate(invalid="ignore"):
-            size = np.abs(out).max(axis=(1, 2)) * np.abs(j).max(axis=(1, 2))
-        good = good & ~(size < 0.1 / FLOOR)
-    if good.any():
-        left, s, right = np.linalg.svd(j[good], full_matrices=False)
-        s = np.maximum(s, FLOOR * s[:, :1])
-        out[good] = np.swapaxes(right, 1, 2) @ (np.swapaxes(left, 1, 2) / s[..., None])
-    return out

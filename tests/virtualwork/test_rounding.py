@@ -13,7 +13,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from cli.bench import groups, linkages
+from cli.bench import groups, linkages, random_linkages
 from cli.bench.exact import Exact
 from cli.bench.groups import compare
 from virtualwork import Guess, Guide, Input, Link, Mechanism
@@ -111,7 +111,7 @@ def test_forces_of_every_kind(name: str) -> None:
 
 
 def test_springs_dampers_and_forces_that_turn() -> None:
-    m = groups._four_bar(np.random.default_rng(3), 0.8, 1.0)[0]
+    m = random_linkages.four_bar(np.random.default_rng(3), 0.8, 1.0)[0]
     m = replace(
         m,
         springs=(Spring((("coupler", 0.3 + 0.2j), ("ground", 1j)), 120.0, 0.4, 3.0),),
@@ -209,7 +209,7 @@ def test_poses_beyond_what_fits_are_taken_in_parts(monkeypatch: pytest.MonkeyPat
 
 
 def test_no_estimate_for_a_pose_that_is_not_assembled_and_none_for_friction() -> None:
-    m = groups._four_bar(np.random.default_rng(5), 1e-3, 1.0, limit=True)[0]
+    m = random_linkages.four_bar(np.random.default_rng(5), 1e-3, 1.0, limit=True)[0]
     limit = m.assembly.track.limits()[0]
     outside = m.motion(limit.input - 0.01 * limit.side)
     assert not outside.assembled[0]
@@ -243,7 +243,7 @@ def test_a_group_that_cannot_be_assembled_leaves_those_before_it_their_estimates
 
 
 def test_an_input_that_is_not_exact_counts() -> None:
-    m = groups._four_bar(np.random.default_rng(3), 0.8, 1.0)[0]
+    m = random_linkages.four_bar(np.random.default_rng(3), 0.8, 1.0)[0]
     motion = m.motion(0.8)
     motion.input_error = 1e-9
     moved = m.motion(0.8 + 1e-9).link("rocker").angle - m.motion(0.8).link("rocker").angle
