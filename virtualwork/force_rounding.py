@@ -25,6 +25,7 @@ from virtualwork.loads import Follower, InertiaForce, InertiaTorque, SpringEnd, 
 from virtualwork.mechanism import GROUND
 from virtualwork.perturbation import grown, inverse
 from virtualwork.rounding import ENTRIES, EPS
+from virtualwork.work import carrier
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -156,8 +157,6 @@ class ForceErrors:
 
     def _through(self, force: Reals) -> Reals:
         """Through motors that sit on another body than `on`; see `work.through_carriers`."""
-        from virtualwork.work import carrier
-
         inputs = self.mechanism.inputs
         k = len(inputs)
         moved = [j for j, e in enumerate(inputs) if not e.is_slide and carrier(self.scene, j) != e.on]
@@ -187,7 +186,7 @@ class ForceErrors:
             parts = [self._part(slice(i, i + poses))._unknowns for i in range(0, self.n, poses)]
             return statics.unknowns, *(np.concatenate([part[i] for part in parts]) for i in (1, 2))  # type: ignore
         a, b = statics._system()
-        value = d.statics.solved[0] if d.statics is not None else self._found(statics)
+        value = d.statics.solved[0] if d.statics is not None else self._gears(statics, a, b)
         known = np.nan_to_num(value)
         found = np.full(value.shape, np.nan)
         step = max(1, ENTRIES // max(1, a.shape[1] * a.shape[2]))
@@ -218,6 +217,16 @@ class ForceErrors:
         ]
         return part.dynamics.error_estimate()
 
+    def _gears(self, statics: Any, a: Reals, b: Reals) -> Reals:
+        """The unknowns with the gears' torques that go best with the others."""
+        value = self._found(statics)
+        gears = [i for i, unknown in enumerate(statics.unknowns) if unknown[0] == "gear"]
+        if gears:
+            rest = np.asarray(a @ value[..., None])[..., 0] + b
+            # how a gear's torque acts on its links is the same in every pose
+            value[:, gears] = -rest @ np.linalg.pinv(a[0][:, gears]).T
+        return value
+
     def _found(self, statics: Any) -> Reals:
         """The unknowns as the reactions found them."""
         d, r, m = self.dynamics, self.dynamics.reactions, self.mechanism
@@ -235,8 +244,7 @@ class ForceErrors:
                 joint = r.by_key[key]
                 out[:, i] = d.joint_moment(joint, m.guides[joint.guide].link) / statics.size  # type: ignore[index]
             elif kind == "gear":
-                (value,) = r.over(partial(r.couple, kind="gear", i=int(key)))
-                out[:, i] = value / statics.size
+                continue  # its torque is nobody's answer: it follows from the others, see `_gears`
             else:
                 out[:, i] = d.newton_euler[:, int(key)] / (1.0 if kind == "force" else statics.size)
         return out
@@ -269,8 +277,11 @@ class ForceErrors:
                 continue
             arm = abs(load.place - center[load.body])
             put(load.body, error, arm * (error + np.abs(value) * turned[load.body]))
-        for carrying, _ in self.dynamics.reactions.carried:
-            put(carrying, 0.0, self.effort.sum(axis=1))
+        for j, entry in enumerate(m.inputs):
+            body = entry.on if entry.is_slide else carrier(self.scene, j)
+            if body != entry.on:  # the motor's reaction is put there as a load
+                for carrying in {body, entry.on} - {GROUND}:
+                    put(carrying, 0.0, self.effort[:, j])
         for joint in self.dynamics.reactions.joints:
             if joint.guide is None:
                 for body in joint.bodies:

@@ -121,6 +121,18 @@ def test_springs_dampers_and_forces_that_turn() -> None:
     judge([p for q in (0.8, 0.85, 0.9) for p in pairs_of_forces(m, q, 2.0, 1.0)], 200)
 
 
+def test_forces_of_a_gear_train() -> None:
+    """Heavy geared five-bars: the gears' torques are between the others."""
+    found = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        at = float(rng.uniform(-3, 3))
+        m = random_linkages.geared_five_bar(rng, at, 1.0)
+        if m is not None:
+            found += pairs_of_forces(heavy(m), at, 2.0, 1.0)
+    judge(found, 200)
+
+
 def test_a_torsion_spring_and_a_motor_on_a_moving_link() -> None:
     """A pendulum on a pendulum: each torque is known in a line."""
     links = {"first": Link({"O": 0j, "A": 1}), "second": Link({"A": 0j}, mass=2, center=0.5)}
@@ -139,8 +151,10 @@ def test_a_torsion_spring_and_a_motor_on_a_moving_link() -> None:
         weight = 2 * mp.mpf(9.81)
         second = weight * mp.cos(b) / 2 + 3 * (b - a - mp.mpf(0.2))
         first = weight * mp.cos(a) - 3 * (b - a - mp.mpf(0.2)) + second
-        for value, true, error in zip(motion.effort[0], (first, second), bound, strict=True):
+        euler = motion.dynamics.error_estimate().newton_euler[0]
+        for value, true, error, other in zip(motion.effort[0], (first, second), bound, euler, strict=True):
             assert abs(true - mp.mpf(float(value))) <= error <= 1e-13
+            assert abs(true - mp.mpf(float(value))) <= other <= 1e-12
 
 
 def test_a_chain_of_a_hundred_links() -> None:
