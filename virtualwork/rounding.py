@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     Complexes = NDArray[np.complex128]
 
 EPS = float(np.finfo(float).eps)
-ROUNDINGS = 1.0  # roundings that a term collects, at worst, on its way into a sum: e^{iθ}, z·e^{iθ}, the sum
+ROUNDINGS = 0.5  # roundings that a term collects, at worst, on its way into a sum: e^{iθ}, z·e^{iθ}, the sum
 FLOOR = (
     1e-13  # a singular value is not taken for smaller: the second order decides there, and does not see it
 )
