@@ -71,10 +71,13 @@ def sum_of(jets: Jets, terms: tuple[Term, ...], k: int) -> Any:
 
 
 def kept(high: Reals, low: Reals) -> Reals:
-    """The same for a position, which errs by no more than √κ, and a half for the third order."""
+    """How much more than the first order a position errs: within a limit's rounding √κ in all.
+
+    That is taken twice, for the third order and the root's own rounding.
+    """
     # (1 − √(1 − 2τ))/τ without cancellation
     near = 2 / (1 + np.sqrt(np.maximum(1 - 2 * high, 0.0)))
-    return np.where(high < 0.5, near, np.minimum(2.0, 1.6 * np.sqrt(2 / np.maximum(low, 0.5))))
+    return np.where(high < 0.5, near, 2 * np.minimum(2.0, np.sqrt(2 / np.maximum(low, 0.5))))
 
 
 def grown(tau: Reals, k: int) -> Reals:
