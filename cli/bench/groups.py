@@ -232,7 +232,7 @@ CAMPAIGNS = {
     ),
     "geared five-bars": ("gears of −1/3, ±1 and 2", _gears),
     "Klann legs": ("anywhere", _legs),
-    "phases at the wrap": ("four-bars at ±π and at up to 10⁴ turns", _wrap),
+    "input angles at the wrap": ("four-bars at ±π and at up to 10⁴ turns", _wrap),
     "long sweeps": ("poses of sweeps of 10⁵ … 10⁶", _sweeps),
     "closure": ("after 1, 10, 1000 turns; geared 3, 9, 30", _closure),
     "forces near dead points": ("effort, joint forces and shaking of heavy four-bars", _forces),
