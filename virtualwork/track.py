@@ -171,7 +171,9 @@ class Track:
             return x
         for i in np.flatnonzero(singular):
             rate = self._marched[group.name].bridge(float(np.atleast_1d(q)[i]), k)
-            if not np.isfinite(rate).all():  # close to a limit nothing goes on: what the Jacobian gives is kept
+            if not np.isfinite(
+                rate
+            ).all():  # close to a limit nothing goes on: what the Jacobian gives is kept
                 continue
             for j in range(len(x)):
                 if np.ndim(q) == 0:
