@@ -378,10 +378,22 @@ class Balanced:
 
     def terms(self, index: int) -> Iterator[tuple[str, str, str, float | None]]:
         """Yield (field, link, kind, power in W) of each load in a step; the power is None where it does no work."""
+        for *head, power, _ in self._terms(index):
+            yield (*head, power)  # type: ignore[misc]
+
+    def _terms(
+        self, index: int, *, bounds: bool = False
+    ) -> Iterator[tuple[str, str, str, float | None, float]]:
+        """Yield the terms of a step with the bounds of their rounding errors (0 where not asked for)."""
         step = self.states.steps[index]
         group, place = self.where[index]
         states, solved, _ = self.groups[group]
         single = len(step.fields) == 1
+        wrong = self.term_bounds[group] if bounds else {}
+
+        def error(kind: str, at: tuple[int, ...]) -> float:
+            return float(wrong[kind][at]) if bounds else 0.0
+
         for f, (of, rows) in enumerate(step.fields.items()):
             here: tuple[int, ...] = (place,) if single else (place, f)
             for kind in KINDS:
@@ -390,12 +402,56 @@ class Balanced:
                 term = states.terms[kind]
                 for i, row in enumerate(rows):
                     if term.works[(*here, i)]:
-                        yield of, self.states.links[row], kind, float(term.power[(*here, i)])
+                        yield (
+                            of,
+                            self.states.links[row],
+                            kind,
+                            float(term.power[(*here, i)]),
+                            error(kind, (*here, i)),
+                        )
                     elif term.workless[(*here, i)]:
-                        yield of, self.states.links[row], kind, None
+                        yield of, self.states.links[row], kind, None, 0.0
             for j, unknown in enumerate(step.unknowns):
                 if solved.determined[place, j]:
-                    yield of, unknown.cells[0].link, "unknown", float(solved.unknown_power[place, f, j])
+                    power = float(solved.unknown_power[place, f, j])
+                    yield of, unknown.cells[0].link, "unknown", power, error("unknown", (place, f, j))
+
+    @cached_property
+    def term_bounds(self) -> list[dict[str, Real]]:
+        """Bounds of the rounding errors of each group's powers by kind, and of its unknowns' powers."""
+        found = []
+        for (states, solved, _), value in zip(self.groups, self.bounds, strict=True):
+            assert solved.given is not None
+            unit = np.stack([states.unit_power_error_estimate(of) for of in solved.given[1]], axis=-1)
+            unit = unit[..., None, :] if solved.value.shape[-1] == 1 else unit
+            unknown = np.abs(solved.coefficient) * value[..., None, :]
+            wrong = {kind: states.term_error_estimate(kind) for kind in states.terms}
+            found.append(wrong | {"unknown": unknown + unit * np.abs(solved.value)[..., None, :]})
+        return found
+
+    @cached_property
+    def bounds(self) -> list[Real]:
+        """Bounds of the rounding errors of each group's unknowns."""
+        return [solved.error_estimate() for _, solved, _ in self.groups]
+
+    def errors(self) -> dict[str, list[float]]:
+        """Bounds of the rounding errors of the columns' numbers, in their units."""
+        used = [name for name in LOADS if any(quantity == name for _, quantity in self.states.table.marks)]
+        found: dict[str, list[float]] = {self.states.table.numbers[name].header: [] for name in used}
+        for index, step in enumerate(self.states.steps):
+            group, place = self.where[index]
+            for unknown, bound in zip(step.unknowns, self.bounds[group][place].tolist(), strict=True):
+                for cell in unknown.cells:
+                    for name in used:
+                        column = self.states.table.numbers[name]
+                        size = abs(bound * cell.factor) if name == cell.quantity else 0.0
+                        found[column.header].append(float(from_si(size, COLUMNS[name], column.unit)))
+        return found
+
+    def ledger_errors(self) -> dict[str, list[float]]:
+        """Bounds of the rounding errors of the ledger's powers."""
+        steps = range(len(self.states.steps))
+        return {"power_W": [error for index in steps for *_, error in self._terms(index, bounds=True)]}
 
     def values(self, index: int) -> list[float | None]:
         """The unknowns of a step in SI; None where they are not determined."""
@@ -534,5 +590,6 @@ def balanced(states: States, gravity: complex, *, ledger: bool = False) -> Shown
         keys=[name for name in ("step", "field", "link", "kind", "unknown") if name in columns],
         notes=(lambda: "") if ledger else result.notes,
         figure=result.figure,
+        errors=result.ledger_errors if ledger else result.errors,
         warnings=[*states.table.warnings, *states.warnings, *result.warnings],
     )

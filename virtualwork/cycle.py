@@ -96,6 +96,27 @@ class Cycle:
         """The root mean square of the effort: the heat in a motor's winding."""
         return float(np.sqrt(self.integral(self.effort**2) / self.span))
 
+    def error_estimate(self) -> dict[str, float]:
+        """Return bounds of the rounding errors of `work`, `mean`, `peak`, `rms` and `fluctuation`.
+
+        They follow from those of the effort at the poses; what the sum or spline between the poses leaves out of an
+        integral is no rounding, and not among them.
+        """
+        error, size = self.motion.dynamics.error_estimate().effort[:, 0], np.abs(self.effort)
+        last = float(np.finfo(float).eps) * (2 + np.log2(len(size)))  # of a pairwise sum
+        q = np.abs(self.input - self.input[0])
+        # the weights of a spline exceed those of the trapezoidal rule by less than a half
+        work = 1.5 * float(np.trapezoid(error + last * size, q))
+        span = abs(self.span)
+        return {
+            "work": work,
+            "mean": work / span,
+            "peak": float(error.max()),
+            # Minkowski: the root mean square of a sum is no more than the sum of those of its parts
+            "rms": 1.5 * float(np.sqrt(np.trapezoid((error + last * size) ** 2, q) / span)),
+            "fluctuation": 4 * work,
+        }
+
     @cached_property
     def energy(self) -> tuple[Reals, Reals]:
         """Kinetic energy and potential of weights and springs at each pose, (n,) J."""

@@ -21,6 +21,7 @@ from virtualwork.work import effort, finished, write_effort
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from virtualwork.force_rounding import ForceErrors
     from virtualwork.motion import Motion
     from virtualwork.statics import Statics
 
@@ -44,6 +45,7 @@ class Dynamics:
         self.motion = motion
         self.scene = Scene(motion)
         self._forces: dict[tuple[str, str], NDArray[np.complex128]] = {}
+        self._errors: ForceErrors | None = None
 
     @cached_property
     def _settled(self) -> tuple[int, NDArray[np.bool_]]:
@@ -243,6 +245,28 @@ class Dynamics:
                 if arm is not None:
                     moment[block.rows] += cross(arm, value)
         return force, moment
+
+    def error_estimate(self) -> ForceErrors:
+        """Return bounds of the rounding errors of all forces, under the names of what they bound.
+
+        Dimensions, loads and inputs are taken as exact. With joint friction there are none: infinite.
+
+        Examples
+        --------
+        A weight of 2·9.81 N on an arm of 0.5 m at 60°:
+
+        >>> from virtualwork.mechanism import Input, Link, Mechanism
+        >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="arm"),
+        ...                 gravity=-9.81j)
+        >>> found = arm.motion(np.pi / 3).dynamics
+        >>> bool(abs(found.effort[0, 0] - 4.905) <= found.error_estimate().effort[0, 0] < 1e-14)
+        True
+        """
+        from virtualwork.force_rounding import ForceErrors
+
+        if self._errors is None:
+            self._errors = ForceErrors(self)
+        return self._errors
 
     def blocks(self) -> list[Block]:
         """The scene's blocks."""

@@ -8,7 +8,7 @@ difference of neighbouring positions.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
@@ -55,6 +55,33 @@ class Equilibrium:
     stable: bool | None
     stiffness: float
     potential: float | None
+    mechanism: Mechanism | None = field(default=None, repr=False, compare=False)
+
+    def error_estimate(self) -> tuple[float, ...]:
+        """Return a bound of the rounding error of each input, rad or m: the error of Q over its slope, |V″⁻¹|·δQ.
+
+        Infinite where the second variation vanishes. The dimensions and the loads are taken as exact.
+
+        Examples
+        --------
+        >>> from virtualwork.mechanism import Input, Link, Mechanism
+        >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="bob"),
+        ...                      gravity=-9.81j)
+        >>> down = equilibria(pendulum).found[1]
+        >>> abs(down.inputs[0] - 1.5 * np.pi) < down.error_estimate()[0] < 1e-14
+        True
+        """
+        assert self.mechanism is not None
+        rest = Rest(self.mechanism, np.array([self.inputs]))
+        error = rest.motion.dynamics.error_estimate().generalized[0]
+        stiffness = rest.hessian()[0]
+        # the search ends where half a bracket, or a step, is below two units in the last digit
+        own = 4 * EPS * np.maximum(np.abs(self.inputs), 2 * np.pi / SAMPLES)
+        try:
+            moved = np.abs(np.linalg.inv(stiffness)) @ error
+        except np.linalg.LinAlgError:
+            moved = np.full(len(own), np.inf)
+        return tuple((moved + own).tolist())
 
 
 @dataclass(frozen=True)
@@ -326,6 +353,7 @@ def _judged(mechanism: Mechanism, inputs: Reals, scale: float) -> Equilibria:
                 None if abs(low) <= small else low > 0,
                 low,
                 float(potential[i]) if np.isfinite(potential[i]) else None,
+                mechanism,
             )
         )
     return Equilibria(tuple(found))

@@ -13,9 +13,9 @@ numbers x + iy: F·v is the real part of F v̄.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,10 @@ KINDS = ("applied force", "applied torque", "weight", "inertia force", "inertia 
 
 ROUNDING = 8 * np.finfo(float).eps
 """A power below this share of load times largest velocity is rounding: the load does no work."""
+
+EPS = float(np.finfo(float).eps)
+FACTORS = 2 * EPS
+"""A bound of what a product of a mass, an acceleration and a velocity collects in roundings, relative."""
 
 
 class Term(NamedTuple):
@@ -102,15 +106,9 @@ class LinkStates:
 
         Kinds without a load are never multiplied out.
         """
-        v, mass = self._vectors(self.velocity), np.asarray(self.mass, dtype=float)
-        inertia = np.asarray(self.inertia, dtype=float)
-        at = v if self.point_velocity is None else self._vectors(self.point_velocity)
         found = {
-            "applied force": self._linear(self._vectors(self.force), at),
-            "applied torque": self._angular(np.asarray(self.torque, dtype=float)),
-            "weight": self._linear(mass * self.gravity, v),
-            "inertia force": self._linear(-mass * self._vectors(self.acceleration), v),
-            "inertia torque": self._angular(-inertia * np.asarray(self.alpha, dtype=float)),
+            kind: self._linear(load, rate) if linear else self._angular(load)
+            for kind, (linear, load, rate) in self._products().items()
         }
         return {kind: term for kind, term in found.items() if term is not None}
 
@@ -135,6 +133,42 @@ class LinkStates:
             np.broadcast_to(turning, full).max(axis=-1, keepdims=True),
         )
 
+    def power_error_estimate(self) -> Real:
+        """Return a bound (...) of the rounding error of `power`, W."""
+        size, cut = np.zeros(self.shape), np.zeros(self.shape)
+        for kind, (linear, load, rate) in self._products().items():
+            if kind in self.terms:
+                size = size + _sizes(load, rate)
+                # a power that was taken for none because it is below rounding may yet be one
+                power = (load * np.conj(rate)).real if linear else load * rate
+                cut = cut + np.where(self.terms[kind].works, 0.0, np.abs(power))
+        return np.asarray(_summed(size) + cut.sum(axis=-1))
+
+    def term_error_estimate(self, kind: str) -> Real:
+        """Return a bound (..., n) of the rounding error of each power of one kind, W."""
+        _, load, rate = self._products()[kind]
+        return np.broadcast_to(FACTORS * _sizes(load, rate), self.shape)
+
+    def unit_power_error_estimate(self, unknown: UnitLoad) -> Real:
+        """Return a bound (...) of the rounding error of the power of a unit of an unknown, W."""
+        at = self._vectors(self.velocity if self.point_velocity is None else self.point_velocity)
+        size = _sizes(np.asarray(unknown.force, dtype=complex), at)
+        size = size + _sizes(np.asarray(unknown.torque, dtype=float), np.asarray(self.omega, dtype=float))
+        return _summed(np.broadcast_to(size, self.shape))
+
+    def _products(self) -> dict[str, tuple[bool, Any, Any]]:
+        """What is multiplied for the power of each kind: whether it is a force, the load, the velocity."""
+        v, omega = self._vectors(self.velocity), np.asarray(self.omega, dtype=float)
+        at = v if self.point_velocity is None else self._vectors(self.point_velocity)
+        mass, inertia = np.asarray(self.mass, dtype=float), np.asarray(self.inertia, dtype=float)
+        return {
+            "applied force": (True, self._vectors(self.force), at),
+            "applied torque": (False, np.asarray(self.torque, dtype=float), omega),
+            "weight": (True, mass * self.gravity, v),
+            "inertia force": (True, -mass * self._vectors(self.acceleration), v),
+            "inertia torque": (False, -inertia * np.asarray(self.alpha, dtype=float), omega),
+        }
+
     @staticmethod
     def _vectors(value: ArrayLike) -> Complex:
         return np.asarray(value, dtype=complex)
@@ -153,6 +187,16 @@ class LinkStates:
         works = np.broadcast_to((np.abs(power) > ROUNDING * load * fastest) | np.isinf(power), self.shape)
         there = np.broadcast_to(load > 0, self.shape)
         return Term(np.where(works, power, 0.0), works, there & ~works)
+
+
+def _sizes(load: Any, rate: Any) -> Any:
+    """|F_x v_x| + |F_y v_y|, or |T ω|."""
+    return np.abs(np.real(load) * np.real(rate)) + np.abs(np.imag(load) * np.imag(rate))
+
+
+def _summed(size: Real) -> Real:
+    """What products and their sum over the links (pairwise, some log₂ n roundings deep) may be wrong by."""
+    return np.asarray((FACTORS + EPS / 2 * (2 + np.log2(size.shape[-1]))) * size.sum(axis=-1))
 
 
 @dataclass(frozen=True)
@@ -185,6 +229,39 @@ class Balance:
     """(...): condition number of the coefficients, rows and columns scaled; 1 for one unknown."""
     power: Real
     """(..., k): the power of the known loads in each field, W."""
+    given: tuple[LinkStates, tuple[UnitLoad, ...]] | None = field(default=None, repr=False, compare=False)
+    """What was balanced."""
+
+    def error_estimate(self) -> Real:
+        """Return a bound (..., k) of the rounding error of each unknown; infinite where it is not determined.
+
+        The table is taken as exact but for the last digit of each number, by which a change of units may move it. With
+        δP and δC the bounds of the running sums (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed.,
+        eq. 4.4), |δx| ≤ |C⁻¹|(δP + δC|x| + ε|C||x|).
+
+        Examples
+        --------
+        >>> states = LinkStates(velocity=[0, 3], omega=[2, 0], force=[0, 5])
+        >>> found = balance(states, [UnitLoad(torque=[1, 0])])
+        >>> float(found.value[0]), bool(0 < found.error_estimate()[0] < 1e-13)
+        (-7.5, True)
+        """
+        assert self.given is not None
+        states, unknowns = self.given
+        k = len(unknowns)
+        power = states.power_error_estimate()
+        power = power[..., None] if k == 1 else power
+        wrong = np.stack([states.unit_power_error_estimate(unknown) for unknown in unknowns], axis=-1)
+        wrong = wrong[..., None, :] if k == 1 else wrong
+        size = np.abs(np.where(self.determined, self.value, 0.0))[..., None]
+        total = power + ((wrong + EPS * np.abs(self.coefficient)) @ size)[..., 0]
+        rows = np.abs(self.coefficient).max(axis=-1, keepdims=True)
+        rows = np.where(rows > 0, rows, 1.0)
+        columns = np.abs(self.coefficient / rows).max(axis=-2, keepdims=True)
+        columns = np.where(columns > 0, columns, 1.0)
+        inverse = np.abs(np.linalg.pinv(self.coefficient / rows / columns, rcond=k * ROUNDING))
+        error = (inverse @ (total / rows[..., 0])[..., None])[..., 0] / columns[..., 0, :]
+        return np.where(self.determined, error + EPS / 2 * size[..., 0], np.inf)
 
     @cached_property
     def unknown_power(self) -> Real:
@@ -257,8 +334,9 @@ def balance(states: LinkStates, unknowns: Sequence[UnitLoad]) -> Balance:
             coefficient[..., None, :],
             np.where(works[..., 0], 1.0, np.inf),
             states.power[..., None],
+            (states, tuple(unknowns)),
         )
-    return _solve(coefficient, states.power)
+    return replace(_solve(coefficient, states.power), given=(states, tuple(unknowns)))
 
 
 def _solve(coefficient: Real, power: Real) -> Balance:

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from virtualwork.assembly import Assembly
     from virtualwork.dynamics import Dynamics
+    from virtualwork.rounding import Rounding
 
     Reals = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -85,12 +86,22 @@ class PointMotion:
         return self._motion.point_derivative(self._body, self._z, order, self._node)
 
     def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the position (order 0), velocity (1) or acceleration (2).
+        """Return a bound (n,) of the rounding error of the position (order 0), velocity (1), acceleration (2) or jerk.
 
-        The dimensions and the input are taken as exact. A relative rounding ε moves a pose by ε·condition of the
-        mechanism's size; the rates inherit the error of the pose and multiply it by the condition once more.
+        It is the length of the error, in the unit of the quantity; the dimensions and the input are taken as exact.
+        Infinite where no digit is known, within rounding of a limit of the input. See `virtualwork.rounding`.
+
+        Examples
+        --------
+        A crank of length 1 at 60°: y = √3/2.
+
+        >>> from virtualwork.mechanism import Input, Link, Mechanism
+        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
+        >>> point = crank.motion(np.pi / 3).point("P")
+        >>> bool(abs(point.position[0, 1] - np.sqrt(0.75)) <= point.error_estimate()[0] < 1e-15)
+        True
         """
-        return self._motion._error_estimate(order)
+        return self._motion.rounding.point(self._body, self._z, self._node, order)
 
     def coefficient(self, j: int = 0) -> Complexes:
         """The velocity coefficient dP/dq_j as x + iy, (n,): the point's virtual displacement for a unit of input j."""
@@ -131,6 +142,13 @@ class LinkMotion:
         """(n,) rad/s³ (000 eq. 1.5.3)."""
         return self._motion.angle_derivative(self._body, 3)
 
+    def error_estimate(self, order: int = 0) -> Reals:
+        """Return a bound (n,) of the rounding error of the angle (order 0, rad), ω (1), α (2) or the angular jerk (3).
+
+        The dimensions and the input are taken as exact. See `virtualwork.rounding`.
+        """
+        return self._motion.rounding.angle(self._body, order)
+
     def coefficient(self, j: int = 0) -> Reals:
         """The velocity coefficient dθ/dq_j, (n,): the link's virtual rotation for a unit of input j."""
         return self._motion.angle_coefficient(self._body, j)
@@ -162,6 +180,13 @@ class SlideMotion:
         """(n,) m/s³."""
         return self._motion.slide_derivative(self._guide, 3)
 
+    def error_estimate(self, order: int = 0) -> Reals:
+        """Return a bound (n,) of the rounding error of the slide (order 0, m), its speed (1), acceleration (2) or jerk (3).
+
+        The dimensions and the input are taken as exact. See `virtualwork.rounding`.
+        """
+        return self._motion.rounding.slide(self._guide, order)
+
 
 class Motion:
     """Position, velocity, acceleration and jerk over given inputs, on demand.
@@ -171,6 +196,8 @@ class Motion:
     Attributes
     ----------
     inputs : array (n, k)
+    input_error : float or array (n, k)
+        Bound of the inputs' own errors, for the estimates of rounding errors: 0 where they are exact as given.
     solved : list of (step, order)
         What has been worked out so far; order 0 is position.
     """
@@ -203,6 +230,7 @@ class Motion:
             self._given(value, [getattr(e, name) for e in m.inputs])
             for name, value in (("speed", speed), ("acceleration", acceleration), ("jerk", jerk))
         ]
+        self.input_error: ArrayLike = 0.0
         self.solved: list[tuple[Step, int]] = []
         self._done: set[tuple[int, int, int]] = set()
         self._blocks: list[State] | None = None
@@ -328,31 +356,12 @@ class Motion:
                 whole[rows] = inverse_norm(jacobian)
         return whole
 
-    def _error_estimate(self, order: int) -> Reals:
-        """ε·condition·size, and what becomes of it in the rates; see `PointMotion.error_estimate`."""
-        c, size = self.condition, self.mechanism.size
-        # so close to a limit that rounding moves the pose by as much as is left, the second order counts
-        eps = float(np.finfo(float).eps) * (1 + 16 * float(np.finfo(float).eps) * c**2)
-        near = np.ones_like(c)
-        if any(len(where) for where in self.assembly.track.flips.values()):
-            # lengths that differ by little more than rounding are taken for equal at a change point
-            eps, near = 2048 * eps, c
-        if order == 0:
-            return np.asarray(3 * eps * c * size)
-        links = [self.link(name) for name in self.mechanism.links]
-        omega = np.max([np.abs(link.omega) for link in links], axis=0)
-        if order == 1:
-            return np.asarray(1.5 * eps * c**2 * size * omega)
-        alpha = np.max([np.abs(link.alpha) for link in links], axis=0)
-        drive = np.max(
-            [
-                np.abs(np.broadcast_to(np.asarray(rate, dtype=float), self.n))
-                / (size if given.is_slide else 1.0)
-                for rate, given in zip(self._rates[0], self.mechanism.inputs, strict=True)
-            ],
-            axis=0,
-        )
-        return np.asarray(eps * near * c**2 * size * (2 * alpha + (2 * omega + 3 * c * drive) * omega))
+    @cached_property
+    def rounding(self) -> Rounding:
+        """Bounds of the rounding errors of this motion, each formed when first asked for."""
+        from virtualwork.rounding import Rounding
+
+        return Rounding(self)
 
     # --- solving ----------------------------------------------------------------------------------------------
     def _states(self) -> list[State]:

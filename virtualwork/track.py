@@ -117,13 +117,20 @@ class Track:
             while self.high < high:
                 self._scan(self.high, self.high + self.length)
                 self.high += self.length
-                if first and self._repeats and not any(len(f) for f in self.flips.values()):
-                    self.settled = True
+                if first and self._seen_all():
                     return
                 first = False
             while self.low > low:
                 self._scan(self.low - self.length, self.low)
                 self.low -= self.length
+                if first and self._seen_all():
+                    return
+                first = False
+
+    def _seen_all(self) -> bool:
+        """Whether the one turn looked through says it all."""
+        self.settled = self._repeats and not any(len(f) for f in self.flips.values())
+        return self.settled
 
     def sign(self, group: Group, q: Number) -> Number:
         """The sign of the group's Jacobian at inputs q."""
@@ -164,6 +171,10 @@ class Track:
             return x
         for i in np.flatnonzero(singular):
             rate = self._marched[group.name].bridge(float(np.atleast_1d(q)[i]), k)
+            if not np.isfinite(
+                rate
+            ).all():  # close to a limit nothing goes on: what the Jacobian gives is kept
+                continue
             for j in range(len(x)):
                 if np.ndim(q) == 0:
                     x[j] = float(rate[j])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cli.errors import DataError
+from cli.bench.exact import need_mpmath
 from virtualwork import Guess, Input, Link, Mechanism
 
 try:
@@ -84,15 +84,8 @@ def _links(rng: np.random.Generator) -> list[float]:
     return [float(x) for x in scale * 10.0 ** rng.uniform(-0.5, 0.5, 4)]
 
 
-def _need_mpmath() -> None:
-    if mp is None:
-        raise DataError(
-            "the campaigns of linkages need mpmath: install dalembert with its extra, dalembert[test]"
-        )
-
-
 def _anywhere(rng: np.random.Generator) -> Pairs:
-    _need_mpmath()
+    need_mpmath()
     return _four_bar(
         _links(rng), float(rng.uniform(0, 2 * math.pi)), int(rng.choice([-1, 1])), float(rng.normal() * 10)
     )
@@ -100,7 +93,7 @@ def _anywhere(rng: np.random.Generator) -> Pairs:
 
 def _near_limit(rng: np.random.Generator) -> Pairs:
     """An input 1e-1 … 1e-15 from where coupler and rocker are in line."""
-    _need_mpmath()
+    need_mpmath()
     a, b, c, d = _links(rng)
     for reach in (b + c, abs(b - c)):
         cosine = (a * a + d * d - reach * reach) / (2 * a * d)
@@ -114,7 +107,7 @@ def _near_limit(rng: np.random.Generator) -> Pairs:
 
 def _near_change_point(rng: np.random.Generator) -> Pairs:
     """A parallelogram whose coupler is off by 1e-2 … 1e-14, within 1e-1 … 1e-12 of being folded."""
-    _need_mpmath()
+    need_mpmath()
     scale = 10.0 ** rng.uniform(-3, 3)
     a, d = scale * rng.uniform(0.5, 2, 2)
     b = d * (1 + rng.choice([-1, 1]) * 10.0 ** rng.uniform(-14, -2))

@@ -17,6 +17,7 @@ import numpy as np
 MODULES = (
     "cli.bench.rotors",
     "cli.bench.linkages",
+    "cli.bench.groups",
     "cli.bench.vibration",
     "cli.bench.placing",
     "cli.bench.rotation",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cli import options
-from cli.render import Expect, Json, Output, Plot, Rtol, Shown, Text, show
+from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
 
 if TYPE_CHECKING:
     from cli.mechanism.asked import Asked
@@ -83,6 +83,7 @@ def run(
     expect: Expect = None,
     rtol: Rtol = 1e-3,
     text: Text = False,
+    digits: Digits = False,
 ) -> None:
     """Solve a planar mechanism: positions, velocities, accelerations, its limits and its assemblies.
 
@@ -123,7 +124,7 @@ def run(
             graph=graph,
             written=output is not None,
         )
-        show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text)
+        show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)
     except MechanismError as error:
         from cli.errors import DataError
 
@@ -193,6 +194,15 @@ def _shown(
         told = [checking.explain_text(job)] if explain else []
         return "\n\n".join([*after, *asked.text(of_forces), *told, *(asked.explain(job) if explain else [])])
 
+    def errors() -> dict[str, Any]:
+        from cli.mechanism import digits
+
+        if not table:
+            return {}
+        if asked.forces and not written:
+            return digits.of_forces(job)
+        return digits.of_states(job) if job.only is None else digits.of_poses(job)
+
     def figure() -> Any:
         if asked.forces and not graph and len(job.inputs.shown) > 2:
             return asked.figure(job)
@@ -211,5 +221,6 @@ def _shown(
         notes=lambda: job.mechanism.name,
         afterword=afterword,
         figure=figure,
+        errors=errors,
         warnings=warnings,
     )

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cli import options
-from cli.render import Expect, Json, Output, Plot, Rtol, Text, show
+from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Text, show
 
 
 def run(
@@ -29,6 +29,7 @@ def run(
     expect: Expect = None,
     rtol: Rtol = 1e-3,
     text: Text = False,
+    digits: Digits = False,
 ) -> None:
     """Find the unknown force or torque that balances a table of link states, by virtual power.
 
@@ -42,4 +43,4 @@ def run(
     from cli import link_states as job
 
     shown = job.balanced(job.read_states(states), g, ledger=ledger)
-    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text)
+    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)

@@ -78,7 +78,10 @@ class Job:
         from virtualwork.motion import Motion
 
         q = self.inputs
-        return tuple(Motion(a, q.values, q.speed, q.acceleration) for a in self.assemblies)
+        found = tuple(Motion(a, q.values, q.speed, q.acceleration) for a in self.assemblies)
+        for motion in found:  # read from decimals, turned to radians: for the estimates of --digits
+            motion.input_error = float(np.finfo(float).eps) * np.abs(motion.inputs)
+        return found
 
     @cached_property
     def links(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -30,15 +30,33 @@ Part = dict[str, list[Any]]
 
 @dataclass(frozen=True)
 class Mark:
-    """Where an input's unknown effort acts: cells of a link, and for a force the velocity of its point."""
+    """Where an input's unknown effort acts: cells of a link, and for a force, in a guide, its point's velocity."""
 
     link: str
     cells: Part
+    guide: int | None = None
+
+
+class Place(NamedTuple):
+    """What a row is of: a link at a pose of a motion, in the field of an input, or an input's mark alone."""
+
+    motion: Motion
+    pose: int
+    link: str
+    field: int | None
+    mark: Mark | None
 
 
 def table(job: Job) -> dict[str, list[Any]]:
     """Centre of mass, angle, rates and loads of every link at every pose."""
-    rows: list[dict[str, Any]] = []
+    listed = [row for _, row in rows(job)]
+    keys = {key for row in listed for key in row}
+    return {key: [row.get(key) for row in listed] for key in ORDER if key in keys}
+
+
+def rows(job: Job) -> list[tuple[Place, dict[str, Any]]]:
+    """The table's rows, each with what it holds."""
+    found: list[tuple[Place, dict[str, Any]]] = []
     several = len(job.motions) > 1
     for assembly, motion in zip(job.assemblies, job.motions, strict=True):
         order = job.order
@@ -55,30 +73,35 @@ def table(job: Job) -> dict[str, list[Any]]:
                     (e.name, {name: _virtual(motion, name, j) for name in job.links}, _marks(motion, j))
                     for j, e in enumerate(job.mechanism.inputs)
                 ]
+        several_fields = bool(fields[0][0])
         for i in range(motion.n):
             head: dict[str, Any] = {"step": job.inputs.steps[i]}
             if several:
                 head["branch"] = str(assembly.number)
-            for field, velocities, marks in fields:
+            for j, (field, velocities, marks) in enumerate(fields):
+                of = j if several_fields else None
                 lead = {**head, "field": field} if field else head
                 here = {
                     name: {key: values[i] for key, values in (part | velocities.get(name, {})).items()}
                     for name, part in parts.items()
                 }
-                extra: list[dict[str, Any]] = []
+                extra: list[tuple[Place, dict[str, Any]]] = []
                 for mark in marks if motion.assembled[i] else ():
                     if mark.link not in here:
                         continue
                     wanted = {key: values[i] for key, values in mark.cells.items() if values[i] != ""}
                     row = here[mark.link]
                     if any(row.get(key) for key in wanted if key != "omega_rad_s") or "fvx_m_s" in wanted:
-                        extra.append({**lead, "link": mark.link, **wanted})
+                        place = Place(motion, i, mark.link, of, mark)
+                        extra.append((place, {**lead, "link": mark.link, **wanted}))
                     else:
                         row |= wanted
-                rows += [{**lead, "link": name, **row} for name, row in here.items()]
-                rows += extra
-    keys = {key for row in rows for key in row}
-    return {key: [row.get(key) for row in rows] for key in ORDER if key in keys}
+                found += [
+                    (Place(motion, i, name, of, None), {**lead, "link": name, **row})
+                    for name, row in here.items()
+                ]
+                found += extra
+    return found
 
 
 def _part(job: Job, motion: Motion, name: str, order: int) -> Part:
@@ -146,7 +169,7 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
             cells_: Part = dict(zip(("fvx_m_s", "fvy_m_s"), pair(velocity), strict=True))
             cells_["fx_N"] = [_share(name, sign * float(c)) for c in rail.real]
             cells_["fy_N"] = [_share(name, sign * float(c)) for c in rail.imag]
-            found.append(Mark(link, cells_))
+            found.append(Mark(link, cells_, i))
     return found
 
 
