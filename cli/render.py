@@ -186,7 +186,7 @@ def _with_digits_that_hold(shown: Shown) -> Shown:
 
 
 def digits_that_hold(columns: Columns, errors: Columns) -> Columns:
-    """Return columns with each number that has an error cut to the digits before it."""
+    """Return columns with each number that has an error cut to the digits before it; none where no digit is known."""
     return {
         name: [
             _below_a_turn(name, _cut(value, error)) for value, error in zip(column, errors[name], strict=True)
@@ -203,9 +203,12 @@ def _below_a_turn(name: str, value: Any) -> Any:
 
 
 def _cut(value: Any, error: float) -> Any:
+    from math import floor, inf, log10
+
+    if error == inf:
+        return None  # no digit is known
     if value is None or not value or not error > 0:
         return value
-    from math import floor, log10
 
     digits = floor(log10(abs(value) / error)) if error < abs(value) else 0
     return float(f"{value:.{min(digits, 17) - 1}e}") if digits > 0 else 0.0
