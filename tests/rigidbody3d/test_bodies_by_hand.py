@@ -1,0 +1,87 @@
+"""Bodies, axes and tensors worked out by hand, away from every origin at which a sign would not show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigidbody3d import Body, Motion, check, compose, principal, tensor
+
+
+def test_a_body_moved_and_turned_about_a_point() -> None:
+    box = Body.of("box", 12.0, width=1.0, height=2.0, depth=3.0)  # tensor 13, 10, 5
+    moved = box.moved([1.0, 2.0, 0.0]).moved([0.5, 0.0, -1.0])
+    np.testing.assert_array_equal(moved.center, [1.5, 2.0, -1.0])
+    quarter = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]  # x to y
+    turned = moved.turned(quarter, about=[1.0, 1.0, 0.0])
+    np.testing.assert_array_equal(turned.center, [0.0, 1.5, -1.0])
+    np.testing.assert_array_equal(turned.inertia, np.diag([10.0, 13.0, 5.0]))
+    np.testing.assert_array_equal(moved.turned(quarter).center, moved.center)
+    # about a point that is not the origin: r = (-1, 0.5, 1), 12 kg
+    about = turned.about([1.0, 1.0, -2.0])
+    np.testing.assert_array_equal(about, [[25.0, 6.0, 12.0], [6.0, 37.0, -6.0], [12.0, -6.0, 20.0]])
+    np.testing.assert_array_equal(turned.principal.moments, [5.0, 10.0, 13.0])
+
+
+def test_one_shape_at_many_places() -> None:
+    rod = Body(0.3, np.array([[0, 0, 1.0], [0, 2.0, 0], [3.0, 0, 0]]), np.diag([0.025, 0.025, 0.0]))
+    assert rod.mass.shape == (3,)
+    assert rod.inertia.shape == (3, 3, 3)
+    np.testing.assert_allclose(rod.about([0, 0, 0])[1], np.diag([1.225, 0.025, 1.2]), rtol=1e-15)
+    whole = compose(rod)
+    assert whole.mass == pytest.approx(0.9, rel=1e-15)
+    np.testing.assert_allclose(whole.center, [1.0, 2 / 3, 1 / 3], rtol=1e-15)
+
+
+def test_a_batch_is_judged_body_by_body() -> None:
+    good, askew = np.diag([1.0, 2.0, 2.5]), np.diag([1.0, 2.0, 2.5])
+    askew[0, 1] = 0.1
+    with pytest.raises(ValueError, match="symmetric"):
+        principal(np.stack([good, askew]))
+    found = check([[1.0, 2.0, 2.5], [1.0, 1.0, 3.0]])
+    np.testing.assert_array_equal(found.valid, [True, False])
+    np.testing.assert_array_equal(found.margin, [0.5, -1.0])
+    assert "1 + 1 < 3" in found.reason
+
+
+def test_a_thin_rod_in_oblique_axes_has_its_two_moments() -> None:
+    along = np.array([2.0, -1.0, 2.0]) / 3
+    found = principal(0.6 * (np.eye(3) - np.outer(along, along)))
+    np.testing.assert_allclose(found.moments, [0, 0.6, 0.6], rtol=1e-15)
+    assert found.moments[0] == 0
+    assert abs(found.axes[0] @ along) == pytest.approx(1.0, rel=1e-15)
+
+
+def test_principal_axes_point_where_their_largest_component_is_positive() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        half = rng.normal(size=(3, 3))
+        axes = principal(half @ half.T).axes
+        for axis in axes[:2]:
+            assert axis[np.abs(axis).argmax()] > 0
+        np.testing.assert_allclose(np.cross(axes[0], axes[1]), axes[2], atol=1e-14)
+    # a diagonal tensor's axes are the given ones, in the order of the moments
+    np.testing.assert_array_equal(principal(np.diag([3.0, 1.0, 2.0])).axes, [[0, 1, 0], [0, 0, 1], [1, 0, 0]])
+
+
+def test_a_disk_on_an_arm_about_the_fixed_point() -> None:
+    """Riul's example 3 in axes that turn with the arm: v = Ω × r, a = Ω × (Ω × r), Ḣ = Ω × H of the disk."""
+    disk = tensor(0.5, 0.5, 1.0)
+    motion = Motion.about_fixed_point(
+        disk, [0, 4.0, 12.0], mass=2.0, center=[0.3, 1.0, 0.1], point=[0.0, 1.0, 0.0], frame_omega=[0, 4.0, 0]
+    )
+    # the disk's own point at G moves as ω × r = (4·0.1 - 0, 12·0.3, -4·0.3)
+    np.testing.assert_allclose(motion.velocity, [0.4, 3.6, -1.2], rtol=1e-15)
+    # α = Ω × ω = (48, 0, 0); α × r + ω × v = (0, -4.8, 0) + (-4.8 - 43.2, 4.8, -1.6)
+    np.testing.assert_allclose(motion.acceleration, [-48.0, 0.0, -1.6], rtol=1e-14, atol=1e-14)
+    np.testing.assert_allclose(motion.rate, [48.0, 0, 0], rtol=1e-15)
+    np.testing.assert_allclose(motion.linear_momentum, [0.8, 7.2, -2.4], rtol=1e-15)
+
+
+def test_in_body_axes_the_tensor_has_no_rate() -> None:
+    """Euler: H = (1·1, 2·2, 3·3), I α = (0.1, 0.4, 0.9), ω × H = (2·9 - 3·4, 3·1 - 1·9, 1·4 - 2·1)."""
+    motion = Motion(np.diag([1.0, 2.0, 3.0]), [1.0, 2.0, 3.0], [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(motion.relative, [0.1, 0.4, 0.9], rtol=1e-15)
+    np.testing.assert_array_equal(motion.transport, [6.0, -6.0, 2.0])
+    np.testing.assert_array_equal(motion.tensor_rate, [0.0, 0.0, 0.0])
+    np.testing.assert_allclose(motion.rate, [6.1, -5.6, 2.9], rtol=1e-15)
