@@ -74,6 +74,7 @@ def test_a_disk_on_an_arm_about_the_fixed_point() -> None:
     np.testing.assert_allclose(motion.velocity, [0.4, 3.6, -1.2], rtol=1e-15)
     # α = Ω × ω = (48, 0, 0); α × r + ω × v = (0, -4.8, 0) + (-4.8 - 43.2, 4.8, -1.6)
     np.testing.assert_allclose(motion.acceleration, [-48.0, 0.0, -1.6], rtol=1e-14, atol=1e-14)
+    np.testing.assert_array_equal(motion.inertia_force, -2.0 * motion.acceleration)
     np.testing.assert_allclose(motion.rate, [48.0, 0, 0], rtol=1e-15)
     np.testing.assert_allclose(motion.linear_momentum, [0.8, 7.2, -2.4], rtol=1e-15)
 
@@ -85,3 +86,27 @@ def test_in_body_axes_the_tensor_has_no_rate() -> None:
     np.testing.assert_array_equal(motion.transport, [6.0, -6.0, 2.0])
     np.testing.assert_array_equal(motion.tensor_rate, [0.0, 0.0, 0.0])
     np.testing.assert_allclose(motion.rate, [6.1, -5.6, 2.9], rtol=1e-15)
+
+
+def test_what_is_not_given_is_zero() -> None:
+    motion = Motion(np.eye(3), [0.0, 0.0, 2.0])
+    for quantity in (motion.mass, motion.center, motion.velocity, motion.acceleration, motion.rate):
+        assert not quantity.any()
+    assert motion.energy == 2.0
+    still = Motion(np.eye(3), [0.0, 0.0, 2.0], mass=3.0)
+    assert not still.momentum_about([0, 0, 0])[:2].any()
+    assert still.energy == 2.0
+
+
+def test_one_spin_and_many_accelerations() -> None:
+    """States that broadcast: I α + ω × H for each α, H the same."""
+    I, w = np.diag([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 3.0])
+    alpha = np.array([[0.1, 0.2, 0.3], [1.0, 0.0, 0.0]])
+    motion = Motion(I, w, alpha)
+    np.testing.assert_allclose(motion.rate, [[6.1, -5.6, 2.9], [7.0, -6.0, 2.0]], rtol=1e-15)
+    np.testing.assert_array_equal(motion.momentum, [1.0, 4.0, 9.0])
+    many = Motion(I, np.stack([w, 2 * w]), [1.0, 0.0, 0.0])
+    np.testing.assert_allclose(many.rate, [[7.0, -6.0, 2.0], [25.0, -24.0, 8.0]], rtol=1e-15)
+    grid = Motion(I, np.broadcast_to(w, (2, 4, 3)), np.broadcast_to(alpha[:, None], (2, 4, 3)))
+    np.testing.assert_allclose(grid.rate[:, 3], motion.rate, rtol=1e-15)
+    assert grid.momentum.shape == (2, 4, 3)

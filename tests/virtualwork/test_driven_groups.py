@@ -158,3 +158,36 @@ def test_an_input_moves_only_its_own_loop() -> None:
         for point in (f"B{there}", f"C{there}"):
             assert np.array_equal(np.zeros(2), np.abs(motion.point(point).coefficient(j)) * np.ones(2))
     assert np.array_equal(motion.point("Cr").complex(1), [0, 0])
+
+
+def test_a_wheel_on_a_block_that_turns_with_its_disc() -> None:
+    """The block's angle is the disc's and a constant: the wheel's phase is found at the guess, constant included."""
+    m = Mechanism(
+        {"O": 0j},
+        {"disc": Link({"O": 0j}), "block": Link({"M": 0j}), "wheel": Link({"M": 0j, "K": 1})},
+        [Guide("M", "block", "disc", "O", 0.2, 0.5)],
+        [Gear(("block", "wheel"), 3.0)],
+        inputs=[Input(link="disc"), Input(slider="M")],
+        guess=Guess((0.3, 1.0), {"wheel": 0.1}),
+    )
+    motion = m.motion(np.array([[0.3, 1.0], [0.9, 1.4]]))
+    assert motion.link("block").angle == pytest.approx([1.0, 1.6], rel=1e-15)
+    assert motion.link("wheel").angle == pytest.approx([0.1, 1.9], rel=1e-14)
+    spoke = motion.point("K").complex(0) - motion.point("M").complex(0)
+    assert spoke == pytest.approx(np.exp([0.1j, 1.9j]), rel=1e-14)
+
+
+def test_a_step_reads_what_it_does_not_make_itself() -> None:
+    m = Mechanism(
+        {"A": 0j, "D": 4},
+        {"crank": Link({"A": 0j, "B": 1}), "coupler": Link({"B": 0j, "C": 4}), "rocker": Link({"D": 0j, "C": 2})},
+        inputs=Input(link="crank"),
+        guess=Guess(0.5, {"coupler": 0.4, "rocker": 1.5}),
+    )
+    plan = m.assembly.plan
+    (group,) = plan.groups
+    assert set(plan.writes(group)) == {"angle:coupler", "angle:rocker"}
+    assert {name for name in plan.reads(group) if name.startswith("angle")} <= {"angle:crank"}
+    assert "point:D" in plan.reads(group)
+    assert [s for s in plan.needed(["point:B"]) if s is group] == []
+    assert [s for s in plan.needed(["point:C"]) if s is group] == [group]
