@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigidbody3d import Body, Motion, check, compose, principal, tensor
+from rigidbody3d import Body, Motion, Shaft, check, compose, principal, tensor
 
 
 def test_a_body_moved_and_turned_about_a_point() -> None:
@@ -110,3 +110,20 @@ def test_one_spin_and_many_accelerations() -> None:
     grid = Motion(I, np.broadcast_to(w, (2, 4, 3)), np.broadcast_to(alpha[:, None], (2, 4, 3)))
     np.testing.assert_allclose(grid.rate[:, 3], motion.rate, rtol=1e-15)
     assert grid.momentum.shape == (2, 4, 3)
+
+
+def test_a_shaft_at_many_speeds_and_many_shafts() -> None:
+    """A point of 2 kg at (0.1, 0.2, 0.25) between bearings at 0 and 1: they carry three quarters and one quarter."""
+    body = Body(2.0, np.array([0.1, 0.2, 0.25]), np.zeros((3, 3)))
+    shaft = Shaft(body, (0.0, 1.0), [2.0, 3.0, 4.0], gravity=[0.0, -10.0, 0.0])
+    whole = -np.array([4.0, 9.0, 16.0])[:, None, None] * 2.0 * np.array([0.1, 0.2])
+    np.testing.assert_allclose(shaft.dynamic, whole * np.array([0.75, 0.25])[:, None], rtol=1e-15)
+    np.testing.assert_allclose(shaft.static, [[0.0, 15.0], [0.0, 5.0]], rtol=1e-15)
+    two = Shaft(body, [[0.0, 1.0], [-0.25, 0.75]], 1.0)
+    shares = np.array([[0.75, 0.25], [0.5, 0.5]])
+    np.testing.assert_allclose(two.unbalance, shares * (0.2 + 0.4j), rtol=1e-15)
+    for bad in ([0.0, 1.0, 2.0], [0.0, np.nan]):
+        with pytest.raises(ValueError, match="two finite positions"):
+            Shaft(body, bad)
+    with pytest.raises(ValueError, match="same place"):
+        Shaft(body, [[0.0, 1.0], [0.5, 0.5]])

@@ -108,6 +108,10 @@ def test_a_torsion_spring_between_two_arms() -> None:
         assert "no weights: gravity is zero" not in absent
 
 
-def test_nothing_is_not_minus_nothing() -> None:
-    m = Mechanism({"O": 0j}, {"bar": Link({"O": 0j}, 1.0, 0.0)}, inputs=Input(link="bar"), torques=[Torque("bar", 0.0)])
-    assert not np.signbit(m.motion(np.array([0.1, 0.2])).effort).any()
+@pytest.mark.parametrize("gravity", [G, -G])
+def test_nothing_is_not_minus_nothing(gravity: float) -> None:
+    """Gravity along the bar: the weight acts, its point moves, and its work is zero, whose sign is never shown."""
+    m = Mechanism({"O": 0j}, {"bar": Link({"O": 0j}, 1.0, 0.5)}, inputs=Input(link="bar"), gravity=gravity)
+    effort = m.motion(np.array([0.0, 0.0])).effort
+    assert np.array_equal(effort, [0.0, 0.0])
+    assert not np.signbit(effort).any()
