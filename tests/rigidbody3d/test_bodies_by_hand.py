@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigidbody3d import Body, Motion, Shaft, check, compose, principal, tensor
+from rigidbody3d import (
+    Body,
+    Motion,
+    Shaft,
+    check,
+    compose,
+    cones,
+    principal,
+    sleeping_threshold,
+    steady_precession,
+    tensor,
+)
 
 
 def test_a_body_moved_and_turned_about_a_point() -> None:
@@ -127,3 +138,24 @@ def test_a_shaft_at_many_speeds_and_many_shafts() -> None:
             Shaft(body, bad)
     with pytest.raises(ValueError, match="same place"):
         Shaft(body, [[0.0, 1.0], [0.5, 0.5]])
+
+
+def test_cones_and_precession_in_any_units() -> None:
+    """I1 = 4, I3 = 1, ω⊥ = 1, ω3 = 4: H = (4, 4), so H leans 45° and ω 14° from the axis; |H|/I1 = √2, spin 3."""
+    found = cones(4.0, 1.0, [[0.6, 0.8, 4.0], [0.6, 0.8, -4.0]])
+    np.testing.assert_allclose(found.body, np.arctan(0.25), rtol=1e-15)
+    np.testing.assert_allclose(found.space, np.pi / 4 - np.arctan(0.25), rtol=1e-15)
+    np.testing.assert_allclose(found.precession, np.sqrt(2), rtol=1e-15)
+    np.testing.assert_allclose(found.spin, [3.0, -3.0], rtol=1e-15)
+
+
+def test_steady_precession_without_weight_and_the_other_way_round() -> None:
+    """Without weight the slow rate is none and the fast one I3 ω3/(I1 cos θ); a spin reversed reverses both."""
+    free = steady_precession(2.0, 3.0, [0.0, 0.0], np.pi / 3, [4.0, -4.0])
+    np.testing.assert_allclose(free.slow, [0.0, 0.0], atol=0)
+    np.testing.assert_allclose(free.fast, [12.0, -12.0], rtol=1e-15)
+    # 2·½·x² - 3·5·x + 14 = 0: x = 1 and 14
+    heavy = steady_precession(2.0, 3.0, 14.0, np.pi / 3, [5.0, -5.0])
+    np.testing.assert_allclose(heavy.slow, [1.0, -1.0], rtol=2e-15)
+    np.testing.assert_allclose(heavy.fast, [14.0, -14.0], rtol=2e-15)
+    assert sleeping_threshold(2.0, 3.0, 4.5) == 2.0

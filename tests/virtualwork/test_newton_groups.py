@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.newton import inverse_norm, solve, solve_columns, stack
+from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
+from virtualwork.newton import Iterate, all_at_once, inverse_norm, newton, solve, solve_columns, stack
+from virtualwork.state import State
 
 
 def triad() -> Mechanism:
@@ -21,17 +22,18 @@ def triad() -> Mechanism:
             "coupler": Link({"B": (0, 0), "C": (80, 0), "E": (45, 60)}),
             "left": Link({"A": (0, 0), "B": (70, 0)}),
             "bar": Link({"D": (0, 0)}),
+            "wheel": Link({"A": (0, 0), "W": (1, 0)}),
         },
         [Guide("C", "coupler", "bar", 5 + 2j, 0.3, -1.4)],
+        [Gear(("bar", "wheel"), 1.3)],
         inputs=Input(link="crank"),
-        guess=Guess(math.radians(90), points={"B": (10, 69), "C": (88, 74), "E": (50, 130), "F": (150, 80)}),
+        guess=Guess(math.radians(90), points={"B": (10, 69), "C": (88, 74), "E": (50, 130), "F": (150, 80)}, angles={"wheel": 0.2}),
     )
 
 
 def test_a_slide_and_a_tied_angle_in_a_group_of_its_own_kind() -> None:
     m = triad()
-    (group,) = m.assembly.plan.groups
-    assert group.kind == "Newton"
+    group = next(g for g in m.assembly.plan.groups if g.kind == "Newton")
     assert group.slides
     assert group.ties
     q = np.radians([80.0, 90.0, 100.0])
@@ -51,6 +53,8 @@ def test_a_slide_and_a_tied_angle_in_a_group_of_its_own_kind() -> None:
     assert motion.point("C").complex(0) == pytest.approx(on_bar, rel=1e-13)
     assert np.exp(1j * motion.link("coupler").angle) == pytest.approx(np.exp(1j * (bar + 0.3 - 1.4)), abs=1e-14)
     assert motion.link("coupler").omega == pytest.approx(motion.link("bar").omega, rel=1e-14)
+    # the wheel counts the turns of the bar from the guess, which is the second pose
+    assert motion.point("W").complex(0) == pytest.approx(np.exp(1j * (0.2 + 1.3 * (bar - bar[1]))), abs=1e-13)
     # the rates against a polynomial through positions close by
     t = np.cos(np.pi * (np.arange(16) + 0.5) / 16) * 0.05
     near = m.motion(q[1] + 2 * t)
@@ -95,3 +99,55 @@ def test_complex_columns_become_two_real_rows() -> None:
     assert solve_columns([[1 + 0j, 1j]], [-3 - 4j]) == [3.0, 4.0]
     many = solve_columns([[1 + 0j, 1j]], [np.array([-3 - 4j, 1j])])
     assert [v.tolist() for v in many] == [[3.0, 0.0], [4.0, -1.0]]
+
+
+def four_bar() -> Mechanism:
+    return Mechanism(
+        {"A": (0, 0), "D": (100, 0)},
+        {
+            "crank": Link({"A": (0, 0), "B": (40, 0)}),
+            "coupler": Link({"B": (0, 0), "C": (120, 0)}),
+            "rocker": Link({"D": (0, 0), "C": (80, 0)}),
+        },
+        inputs=Input(link="crank"),
+        guess=Guess(math.radians(40), {"coupler": 0.3, "rocker": 1.0}),
+    )
+
+
+def test_a_damped_step_never_widens_the_gap() -> None:
+    """From anywhere that leads home: the gap falls from row to row of the table, and no angle turns by more than a radian in a step."""
+    m = four_bar()
+    merged, group = m.assembly.merged
+    rng = np.random.default_rng(0)
+    closed = 0
+    for _ in range(40):
+        st = State([np.array([m.at[0]])], many=True)
+        for step in merged.steps[: merged.steps.index(group)]:
+            m.assembly.run([step], st)
+        table: list[Iterate] = []
+        start = rng.uniform(-math.pi, math.pi, (1, 2))
+        with np.errstate(all="ignore"):
+            _, found = newton(group, st, merged, start, m.size, table=table)
+        if not found[0]:  # in a valley of the gap no twelfth halving falls any further
+            continue
+        closed += 1
+        gaps = np.array([row.residual for row in table])
+        assert (gaps[1:] <= gaps[:-1] * (1 + 1e-12) + 1e-13 * m.size).all()
+        turned = np.abs(np.diff([row.unknowns for row in table], axis=0))
+        assert turned.max() <= 1 + 1e-12
+        assert [row.k for row in table] == list(range(1, len(table) + 1))
+    assert closed >= 30
+
+
+def test_all_at_once_says_how_far_another_assembly_is() -> None:
+    """The two assemblies are mirror images in the diagonal DB: each angle differs by twice that to the diagonal."""
+    m = four_bar()
+    here = m.assembly
+    assert all_at_once(here, m.at).difference < 1e-14
+    (other,) = (a for a in m.assemblies() if a.signs != here.signs)
+    diagonal = 100 - 40 * np.exp(1j * m.at[0])  # from B to D
+    d = abs(diagonal)
+    coupler = math.acos((120**2 + d**2 - 80**2) / (2 * 120 * d))
+    rocker = math.pi - math.acos((80**2 + d**2 - 120**2) / (2 * 80 * d))
+    apart = [abs(math.remainder(2 * angle, 2 * math.pi)) for angle in (coupler, rocker)]
+    assert all_at_once(other, m.at).difference == pytest.approx(max(apart), rel=1e-13)
