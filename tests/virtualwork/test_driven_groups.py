@@ -191,3 +191,51 @@ def test_a_step_reads_what_it_does_not_make_itself() -> None:
     assert "point:D" in plan.reads(group)
     assert [s for s in plan.needed(["point:B"]) if s is group] == []
     assert [s for s in plan.needed(["point:C"]) if s is group] == [group]
+
+
+@pytest.mark.parametrize("order", [("crank", "plate"), ("plate", "crank")])
+def test_a_plate_that_carries_the_rail(order: tuple[str, ...]) -> None:
+    """The pin stands on the crank and the rail slides past it: the plate's origin is B − (through + s·e^{iα})·e^{iθ}."""
+    slope, turned, through = 0.3, 0.4, 0.2j
+    links = {"crank": Link({"O": 0j, "B": 1}), "plate": Link({"K": 0.5 + 0.1j})}
+    m = Mechanism(
+        {"O": 0j},
+        {name: links[name] for name in order},
+        [Guide("B", "crank", "plate", through, slope, turned)],
+        inputs=[Input(link="crank"), Input(slider="B")],
+        guess=Guess((0.5, 0.3)),
+    )
+    q, s = np.array([0.5, 1.2]), np.array([0.3, -0.4])
+    motion = m.motion(np.stack([q, s], axis=1), speed=[2.0, 3.0])
+    turn = np.exp(1j * (q - slope - turned))
+    place = np.exp(1j * q) - (through + s * cmath.exp(1j * slope)) * turn
+    assert motion.point("K").complex(0) == pytest.approx(place + (0.5 + 0.1j) * turn, abs=1e-15)
+    rate = 2j * (motion.point("K").complex(0)) - 3 * cmath.exp(1j * slope) * turn
+    assert motion.point("K").complex(1) == pytest.approx(rate, abs=1e-14)
+
+
+@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize("order", [("sun", "planet", "ring", "arm"), ("arm", "ring", "planet", "sun")])
+def test_a_differential(flip: bool, order: tuple[str, ...]) -> None:
+    """Sun of 20 and ring of 60 teeth both driven: ω_arm = (20 ω_s + 60 ω_r)/80 (Willis), the planet of 20 between them."""
+    links = {
+        "sun": Link({"O": 0j}),
+        "planet": Link({"P": 0j}),
+        "ring": Link({"O": 0j}),
+        "arm": Link({"O": 0j, "P": 2}),
+    }
+    gears = [Gear(("sun", "planet"), -1.0, "arm"), Gear(("planet", "ring"), 20 / 60, "arm")]
+    m = Mechanism(
+        {"O": 0j},
+        {name: links[name] for name in order},
+        gears=gears[::-1] if flip else gears,
+        inputs=[Input(link="sun"), Input(link="ring")],
+        guess=Guess((0.1, 0.2), {"arm": 0.4, "planet": 0.7}),
+    )
+    motion = m.motion(np.array([[0.1, 0.2], [1.3, 0.5]]), speed=[4.0, 1.0])
+    arm = (20 * 4 + 60 * 1) / 80
+    assert motion.link("arm").omega == pytest.approx([arm, arm], rel=1e-14)
+    assert motion.link("planet").omega == pytest.approx([2 * arm - 4.0] * 2, rel=1e-14)
+    turned = (20 * 1.2 + 60 * 0.3) / 80
+    assert motion.link("arm").angle == pytest.approx([0.4, 0.4 + turned], rel=1e-13)
+    assert motion.link("planet").angle == pytest.approx([0.7, 0.7 + 2 * turned - 1.2], rel=1e-13)

@@ -51,3 +51,35 @@ def test_an_input_too_many_turns_away_is_refused_at_once(turns: int) -> None:
     m = both()
     with pytest.raises(MechanismError, match="turns away from the guess"):
         m.motion(m.at[0] + 2 * math.pi * turns).assembled  # noqa: B018
+
+
+def test_a_change_point_and_limits_in_one_loop() -> None:
+    """2 + 4 = 5 + 1: stretched at 180° the linkage may fold over; it reaches no further than d = 5 − 1, cos θ = 1/4."""
+    m = Mechanism(
+        {"A": (0, 0), "D": (4, 0)},
+        {
+            "crank": Link({"A": (0, 0), "B": (2, 0)}),
+            "coupler": Link({"B": (0, 0), "C": (5, 0)}),
+            "rocker": Link({"D": (0, 0), "C": (1, 0)}),
+        },
+        inputs=Input(link="crank"),
+        guess=Guess(math.radians(120), {"coupler": 0.2, "rocker": 1.2}),
+    )
+    check = Check(m.assembly)
+    edge = math.degrees(math.acos(0.25))
+    assert np.degrees(check.input_limits) == pytest.approx([edge, 360 - edge], abs=1e-10)
+    assert np.degrees(check.change_points) == pytest.approx([180], abs=1e-10)
+    q = np.radians(np.arange(76.0, 285.0))
+    motion = m.motion(q, speed=1.0)
+    assert motion.assembled.all()
+    # through 180° by the tangent: the angles run on smoothly, and the triangle BDC turns over
+    rocker = np.unwrap(motion.link("rocker").angle)
+    assert np.abs(np.diff(rocker, 2)).max() < 0.05
+    c, b = motion.point("C").complex(0), motion.point("B").complex(0)
+    side = ((4 - b).conjugate() * (c - b)).imag
+    assert (side[q < 3.14] > 0).all() != (side[q > 3.15] > 0).all()
+    # at 180° B, C and D lie at −2, 3 and 4: the velocity of C from both sides, and its acceleration along the line
+    at = m.motion(math.pi, speed=1.0)
+    w3, w4 = at.link("coupler").omega[0], at.link("rocker").omega[0]
+    assert -2 + 5 * w3 == pytest.approx(-w4, abs=1e-12)
+    assert 2 - 5 * w3**2 == pytest.approx(w4**2, abs=1e-12)
