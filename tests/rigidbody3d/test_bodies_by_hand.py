@@ -153,6 +153,7 @@ def test_steady_precession_without_weight_and_the_other_way_round() -> None:
     """Without weight the slow rate is none and the fast one I3 ω3/(I1 cos θ); a spin reversed reverses both."""
     free = steady_precession(2.0, 3.0, [0.0, 0.0], np.pi / 3, [4.0, -4.0])
     np.testing.assert_allclose(free.slow, [0.0, 0.0], atol=0)
+    assert steady_precession(2.0, 3.0, 0.0, np.pi / 3, 0.0) == (0.0, 0.0)
     np.testing.assert_allclose(free.fast, [12.0, -12.0], rtol=1e-15)
     # 2·½·x² - 3·5·x + 14 = 0: x = 1 and 14
     heavy = steady_precession(2.0, 3.0, 14.0, np.pi / 3, [5.0, -5.0])

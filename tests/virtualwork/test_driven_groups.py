@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
+from virtualwork.assur import direction
 
 QUARTER = math.pi / 2
 
@@ -180,7 +181,11 @@ def test_a_wheel_on_a_block_that_turns_with_its_disc() -> None:
 def test_a_step_reads_what_it_does_not_make_itself() -> None:
     m = Mechanism(
         {"A": 0j, "D": 4},
-        {"crank": Link({"A": 0j, "B": 1}), "coupler": Link({"B": 0j, "C": 4}), "rocker": Link({"D": 0j, "C": 2})},
+        {
+            "crank": Link({"A": 0j, "B": 1}),
+            "coupler": Link({"B": 0j, "C": 4}),
+            "rocker": Link({"D": 0j, "C": 2}),
+        },
         inputs=Input(link="crank"),
         guess=Guess(0.5, {"coupler": 0.4, "rocker": 1.5}),
     )
@@ -197,19 +202,21 @@ def test_a_step_reads_what_it_does_not_make_itself() -> None:
 def test_a_plate_that_carries_the_rail(order: tuple[str, ...]) -> None:
     """The pin stands on the crank and the rail slides past it: the plate's origin is B − (through + s·e^{iα})·e^{iθ}."""
     slope, turned, through = 0.3, 0.4, 0.2j
-    links = {"crank": Link({"O": 0j, "B": 1}), "plate": Link({"K": 0.5 + 0.1j})}
+    links = {"crank": Link({"O": 0j, "A": 0.5j, "B": 1}), "plate": Link({"K": 0.5 + 0.1j})}
     m = Mechanism(
         {"O": 0j},
-        {name: links[name] for name in order},
-        [Guide("B", "crank", "plate", through, slope, turned)],
+        {name: links[name] for name in order} | {"rod": Link({"A": 0j, "S": 2})},
+        [Guide("S", "rod"), Guide("B", "crank", "plate", through, slope, turned)],  # a slider-crank beside it
         inputs=[Input(link="crank"), Input(slider="B")],
-        guess=Guess((0.5, 0.3)),
+        guess=Guess((0.5, 0.3), {"rod": -0.2}),
     )
     q, s = np.array([0.5, 1.2]), np.array([0.3, -0.4])
     motion = m.motion(np.stack([q, s], axis=1), speed=[2.0, 3.0])
     turn = np.exp(1j * (q - slope - turned))
     place = np.exp(1j * q) - (through + s * cmath.exp(1j * slope)) * turn
     assert motion.point("K").complex(0) == pytest.approx(place + (0.5 + 0.1j) * turn, abs=1e-15)
+    a = 0.5j * np.exp(1j * q)
+    assert motion.slide("S").position == pytest.approx(a.real + np.sqrt(4 - a.imag**2), rel=1e-15)
     rate = 2j * (motion.point("K").complex(0)) - 3 * cmath.exp(1j * slope) * turn
     assert motion.point("K").complex(1) == pytest.approx(rate, abs=1e-14)
 
@@ -239,3 +246,41 @@ def test_a_differential(flip: bool, order: tuple[str, ...]) -> None:
     turned = (20 * 1.2 + 60 * 0.3) / 80
     assert motion.link("arm").angle == pytest.approx([0.4, 0.4 + turned], rel=1e-13)
     assert motion.link("planet").angle == pytest.approx([0.7, 0.7 + 2 * turned - 1.2], rel=1e-13)
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.6])
+def test_cranks_on_one_belt(apart: float) -> None:
+    """A five-bar whose outer links a belt holds at one angle, driven at a coupler: a triangle, as both outer links turn."""
+    up, down, left, right, base = 3.0, 2.2, 2.0, 1.0, 4.0
+    m = Mechanism(
+        {"A": 0j, "E": base},
+        {
+            "up": Link({"B": 0j, "C": up}),
+            "left": Link({"A": 0j, "B": left}),
+            "right": Link({"E": 0j, "D": right}),
+            "down": Link({"D": 0j, "C": down}),
+        },
+        gears=[Gear(("left", "right"), 1.0)],
+        inputs=Input(link="up"),
+        guess=Guess(0.3, {"left": 1.2, "right": 1.2 + apart, "down": 1.9}),
+    )
+    motion = m.motion(np.array([0.3, 0.35]))
+    assert motion.assembled.all()
+    # down·e^{iψ} = up·e^{iφ} − base + (left − right·e^{ic})·e^{iθ}
+    for i, phi in enumerate((0.3, 0.35)):
+        known, arm = up * cmath.exp(1j * phi) - base, left - right * cmath.exp(1j * apart)
+        opening = math.acos((down**2 - abs(known) ** 2 - abs(arm) ** 2) / (2 * abs(known) * abs(arm)))
+        both = [cmath.exp(1j * (cmath.phase(known) - cmath.phase(arm) + side * opening)) for side in (1, -1)]
+        theta = cmath.exp(1j * motion.link("left").angle[i])
+        assert min(abs(theta - e) for e in both) < 1e-13
+        right_turn = cmath.exp(1j * motion.link("right").angle[i])
+        assert right_turn == pytest.approx(theta * cmath.exp(1j * apart), abs=1e-13)
+        assert abs(motion.point("C").complex(0)[i] - motion.point("D").complex(0)[i]) == pytest.approx(
+            down, rel=1e-13
+        )
+
+
+def test_rails_at_quarter_turns_are_exact() -> None:
+    turns = [direction(k * math.pi / 2) for k in range(-4, 5)]
+    assert turns == [1, 1j, -1, -1j, 1, 1j, -1, -1j, 1]
+    assert direction(1.0) == cmath.exp(1j)

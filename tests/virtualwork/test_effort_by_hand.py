@@ -67,7 +67,9 @@ def test_springs_may_be_named_from_either_end(swap: bool) -> None:
         inputs=Input(link="bar"),
         springs=[Spring(ends[::-1] if swap else ends, k, s0)],
         torsion_springs=[
-            TorsionSpring(("bar", "ground"), kt, -free) if swap else TorsionSpring(("ground", "bar"), kt, free)
+            TorsionSpring(("bar", "ground"), kt, -free)
+            if swap
+            else TorsionSpring(("ground", "bar"), kt, free)
         ],
     )
     theta = np.array([0.3, 1.0, 2.0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import mpmath as mp
@@ -19,7 +20,9 @@ G = 9.81
 def bar(**loads: Any) -> Mechanism:
     """A bar of 2 kg on a pivot, its centre of mass at 0.5 m."""
     gravity = loads.pop("gravity", -G * 1j)
-    return Mechanism({"O": 0j}, {"bar": Link({"O": 0j}, 2.0, 0.5)}, inputs=Input(link="bar"), gravity=gravity, **loads)
+    return Mechanism(
+        {"O": 0j}, {"bar": Link({"O": 0j}, 2.0, 0.5)}, inputs=Input(link="bar"), gravity=gravity, **loads
+    )
 
 
 def slider_crank(**loads: Any) -> Mechanism:
@@ -59,7 +62,7 @@ def test_a_torsion_spring_and_a_torque(first: str) -> None:
         # all sign changes of V' over the turn
         grid = [mp.mpf(i) / 50 for i in range(315)]
         slope = [mp.diff(energy, t) for t in grid]
-        assert len(found) == sum(a * b < 0 for a, b in zip(slope, slope[1:], strict=False)) > 0
+        assert len(found) == sum(a * b < 0 for a, b in pairwise(slope)) > 0
         for e in found:
             exact = mp.findroot(lambda t: mp.diff(energy, t), e.inputs[0])
             bend = float(mp.diff(energy, exact, 2))
@@ -86,7 +89,7 @@ def test_springs_between_two_moving_links() -> None:
     with mp.workdps(30):
         found = equilibria(m).found
         slope = [mp.diff(energy, mp.mpf(i) / 20) for i in range(126)]
-        assert len(found) == sum(a * b < 0 for a, b in zip(slope, slope[1:], strict=False)) > 0
+        assert len(found) == sum(a * b < 0 for a, b in pairwise(slope)) > 0
         for e in found:
             exact = mp.findroot(lambda t: mp.diff(energy, t), e.inputs[0])
             assert e.inputs[0] == pytest.approx(float(exact), rel=1e-13)

@@ -83,9 +83,12 @@ def test_a_slot_that_turns_and_rubs(speed: float) -> None:
 
 
 def test_friction_where_there_is_no_joint() -> None:
+    m = Mechanism(
+        {"O": 0j},
+        {"bar": Link({"O": 0j, "P": 1}, 1.0, 0.5)},
+        inputs=Input(link="bar"),
+        friction=[Friction("P", 0.1, 0.01)],
+    )
+    motion = m.motion(0.3, 1.0)
     with pytest.raises(DescriptionError, match="no joint"):
-        m = Mechanism(
-            {"O": 0j}, {"bar": Link({"O": 0j, "P": 1}, 1.0, 0.5)}, inputs=Input(link="bar"),
-            friction=[Friction("P", 0.1, 0.01)],
-        )  # fmt: skip
-        _ = m.motion(0.3, 1.0).effort
+        motion.effort  # noqa: B018

@@ -27,7 +27,11 @@ def triad() -> Mechanism:
         [Guide("C", "coupler", "bar", 5 + 2j, 0.3, -1.4)],
         [Gear(("bar", "wheel"), 1.3)],
         inputs=Input(link="crank"),
-        guess=Guess(math.radians(90), points={"B": (10, 69), "C": (88, 74), "E": (50, 130), "F": (150, 80)}, angles={"wheel": 0.2}),
+        guess=Guess(
+            math.radians(90),
+            points={"B": (10, 69), "C": (88, 74), "E": (50, 130), "F": (150, 80)},
+            angles={"wheel": 0.2},
+        ),
     )
 
 
@@ -51,7 +55,9 @@ def test_a_slide_and_a_tied_angle_in_a_group_of_its_own_kind() -> None:
     slide = motion.slide("C").position
     on_bar = 100 + np.exp(1j * bar) * (5 + 2j + slide * np.exp(0.3j))
     assert motion.point("C").complex(0) == pytest.approx(on_bar, rel=1e-13)
-    assert np.exp(1j * motion.link("coupler").angle) == pytest.approx(np.exp(1j * (bar + 0.3 - 1.4)), abs=1e-14)
+    assert np.exp(1j * motion.link("coupler").angle) == pytest.approx(
+        np.exp(1j * (bar + 0.3 - 1.4)), abs=1e-14
+    )
     assert motion.link("coupler").omega == pytest.approx(motion.link("bar").omega, rel=1e-14)
     # the wheel counts the turns of the bar from the guess, which is the second pose
     assert motion.point("W").complex(0) == pytest.approx(np.exp(1j * (0.2 + 1.3 * (bar - bar[1]))), abs=1e-13)
@@ -71,7 +77,9 @@ def test_a_slide_and_a_tied_angle_in_a_group_of_its_own_kind() -> None:
 
 
 def test_a_singular_pose_spoils_no_other() -> None:
-    jacobian = np.array([[[2.0, 0.0], [0.0, 4.0]], [[1.0, 2.0], [2.0, 4.0]], [[np.nan, 0.0], [0.0, 1.0]], np.eye(2)])
+    jacobian = np.array(
+        [[[2.0, 0.0], [0.0, 4.0]], [[1.0, 2.0], [2.0, 4.0]], [[np.nan, 0.0], [0.0, 1.0]], np.eye(2)]
+    )
     right = np.array([[2.0, 4.0], [1.0, 1.0], [1.0, 1.0], [5.0, np.inf]])
     x = solve(jacobian, right)
     assert x[0].tolist() == [1.0, 1.0]

@@ -62,7 +62,10 @@ def test_joints_beside_the_redundancy_feel_nothing_of_it() -> None:
                 continue
             force = alone.dynamics.joint_force(joint, body)
             assert np.isfinite(force).all()
-            assert np.abs(both.dynamics.joint_force(twin, body) - force).max() < 1e-11 * size, (joint.name, body)
+            assert np.abs(both.dynamics.joint_force(twin, body) - force).max() < 1e-11 * size, (
+                joint.name,
+                body,
+            )
             if joint.guide is not None:
                 moment = alone.dynamics.joint_moment(joint, body)
                 assert both.dynamics.joint_moment(twin, body) == pytest.approx(moment, abs=1e-11 * size)

@@ -24,7 +24,9 @@ def both() -> Mechanism:
             "lever": Link({"E": (0, 0), "F": (2, 0)}),
         },
         inputs=Input(link="crank"),
-        guess=Guess(math.radians(270), {"coupler": 0.0, "rocker": math.radians(270), "rod": 1.9, "lever": 3.4}),
+        guess=Guess(
+            math.radians(270), {"coupler": 0.0, "rocker": math.radians(270), "rod": 1.9, "lever": 3.4}
+        ),
     )
 
 
