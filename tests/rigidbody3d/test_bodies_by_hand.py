@@ -12,7 +12,9 @@ from rigidbody3d import (
     check,
     compose,
     cones,
+    mesh,
     principal,
+    products,
     sleeping_threshold,
     steady_precession,
     tensor,
@@ -160,3 +162,13 @@ def test_steady_precession_without_weight_and_the_other_way_round() -> None:
     np.testing.assert_allclose(heavy.slow, [1.0, -1.0], rtol=2e-15)
     np.testing.assert_allclose(heavy.fast, [14.0, -14.0], rtol=2e-15)
     assert sleeping_threshold(2.0, 3.0, 4.5) == 2.0
+
+
+def test_a_tetrahedron_far_from_the_origin() -> None:
+    """Of volume 1/6, ∫x² = 1/60 and ∫xy = 1/120 from its corner: 1/160 and −1/480 from its centre."""
+    corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) + [8.0, 16.0, -32.0]
+    mass, center, inertia = mesh(corner, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], density=12.0)
+    assert mass == pytest.approx(2.0, rel=1e-14)
+    np.testing.assert_allclose(center, [8.25, 16.25, -31.75], rtol=1e-15)
+    np.testing.assert_allclose(products(inertia), [-0.025] * 3, rtol=1e-13)
+    np.testing.assert_allclose(inertia.diagonal(), [0.15] * 3, rtol=1e-13)
