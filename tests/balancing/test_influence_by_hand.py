@@ -51,6 +51,8 @@ def test_significance_and_the_combination_least_seen_with_weights() -> None:
     combination, share = unseen([[1, 1j]])
     assert share == 0
     assert combination == pytest.approx([1, 1j], abs=1e-14)
+    combination, share = unseen([[2.0j], [1.0]])
+    assert (combination.tolist(), share) == ([1.0], 1.0)
     # a plane half as strong needs twice the mass to stay unseen
     combination, _ = unseen([[2, 1], [2, 1], [0, 0]])
     assert combination == pytest.approx([-0.5, 1], abs=1e-14)
