@@ -177,3 +177,53 @@ def test_two_inputs_with_torsion_springs() -> None:
     assert e.stiffness == pytest.approx(half - math.sqrt(half**2 - k1 * k2), rel=1e-12)
     assert e.stable is True
     assert abs(e.potential or 0.0) < 1e-25
+
+
+def test_a_range_with_gaps_and_a_range_about_zero() -> None:
+    """A four-bar that cannot turn all the way, 2 kg at its rocker's pin: V = m g y_C, from the two circles' cut."""
+    m = Mechanism(
+        {"A": 0j, "D": 4},
+        {
+            "crank": Link({"A": 0j, "B": 2}),
+            "coupler": Link({"B": 0j, "C": 5}),
+            "rocker": Link({"D": 0j, "C": 2}, 2.0, 2.0),
+        },
+        inputs=Input(link="crank"),
+        guess=Guess(math.pi, {"coupler": 0.3, "rocker": 2.0}),
+        gravity=-G * 1j,
+    )
+
+    def energy(t: Any) -> Any:
+        b = 2 * mp.expj(t)
+        d = abs(4 - b)
+        foot = (d**2 + 25 - 4) / (2 * d)
+        return 2 * G * (b + mp.mpc(foot, mp.sqrt(25 - foot**2)) * (4 - b) / d).imag
+
+    with mp.workdps(30):
+        edge = mp.acos(mp.mpf(11) / 16)
+        grid = [edge + (2 * mp.pi - 2 * edge) * i / 200 for i in range(1, 200)]
+        slope = [mp.diff(energy, t, h=mp.mpf(10) ** -12) for t in grid]
+        exact = [
+            mp.findroot(lambda t: mp.diff(energy, t), (t + u) / 2)
+            for (t, a), (u, b) in pairwise(zip(grid, slope, strict=True))
+            if a * b < 0
+        ]
+        assert exact
+        for span in (None, [[0.0, 2 * math.pi]], [[-0.5, 2 * math.pi - 0.5]]):
+            found = equilibria(m, span).found
+            assert [e.inputs[0] for e in found] == pytest.approx([float(t) for t in exact], rel=1e-11)
+            for e, t in zip(found, exact, strict=True):
+                assert e.stiffness == pytest.approx(float(mp.diff(energy, t, 2)), rel=1e-9)
+
+
+def test_an_equilibrium_at_the_end_of_the_range_is_found_though_the_end_is_rounded() -> None:
+    """sin(−π) and cos(−π/2) are not zero in doubles, and have no other sign beside them."""
+    turned = equilibria(bar(gravity=-G + 0j), [[-math.pi, math.pi]]).found
+    assert [e.inputs[0] for e in turned] == pytest.approx([-math.pi, 0.0], abs=1e-12)
+    hanging, standing = equilibria(bar(), [[-math.pi / 2, 3 * math.pi / 2]]).found
+    assert (hanging.inputs[0], standing.inputs[0]) == pytest.approx((-math.pi / 2, math.pi / 2), abs=1e-12)
+    assert (hanging.stable, standing.stable) == (True, False)
+    assert [e.inputs[0] for e in equilibria(bar(), [[0.1, math.pi / 2]]).found] == [math.pi / 2]
+    # half a turn that begins and ends at rest is no whole one: both count
+    half = equilibria(bar(gravity=-G + 0j), [[0.0, math.pi]]).found
+    assert [e.inputs[0] for e in half] == pytest.approx([0.0, math.pi], abs=1e-12)
