@@ -12,6 +12,8 @@ from rigidbody3d import (
     check,
     compose,
     cones,
+    inertia_of,
+    measure_of,
     mesh,
     principal,
     products,
@@ -172,3 +174,39 @@ def test_a_tetrahedron_far_from_the_origin() -> None:
     np.testing.assert_allclose(center, [8.25, 16.25, -31.75], rtol=1e-15)
     np.testing.assert_allclose(products(inertia), [-0.025] * 3, rtol=1e-13)
     np.testing.assert_allclose(inertia.diagonal(), [0.15] * 3, rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("shape", "dimensions", "moments", "measure"),
+    [
+        ("box", {"width": 2, "height": 3, "depth": 4}, (25 / 12, 20 / 12, 13 / 12), 24),
+        ("plate", {"width": 2, "height": 3}, (9 / 12, 4 / 12, 13 / 12), 6),
+        ("rod", {"length": 3}, (9 / 12, 9 / 12, 0), 3),
+        ("cylinder", {"radius": 2, "length": 3}, (1.75, 1.75, 2), 12 * np.pi),
+        ("cone", {"radius": 2, "length": 3}, (0.9375, 0.9375, 1.2), 4 * np.pi),
+        ("tube", {"radius": 3, "inner_radius": 2, "length": 6}, (6.25, 6.25, 6.5), 30 * np.pi),
+        ("disk", {"radius": 2}, (1, 1, 2), 4 * np.pi),
+        ("ring", {"radius": 2}, (2, 2, 4), 4 * np.pi),
+        ("sphere", {"radius": 2, "inner_radius": 1}, (12.4 / 7,) * 3, 28 / 3 * np.pi),
+        ("sphere", {"radius": 2}, (1.6,) * 3, 32 / 3 * np.pi),
+        ("arc", {"radius": 2, "angle": np.pi}, (2, 2 - 16 / np.pi**2, 4 - 16 / np.pi**2), 2 * np.pi),
+    ],
+)
+def test_shapes_without_a_length_of_one(shape: str, dimensions, moments, measure: float) -> None:
+    """The tables' formulas with numbers whose powers all differ, for 3 kg."""
+    np.testing.assert_allclose(
+        inertia_of(shape, 3.0, **dimensions), 3.0 * np.diag(moments), rtol=1e-15, atol=1e-15
+    )
+    found, thin = measure_of(shape, **dimensions)
+    assert found == pytest.approx(measure, rel=1e-15)
+    assert thin == {"plate": 2, "disk": 2, "rod": 1, "ring": 1, "arc": 1}.get(shape, 3)
+
+
+def test_a_dimension_of_zero_is_none_but_a_bore_may_be() -> None:
+    for shape, dimensions in (("rod", {"length": 0}), ("box", {"width": 1, "height": 0, "depth": 1})):
+        with pytest.raises(ValueError, match="positive"):
+            inertia_of(shape, 1.0, **dimensions)
+    with pytest.raises(ValueError, match="positive"):
+        inertia_of("disk", 1.0, radius=[1.0, -1.0])
+    solid = inertia_of("cylinder", 1.0, radius=2, length=3)
+    np.testing.assert_allclose(inertia_of("tube", 1.0, radius=2, inner_radius=0, length=3), solid, rtol=1e-15)

@@ -26,9 +26,9 @@ def test_the_torque_turned_into_space_by_hand_is_the_same(torque: list[float]) -
     np.testing.assert_allclose(function.momentum, body.momentum, atol=1e-12)
 
 
-@pytest.mark.parametrize("torque", TORQUES)
-def test_eulers_equations(torque: list[float]) -> None:
+def test_eulers_equations() -> None:
     """I ω̇ + ω × I ω = M in body axes, by Taylor series of 30 digits."""
+    torque = TORQUES[-1]
     with mp.workdps(30):
 
         def rates(s, w):

@@ -172,3 +172,40 @@ def test_a_load_that_nothing_can_hold_has_no_reactions() -> None:
     assert d.newton_euler[1, 0] == pytest.approx(0.0, abs=1e-12)
     assert d.effort[1, 0] == pytest.approx(0.0, abs=1e-14)
     assert np.isnan(d.newton_euler[0, 0])
+
+
+def test_what_is_determined_of_three_cranks_is_named() -> None:
+    """The cranks share the coupler's load; known are the sums that the forces on each link, and on all, must have."""
+    m = Mechanism(
+        {"A": 0j, "D": 2, "F": 1},
+        {
+            "crank": Link({"A": 0j, "B": 1}),
+            "coupler": Link({"B": 0j, "E": 1, "C": 2}, 3.0, 0.8),
+            "middle": Link({"F": 0j, "E": 1}),
+            "rocker": Link({"D": 0j, "C": 1}),
+        },
+        inputs=Input(link="crank"),
+        guess=Guess(1.0, {"coupler": 0.0, "middle": 1.0, "rocker": 1.0}),
+        gravity=-9.81j,
+    )
+    d = m.motion(np.array([0.9, 1.2])).dynamics
+    assert d.statics is not None
+    open_, sums = d.statics.undetermined()
+    pins = (
+        "A on crank",
+        "D on rocker",
+        "F on middle",
+        "B on crank",
+        "B on coupler",
+        "E on coupler",
+        "E on middle",
+    )
+    for axis in ("fx", "fy"):
+        for pin in (*pins, "C on coupler", "C on rocker"):
+            assert f"{axis} at {pin}" in open_
+    links = ("crank at A and B", "coupler at B and E and C", "middle at F and E", "rocker at D and C")
+    assert sums == "determined are the sums of " + "; ".join(
+        text
+        for axis in ("fx", "fy")
+        for text in (*(f"{axis} on {link}" for link in links), f"{axis} from the ground at A and D and F")
+    )
