@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from balancing import DependentPlanes, condition_number, least_squares, minimax, plane_significance, unseen
+from balancing import (
+    DependentPlanes,
+    Infeasible,
+    condition_number,
+    least_squares,
+    minimax,
+    plane_significance,
+    unseen,
+)
 
 EPS = np.finfo(float).eps
 
@@ -107,3 +115,35 @@ def test_dependent_planes_are_kept_apart_by_their_limits() -> None:
     held = minimax(alpha, v, 1.0)
     assert held.residual_max == pytest.approx(2.0, rel=1e-8)
     assert held.bound == pytest.approx(2.0, rel=1e-8)
+
+
+def test_a_sensor_that_no_plane_moves_excuses_no_other() -> None:
+    """Of (1, 10) the plane moves the first alone: it is brought to nothing, though the second stays at ten."""
+    fix = minimax([[1.0], [0.0]], [1.0, 10.0])
+    assert fix.corrections == pytest.approx([-1.0], rel=1e-12)
+    assert fix.residual_max == 10
+    assert fix.bound == 10
+    fix = minimax(
+        [[2.0], [0.0], [2.0j]], [1.0, 10.0, 1.0]
+    )  # 1 + 2w and 1 + 2iw: alike in size at w = (-1 + i)/4
+    assert fix.corrections == pytest.approx([(-1 + 1j) / 4], abs=1e-10)
+    assert np.abs(fix.residual)[[0, 2]] == pytest.approx([np.sqrt(0.5)] * 2, rel=1e-10)
+
+
+@pytest.mark.parametrize("size", [1e-6, 0.1, 1e6])
+def test_a_ceiling_in_any_unit(size: float) -> None:
+    """Residuals 1 + w and 1 − w: least squares leaves w = 0 and 1 each, weighted it may leave at most 1.2."""
+    alpha, v = np.array([[1.0], [-1.0]]), np.array([1.0, 1.0]) * size
+    assert least_squares(alpha, v, max_residual=1.5 * size).corrections == pytest.approx(
+        [0.0], abs=1e-12 * size
+    )
+    fix = least_squares(
+        alpha, v, [9.0, 1.0], max_residual=1.2 * size
+    )  # freely −0.8, which leaves 0.2 and 1.8
+    assert fix.corrections == pytest.approx([-0.2 * size], rel=1e-6)
+    assert fix.residual_max <= 1.2 * size
+    with pytest.raises(Infeasible) as caught:
+        least_squares(alpha, v, max_residual=0.9 * size)
+    assert caught.value.smallest == pytest.approx(size, rel=1e-9)
+    with pytest.raises(ValueError, match="positive"):
+        least_squares(alpha, v, max_residual=0.0)

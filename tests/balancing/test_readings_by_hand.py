@@ -67,3 +67,14 @@ def test_the_covariance_across_a_zero_correction_is_in_space_axes() -> None:
     assert found[1] == pytest.approx(np.diag([0.04, 0.0]), rel=1e-13, abs=1e-18)
     moved = Readings(np.array([2.0j, 4.0j]), 0.1, 0.0, influence=alpha).covariance(np.zeros(2))
     assert moved[0] == pytest.approx(np.diag([0.0, 0.04]), rel=1e-13, abs=1e-18)
+
+
+def test_the_spread_of_four_draws() -> None:
+    """A tenth along and a fifth across 0.5i, to either side: variances of (0.05² + 0.05²)/4 and (0.1² + 0.1²)/4."""
+    about = np.array([0.5j])
+    drawn = about * np.array([[1.1], [0.9], [1 + 0.2j], [1 - 0.2j]])
+    assert spread(drawn, about)[0] == pytest.approx(np.diag([0.05**2 / 2, 0.1**2 / 2]), abs=1e-16)
+    # about no correction at all the axes are those of space
+    assert spread(np.array([[0.3], [-0.3], [0.2j], [-0.2j]]), np.zeros(1, dtype=complex))[0] == pytest.approx(
+        np.diag([0.045, 0.02]), abs=1e-16
+    )

@@ -124,3 +124,16 @@ def test_counterweights_on_links_that_turn_alike_are_refused() -> None:
     assert np.abs(after).max() < 1e-11 * np.abs(before).max()
     with pytest.raises(DescriptionError, match="speed is zero"):
         least_squares(m.motion(np.linspace(0.2, 1.4, 30)), ["crank"])
+
+
+def test_a_turn_that_begins_anywhere_and_one_in_uneven_steps() -> None:
+    m = arm(torques=[Torque("arm", -4.0)])
+    begun = Cycle(m.motion(np.linspace(0.7, 0.7 + 2 * math.pi, 181), 6.0))
+    assert begun.whole
+    assert begun.work == pytest.approx(8 * math.pi, rel=1e-13)
+    # crowded where the weight is lifted: their plain mean would be wrong
+    q = np.linspace(0, 2 * math.pi, 361)
+    uneven = Cycle(m.motion(q - 0.9 * np.sin(q), 6.0))
+    assert not uneven.whole
+    assert uneven.work == pytest.approx(8 * math.pi, rel=1e-6)
+    assert uneven.fluctuation == pytest.approx(2 * G, rel=1e-5)

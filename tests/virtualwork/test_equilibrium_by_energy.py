@@ -227,3 +227,23 @@ def test_an_equilibrium_at_the_end_of_the_range_is_found_though_the_end_is_round
     # half a turn that begins and ends at rest is no whole one: both count
     half = equilibria(bar(gravity=-G + 0j), [[0.0, math.pi]]).found
     assert [e.inputs[0] for e in half] == pytest.approx([0.0, math.pi], abs=1e-12)
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e12])
+def test_equilibria_in_any_unit(scale: float) -> None:
+    """A watch and a ship: V = M (sin θ + (θ − 0.7)²/6), stable or not whatever M."""
+    m = Mechanism(
+        {"O": 0j},
+        {"bar": Link({"O": 0j}, 2.0 * scale, 0.5)},
+        inputs=Input(link="bar"),
+        gravity=-G * 1j,
+        torsion_springs=[TorsionSpring(("ground", "bar"), G / 3 * scale, 0.7)],
+    )
+    found = equilibria(m).found
+    one = equilibria(bar(torsion_springs=[TorsionSpring(("ground", "bar"), G / 3, 0.7)])).found
+    assert [e.inputs[0] for e in found] == pytest.approx([e.inputs[0] for e in one], rel=1e-13)
+    for e in found:
+        bend = -math.sin(e.inputs[0]) + 1 / 3
+        assert math.cos(e.inputs[0]) == pytest.approx(-(e.inputs[0] - 0.7) / 3, abs=1e-13)
+        assert e.stiffness == pytest.approx(G * scale * bend, rel=1e-12)
+        assert e.stable is (bend > 0)
