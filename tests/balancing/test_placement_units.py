@@ -43,6 +43,14 @@ def test_a_split(scale: float) -> None:
     assert one.bound == pytest.approx(0.5 * scale, rel=1e-12)
 
 
+def test_of_several_ways_that_fit_the_lightest() -> None:
+    """Within their limits the neighbours of the target share it by the sine rule, though filling others would do too."""
+    found = place(3, np.radians([90, 180, 210, 240, 330]), [2, 5, 1, 3, 4])
+    assert found.masses == pytest.approx([np.sqrt(3), 0, 0, 0, 2 * np.sqrt(3)], abs=1e-14)
+    found = place(-3, np.radians([150, 240, 270]), [4, 2, 2])
+    assert found.masses == pytest.approx([1.5 * np.sqrt(3), 1.5, 0], abs=1e-14)
+
+
 def test_a_pointed_drill() -> None:
     """Of 90° its cone is as deep as its radius: π r³/3; below it a full bore, above it a smaller cone alike."""
     r, rho = 0.005, 7800.0
@@ -52,6 +60,7 @@ def test_a_pointed_drill() -> None:
     assert drill_depth(cone + rho * np.pi * r**2 * 0.01, 2 * r, rho, np.pi / 2) == pytest.approx(
         0.015, rel=1e-14
     )
+    assert drill_depth([0.0, cone], 2 * r, rho, np.pi / 2) == pytest.approx([0.0, r], rel=1e-14)
     # of 118° (r/tan 59°) a quarter of the way down
     point = r / np.tan(np.radians(59))
     mass = rho * np.pi * r**2 * point / 3 / 64

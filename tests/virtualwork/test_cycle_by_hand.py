@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from virtualwork import DescriptionError, Guess, Guide, Input, Link, Mechanism
-from virtualwork.counterweights import least_squares
+from virtualwork.counterweights import berkof_lowen, least_squares
 from virtualwork.cycle import Cycle
 from virtualwork.mechanism import Friction, Spring, Torque, TorsionSpring
 
@@ -137,3 +137,24 @@ def test_a_turn_that_begins_anywhere_and_one_in_uneven_steps() -> None:
     assert not uneven.whole
     assert uneven.work == pytest.approx(8 * math.pi, rel=1e-6)
     assert uneven.fluctuation == pytest.approx(2 * G, rel=1e-5)
+
+
+def test_berkof_and_lowen_with_pivots_away_from_the_links_origins() -> None:
+    """Crank of 1, coupler of 3, rocker of 2 m: m₃ = 3 kg at a third gives 2 kg to B and 1 kg to C."""
+    m = Mechanism(
+        {"A": 0j, "D": 4},
+        {
+            "crank": Link({"A": 5j, "B": 1 + 5j}, 1.0, 0.5 + 5j),
+            "coupler": Link({"B": -2.0, "C": 1.0}, 3.0, -1.0),
+            "rocker": Link({"D": 7.0, "C": 7.0 + 2j}, 2.0, 7.0 + 1j),
+        },
+        inputs=Input(link="crank"),
+        guess=Guess(0.5, {"coupler": 0.4, "rocker": 0.0}),
+    )
+    exact = berkof_lowen(m, "crank", "coupler", "rocker")
+    assert exact["crank"] == pytest.approx(-(0.5 + 2.0), rel=1e-15)
+    assert exact["rocker"] == pytest.approx(-(2j + 2j), rel=1e-15)
+    weights, before, after = least_squares(m.motion(np.linspace(0.1, 2.0, 40), 3.0), ["crank", "rocker"])
+    for link, weight in exact.items():
+        assert weights[link] == pytest.approx(weight, rel=1e-10)
+    assert np.abs(after).max() < 1e-12 * np.abs(before).max()
