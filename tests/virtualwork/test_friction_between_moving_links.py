@@ -82,6 +82,29 @@ def test_a_slot_that_turns_and_rubs(speed: float) -> None:
         assert motion.dynamics.joint_force(guide, "lever")[i] == pytest.approx(-force, rel=1e-13)
 
 
+def test_a_plate_that_hangs_on_its_rubbing_rail() -> None:
+    """The plate is placed by the rail itself: driven along it at 2 m/s, μ m g cos θ pushes with its weight's part."""
+    mu, mass, slope = 0.25, 4.0, 0.3
+    m = Mechanism(
+        {"O": 0j},
+        {"arm": Link({"O": 0j, "B": 1.0}), "plate": Link({"K": 0j}, mass, 0j)},
+        [Guide("B", "arm", "plate", 0j, slope, 0.0)],
+        inputs=[Input(link="arm"), Input(slider="B")],
+        guess=Guess((0.6, 0.0)),
+        gravity=-G * 1j,
+        friction=[Friction("B", mu)],
+    )
+    # the plate turns with the arm, at θ − slope; the rail lies along θ; the pin slides on it at s
+    for speed in (2.0, -2.0):
+        motion = m.motion(np.array([[0.6, 0.4]]), speed=[0.0, speed])
+        normal = mass * G * math.cos(0.6)
+        push = -mass * G * math.sin(0.6) + math.copysign(mu * normal, speed)
+        # the plate's centre stands at B − s·e^{iθ}: the arm holds its weight there
+        torque = mass * G * (1 - 0.4) * math.cos(0.6)
+        assert motion.dynamics.effort[0] == pytest.approx([torque, push], rel=1e-13)
+        assert motion.dynamics.newton_euler[0] == pytest.approx([torque, push], rel=1e-13)
+
+
 def test_friction_where_there_is_no_joint() -> None:
     m = Mechanism(
         {"O": 0j},
