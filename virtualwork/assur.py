@@ -142,7 +142,7 @@ class _Planner:
         own = tuple(tie for tie in ties if any(base in free for base, _ in tie.angle.bases))
         self._settle()
         moving = {name for kind, name in block if kind in "xy"} - set(self.anchors)
-        closures, trees = self._loops(moving, set(free) | {t.body for t in own})
+        closures, trees = self._loops(moving)
         unknown = tuple(i for i in slides if i not in self.slides_known)
         if closures or free or unknown:
             held = {*free, *(t.body for t in own), *moving}
@@ -313,7 +313,7 @@ class _Planner:
         self.used.add((f"guide {i}", ""))
         return found
 
-    def _loops(self, moving: set[str], turning: set[str]) -> tuple[list[Closure], dict[str, Chain]]:
+    def _loops(self, moving: set[str]) -> tuple[list[Closure], dict[str, Chain]]:
         """A tree over the block's bodies from what is placed; every joint outside the tree closes a loop."""
         anchors = dict(self.anchors)
         nodes: dict[str, Chain] = {name: (name, ()) for name in self.nodes}

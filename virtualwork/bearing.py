@@ -88,18 +88,27 @@ class Bearing:
     def _hang(self) -> None:
         """Note for each node, angle and slide what bears on it."""
 
-        def bear(base: str | None, terms: Iterable[Term], source: tuple[str, Any]) -> None:
+        def bear(
+            base: str | None,
+            terms: Iterable[Term],
+            source: tuple[str, Any],
+            along: Iterable[Term] | None = None,
+        ) -> None:
             if base is not None:
                 self._hung.setdefault(f"point:{base}", []).append((None, 1.0, source))
             for t in terms:
                 if t.body != GROUND:
                     self._hung.setdefault(f"angle:{t.body}", []).append((t, 1.0, source))
+            for t in terms if along is None else along:
                 if t.slide is not None:
                     self._hung.setdefault(f"slide:{t.slide}", []).append((t, 1.0, source))
 
         for load in self.acting.everything:
             if load.path is not None and load.body != GROUND:
-                bear(*load.path, ("load", load))
+                # what rubs on a rail acts where the pin stands, but on the rail, which does not slide with the pin
+                rail = isinstance(load, Rub) and load.guide is not None and load.sign < 0
+                along = self.acting.path(load.body, load.place)[1] if rail else None
+                bear(*load.path, ("load", load), along)
         for step in self.plan.steps:
             ties = step.ties if isinstance(step, Group) else (step,) if isinstance(step, Turn) else ()
             for tie in ties:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.dyads import Number
+from virtualwork.dyads import Number, dot
 from virtualwork.equilibrium import potential_of
 from virtualwork.loads import SpringEnd, TorsionEnd, path_reads, plus, times
 from virtualwork.scene import Block
-from virtualwork.work import power
+from virtualwork.work import displacement, power
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -69,11 +69,19 @@ class Cycle:
             return float(np.trapezoid(values, self.input))
         from scipy.interpolate import CubicSpline
 
-        return float(CubicSpline(self.input, values).integrate(self.input[0], self.input[-1]))
+        forward = self._forward
+        return float(
+            CubicSpline(self.input[forward], values[forward]).integrate(self.input[0], self.input[-1])
+        )
+
+    @property
+    def _forward(self) -> slice:
+        """The poses in the order of a rising input, as splines want them."""
+        return slice(None, None, -1 if self.input[-1] < self.input[0] else 1)
 
     @cached_property
     def span(self) -> float:
-        """The length of the sweep."""
+        """The length of the sweep, negative backwards."""
         return float(self.input[-1] - self.input[0])
 
     @cached_property
@@ -175,8 +183,11 @@ class Cycle:
         values = self.effort.copy()
         if self.whole:
             values[-1] = values[0]
+        forward = self._forward
         spline = CubicSpline(
-            self.input, values - self.mean, bc_type="periodic" if self.whole else "not-a-knot"
+            self.input[forward],
+            values[forward] - self.mean,
+            bc_type="periodic" if self.whole else "not-a-knot",
         )
         stored = spline.antiderivative()
         crossings = spline.roots(extrapolate=False)
@@ -203,7 +214,10 @@ def _elastic(load: Any, block: Block) -> Number:
     if not isinstance(load, SpringEnd | TorsionEnd) or load.spring is None or not load.spring.stiffness:
         return None
     bare: Any = load.spring
-    undamped: Any = load
+    undamped: Any = load  # a passing one is not kept by the block, which knows loads by their identity
     if bare.damping:
         undamped = replace(undamped, spring=replace(bare, damping=0.0))
-    return power(undamped, block, 0)
+    moved, value = displacement(undamped, block, 0), undamped.value(block)
+    if moved is None or value is None:
+        return None
+    return value * moved if undamped.path is None else dot(value, moved)

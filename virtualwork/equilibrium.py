@@ -292,14 +292,16 @@ def _one(mechanism: Mechanism, span: Reals, samples: int) -> Equilibria:
     # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart
     if not np.median(np.abs(force[good])) > 1e-12 * scale:
         return Equilibria((), everywhere=True, loaded=scale > 0)
-    tiny = np.abs(force) <= 64 * EPS * size
+    slope = rest.along(np.ones(1))
+    # what the rounding of the terms, or of the input itself, makes of zero: the end of a range may be a root
+    shift = 2 * EPS * np.abs(q * np.where(np.isfinite(slope), slope, 0.0))
+    tiny = np.abs(force) <= 64 * EPS * size + shift
     sign = np.where(tiny, 0.0, np.sign(force))
     roots = list(q[tiny & good])
     here = np.flatnonzero(good[:-1] & good[1:] & (sign[:-1] * sign[1:] < 0))
     if len(here):
         roots += list(_refine(mechanism, q[here], q[here + 1], force[here]))
     # a root that the force only touches: its derivative changes sign where it is small
-    slope = rest.along(np.ones(1))
     touch = np.flatnonzero(good[:-1] & good[1:] & (sign[:-1] * sign[1:] > 0) & (slope[:-1] * slope[1:] < 0))
     touch = touch[np.minimum(np.abs(force[touch]), np.abs(force[touch + 1])) < 1e-4 * scale]
     if len(touch):

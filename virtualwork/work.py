@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.dyads import Number, dot
-from virtualwork.loads import Acting, Load, SpringEnd, TorsionEnd, plus, times
+from virtualwork.loads import Acting, Load, Rub, SpringEnd, TorsionEnd, plus, times
 from virtualwork.mechanism import GROUND
 from virtualwork.scene import BLOCK, Block, Scene
 
@@ -32,7 +32,7 @@ def displacement(load: Load, block: Block, j: int) -> Number:
     """The virtual displacement on which a load does work, for a unit of input j; None where it cannot move.
 
     Of a spring between two moving points the first end carries the whole relative displacement, the second none:
-    action and reaction are one term.
+    action and reaction are one term. So does the friction of a guide on a moving link, whose displacement is the slide.
     """
     if isinstance(load, SpringEnd):
         assert load.path is not None
@@ -47,9 +47,20 @@ def displacement(load: Load, block: Block, j: int) -> Number:
             return None
         turn = plus(block.turning(a, j), times(block.turning(b, j), -1.0))
         return times(turn, load.sign)
+    if isinstance(load, Rub) and load.guide is not None and _rail(load, block) != GROUND:
+        if load.sign < 0:
+            return None
+        along = block.scene.plan.directions[load.guide] * block.st.turn[_rail(load, block)]
+        return times(block.by[j].slide[load.guide][0], along)
     if load.path is None:
         return block.turning(load.body, j)
     return block.coefficient(load.path, j)
+
+
+def _rail(load: Rub, block: Block) -> str:
+    """The body that carries the guide in which a load rubs."""
+    assert load.guide is not None
+    return block.scene.mechanism.guides[load.guide].on
 
 
 def power(load: Load, block: Block, j: int) -> Number:
@@ -182,8 +193,10 @@ def ledger(scene: Scene, j: int = 0) -> tuple[dict[str, Reals], list[str], list[
 
 def _reaction_end(load: Load) -> bool:
     """Whether a load is the second side of a pair whose work its first side carries."""
-    return (isinstance(load, SpringEnd) and not load.first) or (
-        isinstance(load, TorsionEnd) and load.sign < 0
+    return (
+        (isinstance(load, SpringEnd) and not load.first)
+        or (isinstance(load, TorsionEnd) and load.sign < 0)
+        or (isinstance(load, Rub) and load.guide is not None and load.sign < 0)
     )
 
 

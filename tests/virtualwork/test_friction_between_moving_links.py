@@ -1,0 +1,117 @@
+"""Friction in a pin between two arms and in a slot that moves, each in closed form."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+
+from virtualwork import DescriptionError, Guess, Guide, Input, Link, Mechanism
+from virtualwork.mechanism import Friction, Torque
+from virtualwork.work import ledger
+
+G = 9.81
+
+
+def cross(a: complex, b: complex) -> float:
+    return (a.conjugate() * b).imag
+
+
+@pytest.mark.parametrize("speeds", [(1.0, 3.0), (2.0, -1.0), (1.5, 1.5)])
+@pytest.mark.parametrize("swap", [False, True])
+def test_an_elbow_that_rubs(speeds: tuple[float, float], swap: bool) -> None:
+    """μ r |R| at the elbow, R = m (a − g) of the lower arm, on it and back on the upper one; none where nothing slips."""
+    mu, radius, reach, center, mass = 0.2, 0.03, 1.2, 0.4, 3.0
+    links = {"upper": Link({"O": 0j, "E": reach}), "lower": Link({"E": 0j}, mass, center)}
+    if swap:
+        links = dict(reversed(links.items()))
+    m = Mechanism(
+        {"O": 0j},
+        links,
+        inputs=(Input(link="upper"), Input(link="lower")),
+        gravity=-G * 1j,
+        friction=[Friction("E", mu, radius)],
+    )
+    one, two = 0.3, 0.9
+    motion = m.motion(np.array([[one, two]]), speed=list(speeds))
+    arm, end = reach * cmath.exp(1j * one), center * cmath.exp(1j * two)
+    held = mass * (-(speeds[0] ** 2) * arm - speeds[1] ** 2 * end + G * 1j)
+    slip = math.copysign(1.0, speeds[1] - speeds[0]) if speeds[1] != speeds[0] else 0.0
+    rub = mu * radius * abs(held) * slip
+    exact = [cross(arm, held) - rub, cross(end, held) + rub]
+    assert motion.dynamics.effort[0] == pytest.approx(exact, rel=1e-13)
+    assert motion.dynamics.newton_euler[0] == pytest.approx(exact, rel=1e-13)
+    (pin,) = motion.dynamics.joints_named("E")
+    assert motion.dynamics.joint_moment(pin, "lower")[0] == pytest.approx(-rub, rel=1e-13)
+    assert motion.dynamics.joint_moment(pin, "upper")[0] == pytest.approx(rub, rel=1e-13)
+
+
+@pytest.mark.parametrize("speed", [2.0, -2.0, 0.0])
+def test_a_slot_that_turns_and_rubs(speed: float) -> None:
+    """A quick return, its lever loaded with M: N = M/d across the slot, and μ N along it against the sliding."""
+    mu, load, base = 0.3, 25.0, -1.5
+    m = Mechanism(
+        {"O": 0j, "Q": base},
+        {"crank": Link({"O": 0j, "B": 1.0}), "lever": Link({"Q": 0j})},
+        [Guide("B", "crank", "lever", "Q")],
+        inputs=Input(link="crank"),
+        guess=Guess(1.0, {"lever": 0.5}),
+        torques=[Torque("lever", load)],
+        friction=[Friction("B", mu)],
+    )
+    q = np.array([0.4, 1.2, 4.0])
+    motion = m.motion(q, speed)
+    for i, theta in enumerate(q):
+        pin = cmath.exp(1j * theta)
+        d = abs(pin - base)
+        rail = (pin - base) / d
+        normal = load / d  # on the pin, along i·rail: the lever would turn on with M
+        sliding = (1j * pin * speed * rail.conjugate()).real
+        rub = -mu * normal * (math.copysign(1.0, sliding) if sliding else 0.0)
+        exact = -cross(pin, normal * 1j * rail + rub * rail)
+        assert motion.effort[i] == pytest.approx(exact, rel=1e-13)
+        assert motion.dynamics.newton_euler[i, 0] == pytest.approx(exact, rel=1e-13)
+        works, workless, _ = ledger(motion.dynamics.scene)
+        assert sum(works.values())[i] == pytest.approx(-exact, rel=1e-13)
+        assert workless == []
+        (guide,) = motion.dynamics.joints_named("B")
+        force = motion.dynamics.joint_force(guide, "crank")[i]
+        assert force == pytest.approx(normal * 1j * rail + rub * rail, rel=1e-13)
+        assert motion.dynamics.joint_force(guide, "lever")[i] == pytest.approx(-force, rel=1e-13)
+
+
+def test_a_plate_that_hangs_on_its_rubbing_rail() -> None:
+    """The plate is placed by the rail itself: driven along it at 2 m/s, μ m g cos θ pushes with its weight's part."""
+    mu, mass, slope = 0.25, 4.0, 0.3
+    m = Mechanism(
+        {"O": 0j},
+        {"arm": Link({"O": 0j, "B": 1.0}), "plate": Link({"K": 0j}, mass, 0j)},
+        [Guide("B", "arm", "plate", 0j, slope, 0.0)],
+        inputs=[Input(link="arm"), Input(slider="B")],
+        guess=Guess((0.6, 0.0)),
+        gravity=-G * 1j,
+        friction=[Friction("B", mu)],
+    )
+    # the plate turns with the arm, at θ − slope; the rail lies along θ; the pin slides on it at s
+    for speed in (2.0, -2.0):
+        motion = m.motion(np.array([[0.6, 0.4]]), speed=[0.0, speed])
+        normal = mass * G * math.cos(0.6)
+        push = -mass * G * math.sin(0.6) + math.copysign(mu * normal, speed)
+        # the plate's centre stands at B − s·e^{iθ}: the arm holds its weight there
+        torque = mass * G * (1 - 0.4) * math.cos(0.6)
+        assert motion.dynamics.effort[0] == pytest.approx([torque, push], rel=1e-13)
+        assert motion.dynamics.newton_euler[0] == pytest.approx([torque, push], rel=1e-13)
+
+
+def test_friction_where_there_is_no_joint() -> None:
+    m = Mechanism(
+        {"O": 0j},
+        {"bar": Link({"O": 0j, "P": 1}, 1.0, 0.5)},
+        inputs=Input(link="bar"),
+        friction=[Friction("P", 0.1, 0.01)],
+    )
+    motion = m.motion(0.3, 1.0)
+    with pytest.raises(DescriptionError, match="no joint"):
+        motion.effort  # noqa: B018
