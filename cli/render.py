@@ -178,8 +178,11 @@ def _plain(value: Any) -> Any:
 def _with_digits_that_hold(shown: Shown) -> Shown:
     """Cut the CSV's columns, and those of the terminal's table that bear the same names."""
     errors, table = shown.errors(), shown.table
+    unknown = sum(sum(error == float("inf") for error in column) for column in errors.values())
+    noted = f"--digits: of {unknown} numbers no digit is known to hold; their cells are empty"
     return replace(
         shown,
+        warnings=[*shown.warnings, *([noted] if unknown else [])],
         columns=digits_that_hold(shown.columns, errors),
         table=None if table is None else lambda: digits_that_hold(table(), errors),
     )
