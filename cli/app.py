@@ -8,7 +8,7 @@ from importlib import import_module
 
 import typer
 
-from cli.errors import DataError
+from cli.errors import DataError, one_line
 
 # name -> (module with a function `run`, the line shown by `dalembert --help`)
 COMMANDS = {
@@ -92,5 +92,5 @@ def main() -> None:
 
 
 def _fail(message: str) -> int:
-    print("dalembert: " + " ".join(message.split()), file=sys.stderr)
+    print(f"dalembert: {one_line(message)}", file=sys.stderr)
     return 1

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli.errors import DataError
+from cli.errors import DataError, one_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -117,7 +117,7 @@ def show(
             output, (_json(shown) if output.suffix.lower() == ".json" else csv_text(shown.columns)).encode()
         )
     for warning in shown.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
+        print(f"warning: {one_line(warning)}", file=sys.stderr)
     if json:
         sys.stdout.write(_json(shown))
         if report is not None:

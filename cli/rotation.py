@@ -52,6 +52,8 @@ def read_body(path: str) -> Given:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise DataError(f"{file}: {reason}") from None
+    except RecursionError:
+        raise DataError(f"{file}: no valid TOML: nested too deeply") from None
     for key in document:
         if key not in KEYS:
             raise DataError(f"{file}: unknown key '{key}': expected {', '.join(KEYS)}{nearest(key, KEYS)}")
