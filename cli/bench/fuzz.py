@@ -7,6 +7,7 @@ of numpy's, half a file, a long wait or much memory. A case is replayed by its s
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import json
 import os
@@ -21,8 +22,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+import typer
 
-from cli.app import main
+from cli.app import build, main
 from cli.bench.fuzz_cases import Case, draw
 
 LONGEST = 5.0  # seconds of processor time
@@ -90,7 +92,7 @@ def _call(case: Case) -> _Ended:
         ):
             warnings.simplefilter("error")
             try:
-                main()
+                main(_front)
             except SystemExit as end:
                 status = end.code
             except Exception as error:
@@ -101,6 +103,12 @@ def _call(case: Case) -> _Ended:
         if shown is not None:
             os.environ["DALEMBERT_TRACEBACK"] = shown
     return _Ended(status, _text(out), _text(err), exception)
+
+
+@functools.cache
+def _front(called: str | None) -> Any:
+    """The command line, built once: that takes as long as a case."""
+    return typer.main.get_command(build(called))
 
 
 @contextlib.contextmanager

@@ -213,8 +213,15 @@ def _rates_of(path: str, time: NDArray[np.float64], q: NDArray[np.float64]) -> t
         )
     from scipy.interpolate import CubicSpline
 
-    spline = CubicSpline(time, q, axis=0)
-    return spline(time, 1), spline(time, 2)
+    with np.errstate(all="ignore"):
+        try:
+            spline = CubicSpline(time, q, axis=0)
+            speed, acceleration = spline(time, 1), spline(time, 2)
+        except (ValueError, np.linalg.LinAlgError):
+            speed = acceleration = np.array([np.nan])
+    if not (np.isfinite(speed).all() and np.isfinite(acceleration).all()):
+        raise DataError(f"{path}: time_s: rows too close in time for the speeds of the law of motion")
+    return speed, acceleration
 
 
 def _from_history(m: Mechanism) -> Inputs:
