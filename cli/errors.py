@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-
 LONGEST = 1200  # characters of a message
+MEMORY = 900e6  # bytes that a result may take: what takes more is refused before it is begun
 
 
 class DataError(Exception):

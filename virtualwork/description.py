@@ -156,7 +156,9 @@ class _Reader:
             raise _wrong(f"{where} points", given, "a table { A = [0, 0], B = [120, 0] }")
         for p, v in given.items():
             if isinstance(v, dict) and not isinstance(v.get("from"), str):
-                raise DescriptionError(f"{where} points.{p} from: expected the name of another point of this link")
+                raise DescriptionError(
+                    f"{where} points.{p} from: expected the name of another point of this link"
+                )
         waiting = dict(given)
         while waiting:
             ready = [p for p, v in waiting.items() if not isinstance(v, dict) or v.get("from") in points]

@@ -174,7 +174,10 @@ def _left(ended: _Ended, changed: list[str]) -> str | None:
     """What an error may not leave behind."""
     if ended.out.strip():
         return f"an error after output: {ended.out[:100]!r}, {ended.err[:200]!r}"
-    return f"an error after writing {', '.join(changed)}: {ended.err[:200]!r}" if changed else None
+    # of several files the first may be written, whole, when the second cannot be
+    if changed and "cannot write" not in ended.err:
+        return f"an error after writing {', '.join(changed)}: {ended.err[:200]!r}"
+    return None
 
 
 def _of_result(ended: _Ended, changed: list[str]) -> str | None:

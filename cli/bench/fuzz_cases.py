@@ -209,7 +209,11 @@ def _damaged_words(rng: np.random.Generator, words: list[str], files: list[str])
 
 
 def _number(rng: np.random.Generator) -> str:
-    return str(_pick(rng, NUMBERS)) if rng.random() < 0.5 else f"{rng.normal() * 10.0 ** rng.integers(-3, 4):.4g}"
+    return (
+        str(_pick(rng, NUMBERS))
+        if rng.random() < 0.5
+        else f"{rng.normal() * 10.0 ** rng.integers(-3, 4):.4g}"
+    )
 
 
 def _quantity(rng: np.random.Generator) -> str:

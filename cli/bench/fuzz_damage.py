@@ -72,7 +72,9 @@ def _bulk(rng: Rng, text: str) -> bytes:
         case 7:
             text += f"\n[{'.'.join('a' * nested)}]\nx = 1\n"
         case 8:
-            links = (f"[links.l{i}]\npoints = {{ P{i} = [0, 0], P{i + 1} = [1, 0] }}\n" for i in range(n // 60))
+            links = (
+                f"[links.l{i}]\npoints = {{ P{i} = [0, 0], P{i + 1} = [1, 0] }}\n" for i in range(n // 60)
+            )
             text += "\n" + "".join(links)
         case 9:
             text = "\0" * n
@@ -129,7 +131,26 @@ def _replace_word(rng: Rng, lines: list[str], i: int, token: str) -> str:
 
 # --- tables ------------------------------------------------------------------------------------------------
 
-SUFFIXES = ["kg", "g", "mm", "m", "in", "deg", "rad", "N", "um", "um_pp", "mm_s", "g_mm", "kg_m", "rpm", "rad_s", "", "furlong", "KG"]
+SUFFIXES = [
+    "kg",
+    "g",
+    "mm",
+    "m",
+    "in",
+    "deg",
+    "rad",
+    "N",
+    "um",
+    "um_pp",
+    "mm_s",
+    "g_mm",
+    "kg_m",
+    "rpm",
+    "rad_s",
+    "",
+    "furlong",
+    "KG",
+]
 
 
 def _csv_fault(rng: Rng, text: str) -> str:
@@ -145,7 +166,9 @@ def _csv_fault(rng: Rng, text: str) -> str:
         case 1:
             rows = [row[:j] + row[j + 1 :] for row in rows]
         case 2:  # cells under the wrong header
-            rows[0] = [rows[0][k] if i == j else rows[0][j] if i == k else name for i, name in enumerate(rows[0])]
+            rows[0] = [
+                rows[0][k] if i == j else rows[0][j] if i == k else name for i, name in enumerate(rows[0])
+            ]
         case 3:
             stem, _, _ = rows[0][j].partition("_")
             rows[0] = [f"{stem}_{rng.choice(SUFFIXES)}" if i == j else name for i, name in enumerate(rows[0])]
@@ -153,7 +176,10 @@ def _csv_fault(rng: Rng, text: str) -> str:
             rows = [rows[0], *([value if i == j else cell for i, cell in enumerate(row)] for row in body)]
         case 5:
             factor = 10.0 ** int(rng.integers(-40, 41))
-            rows = [rows[0], *([_times(cell, factor) if i == j else cell for i, cell in enumerate(row)] for row in body)]
+            rows = [
+                rows[0],
+                *([_times(cell, factor) if i == j else cell for i, cell in enumerate(row)] for row in body),
+            ]
         case 6 if body:
             rows += [list(body[int(rng.integers(len(body)))]) for _ in range(int(rng.integers(1, 5)))]
         case 7 if body:
@@ -219,7 +245,9 @@ def _toml_fault(rng: Rng, text: str) -> str:
             holder[key] = ODD[int(rng.integers(len(ODD)))]
         case 2 if isinstance(value, (int, float)):  # numbers: equal, opposite, tiny, huge, near
             factor = 10.0 ** int(rng.integers(-30, 31))
-            holder[key] = [0, -value, value * (1 + 1e-15), value * factor, float(_near(rng))][int(rng.integers(5))]
+            holder[key] = [0, -value, value * (1 + 1e-15), value * factor, float(_near(rng))][
+                int(rng.integers(5))
+            ]
         case 3:  # the same value in two places: coincident points, links pinned to themselves, doubled tables
             holder[key] = other[far]
         case 4 if isinstance(holder, dict):  # doubled under another name

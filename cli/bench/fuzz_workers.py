@@ -120,7 +120,9 @@ class _Worker:
         except (EOFError, ConnectionError):
             self.process.join()
             code = self.process.exitcode or 0
-            return self._lost(f"ended the process: {signal.Signals(-code).name if code < 0 else code}", seconds)
+            return self._lost(
+                f"ended the process: {signal.Signals(-code).name if code < 0 else code}", seconds
+            )
         now = _processor_time(self.process.pid)
         spent = seconds if now is None or self.cpu is None else now - self.cpu
         if spent > LONGEST or seconds > self.patience:

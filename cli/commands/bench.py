@@ -208,7 +208,8 @@ def _fuzz(inputs: int, first: int, workers: int, *, json: bool, text: bool, outp
             tallies.setdefault(outcome.command, Tally(outcome.command)).add(seed, outcome)
             if outcome.fault is not None:
                 print(
-                    f"\nseed {seed}: dalembert {join(outcome.arguments)}: {outcome.fault}"[:1000], file=sys.stderr
+                    f"\nseed {seed}: dalembert {join(outcome.arguments)}: {outcome.fault}"[:1000],
+                    file=sys.stderr,
                 )
             bar.update(1)
     found = [tallies[command] for command in sorted(tallies)]
@@ -230,7 +231,9 @@ def _fuzz(inputs: int, first: int, workers: int, *, json: bool, text: bool, outp
             lambda: {
                 "first_seed": first,
                 "inputs": total,
-                "commands": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
+                "commands": [
+                    dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)
+                ],
                 "faults": [
                     {"seed": seed, "arguments": outcome.arguments, "fault": outcome.fault}
                     for t in found

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from virtualwork import Mechanism
 
-MOST = 20_000_000  # poses in one sweep
+MOST = 2_000_000  # poses in one sweep; `Job.check_size` knows what one takes
 
 
 @dataclass(frozen=True)
@@ -130,10 +130,7 @@ def _sweep(m: Mechanism, text: str, at: list[str] | None) -> Inputs:
     start, stop = (_quantity(m, j, part, "--sweep") for part in parts[:2])
     swept: NDArray[np.float64]
     if slash:
-        try:
-            n = int(count)
-        except ValueError:
-            n = 0
+        n = options.whole(count)
         if not 1 <= n <= MOST:
             raise options.bad(
                 "--sweep", f"'{span}': expected a whole number of steps from 1 to {MOST} after the /"
