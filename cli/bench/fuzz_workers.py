@@ -111,11 +111,13 @@ class _Worker:
 
     def outcome(self) -> tuple[int, Outcome] | None:
         """Return (seed, outcome) when the case is over, one way or another."""
-        assert self.seed is not None
+        seed = self.seed
+        assert seed is not None
         seconds = time.monotonic() - self.wall
         try:
             if self.pipe.poll():
-                outcome, self.seed, seed = self.pipe.recv(), None, self.seed
+                outcome: Outcome = self.pipe.recv()
+                self.seed = None
                 return seed, outcome
         except (EOFError, ConnectionError):
             self.process.join()
