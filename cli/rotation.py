@@ -20,10 +20,13 @@ from rigidbody3d import cones as cones_of
 from rigidbody3d import sleeping_threshold as threshold_of
 from rigidbody3d import steady_precession as steady_of
 from rigidbody3d.attitude import normalize, rotate
+from rigidbody3d.spin import MOST
 
 Array = NDArray[np.float64]
 
 KEYS = ("name", "inertia", "parts", "omega", "attitude", "top", "torque", "frame")
+UNASKED = 20_000
+"""Steps of an integration that nobody asked for by name: some seconds."""
 EQUAL = 1e-12
 """Two principal moments as near as this, relatively, are those of a body of revolution."""
 
@@ -201,9 +204,15 @@ class Answer:
                 frame=g.frame,
                 mgl=g.mgl or 0.0,
                 method=self.integrator,
+                most=MOST if self.method == "integrate" else UNASKED,
             )
         except (ValueError, RuntimeError) as error:
-            raise DataError(f"{g.file}: {error}") from None
+            wait = (
+                ", or --method integrate to wait for it"
+                if self.method is None and "steps" in str(error)
+                else ""
+            )
+            raise DataError(f"{g.file}: {error}{wait}") from None
 
     @cached_property
     def drift(self) -> dict[str, float | None]:

@@ -75,6 +75,7 @@ def integrate(
     method: str = "DOP853",
     rtol: float = 1e-13,
     steps_per_turn: int = 60,
+    most: float = MOST,
 ) -> Trajectory:
     """Integrate the rotation of a body under a torque from time zero to each of the times.
 
@@ -101,10 +102,13 @@ def integrate(
         Relative tolerance of a scipy method.
     steps_per_turn
         Steps of the splitting per turn of the fastest motion.
+    most
+        Steps that are not to be exceeded.
 
     Raises
     ------
     ValueError
+        More steps than `most` would be needed.
         A splitting of what is no symmetric top; another frame; an inertia that is not positive.
     RuntimeError
         The integrator gave up; with its reason.
@@ -132,9 +136,11 @@ def integrate(
             or tensor[0, 0] != tensor[1, 1]
         ):
             raise ValueError("the splitting is for a symmetric top, its axis body z, under its weight alone")
-        H, q, count = _split(tensor[0, 0], tensor[2, 2], mgl, H0, q0, time, steps_per_turn)
+        H, q, count = _split(tensor[0, 0], tensor[2, 2], mgl, H0, q0, time, steps_per_turn, most)
         return Trajectory(time, H, q, tensor, mgl, count)
-    solved = _solve(tensor, np.asarray(omega, dtype=float), H0, q0, time, torque, frame, mgl, method, rtol)
+    solved = _solve(
+        tensor, np.asarray(omega, dtype=float), H0, q0, time, torque, frame, mgl, method, rtol, most
+    )
     return Trajectory(time, *solved[:2], tensor, mgl, solved[2])
 
 
@@ -149,6 +155,7 @@ def _solve(
     mgl: float,
     method: str,
     rtol: float,
+    most: float,
 ) -> tuple[Array, Array, int]:
     import scipy.integrate
 
@@ -210,12 +217,7 @@ def _solve(
         # never less than 40 steps a turn, at a coarser one as many fewer as order eight allows.
         rate = max(float(np.linalg.norm(omega)), math.sqrt(abs(mgl) / tensor.diagonal().min()))
         longest = 2 * math.pi / rate / 40 * (max(rtol, 1e-13) / 1e-13) ** 0.125 if rate else np.inf
-        planned = float(np.abs(time[order]).max()) / longest
-        if planned > MOST:
-            raise ValueError(
-                f"the integration would take some {planned:.1g} steps, more than {MOST:.0e}: expected a shorter time "
-                "or a slower rotation"
-            )
+        _check_steps(float(np.abs(time[order]).max()) / longest, most)
         limits = {"rtol": max(rtol, 3e-14), "atol": rtol, "max_step": longest}
         solver = method_class(rates, 0.0, start, sign * np.inf, **limits)
         before = (0.0, start)
@@ -225,8 +227,8 @@ def _solve(
                 before = (solver.t, solver.y)
                 message = solver.step()
                 steps += 1
-                if steps > MOST:
-                    raise RuntimeError(f"the integration stopped at {solver.t:g} s, after {MOST:.0e} steps")
+                if steps > most:
+                    raise RuntimeError(f"the integration stopped at {solver.t:g} s, after {most:.0e} steps")
                 if solver.status == "failed":
                     raise RuntimeError(f"the integration stopped at {solver.t:g} s: {message}")
             # a shorter step from the last station: the interpolant of the step taken is some digits worse
@@ -242,11 +244,20 @@ def _solve(
     return out[:, :3] * size, quaternion.normalize(out[:, 3:]), count
 
 
+def _check_steps(planned: float, most: float) -> None:
+    if planned > most:
+        raise ValueError(
+            f"the integration would take some {planned:.1g} steps, more than {most:.0e}: expected a shorter time "
+            "or a slower rotation"
+        )
+
+
 def _split(
-    I1: float, I3: float, mgl: float, H0: Array, q0: Array, time: Array, per_turn: int
+    I1: float, I3: float, mgl: float, H0: Array, q0: Array, time: Array, per_turn: int, most: float
 ) -> tuple[Array, Array, int]:
     rate = max(float(np.linalg.norm(H0)) / min(I1, I3), math.sqrt(abs(mgl) / I1))
     longest = 2 * math.pi / rate / per_turn if rate else math.inf
+    _check_steps(float(np.abs(time).max(initial=0.0)) / longest, most)
     H, q = np.empty((len(time), 3)), np.empty((len(time), 4))
     count = 0
     for sign in (1.0, -1.0):

@@ -120,7 +120,7 @@ class _Reader:
             gears=[self.gear(e, i) for i, e in self.rows("gears")],
             inputs=inputs,
             guess=self.guess(inputs),
-            name=str(self.data.get("name", "")),
+            name=self.name(),
             gravity=self.gravity(),
             forces=[self.force(e, i) for i, e in self.rows("forces")],
             torques=[self.torque(e, i) for i, e in self.rows("torques")],
@@ -129,6 +129,12 @@ class _Reader:
             motors=[self.motor(e, i) for i, e in self.rows("motors")],
             friction=[self.rub(e, i) for i, e in self.rows("friction")],
         )
+
+    def name(self) -> str:
+        found = self.data.get("name", "")
+        if not isinstance(found, (str, int, float)):
+            raise _wrong("name", found, "text")
+        return str(found)
 
     # --- tables ---------------------------------------------------------------------------------------------
     def table(self, name: str) -> dict[str, Any]:

@@ -184,7 +184,7 @@ def _of_result(ended: _Ended, changed: list[str]) -> str | None:
     """What a result must be: something, and JSON where it looks like it."""
     if not ended.out.strip() and not changed:
         return f"status {ended.status} and nothing shown: {ended.err[:200]!r}"
-    documents = {"standard output": ended.out if ended.out.startswith("{") else ""}
+    documents = {"standard output": ended.out if ended.out.startswith("{\n") else ""}
     documents |= {name: Path(name).read_text("utf-8") for name in changed if name.endswith(".json")}
     for name, text in documents.items():
         try:

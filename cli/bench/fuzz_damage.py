@@ -243,7 +243,9 @@ def _toml_fault(rng: Rng, text: str) -> str:
             del holder[key]
         case 1:
             holder[key] = ODD[int(rng.integers(len(ODD)))]
-        case 2 if isinstance(value, (int, float)) and abs(value) < 1e300:  # numbers: equal, opposite, tiny, huge, near
+        case 2 if (
+            isinstance(value, (int, float)) and abs(value) < 1e300
+        ):  # numbers: equal, opposite, tiny, huge, near
             factor = 10.0 ** int(rng.integers(-30, 31))
             holder[key] = [0, -value, value * (1 + 1e-15), value * factor, float(_near(rng))][
                 int(rng.integers(5))

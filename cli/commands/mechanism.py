@@ -98,6 +98,8 @@ def run(
     names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
     if names == []:
         raise options.bad("--only", "expected names of links or points")
+    if counterweights is not None and not any(name.strip() for name in counterweights.split(",")):
+        raise options.bad("--counterweights", "expected names of links")
     if flywheel is not None and not 0 < flywheel < float("inf"):
         raise options.bad("--flywheel", "expected a positive speed fluctuation, such as 0.02")
     if (flywheel is not None or counterweights is not None) and sweep is None and inputs is None:
