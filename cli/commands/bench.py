@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cli import options
-from cli.errors import nearest
+from cli.errors import nearest, one_line
 from cli.render import Json, Output, Plot, Shown, Text, show
 
 if TYPE_CHECKING:
@@ -203,14 +204,16 @@ def _fuzz(inputs: int, first: int, workers: int, *, json: bool, text: bool, outp
     from cli.bench.fuzz_workers import LIMITED, Tally, run
 
     tallies: dict[str, Tally] = {}
-    with typer.progressbar(length=inputs, label="damaged inputs", file=sys.stderr) as bar:
+    # an interrupted run shows what it has done
+    with (
+        typer.progressbar(length=inputs, label="damaged inputs", file=sys.stderr) as bar,
+        suppress(KeyboardInterrupt),
+    ):
         for seed, outcome in run(first, inputs, workers):
             tallies.setdefault(outcome.command, Tally(outcome.command)).add(seed, outcome)
             if outcome.fault is not None:
-                print(
-                    f"\nseed {seed}: dalembert {join(outcome.arguments)}: {outcome.fault}"[:1000],
-                    file=sys.stderr,
-                )
+                line = f"seed {seed}: dalembert {join(outcome.arguments)}: {outcome.fault}"
+                print("\n" + one_line(line), file=sys.stderr)
             bar.update(1)
     found = [tallies[command] for command in sorted(tallies)]
     columns: dict[str, list[Any]] = {
