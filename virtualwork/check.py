@@ -76,6 +76,8 @@ class Check:
         labels, jacobian = constraint_jacobian(self.mechanism, self._typical())
         if not len(labels):
             return 0, ()
+        if not np.isfinite(jacobian).all():
+            raise AssemblyError("assembled at no pose of the motion where the joints' rank could be told")
         u, s, _ = np.linalg.svd(jacobian)
         rank = int((s > 1e-9 * s[0]).sum())
         left = u[:, rank:]

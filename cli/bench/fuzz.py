@@ -45,7 +45,7 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class _Ended:
+class Ended:
     """How a call ended: its status, what it printed, the exception that came through."""
 
     status: object
@@ -66,7 +66,7 @@ def trial(seed: int) -> Outcome:
             start = time.process_time()
             ended = _call(case)
             spent = time.process_time() - start
-            handled, fault = _judge(case, ended)
+            handled, fault = judge(case, ended)
         finally:
             os.chdir(before)
     if fault is None and spent > LONGEST:
@@ -74,7 +74,7 @@ def trial(seed: int) -> Outcome:
     return Outcome(case.command, case.arguments, spent, handled, fault)
 
 
-def _call(case: Case) -> _Ended:
+def _call(case: Case) -> Ended:
     """Run the command as its console script does, with numpy's warnings as errors and no net under it."""
     given, shown = sys.argv, os.environ.get("DALEMBERT_TRACEBACK")
     out = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
@@ -102,7 +102,7 @@ def _call(case: Case) -> _Ended:
         os.environ.pop("DALEMBERT_TRACEBACK")
         if shown is not None:
             os.environ["DALEMBERT_TRACEBACK"] = shown
-    return _Ended(status, _text(out), _text(err), exception)
+    return Ended(status, _text(out), _text(err), exception)
 
 
 @functools.cache
@@ -135,7 +135,7 @@ def _told(error: Exception) -> str:
     return f"{type(error).__name__}: {str(error)[:300]} ({' '.join(places)})"
 
 
-def _judge(case: Case, ended: _Ended) -> tuple[str, str | None]:
+def judge(case: Case, ended: Ended) -> tuple[str, str | None]:
     """Say how a call was handled, and what is wrong with that."""
     if ended.exception is not None:
         return "", ended.exception
@@ -170,7 +170,7 @@ def _judge(case: Case, ended: _Ended) -> tuple[str, str | None]:
     return "data error", fault or _left(ended, changed)
 
 
-def _left(ended: _Ended, changed: list[str]) -> str | None:
+def _left(ended: Ended, changed: list[str]) -> str | None:
     """What an error may not leave behind."""
     if ended.out.strip():
         return f"an error after output: {ended.out[:100]!r}, {ended.err[:200]!r}"
@@ -180,7 +180,7 @@ def _left(ended: _Ended, changed: list[str]) -> str | None:
     return None
 
 
-def _of_result(ended: _Ended, changed: list[str]) -> str | None:
+def _of_result(ended: Ended, changed: list[str]) -> str | None:
     """What a result must be: something, and JSON where it looks like it."""
     if not ended.out.strip() and not changed:
         return f"status {ended.status} and nothing shown: {ended.err[:200]!r}"

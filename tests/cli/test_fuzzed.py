@@ -122,7 +122,14 @@ USAGE = {
     ("mechanism", "klann.toml", "--sweep", "0deg:360deg:1e-30deg"): "more than 2000000 poses",
     ("mechanism", "klann.toml", "--branch", "9" * 5000): "the number of an assembly",
     ("mechanism", "klann.toml", "--branch", "²"): "the number of an assembly",
-    ("mechanism", "klann.toml", "--sweep", "0deg:9deg/3", "--counterweights", " ,"): "expected names of links",
+    (
+        "mechanism",
+        "klann.toml",
+        "--sweep",
+        "0deg:9deg/3",
+        "--counterweights",
+        " ,",
+    ): "expected names of links",
     ("spin", "b.toml", "--time", "0:1:1e-30"): "expected at most 250000",
     ("spin", "b.toml", "--time", "0:1/100000000"): "expected at most 250000",
     ("spin", "b.toml", "--time", "0:1/" + "9" * 5000): "number of equal steps",
@@ -141,7 +148,9 @@ def test_counts_beyond_measure(arguments: tuple[str, ...], dalembert: Dalembert)
 
 
 @pytest.mark.skipif(not hasattr(os, "wait4"), reason="the system does not tell a process's memory")
-@pytest.mark.parametrize("options", [["--json"], [], ["--only", "H", "--json"], ["--only", "H"], ["--forces"]])
+@pytest.mark.parametrize(
+    "options", [["--json"], [], ["--only", "H", "--json"], ["--only", "H"], ["--forces"]]
+)
 def test_a_sweep_takes_no_more_than_is_reckoned(
     options: list[str], dalembert: Dalembert, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -191,7 +200,9 @@ def test_an_integration_of_many_turns_is_for_those_who_ask_for_it(dalembert: Dal
     assert (done.returncode, done.stdout) == (1, "")
     assert "expected a shorter time" in done.stderr
     top = "inertia = [1, 1, 2]\nomega = [1, 2, 1e9]\n[top]\nmgl = 3\n"
-    done = dalembert("spin", "-", "--at", "1e9", "--method", "integrate", "--integrator", "splitting", stdin=top)
+    done = dalembert(
+        "spin", "-", "--at", "1e9", "--method", "integrate", "--integrator", "splitting", stdin=top
+    )
     assert (done.returncode, done.stdout) == (1, "")
     assert "expected a shorter time" in done.stderr
 
@@ -203,3 +214,16 @@ def test_a_large_table_is_read_without_a_word_of_its_reader(tmp_path: Path) -> N
     done = subprocess.run(call, cwd=tmp_path, capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
     assert done.stdout.count(b"\n") == 12_001
+
+
+def test_a_tangent_where_nothing_is_assembled(dalembert: Dalembert, tmp_path: Path) -> None:
+    """The sweep passes a change point of one group at which another is not assembled."""
+    dalembert("examples", "peaucellier")
+    file = tmp_path / "peaucellier.toml"
+    text = file.read_text()
+    moved = text.replace("points = { O = [0, 0], C = [2, 0] }", "points = { C = [2, 0], P = [0, 0] }")
+    assert moved != text
+    file.write_text(moved)
+    done = dalembert("mechanism", "peaucellier.toml", "--sweep", "-90deg:90deg:90deg", "--only", "B")
+    assert done.returncode == 0
+    assert len(done.stdout.splitlines()) == 4
