@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cli.errors import DataError, nearest, quote
 from cli.tables import Table, read
 from cli.units import UNITS, cosine_sine, to_si
-from rigidbody3d import Body, check, compose, inertia_of, load_mesh, measure_of, mesh, tensor
+from rigidbody3d import Body, check, compose, load_mesh, mesh, tensor
 from rigidbody3d.shapes import SHAPES
 
 Array = NDArray[np.float64]
@@ -63,14 +63,18 @@ def read_parts(path: str) -> Parts:
     center = np.stack([np.nan_to_num(values.get(axis, np.zeros(table.rows))) for axis in "xyz"], axis=-1)
     folder = Path() if path == "-" else Path(path).parent
     warnings = list(table.warnings)
+    columns = {
+        key: column.tolist() for key, column in values.items()
+    }  # row by row Python's numbers are faster
     for index, shape in enumerate(table.texts["shape"]):
-        row = {key: float(column[index]) for key, column in values.items() if not np.isnan(column[index])}
+        row = {key: value for key, column in columns.items() if (value := column[index]) == value}
         if shape.lower() == MESH:
             mass[index], own, inertia[index] = _mesh(table, index, row, folder)
             if not row.keys() & {"x", "y", "z"}:  # it stays where the file has it
                 center[index] = own
         else:
             mass[index], inertia[index] = _part(table, index, shape.lower(), row, warnings, name[index])
+    _check_tensors(table, mass, inertia)
     rotation = turns @ _along(table, values)
     each = Body(mass, center, inertia).turned(rotation)
     total = mass.sum()
@@ -120,18 +124,30 @@ def _part(
             )
     mass = _mass(table, index, shape, row, dimensions)
     if shape != TENSOR:
-        return mass, inertia_of(shape, mass, **dimensions)
+        full = dict.fromkeys(SHAPES[shape].optional, 0.0) | dimensions
+        return mass, np.diag([mass * moment for moment in SHAPES[shape].moments(**full)])
     given = tensor(*(row.get(key, 0.0) for key in (*MOMENTS, *PRODUCTS)))
     # a hole's tensor may be given as that of the material taken away, or already with its sign
     if mass < 0 and np.trace(given) > 0:
         given = -given
-    verdict = check(given if mass > 0 else -given)
-    if not verdict.valid:
-        header = table.numbers["ixx"].header
-        raise table.error(
-            index, header, f"{row['ixx']:g}", f"a tensor that a body can have: {verdict.reason}"
-        )
     return mass, given
+
+
+def _check_tensors(table: Table, mass: Array, inertia: Array) -> None:
+    """Refuse a given tensor that no body can have; all at once, for one by one takes long."""
+    rows = [index for index, shape in enumerate(table.texts["shape"]) if shape.lower() == TENSOR]
+    if not rows:
+        return
+    verdict = check(inertia[rows] * np.sign(mass[rows])[:, None, None])
+    if not verdict.valid.all():
+        index = rows[int(np.argmin(verdict.valid))]
+        column = table.numbers["ixx"]
+        raise table.error(
+            index,
+            column.header,
+            f"{to_si(column.values[index], 'inertia', column.unit):g}",
+            f"a tensor that a body can have: {verdict.reason}",
+        )
 
 
 def _mesh(table: Table, index: int, row: dict[str, float], folder: Path) -> tuple[float, Array, Array]:
@@ -182,8 +198,9 @@ def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimension
     if DENSITIES.get(kind) != key or len(densities) > 1:
         wanted = f"{DENSITIES[kind]} or mass" if kind else "mass"
         raise table.error(index, header, f"{row[key]:g}", f"{wanted} for a {shape}")
-    measure, _ = measure_of(shape, **dimensions)
-    mass = row[key] * float(measure)
+    measure = SHAPES[shape].measure
+    assert measure is not None  # a shape that is thin in no direction has a volume
+    mass = row[key] * float(measure(**dict.fromkeys(SHAPES[shape].optional, 0.0) | dimensions))
     if mass == 0:
         raise table.error(index, header, f"{row[key]:g}", "a mass that is not zero: this shape has no volume")
     return mass

@@ -336,7 +336,10 @@ class Track:
                     d.step(s, k)
             return d
 
-        found = branches(group, jets, ORDER)
+        try:
+            found = branches(group, jets, ORDER)
+        except ZeroDivisionError:  # a group that this one hangs on has no direction here
+            found = []
         best, nearest = None, np.inf
         probe = int(np.argmax(nodes))
         for rates in found:

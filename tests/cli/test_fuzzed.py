@@ -227,3 +227,12 @@ def test_a_tangent_where_nothing_is_assembled(dalembert: Dalembert, tmp_path: Pa
     done = dalembert("mechanism", "peaucellier.toml", "--sweep", "-90deg:90deg:90deg", "--only", "B")
     assert done.returncode == 0
     assert len(done.stdout.splitlines()) == 4
+
+
+def test_a_change_point_where_another_group_has_no_direction(dalembert: Dalembert, tmp_path: Path) -> None:
+    dalembert("examples", "scissors-lift")
+    file = tmp_path / "lift.toml"
+    text = file.read_text()
+    turned = re.sub(r"gravity.*\n|\[\[forces\]\]\n(.+\n)+", "", text)
+    file.write_text(turned)
+    assert dalembert("mechanism", "lift.toml", "--sweep", "-0.4m:1.15m:0.05m").returncode == 0
