@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,8 +125,9 @@ def _part(
             )
     mass = _mass(table, index, shape, row, dimensions)
     if shape != TENSOR:
-        full = dict.fromkeys(SHAPES[shape].optional, 0.0) | dimensions
-        return mass, np.diag([mass * moment for moment in SHAPES[shape].moments(**full)])
+        known: Any = SHAPES[shape]  # its formulas hold for plain numbers too, which are faster one by one
+        full = dict.fromkeys(known.optional, 0.0) | dimensions
+        return mass, np.diag([mass * moment for moment in known.moments(**full)])
     given = tensor(*(row.get(key, 0.0) for key in (*MOMENTS, *PRODUCTS)))
     # a hole's tensor may be given as that of the material taken away, or already with its sign
     if mass < 0 and np.trace(given) > 0:
@@ -198,9 +200,8 @@ def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimension
     if DENSITIES.get(kind) != key or len(densities) > 1:
         wanted = f"{DENSITIES[kind]} or mass" if kind else "mass"
         raise table.error(index, header, f"{row[key]:g}", f"{wanted} for a {shape}")
-    measure = SHAPES[shape].measure
-    assert measure is not None  # a shape that is thin in no direction has a volume
-    mass = row[key] * float(measure(**dict.fromkeys(SHAPES[shape].optional, 0.0) | dimensions))
+    known: Any = SHAPES[shape]
+    mass = row[key] * float(known.measure(**dict.fromkeys(known.optional, 0.0) | dimensions))
     if mass == 0:
         raise table.error(index, header, f"{row[key]:g}", "a mass that is not zero: this shape has no volume")
     return mass
