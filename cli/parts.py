@@ -125,9 +125,9 @@ def _part(
             )
     mass = _mass(table, index, shape, row, dimensions)
     if shape != TENSOR:
-        known: Any = SHAPES[shape]  # its formulas hold for plain numbers too, which are faster one by one
-        full = dict.fromkeys(known.optional, 0.0) | dimensions
-        return mass, np.diag([mass * moment for moment in known.moments(**full)])
+        formulas: Any = SHAPES[shape]  # which hold for plain numbers too, which are faster one by one
+        full = dict.fromkeys(formulas.optional, 0.0) | dimensions
+        return mass, np.diag([mass * moment for moment in formulas.moments(**full)])
     given = tensor(*(row.get(key, 0.0) for key in (*MOMENTS, *PRODUCTS)))
     # a hole's tensor may be given as that of the material taken away, or already with its sign
     if mass < 0 and np.trace(given) > 0:

@@ -142,7 +142,7 @@ def draw(rng: np.random.Generator) -> Case:
         victim = sorted(files)[int(rng.integers(len(files)))]
         files[victim] = damage(rng, files[victim], victim)
     if kind > 0.65 or not files:
-        for _ in range(int(rng.integers(1, 3))):
+        for _ in range(1 if rng.random() < 0.7 else 2):
             words = _damaged_words(rng, words, sorted(files))
     if rng.random() < 0.4 and command != "examples":
         words.append("--json")

@@ -32,7 +32,7 @@ def damage(rng: Rng, data: bytes, name: str) -> bytes:
     one: Callable[[Rng, str], str] = _text_fault
     if kind < 0.55:
         one = _toml_fault if name.endswith(".toml") else _csv_fault
-    for _ in range(int(rng.integers(1, 5))):
+    for _ in range(min(int(rng.geometric(0.6)), 4)):  # one fault reaches deeper than four
         text = one(rng, text)
     return _encoded(rng, text)
 
