@@ -125,7 +125,7 @@ def _part(
             )
     mass = _mass(table, index, shape, row, dimensions)
     if shape != TENSOR:
-        formulas: Any = SHAPES[shape]  # which hold for plain numbers too, which are faster one by one
+        formulas: Any = SHAPES[shape]  # they hold for plain numbers too, and those are faster one by one
         full = dict.fromkeys(formulas.optional, 0.0) | dimensions
         return mass, np.diag([mass * moment for moment in formulas.moments(**full)])
     given = tensor(*(row.get(key, 0.0) for key in (*MOMENTS, *PRODUCTS)))
