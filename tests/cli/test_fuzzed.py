@@ -207,6 +207,11 @@ def test_an_integration_of_many_turns_is_for_those_who_ask_for_it(dalembert: Dal
     assert "expected a shorter time" in done.stderr
 
 
+def test_a_limit_of_pieces_that_is_none(dalembert: Dalembert) -> None:
+    call = ("place", "83.5g@308.87deg", "--blades", "8", "--stock", "10g,20g,50g", "--max-pieces")
+    assert dalembert(*call, "100000000000").stdout == dalembert(*call, "8").stdout
+
+
 def test_a_large_table_is_read_without_a_word_of_its_reader(tmp_path: Path) -> None:
     rows = "".join(f"r{i},1.1,30,{i % 360}\n" for i in range(12_000))
     (tmp_path / "t.csv").write_text("rotor,mass_g,radius_mm,angle_deg\n" + rows)
