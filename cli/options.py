@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from cli.units import UNITS, parse_number, parse_quantity, to_si
+from cli.units import SMALLEST, UNITS, parse_number, parse_quantity, to_si
 
 STATES = 250_000  # what a gigabyte holds, integrated and shown
 PLACES = 10_000  # holes or blades on one rotor
@@ -31,7 +31,7 @@ def with_unit(
         value, unit = parse_quantity(text, dimension)
     except ValueError as error:
         raise bad(flag, error) from None
-    if positive and not value > 0:
+    if positive and not value >= SMALLEST:
         raise bad(flag, f"'{text}': expected a positive value")
     return value, unit
 

@@ -207,6 +207,31 @@ def test_an_integration_of_many_turns_is_for_those_who_ask_for_it(dalembert: Dal
     assert "expected a shorter time" in done.stderr
 
 
+def test_a_radius_that_nothing_can_be_divided_by(dalembert: Dalembert) -> None:
+    table = "mass_g,radius_mm,angle_deg,z_mm\n9,30,60,20\n"
+    done = dalembert("balance", "-", "--plane", "A:1e-320mm", stdin=table)
+    assert (done.returncode, "expected a positive radius" in done.stderr) == (2, True)
+    done = dalembert("place", "5g@0deg", "--at-radius", "1m", "--to-radius", "1e-320mm")
+    assert (done.returncode, "expected a positive value" in done.stderr) == (2, True)
+
+
+def test_a_dyad_between_points_that_coincide(dalembert: Dalembert) -> None:
+    text = CRANK.replace("A = [0, 0]\n[links", "A = [0, 0]\nD = [4, 0]\n[links", 1) + INPUT
+    dyad = "[links.rod]\npoints = { D = [0, 0], C = [4, 0] }\n[links.rocker]\npoints = { D = [0, 0], C = [3, 0] }\n"
+    guess = "[guess]\nat = 1\nrod = 1\nrocker = 2\n"
+    done = dalembert("mechanism", "-", "--sweep", "0deg:360deg/24", "--check", stdin=text + dyad + guess)
+    assert done.returncode == 1
+
+
+def test_many_stored_coefficients_are_looked_through_once(dalembert: Dalembert, tmp_path: Path) -> None:
+    rows = "".join(f"1,{speed},A,2000,30\n" for speed in range(1000, 31_000))
+    (tmp_path / "stored.csv").write_text("sensor,speed_rpm,plane,magnitude_per_kg,phase_deg\n" + rows)
+    (tmp_path / "runs.csv").write_text("run,sensor,speed_rpm,amplitude_um,phase_deg\n0,1,3000,70,40\n")
+    done = dalembert("field", "runs.csv", "--influence", "stored.csv", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["rotors"][0]["corrections"][0]["mass_kg"] == pytest.approx(70 / 2000)
+
+
 def test_a_limit_of_pieces_that_is_none(dalembert: Dalembert) -> None:
     call = ("place", "83.5g@308.87deg", "--blades", "8", "--stock", "10g,20g,50g", "--max-pieces")
     assert dalembert(*call, "100000000000").stdout == dalembert(*call, "8").stdout
