@@ -215,6 +215,20 @@ def test_a_radius_that_nothing_can_be_divided_by(dalembert: Dalembert) -> None:
     assert (done.returncode, "expected a positive value" in done.stderr) == (2, True)
 
 
+def test_a_dyad_stretched_all_along(dalembert: Dalembert, tmp_path: Path) -> None:
+    """Crank and arms turn about one point: rounding alone crosses zero, some hundred times a turn."""
+    dalembert("examples", "peaucellier")
+    file = tmp_path / "peaucellier.toml"
+    text = file.read_text()
+    moved = text.replace("points = { P = [0, 0], A = [1, 0] }", "points = { A = [1, 0], O = [0, 0] }")
+    assert moved != text
+    file.write_text(moved)
+    done = dalembert("mechanism", "peaucellier.toml", "--sweep", "-90deg:90deg:90deg", "--check", "--json")
+    assert done.returncode in (0, 1)
+    if done.returncode == 0:
+        assert json.loads(done.stdout)["check"]["change_points_deg"] == []
+
+
 def test_a_dyad_between_points_that_coincide(dalembert: Dalembert) -> None:
     text = CRANK.replace("A = [0, 0]\n[links", "A = [0, 0]\nD = [4, 0]\n[links", 1) + INPUT
     dyad = "[links.rod]\npoints = { D = [0, 0], C = [4, 0] }\n[links.rocker]\npoints = { D = [0, 0], C = [3, 0] }\n"
