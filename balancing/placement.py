@@ -255,7 +255,8 @@ def place_from_stock(
     (sa, ma, ca, xa), (sb, mb, cb, xb) = halves
     best: tuple[float, float, int, int] | None = None
     slack = 1e-12 * float(max(abs(goal), weights[-1]))
-    for level in range(max_pieces + 1) if max_pieces is not None else [None]:
+    # no further than weights are used at all: a limit may be any number
+    for level in range(min(max_pieces, int(cb.max())) + 1) if max_pieces is not None else [None]:
         b = np.arange(len(sb)) if level is None else np.flatnonzero(cb == level)
         a = (
             np.arange(len(sa))

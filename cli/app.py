@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from importlib import import_module
+from typing import Any
 
 import typer
 
-from cli.errors import DataError
+from cli.errors import DataError, one_line
 
 # name -> (module with a function `run`, the line shown by `dalembert --help`)
 COMMANDS = {
@@ -63,13 +65,16 @@ def build(called: str | None) -> typer.Typer:
     return app
 
 
-def main() -> None:
-    """Run the command; a data error is one line on standard error and status 1, never a traceback."""
+def main(front: Callable[[str | None], Callable[..., Any]] = build) -> None:
+    """Run the command; a data error is one line on standard error and status 1, never a traceback.
+
+    `front` builds the command line: one that is used many times need not be built each time.
+    """
     # Small matrices only: a pool of BLAS threads costs more to start than it gives. The user's word goes first.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     called = next((word for word in sys.argv[1:] if not word.startswith("-")), None)
     try:
-        build(called)(prog_name="dalembert")
+        front(called)(prog_name="dalembert")
     except DataError as error:
         sys.exit(_fail(str(error)))
     except BrokenPipeError:
@@ -92,5 +97,5 @@ def main() -> None:
 
 
 def _fail(message: str) -> int:
-    print("dalembert: " + " ".join(message.split()), file=sys.stderr)
+    print(f"dalembert: {one_line(message)}", file=sys.stderr)
     return 1

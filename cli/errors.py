@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+LONGEST = 1200  # characters of a message
+MEMORY = 900e6  # bytes that a result may take: what takes more is refused before it is begun
+
 
 class DataError(Exception):
     """Bad data: shown as one line, status 1."""
@@ -23,6 +26,13 @@ def quote(found: str) -> str:
     """Show a value from a file on one line, whatever it holds."""
     text = ascii(found) if not found.isprintable() else f"'{found}'"
     return text if len(text) <= 60 else text[:57] + "...'"
+
+
+def one_line(message: str) -> str:
+    """Put a message on one line that a terminal can show, whatever names and values of a file stand in it."""
+    line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(message.split()))
+    # what was found stands at the front, what was expected at the end
+    return line if len(line) <= LONGEST else f"{line[: LONGEST * 2 // 3]} ... {line[-LONGEST // 3 :]}"
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

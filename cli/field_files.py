@@ -85,7 +85,8 @@ class Stored:
             for p, name in enumerate(planes):
                 rows = [i for i in mine if sensor[i] == channel.sensor and plane[i] == name]
                 off = [0.0 if channel.speed is None else apart(channel.speed, self.speed[i]) for i in rows]
-                best = [i for i, apart in zip(rows, off, strict=True) if apart == min(off) and apart <= 0.01]
+                least = min(off, default=np.inf)
+                best = [i for i, far in zip(rows, off, strict=True) if far == least and far <= 0.01]
                 if not best:
                     raise DataError(f"{self.table.file}: no coefficient of sensor {channel} for plane {name}")
                 if len(best) > 1:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cli.errors import DataError, quote
 from cli.known_masses import number_names
 from cli.tables import Cells, Table, read
-from cli.units import UNITS, parse_number, phasor, to_si
+from cli.units import SMALLEST, UNITS, parse_number, phasor, to_si
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -400,8 +400,8 @@ class _Reader:
             )
         size = self._numbers(self.size, rows, place, "a trial mass, positive")
         turn = self._numbers(angle, rows, place, "the angle of the trial mass")
-        if not (size > 0).all():
-            row = int(rows[int(np.argmin(size > 0))])
+        if not (size >= SMALLEST).all():
+            row = int(rows[int(np.argmin(size >= SMALLEST))])
             raise self.fail(row, self.size.header, self.size.values[row], "a positive trial mass")
         return np.asarray(to_si(size, self.runs.per, self.size.unit)), turn, angle.unit
 

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import typer
 
-from cli.units import UNITS, parse_number, parse_quantity, to_si
+from cli.units import SMALLEST, UNITS, parse_number, parse_quantity, to_si
+
+STATES = 250_000  # what a gigabyte holds, integrated and shown
+PLACES = 10_000  # holes or blades on one rotor
+
+
+def whole(text: str) -> int:
+    """Read a whole number that is not negative; -1 where it is none, or one of more than 18 digits."""
+    text = text.strip()
+    return int(text) if text.isascii() and text.isdecimal() and len(text) <= 18 else -1
 
 
 def bad(flag: str, message: object) -> typer.BadParameter:
@@ -22,7 +31,7 @@ def with_unit(
         value, unit = parse_quantity(text, dimension)
     except ValueError as error:
         raise bad(flag, error) from None
-    if positive and not value > 0:
+    if positive and not value >= SMALLEST:
         raise bad(flag, f"'{text}': expected a positive value")
     return value, unit
 
@@ -82,9 +91,9 @@ def time_range(flag: str, text: str) -> list[float]:
     body = text
     if "/" in text:
         body, _, number = text.partition("/")
-        if not number.strip().isdecimal() or int(number) < 1:
+        if whole(number) < 1:
             raise bad(flag, f"'{text}': expected a number of equal steps after the /, such as 0:10/1000")
-        steps = int(number)
+        steps = whole(number)
     parts = body.split(":")
     if len(parts) != (2 if steps else 3):
         raise bad(flag, f"'{text}': expected START:STOP:STEP or START:STOP/N, such as 0:10:0.01")
@@ -95,11 +104,13 @@ def time_range(flag: str, text: str) -> list[float]:
         if step == 0 or (stop - start) * step < 0:
             raise bad(flag, f"'{text}': a step of {step:g} s never gets from {start:g} s to {stop:g} s")
         ratio = (stop - start) / step
-        if ratio > 1e8:
-            raise bad(flag, f"'{text}': {ratio:.3g} states are more than fit in memory")
+        if ratio > STATES:
+            raise bad(flag, f"'{text}': {ratio:.3g} states: expected at most {STATES}")
         steps = round(ratio)
         if abs(ratio - steps) > 1e-9 * max(1.0, ratio):
             return [start + i * step for i in range(int(ratio) + 1)]
         if steps == 0:
             return [start]
+    if steps > STATES:
+        raise bad(flag, f"'{text}': {steps:.3g} states: expected at most {STATES}")
     return [start + (stop - start) * i / steps for i in range(steps + 1)]

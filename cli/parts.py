@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from cli.errors import DataError, nearest, quote
 from cli.tables import Table, read
 from cli.units import UNITS, cosine_sine, to_si
-from rigidbody3d import Body, check, compose, inertia_of, load_mesh, measure_of, mesh, tensor
+from rigidbody3d import Body, check, compose, load_mesh, mesh, tensor
 from rigidbody3d.shapes import SHAPES
 
 if TYPE_CHECKING:
@@ -73,8 +73,11 @@ def read_parts(path: str) -> Parts:
     warnings = list(table.warnings)
     rows: list[dict[str, float]] = []
     meshes: dict[int, Callable[[], tuple[float, float]]] = {}
+    columns = {
+        key: column.tolist() for key, column in values.items()
+    }  # row by row Python's numbers are faster
     for index, shape in enumerate(table.texts["shape"]):
-        row = {key: float(column[index]) for key, column in values.items() if not np.isnan(column[index])}
+        row = {key: value for key, column in columns.items() if (value := column[index]) == value}
         rows.append(row)
         if shape.lower() == MESH:
             mass[index], own, inertia[index], meshes[index] = _mesh(table, index, row, folder)
@@ -82,6 +85,7 @@ def read_parts(path: str) -> Parts:
                 center[index] = own
         else:
             mass[index], inertia[index] = _part(table, index, shape.lower(), row, warnings, name[index])
+    _check_tensors(table, mass, inertia)
     rotation = turns @ _along(table, values)
     shapes = [shape.lower() for shape in table.texts["shape"]]
     drawn = Body(mass, center, inertia, partial(_reading, shapes, rows, meshes, mass, center, inertia))
@@ -134,18 +138,31 @@ def _part(
             )
     mass = _mass(table, index, shape, row, dimensions)
     if shape != TENSOR:
-        return mass, inertia_of(shape, mass, **dimensions)
+        formulas: Any = SHAPES[shape]  # they hold for plain numbers too, and those are faster one by one
+        full = dict.fromkeys(formulas.optional, 0.0) | dimensions
+        return mass, np.diag([mass * moment for moment in formulas.moments(**full)])
     given = tensor(*(row.get(key, 0.0) for key in (*MOMENTS, *PRODUCTS)))
     # a hole's tensor may be given as that of the material taken away, or already with its sign
     if mass < 0 and np.trace(given) > 0:
         given = -given
-    verdict = check(given if mass > 0 else -given)
-    if not verdict.valid:
-        header = table.numbers["ixx"].header
-        raise table.error(
-            index, header, f"{row['ixx']:g}", f"a tensor that a body can have: {verdict.reason}"
-        )
     return mass, given
+
+
+def _check_tensors(table: Table, mass: Array, inertia: Array) -> None:
+    """Refuse a given tensor that no body can have; all at once, for one by one takes long."""
+    rows = [index for index, shape in enumerate(table.texts["shape"]) if shape.lower() == TENSOR]
+    if not rows:
+        return
+    verdict = check(inertia[rows] * np.sign(mass[rows])[:, None, None])
+    if not verdict.valid.all():
+        index = rows[int(np.argmin(verdict.valid))]
+        column = table.numbers["ixx"]
+        raise table.error(
+            index,
+            column.header,
+            f"{to_si(column.values[index], 'inertia', column.unit):g}",
+            f"a tensor that a body can have: {verdict.reason}",
+        )
 
 
 def _mesh(
@@ -210,8 +227,8 @@ def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimension
     if DENSITIES.get(kind) != key or len(densities) > 1:
         wanted = f"{DENSITIES[kind]} or mass" if kind else "mass"
         raise table.error(index, header, f"{row[key]:g}", f"{wanted} for a {shape}")
-    measure, _ = measure_of(shape, **dimensions)
-    mass = row[key] * float(measure)
+    known: Any = SHAPES[shape]
+    mass = row[key] * float(known.measure(**dict.fromkeys(known.optional, 0.0) | dimensions))
     if mass == 0:
         raise table.error(index, header, f"{row[key]:g}", "a mass that is not zero: this shape has no volume")
     return mass

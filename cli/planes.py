@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cli.errors import DataError, quote
 from cli.options import bad
 from cli.tables import read
-from cli.units import parse_quantity, to_si
+from cli.units import SMALLEST, parse_quantity, to_si
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def from_options(specs: Sequence[str], flag: str = "--plane") -> Planes:
                 z.append(parse_quantity(parts[1], "length"))
         except ValueError as error:
             raise bad(flag, error) from None
-        if not radius[0] > 0:
+        if not radius[0] >= SMALLEST:
             raise bad(flag, f"'{spec}': expected a positive radius")
         if parts[0].strip() in names:
             raise bad(flag, f"the plane {parts[0].strip()} is given twice")
@@ -101,7 +101,7 @@ def from_table(path: str) -> Planes:
     if "plane" not in table.texts:
         raise DataError(f"{table.file}: no column plane (the header is: {', '.join(table.header)})")
     radius = table.require("radius", "length")
-    table.reject(~(radius.values > 0), "radius", "a positive radius")
+    table.reject(~(radius.values >= SMALLEST), "radius", "a positive radius")
     names, rotor = table.texts["plane"], table.texts.get("rotor")
     owners = rotor or [""] * len(names)
     seen: set[tuple[str, str]] = set()

@@ -5,14 +5,14 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli.errors import DataError
+from cli.errors import DataError, one_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -100,8 +100,9 @@ def show(
     rtol: float = 1e-3,
     text: bool = False,
     digits: bool = False,
+    beside: Mapping[Path, bytes] | None = None,
 ) -> None:
-    """Write the files asked for, print the result, end with status 1 if an expectation is not met."""
+    """Write the files asked for and those `beside` them, print the result, end with status 1 if an expectation is not met."""
     report = None
     if expect is not None:
         from cli.expect import compare
@@ -110,16 +111,19 @@ def show(
         checked = f"{table_text(report.columns)}\n{report.summary}"
     if digits:
         shown = _with_digits_that_hold(shown)
+    for path, data in (beside or {}).items():
+        write(path, data)
     if plot is not None and shown.figure is not None:
         write(plot, _picture(shown.figure, plot.suffix.lower()[1:]))
     if output is not None:
-        write(
-            output, (_json(shown) if output.suffix.lower() == ".json" else csv_text(shown.columns)).encode()
-        )
+        if output.suffix.lower() == ".json":
+            write(output, (part.encode() for part in _json(shown)))
+        else:
+            write(output, csv_text(shown.columns).encode())
     for warning in shown.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
+        print(f"warning: {one_line(warning)}", file=sys.stderr)
     if json:
-        sys.stdout.write(_json(shown))
+        sys.stdout.writelines(_json(shown))
         if report is not None:
             print(checked, file=sys.stderr)
     elif report is not None:
@@ -134,12 +138,13 @@ def show(
         raise typer.Exit(1)
 
 
-def write(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all."""
+def write(path: Path, data: bytes | Iterable[bytes]) -> None:
+    """Write a file whole or not at all; `data` may come in parts."""
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         try:
-            partial.write_bytes(data)
+            with partial.open("wb") as stream:
+                stream.writelines([data] if isinstance(data, bytes) else data)
             os.replace(partial, path)
         finally:
             partial.unlink(missing_ok=True)
@@ -238,16 +243,15 @@ def _paragraphs(*parts: str) -> str:
     return "\n".join(part.rstrip("\n") + "\n" for part in parts if part)
 
 
-def _json(shown: Shown) -> str:
+def _json(shown: Shown) -> Iterator[str]:
+    """Yield the document in parts: the text of a long sweep is three times the size of its numbers."""
     import json
 
-    document = {**shown.document(), "warnings": shown.warnings}
-    return (
-        json.dumps(
-            document, ensure_ascii=False, indent=1, allow_nan=False, default=lambda array: array.tolist()
-        )
-        + "\n"
+    encoder = json.JSONEncoder(
+        ensure_ascii=False, indent=1, allow_nan=False, default=lambda array: array.tolist()
     )
+    yield from encoder.iterencode({**shown.document(), "warnings": shown.warnings})
+    yield "\n"
 
 
 def _picture(draw: Callable[[], Figure], suffix: str) -> bytes:

@@ -21,10 +21,13 @@ from rigidbody3d import cones as cones_of
 from rigidbody3d import sleeping_threshold as threshold_of
 from rigidbody3d import steady_precession as steady_of
 from rigidbody3d.attitude import normalize, rotate
+from rigidbody3d.spin import MOST
 
 Array = NDArray[np.float64]
 
 KEYS = ("name", "inertia", "parts", "omega", "attitude", "top", "torque", "frame")
+UNASKED = 20_000
+"""Steps of an integration that nobody asked for by name: some seconds."""
 EQUAL = 1e-12
 """Two principal moments as near as this, relatively, are those of a body of revolution."""
 
@@ -55,6 +58,8 @@ def read_body(path: str) -> Given:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise DataError(f"{file}: {reason}") from None
+    except RecursionError:
+        raise DataError(f"{file}: no valid TOML: nested too deeply") from None
     for key in document:
         if key not in KEYS:
             raise DataError(f"{file}: unknown key '{key}': expected {', '.join(KEYS)}{nearest(key, KEYS)}")
@@ -211,9 +216,15 @@ class Answer:
                 frame=g.frame,
                 mgl=g.mgl or 0.0,
                 method=self.integrator,
+                most=MOST if self.method == "integrate" else UNASKED,
             )
         except (ValueError, RuntimeError) as error:
-            raise DataError(f"{g.file}: {error}") from None
+            wait = (
+                ", or --method integrate to wait for it"
+                if self.method is None and "steps" in str(error)
+                else ""
+            )
+            raise DataError(f"{g.file}: {error}{wait}") from None
 
     @cached_property
     def drift(self) -> dict[str, float | None]:

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -326,9 +326,17 @@ def _read_small(source: _Source, table: Table, plan: _Plan, marker: str) -> None
             table.numbers[name] = Numbers(source.header[index], unit, values)
 
 
+def _version(package: Any) -> tuple[int, int]:
+    major, minor = package.__version__.split(".")[:2]
+    return int(major), int(minor)
+
+
 def _read_large(source: _Source, table: Table, plan: _Plan, marker: str) -> bool:
     """Read with pandas; False where anything is out of order, for the csv module to say what and where."""
     import pandas as pd
+
+    # from 3.1 numbers are read to the nearest double without being asked to
+    exact: dict[str, Any] = {} if _version(pd) >= (3, 1) else {"float_precision": "round_trip"}
 
     def read(decimal: str) -> pd.DataFrame:
         return pd.read_csv(
@@ -348,9 +356,9 @@ def _read_large(source: _Source, table: Table, plan: _Plan, marker: str) -> bool
             usecols=[index for _, index, *_ in plan] if plan else None,
             keep_default_na=False,
             na_filter=False,
-            float_precision="round_trip",
             decimal=decimal,
             engine="c",
+            **exact,
         )
 
     try:

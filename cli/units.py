@@ -118,6 +118,7 @@ def from_si(value: Any, dimension: str, unit: str) -> Any:
 
 
 LARGEST = 1e60  # no quantity of a machine is larger, and no product of five of them overflows
+SMALLEST = 1e-60  # what has to be positive is no smaller: it can be divided by
 
 
 def parse_number(text: str) -> float:

@@ -110,6 +110,7 @@ def integrate(
     steps_per_turn: float = 60,
     refine: int = 1,
     longest: float = math.inf,
+    most: float = MOST,
 ) -> Trajectory:
     """Integrate the rotation of a body under a torque from time zero to each of the times.
 
@@ -140,10 +141,13 @@ def integrate(
         Each of these steps is cut into as many.
     longest
         No step of a scipy method is longer, s.
+    most
+        Steps that are not to be exceeded.
 
     Raises
     ------
     ValueError
+        More steps than `most` would be needed.
         A splitting of what is no symmetric top; another frame; an inertia that is not positive.
     RuntimeError
         The integrator gave up; with its reason.
@@ -164,8 +168,18 @@ def integrate(
     time = np.atleast_1d(np.asarray(t, dtype=float))
     q0 = quaternion.normalize(attitude)
     H0 = quaternion.rotate(q0, tensor @ np.asarray(omega, dtype=float))
+    # the finer repetition of an estimate may take as many more steps as it is finer
     again = partial(
-        integrate, inertia, omega, attitude, t, torque=torque, frame=frame, mgl=mgl, method=method
+        integrate,
+        inertia,
+        omega,
+        attitude,
+        t,
+        torque=torque,
+        frame=frame,
+        mgl=mgl,
+        method=method,
+        most=4 * most,
     )
     if method == "splitting":
         if (
@@ -174,11 +188,11 @@ def integrate(
             or tensor[0, 0] != tensor[1, 1]
         ):
             raise ValueError("the splitting is for a symmetric top, its axis body z, under its weight alone")
-        H, q, count = _split(tensor[0, 0], tensor[2, 2], mgl, H0, q0, time, steps_per_turn, refine)
+        H, q, count = _split(tensor[0, 0], tensor[2, 2], mgl, H0, q0, time, steps_per_turn, refine, most)
         finer = partial(again, steps_per_turn=steps_per_turn, refine=2 * refine)
         return Trajectory(time, H, q, tensor, mgl, count, finer)
     w0 = np.asarray(omega, dtype=float)
-    H, q, count, step = _solve(tensor, w0, H0, q0, time, torque, frame, mgl, method, rtol, longest)
+    H, q, count, step = _solve(tensor, w0, H0, q0, time, torque, frame, mgl, method, rtol, longest, most)
     finer = partial(again, longest=step / 2, rtol=rtol / 256)
     return Trajectory(time, H, q, tensor, mgl, count, finer)
 
@@ -195,6 +209,7 @@ def _solve(
     method: str,
     rtol: float,
     longest: float,
+    most: float,
 ) -> tuple[Array, Array, int, float]:
     import scipy.integrate
 
@@ -257,12 +272,7 @@ def _solve(
         rate = max(float(np.linalg.norm(omega)), math.sqrt(abs(mgl) / tensor.diagonal().min()))
         if rate:
             longest = min(longest, 2 * math.pi / rate / 40 * (max(rtol, 1e-13) / 1e-13) ** 0.125)
-        planned = float(np.abs(time[order]).max()) / longest
-        if planned > MOST:
-            raise ValueError(
-                f"the integration would take some {planned:.1g} steps, more than {MOST:.0e}: expected a shorter time "
-                "or a slower rotation"
-            )
+        _check_steps(float(np.abs(time[order]).max()) / longest, most)
         limits = {"rtol": max(rtol, 3e-14), "atol": rtol, "max_step": longest}
         solver = method_class(rates, 0.0, start, sign * np.inf, **limits)
         before = (0.0, start)
@@ -272,8 +282,8 @@ def _solve(
                 before = (solver.t, solver.y)
                 message = solver.step()
                 steps += 1
-                if steps > MOST:
-                    raise RuntimeError(f"the integration stopped at {solver.t:g} s, after {MOST:.0e} steps")
+                if steps > most:
+                    raise RuntimeError(f"the integration stopped at {solver.t:g} s, after {most:.0e} steps")
                 if solver.status == "failed":
                     raise RuntimeError(f"the integration stopped at {solver.t:g} s: {message}")
             # a shorter step from the last station: the interpolant of the step taken is some digits worse
@@ -290,11 +300,28 @@ def _solve(
     return out[:, :3] * size, quaternion.normalize(out[:, 3:]), count, mean
 
 
+def _check_steps(planned: float, most: float) -> None:
+    if planned > most:
+        raise ValueError(
+            f"the integration would take some {planned:.1g} steps, more than {most:.0e}: expected a shorter time "
+            "or a slower rotation"
+        )
+
+
 def _split(
-    I1: float, I3: float, mgl: float, H0: Array, q0: Array, time: Array, per_turn: float, refine: int
+    I1: float,
+    I3: float,
+    mgl: float,
+    H0: Array,
+    q0: Array,
+    time: Array,
+    per_turn: float,
+    refine: int,
+    most: float,
 ) -> tuple[Array, Array, int]:
     rate = max(float(np.linalg.norm(H0)) / min(I1, I3), math.sqrt(abs(mgl) / I1))
     longest = 2 * math.pi / rate / per_turn if rate else math.inf
+    _check_steps(float(np.abs(time).max(initial=0.0)) / longest, most)
     H, q = np.empty((len(time), 3)), np.empty((len(time), 4))
     count = 0
     for sign in (1.0, -1.0):

@@ -199,7 +199,12 @@ class _Chooser:
         from virtualwork.check import constraint_jacobian
 
         _, jacobian = constraint_jacobian(self.m, st)
-        s = np.linalg.svd(jacobian, compute_uv=False)
+        try:
+            s = np.linalg.svd(jacobian, compute_uv=False)
+        except np.linalg.LinAlgError:
+            raise AssemblyError(
+                "the lengths of the links differ too much to tell the mechanism's mobility"
+            ) from None
         left = 3 * len(self.m.links) - int((s > 1e-9 * s[0]).sum())
         counted = done.blocks.mobility
         if left < len(self.m.inputs) or 1 <= counted < len(self.m.inputs):

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from virtualwork.assembly import Assembly
     from virtualwork.mechanism import Mechanism
+    from virtualwork.motion import Motion
 
     Reals = NDArray[np.float64]
 
@@ -75,6 +76,8 @@ class Check:
         labels, jacobian = constraint_jacobian(self.mechanism, self._typical())
         if not len(labels):
             return 0, ()
+        if not np.isfinite(jacobian).all():
+            raise AssemblyError("assembled at no pose of the motion where the joints' rank could be told")
         u, s, _ = np.linalg.svd(jacobian)
         rank = int((s > 1e-9 * s[0]).sum())
         left = u[:, rank:]
@@ -222,15 +225,18 @@ class Check:
             angles = self._seen(bodies, corners)
         return FourBar(links, lengths, grashof_class(*lengths), (angles[0], angles[-1]))
 
-    def _seen(self, bodies: tuple[str, ...], corners: list[str]) -> list[float]:
-        """The transmission angle over the motion, sampled, for chains that are not driven at their own crank."""
+    @cached_property
+    def _sampled(self) -> Motion:
+        """The motion over the whole span, for every four-bar the same."""
         from virtualwork.motion import Motion
 
         low, high = self._span()
         q = np.linspace(low, high, 1441)
-        inputs = q if self.assembly.track.active else np.array([self.mechanism.at])
-        motion = Motion(self.assembly, inputs)
-        b, c, d = (motion.point(p).complex(0) for p in corners[1:])
+        return Motion(self.assembly, q if self.assembly.track.active else np.array([self.mechanism.at]))
+
+    def _seen(self, bodies: tuple[str, ...], corners: list[str]) -> list[float]:
+        """The transmission angle over the motion, sampled, for chains that are not driven at their own crank."""
+        b, c, d = (self._sampled.point(p).complex(0) for p in corners[1:])
         mu = np.abs(np.angle((b - c) * np.conj(d - c)))
         mu = mu[np.isfinite(mu)]
         return [float(mu.min()), float(mu.max())] if len(mu) else [math.nan, math.nan]

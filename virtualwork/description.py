@@ -52,7 +52,9 @@ def loads(text: str, file: str = "<text>", folder: Path | None = None) -> Mechan
     """Read a mechanism from TOML text; `folder` is where its input tables lie."""
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise DescriptionError(f"{file}: no valid TOML: nested too deeply") from None
+    except ValueError as error:  # a TOMLDecodeError, or a number of thousands of digits
         raise DescriptionError(f"{file}: no valid TOML: {error}") from None
     try:
         return _Reader(data, folder or Path()).mechanism()
@@ -80,7 +82,8 @@ class _Reader:
         """One quantity: a bare number in the file's unit (length, angle) or SI, or a string with its unit."""
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             factor = self.bare[kind][1] if kind in self.bare else 1.0
-            result: float | None = scaled(repr(value), factor) if math.isfinite(value) else float(value)
+            # a whole number of TOML has no bound
+            result: float | None = scaled(repr(value), factor) if abs(value) <= LARGEST else math.inf
         elif isinstance(value, str):
             result = parse(value, kind)
             if result is None:
@@ -117,7 +120,7 @@ class _Reader:
             gears=[self.gear(e, i) for i, e in self.rows("gears")],
             inputs=inputs,
             guess=self.guess(inputs),
-            name=str(self.data.get("name", "")),
+            name=self.name(),
             gravity=self.gravity(),
             forces=[self.force(e, i) for i, e in self.rows("forces")],
             torques=[self.torque(e, i) for i, e in self.rows("torques")],
@@ -126,6 +129,12 @@ class _Reader:
             motors=[self.motor(e, i) for i, e in self.rows("motors")],
             friction=[self.rub(e, i) for i, e in self.rows("friction")],
         )
+
+    def name(self) -> str:
+        found = self.data.get("name", "")
+        if not isinstance(found, (str, int, float)):
+            raise _wrong("name", found, "text")
+        return str(found)
 
     # --- tables ---------------------------------------------------------------------------------------------
     def table(self, name: str) -> dict[str, Any]:
@@ -151,6 +160,11 @@ class _Reader:
         given = entry.get("points", {})
         if not isinstance(given, dict):
             raise _wrong(f"{where} points", given, "a table { A = [0, 0], B = [120, 0] }")
+        for p, v in given.items():
+            if isinstance(v, dict) and not isinstance(v.get("from"), str):
+                raise DescriptionError(
+                    f"{where} points.{p} from: expected the name of another point of this link"
+                )
         waiting = dict(given)
         while waiting:
             ready = [p for p, v in waiting.items() if not isinstance(v, dict) or v.get("from") in points]
@@ -265,26 +279,32 @@ class _Reader:
 
     def history(self, law: Any, where: str, slide: bool) -> tuple[tuple[float, float], ...]:
         """A law of motion: a CSV of time_s and angle_deg (angle_rad, position_m, position_mm)."""
-        import csv
-
         kinds = (
             {"position_m": 1.0, "position_mm": 1e-3}
             if slide
             else {"angle_rad": 1.0, "angle_deg": math.pi / 180}
         )
-        path = self.folder / str(law)
-        try:
-            with path.open(newline="", encoding="utf-8-sig") as stream:
-                rows = list(csv.DictReader(stream))
-        except OSError:
-            raise _wrong(f"{where} law", law, "a CSV file that can be read") from None
+        rows = self.csv(law, f"{where} law")
         column = next((c for c in kinds if rows and c in rows[0]), None)
         if column is None or "time_s" not in rows[0]:
             raise _wrong(f"{where} law", law, f"columns time_s and {' or '.join(kinds)}")
         try:
-            return tuple((float(r["time_s"]), float(r[column]) * kinds[column]) for r in rows)
+            found = tuple((float(r["time_s"]), float(r[column]) * kinds[column]) for r in rows)
         except (TypeError, ValueError):
             raise _wrong(f"{where} law", law, "numbers in every row") from None
+        if not all(math.hypot(*pair) <= LARGEST for pair in found):
+            raise _wrong(f"{where} law", law, "finite numbers in every row")
+        return found
+
+    def csv(self, name: Any, where: str) -> list[dict[str, str]]:
+        """The rows of a CSV file beside this one."""
+        import csv
+
+        try:
+            with (self.folder / str(name)).open(newline="", encoding="utf-8-sig") as stream:
+                return list(csv.DictReader(stream))
+        except (OSError, ValueError, csv.Error):
+            raise _wrong(where, name, "a CSV file that can be read") from None
 
     def guess(self, inputs: list[Input]) -> Guess:
         table = self.table("guess")
@@ -348,9 +368,9 @@ class _Reader:
 
     def body(self, name: Any, where: str, ground: bool = True) -> str:
         names = self.bodies if ground else self.links
-        if name not in names:
+        if not isinstance(name, str) or name not in names:
             raise DescriptionError(f"{where}: unknown link '{name}'{_hint(name, names)}")
-        return str(name)
+        return name
 
     def force(self, entry: dict[str, Any], i: int) -> Force:
         where = f"[[forces]] {i}"
@@ -373,8 +393,6 @@ class _Reader:
 
     def force_table(self, name: Any, where: str) -> tuple[tuple[tuple[float, complex], ...], bool]:
         """A force over the input: a CSV of angle_deg (angle_rad, position_m, position_mm), fx_N and fy_N."""
-        import csv
-
         inputs = list(self.rows("input"))
         if len(inputs) != 1:
             raise _wrong(f"{where} table", name, "a mechanism with one input, for the force is given over it")
@@ -384,11 +402,7 @@ class _Reader:
             if slide
             else {"angle_rad": 1.0, "angle_deg": math.pi / 180}
         )
-        try:
-            with (self.folder / str(name)).open(newline="", encoding="utf-8-sig") as stream:
-                rows = list(csv.DictReader(stream))
-        except OSError:
-            raise _wrong(f"{where} table", name, "a CSV file that can be read") from None
+        rows = self.csv(name, f"{where} table")
         column = next((c for c in kinds if rows and c in rows[0]), None)
         if column is None or not {"fx_N", "fy_N"} & set(rows[0]):
             raise _wrong(f"{where} table", name, f"columns {' or '.join(kinds)}, fx_N and fy_N")
@@ -480,6 +494,8 @@ class _Reader:
 
 
 def _known(entry: Mapping[str, Any], names: set[str], where: str, what: str) -> None:
+    if not isinstance(entry, Mapping):
+        raise _wrong(where, entry, "a table")
     for key in entry:
         if key not in names:
             raise DescriptionError(f"{where}: unknown {what} '{key}'{_hint(key, names)}")

@@ -61,6 +61,8 @@ class March:
         rate = solve(jacobian, -right)[0]
         if jacobian.shape[1] == jacobian.shape[2]:
             return rate, float(np.linalg.det(jacobian[0]))
+        if not np.isfinite(jacobian).all():
+            return rate, np.nan
         return rate, float(np.prod(np.linalg.svd(jacobian[0], compute_uv=False)))
 
     def extend(self, a: float, b: float) -> None:

@@ -196,6 +196,8 @@ def newton(
         x, f, norm = trial, g, after
         if table is not None:
             table.append(Iterate(k, x[0].copy(), float(norm[0])))
+        # of dependent constraints rounding leaves a gap that no step makes less: it is closed, and stays as it is
+        done = done | (worse & (norm <= 1e-12 * size))
         small = (norm <= 64 * EPS * size) & (big <= 1e-7)
         done = done | small | ~np.isfinite(norm)
     write_unknowns(group, st, x)

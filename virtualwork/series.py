@@ -40,6 +40,8 @@ def branches(group: Group, jets: Callable[[], Jets], order: int) -> list[list[Re
     """
     d = jets()
     jacobian = stack(d.columns(group), 1)[0]
+    if not np.isfinite(jacobian).all():
+        return []  # what the group hangs on is not assembled here
     u, s, vt = np.linalg.svd(jacobian)
     left, null = u[:, -1], vt[-1]
     span = len(s) - 1

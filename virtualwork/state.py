@@ -172,6 +172,10 @@ class Case:
         w = st.point[self.closure.start] - st.point[self.closure.end]
         if self.known:
             w = w + st.sum(self.known)
+        if st.many and isinstance(w, complex):
+            w = np.complex128(
+                w
+            )  # between points that stand: as in any array, what is divided by zero is infinite
         if group.kind == "RRR":
             a, b = group.angles
             st.turn[a], st.turn[b], margin = two_angles(w, self.arm(0, st), self.arm(1, st), sign, st.xp)

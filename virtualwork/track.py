@@ -246,6 +246,8 @@ class Track:
 
     def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
         """Find where the radicand crosses or touches zero; say whether a change point was found."""
+        if np.mean(np.abs(m) < 1e-14) > 0.9:
+            return False  # stretched all along: zeros of rounding are no change points
         inside = (q >= a) & (q < b)
         crossing = np.flatnonzero((m[:-1] >= 0) != (m[1:] >= 0))
         for i in crossing:
@@ -347,7 +349,10 @@ class Track:
                     d.step(s, k)
             return d
 
-        found = branches(group, jets, ORDER)
+        try:
+            found = branches(group, jets, ORDER)
+        except ZeroDivisionError:  # a group that this one hangs on has no direction here
+            found = []
         best, nearest = None, np.inf
         probe = int(np.argmax(nodes))
         for rates in found:

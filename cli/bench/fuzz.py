@@ -1,142 +1,207 @@
-"""Broken input: the worked examples with their files and options damaged at random.
+"""Broken input: worked examples with their files and options damaged at random, run by the real command.
 
-Whatever comes in, the answer is a result, one line of a data error, or a usage error; never an exception, a
-warning of numpy's, or a wait of more than five seconds. A case is replayed by its seed.
+Whatever comes in, the answer is a result, one line of a data error, or a usage error; never an exception, a warning
+of numpy's, half a file, a long wait or much memory. A case is replayed by its seed.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
+import json
 import os
-import re
-import shlex
+import sys
 import tempfile
 import time
+import traceback
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import typer
 
-from cli.app import build
-from cli.commands.examples import ABOUT, EXAMPLES, describe, names
-from cli.errors import DataError
+from cli.app import build, main
+from cli.bench.fuzz_cases import Case, draw
 
-LONGEST = 5.0  # seconds
-
-# what people, spreadsheets and bad luck put into cells
-TOKENS = [
-    "", " ", "0", "-0", "-1", "1", "1e9", "-1e-9", "1e60", "1e-60", "1e61", "1e308", "1e-320", "nan", "inf", "-inf", "NaN",
-    "x", "?", "?A", "yes", "NA", "None", "true", "1,5", "1.5.2", "0x1", "1_0", "½", "ü", "\u2212" + "1", "A", "B", "ground",
-    "360", "-90", "1e5deg", "30 deg", "12 furlong", "3000 rpm", "[", "]", "{}", "[[", "= ", "\"", "'", "\\", "#", "\t",
-    ";", ",", ",,", "\r", "\n", "\n\n", "\0", "\ufeff", "point = \"A\"", "[0, 0]", "[1e60, 0]",
-]  # fmt: skip
+LONGEST = 5.0  # seconds of processor time
+LONGEST_LINE = 2000  # characters of a data error: more is no message
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a damaged example; `fault` is None where it was handled."""
+    """What became of a case; `handled` is result, data error or usage error, `fault` None where it was handled."""
 
-    example: str
+    command: str
     arguments: list[str]
     seconds: float
+    handled: str
     fault: str | None
+    bytes: int = 0
+    """Memory above that at the start of the case."""
 
 
-def damage(rng: np.random.Generator, data: bytes) -> bytes:
-    """Return a file with one to four small faults."""
-    text = data.decode("utf-8")
-    for _ in range(int(rng.integers(1, 5))):
-        lines = text.splitlines(keepends=True) or [""]
-        i = int(rng.integers(len(lines)))
-        token = TOKENS[int(rng.integers(len(TOKENS)))]
-        match int(rng.integers(8)):
-            case 0 | 1:
-                text = _replace_word(rng, lines, i, token)
-            case 2:
-                text = _replace_word(rng, lines, i, f"{rng.normal() * 10.0 ** rng.integers(-4, 5):.4g}")
-            case 3:
-                text = "".join(lines[:i] + lines[i + 1 :])
-            case 4:
-                text = "".join([*lines[: i + 1], *lines[i:]])
-            case 5:
-                text = "".join([*lines[:i], token, *lines[i:]])
-            case 6:
-                text = text[: int(rng.integers(len(text) + 1))]
-            case _:
-                text = "".join(lines[k] for k in rng.permutation(len(lines)))
-    encoded = text.encode("utf-8")
-    if rng.random() < 0.05:
-        encoded = text.encode(str(rng.choice(["utf-16", "cp1252", "utf-32"])), "replace")
-    if rng.random() < 0.05 and encoded:
-        place = int(rng.integers(len(encoded)))
-        encoded = encoded[:place] + bytes([int(rng.integers(256))]) + encoded[place + 1 :]
-    return encoded
+@dataclass(frozen=True)
+class Ended:
+    """How a call ended: its status, what it printed, the exception that came through."""
 
-
-def _replace_word(rng: np.random.Generator, lines: list[str], i: int, token: str) -> str:
-    """Put a token in the place of one cell, number or word of a line."""
-    words = list(re.finditer(r"[^\s,;=\[\]{}]+|(?<=,)(?=[,\n])", lines[i]))
-    if not words:
-        return "".join(lines)
-    word = words[int(rng.integers(len(words)))]
-    line = lines[i][: word.start()] + token + lines[i][word.end() :]
-    return "".join([*lines[:i], line, *lines[i + 1 :]])
+    status: object
+    out: str
+    err: str
+    exception: str | None = None
 
 
 def trial(seed: int) -> Outcome:
-    """Damage one example and run its command, in this process and an empty folder."""
-    rng = np.random.default_rng(seed)
-    known = names()
-    example = known[int(rng.integers(len(known)))]
-    arguments = shlex.split(describe(example)["command"])[1:]
-    arguments = [
-        word for word in arguments if not word.endswith((".png", ".svg", ".pdf")) and word != "--plot"
-    ]
-    if rng.random() < 0.3 and len(arguments) > 1:
-        place = int(rng.integers(1, len(arguments)))
-        arguments[place] = TOKENS[int(rng.integers(len(TOKENS)))].replace("\0", "")
-    if rng.random() < 0.5:
-        arguments.append("--json")
+    """Draw a case and run its command, in this process and a folder of its own."""
+    case = draw(np.random.default_rng(seed))
     before = Path.cwd()
     with tempfile.TemporaryDirectory() as folder:
-        files = [file for file in EXAMPLES.joinpath(example).iterdir() if file.name != ABOUT]
-        victim = files[int(rng.integers(len(files)))].name
-        for file in files:
-            data = file.read_bytes()
-            Path(folder, file.name).write_bytes(damage(rng, data) if file.name == victim else data)
+        for name, data in case.files.items():
+            Path(folder, name).write_bytes(data)
         os.chdir(folder)
-        start = time.monotonic()
         try:
-            fault = _run(arguments)
+            start = time.process_time()
+            ended = _call(case)
+            spent = time.process_time() - start
+            handled, fault = judge(case, ended)
         finally:
             os.chdir(before)
-    spent = time.monotonic() - start
     if fault is None and spent > LONGEST:
         fault = f"took {spent:.1f} s"
-    return Outcome(example, arguments, spent, fault)
+    return Outcome(case.command, case.arguments, spent, handled, fault)
 
 
-def _run(arguments: list[str]) -> str | None:
-    command: Any = typer.main.get_command(build(arguments[0]))
-    with (
-        contextlib.redirect_stdout(io.StringIO()),
-        contextlib.redirect_stderr(io.StringIO()),
-        warnings.catch_warnings(),
-    ):
-        warnings.simplefilter("error")
-        try:
-            command.main(arguments, prog_name="dalembert")
-        except DataError as error:
-            return None if str(error).strip() else "an empty message"
-        except SystemExit as end:
-            return None if end.code in (0, 1, 2, None) else f"status {end.code}"
-        except Exception as error:
-            import traceback
+def _call(case: Case) -> Ended:
+    """Run the command as its console script does, with numpy's warnings as errors and no net under it."""
+    given, shown = sys.argv, os.environ.get("DALEMBERT_TRACEBACK")
+    out = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
+    err = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", errors="backslashreplace")
+    status: object = 0
+    exception = None
+    sys.argv = ["dalembert", *case.arguments]
+    os.environ["DALEMBERT_TRACEBACK"] = "1"
+    try:
+        with (
+            _standard_input(case.stdin),
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+            warnings.catch_warnings(),
+        ):
+            warnings.simplefilter("error")
+            try:
+                main(_front)
+            except SystemExit as end:
+                status = end.code
+            except Exception as error:
+                exception = _told(error)
+    finally:
+        sys.argv = given
+        os.environ.pop("DALEMBERT_TRACEBACK")
+        if shown is not None:
+            os.environ["DALEMBERT_TRACEBACK"] = shown
+    return Ended(status, _text(out), _text(err), exception)
 
-            where = traceback.extract_tb(error.__traceback__)[-1]
-            return f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
+
+@functools.cache
+def _front(called: str | None) -> Any:
+    """The command line, built once: that takes as long as a case."""
+    return typer.main.get_command(build(called))
+
+
+@contextlib.contextmanager
+def _standard_input(data: bytes) -> Iterator[None]:
+    before = sys.stdin
+    sys.stdin = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8")
+    try:
+        yield
+    finally:
+        sys.stdin = before
+
+
+def _text(stream: io.TextIOWrapper) -> str:
+    stream.flush()
+    stream.seek(0)
+    return stream.read()
+
+
+def _told(error: Exception) -> str:
+    """The exception and the last two places of this project's that it went through."""
+    frames = traceback.extract_tb(error.__traceback__)
+    ours = [f for f in frames if "site-packages" not in f.filename and "fuzz" not in f.filename]
+    places = [f"{Path(f.filename).name}:{f.lineno}" for f in (ours[-2:] or frames[-1:])]
+    return f"{type(error).__name__}: {str(error)[:300]} ({' '.join(places)})"
+
+
+def judge(case: Case, ended: Ended) -> tuple[str, str | None]:
+    """Say how a call was handled, and what is wrong with that."""
+    if ended.exception is not None:
+        return "", ended.exception
+    lines = ended.err.splitlines()
+    changed = [
+        name
+        for name in sorted(os.listdir())
+        if name not in case.files or Path(name).read_bytes() != case.files[name]
+    ]
+    fault = None
+    if halves := [name for name in changed if name.endswith(".part")]:
+        fault = f"left {halves[0]}"
+    if ended.status in (0, None):
+        return "result", fault or _of_result(ended, changed)
+    if ended.status == 2:
+        if not any(line.startswith("Error: ") and len(line) > 10 for line in lines):
+            fault = fault or f"a usage error that says nothing: {ended.err[-200:]!r}"
+        return "usage error", fault or _left(ended, changed)
+    if ended.status != 1:
+        return "", f"status {ended.status}"
+    if not any(line.startswith("dalembert: ") for line in lines):
+        # a check that failed, or no pose that can be assembled: shown, with status 1
+        return "result", fault or _of_result(ended, changed)
+    if "not enough memory" in ended.err:
+        return "data error", "not enough memory"
+    if len(lines) != 1 or len(lines[0].removeprefix("dalembert: ")) < 10:
+        fault = fault or f"a data error of {len(lines)} lines: {ended.err[:200]!r}"
+    elif len(lines[0]) > LONGEST_LINE:
+        fault = fault or f"a data error of {len(lines[0])} characters: {lines[0][:100]!r}"
+    elif not lines[0].isprintable():
+        fault = fault or f"a data error with control characters: {lines[0][:300]!r}"
+    return "data error", fault or _left(ended, changed)
+
+
+def _left(ended: Ended, changed: list[str]) -> str | None:
+    """What an error may not leave behind."""
+    if ended.out.strip():
+        return f"an error after output: {ended.out[:100]!r}, {ended.err[:200]!r}"
+    # of several files the first may be written, whole, when the second cannot be
+    if changed and "cannot write" not in ended.err:
+        return f"an error after writing {', '.join(changed)}: {ended.err[:200]!r}"
     return None
+
+
+def _of_result(ended: Ended, changed: list[str]) -> str | None:
+    """What a result must be: something, and JSON where it looks like it."""
+    if not ended.out.strip() and not changed:
+        return f"status {ended.status} and nothing shown: {ended.err[:200]!r}"
+    documents = {"standard output": ended.out if ended.out.startswith("{\n") else ""}
+    documents |= {name: Path(name).read_text("utf-8") for name in changed if name.endswith(".json")}
+    for name, text in documents.items():
+        try:
+            if text:
+                json.loads(text, parse_constant=_refuse)
+        except ValueError as error:
+            return f"{name} is no JSON: {error}"
+    if "Warning" in ended.err or "Traceback" in ended.err:
+        return f"a stray warning: {ended.err[:300]!r}"
+    return None
+
+
+def _refuse(constant: str) -> NoReturn:
+    raise ValueError(f"{constant} in it")
+
+
+def replayed(seed: int) -> dict[str, Any]:
+    """Return a case in full: its arguments, files and standard input, to be looked at."""
+    case = draw(np.random.default_rng(seed))
+    return {"arguments": case.arguments, "files": case.files, "stdin": case.stdin}

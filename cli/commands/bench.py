@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cli import options
-from cli.errors import nearest
+from cli.errors import nearest, one_line
 from cli.render import Json, Output, Plot, Shown, Text, show
 
 if TYPE_CHECKING:
@@ -51,9 +52,19 @@ def run(
         str | None,
         typer.Option(metavar="TIME", help="Run the random campaigns for this long instead, such as 10min."),
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="With --stress: replay this one case of each campaign.")
+    fuzz: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Run N damaged inputs through the commands instead."),
     ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            help="With --stress: replay this one case of each campaign. With --fuzz: the first input's seed; "
+            "--fuzz 1 replays one.",
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes for --fuzz.")] = 1,
     json: Json = False,
     output: Output = None,
     plot: Plot = None,
@@ -65,6 +76,11 @@ def run(
     √(x² + y²) over 4096 doubles), so that results from different machines compare. Errors are against answers of
     extended precision.
     """
+    if fuzz is not None:
+        if stress is not None or name:
+            raise options.bad("--fuzz", "runs alone: expected no --stress and no names")
+        _fuzz(fuzz, seed or 0, workers, json=json, text=text, output=output)
+        return
     if stress is not None or seed is not None:
         _stress(
             name or [],
@@ -178,4 +194,63 @@ def _stress(names: list[str], seconds: float, seed: int | None, *, text: bool, o
         output=output,
     )
     if any(t.bounded < 0.999 for t in tallies):
+        raise typer.Exit(1)
+
+
+def _fuzz(inputs: int, first: int, workers: int, *, json: bool, text: bool, output: Path | None) -> None:
+    """Run damaged inputs with a progress bar; status 1 if one is not handled as it should be."""
+    from shlex import join
+
+    from cli.bench.fuzz_workers import LIMITED, Tally, run
+
+    tallies: dict[str, Tally] = {}
+    # an interrupted run shows what it has done
+    with (
+        typer.progressbar(length=inputs, label="damaged inputs", file=sys.stderr) as bar,
+        suppress(KeyboardInterrupt),
+    ):
+        for seed, outcome in run(first, inputs, workers):
+            tallies.setdefault(outcome.command, Tally(outcome.command)).add(seed, outcome)
+            if outcome.fault is not None:
+                line = f"seed {seed}: dalembert {join(outcome.arguments)}: {outcome.fault}"
+                print("\n" + one_line(line), file=sys.stderr)
+            bar.update(1)
+    found = [tallies[command] for command in sorted(tallies)]
+    columns: dict[str, list[Any]] = {
+        "command": [t.command for t in found],
+        "inputs": [t.inputs for t in found],
+        "results": [t.handled["result"] for t in found],
+        "data_errors": [t.handled["data error"] for t in found],
+        "usage_errors": [t.handled["usage error"] for t in found],
+        "slowest_s": [t.slowest[0] for t in found],
+        "slowest_seed": [t.slowest[1] for t in found],
+        "memory_bytes": [t.largest[0] for t in found],
+        "memory_seed": [t.largest[1] for t in found],
+        "faults": [len(t.faults) for t in found],
+    }
+    total = sum(t.inputs for t in found)
+    show(
+        Shown(
+            lambda: {
+                "first_seed": first,
+                "inputs": total,
+                "commands": [
+                    dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)
+                ],
+                "faults": [
+                    {"seed": seed, "arguments": outcome.arguments, "fault": outcome.fault}
+                    for t in found
+                    for seed, outcome in t.faults
+                ],
+            },
+            columns,
+            ("command",),
+            afterword=lambda: f"{total} inputs from seed {first}, {sum(len(t.faults) for t in found)} faults",
+            warnings=[] if LIMITED else ["this system limits no process's memory: it was not limited"],
+        ),
+        json=json,
+        text=text,
+        output=output,
+    )
+    if any(t.faults for t in found):
         raise typer.Exit(1)

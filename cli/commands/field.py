@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli import options
-from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show, write
+from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
 
 if TYPE_CHECKING:
     from cli.field_runs import Runs
@@ -60,7 +60,8 @@ def run(
         ),
     ] = None,
     monte_carlo: Annotated[
-        int, typer.Option(metavar="N", min=0, help="Uncertainties from N drawn sets of readings.")
+        int,
+        typer.Option(metavar="N", min=0, max=100_000, help="Uncertainties from N drawn sets of readings."),
     ] = 0,
     method: Annotated[
         str, typer.Option(help="influence, or four-run: amplitudes only, one plane.")
@@ -96,7 +97,10 @@ def run(
     ] = False,
     planes: Annotated[int, typer.Option(min=1, help="Number of planes, for --suggest-trial.")] = 1,
     blades: Annotated[
-        int | None, typer.Option(min=1, help="Split the corrections onto so many places, evenly spaced.")
+        int | None,
+        typer.Option(
+            min=1, max=options.PLACES, help="Split the corrections onto so many places, evenly spaced."
+        ),
     ] = None,
     positions: Annotated[
         str | None, typer.Option(metavar="ANGLES", help="Split them onto these places: 0deg,30deg,60deg.")
@@ -206,16 +210,17 @@ def run(
     )
     field = Field(measured, wanted, stored)
     shown = field.shown()
+    beside: dict[Path, bytes] = {}
     if save_influence is not None:
         from cli.render import csv_text
 
-        write(save_influence, csv_text(field.coefficients()).encode())
+        beside[save_influence] = csv_text(field.coefficients()).encode()
     if report is not None:
         from cli.field_report import html
 
         source = "standard input" if runs == "-" else Path(runs).name
-        write(report, html(field, source, shown.warnings))
-    show(shown, **shared)  # type: ignore[arg-type]
+        beside[report] = html(field, source, shown.warnings)
+    show(shown, beside=beside, **shared)  # type: ignore[arg-type]
 
 
 def _conventions(method: str, phase_lag: bool, rotation: str | None) -> str:

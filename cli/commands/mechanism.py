@@ -94,11 +94,13 @@ def run(
 
     if order is not None and order not in ORDERS:
         raise options.bad("--order", f"'{order}': expected {', '.join(ORDERS)}")
-    if branch is not None and branch != "all" and not (branch.isdecimal() and int(branch) > 0):
+    if branch is not None and branch != "all" and options.whole(branch) < 1:
         raise options.bad("--branch", f"'{branch}': expected all, or the number of an assembly")
     names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
     if names == []:
         raise options.bad("--only", "expected names of links or points")
+    if counterweights is not None and not any(name.strip() for name in counterweights.split(",")):
+        raise options.bad("--counterweights", "expected names of links")
     if flywheel is not None and not 0 < flywheel < float("inf"):
         raise options.bad("--flywheel", "expected a positive speed fluctuation, such as 0.02")
     if (flywheel is not None or counterweights is not None) and sweep is None and inputs is None:
@@ -114,6 +116,8 @@ def run(
         job = _job(file, at, sweep, inputs, names, order, branch)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not json or expect is not None or output is not None
+        document = json or (output is not None and output.suffix.lower() == ".json")
+        job.check_size(json=document, table=table, forces=forces)
         shown = _shown(
             job,
             asked,

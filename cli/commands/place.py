@@ -19,7 +19,8 @@ def run(
         str | None, typer.Option(metavar="ANGLES", help="Where masses can go, such as 292.5deg,315deg.")
     ] = None,
     blades: Annotated[
-        int | None, typer.Option(min=1, help="So many places, evenly spaced, numbered from 1.")
+        int | None,
+        typer.Option(min=1, max=options.PLACES, help="So many places, evenly spaced, numbered from 1."),
     ] = None,
     first: Annotated[str, typer.Option(metavar="ANGLE", help="Angle of the first blade.")] = "0deg",
     max_mass: Annotated[

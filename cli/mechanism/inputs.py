@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from virtualwork import Mechanism
 
-MOST = 20_000_000  # poses in one sweep
+MOST = 2_000_000  # poses in one sweep; `Job.check_size` knows what one takes
 
 
 @dataclass(frozen=True)
@@ -130,10 +130,7 @@ def _sweep(m: Mechanism, text: str, at: list[str] | None) -> Inputs:
     start, stop = (_quantity(m, j, part, "--sweep") for part in parts[:2])
     swept: NDArray[np.float64]
     if slash:
-        try:
-            n = int(count)
-        except ValueError:
-            n = 0
+        n = options.whole(count)
         if not 1 <= n <= MOST:
             raise options.bad(
                 "--sweep", f"'{span}': expected a whole number of steps from 1 to {MOST} after the /"
@@ -213,8 +210,15 @@ def _rates_of(path: str, time: NDArray[np.float64], q: NDArray[np.float64]) -> t
         )
     from scipy.interpolate import CubicSpline
 
-    spline = CubicSpline(time, q, axis=0)
-    return spline(time, 1), spline(time, 2)
+    with np.errstate(all="ignore"):
+        try:
+            spline = CubicSpline(time, q, axis=0)
+            speed, acceleration = spline(time, 1), spline(time, 2)
+        except (ValueError, np.linalg.LinAlgError):
+            speed = acceleration = np.array([np.nan])
+    if not (np.isfinite(speed).all() and np.isfinite(acceleration).all()):
+        raise DataError(f"{path}: time_s: rows too close in time for the speeds of the law of motion")
+    return speed, acceleration
 
 
 def _from_history(m: Mechanism) -> Inputs:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.errors import DataError, nearest
+from cli.errors import MEMORY, DataError, nearest
 from cli.mechanism.inputs import Inputs
 
 if TYPE_CHECKING:
@@ -114,6 +114,25 @@ class Job:
                 raise DataError(
                     f"{self.file}: --only: no link or point is named '{name}'{nearest(name, known)}"
                 )
+
+    def bytes_each(self, *, json: bool, table: bool, forces: bool) -> float:
+        """What the answer for one pose takes at most, as measured."""
+        rates = self.order + 1
+        numbers = rates * (len(self.links) + 2 * len(self.points) + len(self.slides))
+        if forces:
+            numbers += 5 + 6 * len(self.points)
+        wide = self.only is not None or forces
+        return 300 + 110 * numbers * json + table * (100 * numbers if wide else 1200 * len(self.links))
+
+    def check_size(self, *, json: bool, table: bool, forces: bool) -> None:
+        """Refuse what would take more than a gigabyte, before it is begun."""
+        each = self.bytes_each(json=json, table=table, forces=forces) * len(self.assemblies)
+        poses = len(self.inputs.shown)
+        if poses * each > MEMORY:
+            raise DataError(
+                f"{self.file}: {poses} poses of {len(self.links)} links and {len(self.points)} points would take "
+                f"{poses * each / 1e9:.2g} GB: expected at most {MEMORY / each:.0f} poses, or fewer names by --only"
+            )
 
     def assembled(self, motion: Motion) -> NDArray[np.bool_]:
         """Which poses are assembled, as far as what is asked for goes: with --only the rest is not solved."""

@@ -171,3 +171,105 @@ def test_an_unknown_domain(dalembert: Dalembert) -> None:
     done = dalembert("bench", "rotor")
     assert done.returncode == 2
     assert "did you mean 'rotors'?" in done.stderr
+
+
+def test_damaged_inputs(dalembert: Dalembert) -> None:
+    done = dalembert("bench", "--fuzz", "24", "--seed", "7", "--workers", "2", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["first_seed"], found["inputs"], found["faults"]) == (7, 24, [])
+    rows = found["commands"]
+    assert sum(row["inputs"] for row in rows) == 24
+    for row in rows:
+        assert row["inputs"] == row["results"] + row["data_errors"] + row["usage_errors"]
+        assert row["slowest_seed"] in range(7, 31)
+    # one of them again, by its seed
+    seed = rows[0]["slowest_seed"]
+    done = dalembert("bench", "--fuzz", "1", "--seed", seed)
+    assert done.stdout.splitlines()[1].startswith(f"{rows[0]['command']},1,")
+
+
+def test_a_damaged_input_is_the_same_each_time() -> None:
+    from cli.bench.fuzz import replayed
+
+    assert all(replayed(seed) == replayed(seed) for seed in range(40))
+    assert len({str(replayed(seed)) for seed in range(40)}) == 40
+
+
+STUBBORN = """
+import math, os
+from cli.bench.fuzz import Outcome
+
+def case(seed):
+    if seed == 1:
+        math.factorial(10**8)  # in compiled code: only another process can end it
+    elif seed == 2:
+        return Outcome("c", ["x"], 0.0, str(len(bytearray(3 * 2**30))), None)
+    elif seed == 3:
+        os.abort()
+    elif seed == 4:
+        import time
+        time.sleep(100)
+    return Outcome("c", ["x"], 0.0, "result", None)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="limits as on Linux")
+def test_limits_are_held_from_outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A loop in compiled code, more than 1 GiB, a crash, an endless wait: each a fault, and the run goes on."""
+    from importlib import import_module
+
+    from cli.bench import fuzz_workers
+
+    (tmp_path / "stubborn.py").write_text(STUBBORN)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(fuzz_workers, "LONGEST", 1.0)
+    case = import_module("stubborn").case
+    found = dict(fuzz_workers.run(0, 6, case=case, patience=8.0))
+    assert sorted(found) == list(range(6))
+    assert found[0].fault is found[5].fault is None
+    assert "killed after" in str(found[1].fault)
+    assert found[1].seconds > 1.0
+    assert "1 GiB of memory" in str(found[2].fault)
+    assert "SIGABRT" in str(found[3].fault)
+    assert "killed after" in str(found[4].fault)
+
+
+@pytest.mark.parametrize(
+    ("status", "out", "err", "files", "said"),
+    [
+        (0, "x\n", "", {}, None),
+        (0, "", "", {}, "nothing shown"),
+        (0, "{\n \"a\": NaN}", "", {}, "NaN in it"),
+        (0, "x\n", "x.py:3: RuntimeWarning: overflow", {}, "stray warning"),
+        (1, "", "dalembert: t.csv: found 'x', expected a number\n", {}, None),
+        (1, "", "dalembert: \n", {}, "data error of 1 lines"),
+        (1, "", "dalembert: one\ntwo and three\n", {}, "data error of 2 lines"),
+        (1, "", "dalembert: t.csv: \x1b[31m found\n", {}, "control characters"),
+        (1, "half", "dalembert: t.csv: found 'x', expected a number\n", {}, "error after output"),
+        (1, "", "dalembert: t.csv: found 'x', expected a number\n", {"o.csv": b"1"}, "error after writing o.csv"),
+        (1, "", "dalembert: not enough memory for this input\n", {}, "not enough memory"),
+        (1, "WRONG\n", "", {}, None),
+        (2, "", "Usage: x\n\nError: Invalid value for --at: 'x'\n", {}, None),
+        (2, "", "Usage: x\n", {}, "usage error that says nothing"),
+        (0, "x\n", "", {".o.csv.7.part": b"1"}, "left .o.csv.7.part"),
+        (3, "", "", {}, "status 3"),
+    ],
+)  # fmt: skip
+def test_what_is_a_fault(
+    status: int,
+    out: str,
+    err: str,
+    files: dict[str, bytes],
+    said: str | None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from cli.bench.fuzz import Ended, judge
+    from cli.bench.fuzz_cases import Case
+
+    monkeypatch.chdir(tmp_path)
+    for name, data in files.items():
+        (tmp_path / name).write_bytes(data)
+    _, fault = judge(Case("balance", ["balance"], {}), Ended(status, out, err))
+    assert fault is None if said is None else said in str(fault)

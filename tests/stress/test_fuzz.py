@@ -1,4 +1,4 @@
-"""Damaged examples, short: never an exception, a warning of numpy's, or a long wait."""
+"""Damaged inputs, short: never an exception, a warning of numpy's, half a file or a long wait."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import time
 from cli.bench.fuzz import trial
 
 
-def test_damaged_examples_are_handled() -> None:
+def test_damaged_inputs_are_handled() -> None:
     end = time.monotonic() + 12
     faults = []
     for seed in range(100_000):
@@ -16,6 +16,6 @@ def test_damaged_examples_are_handled() -> None:
             faults.append((seed, outcome))
         if time.monotonic() > end:
             break
-    print(f"{seed + 1} damaged examples")
-    assert seed >= 50
+    print(f"{seed + 1} damaged inputs")
+    assert seed >= 20
     assert not faults, faults[:5]
