@@ -33,6 +33,9 @@ Array = NDArray[np.float64]
 BLOCK = 8192
 
 
+LIGHTEST = 1e60  # I ω² over m g l: what it takes from the 200 digits of the roots
+
+
 @dataclass(frozen=True)
 class Top:
     """A heavy symmetric top from its inertia about the fixed point and its state at time zero.
@@ -52,7 +55,8 @@ class Top:
     Raises
     ------
     ValueError
-        Two different moments across the axis, a moment that is not positive, shapes that do not fit.
+        Two different moments across the axis, a moment that is not positive, shapes that do not fit; a rotation
+        so fast that 200 digits do not tell the weight.
 
     Examples
     --------
@@ -84,6 +88,12 @@ class Top:
         if (I[..., 0] != I[..., 1]).any() or (I[..., 0] <= 0).any() or (I[..., 2] < 0).any():
             raise ValueError(
                 "a symmetric top has two equal positive moments across its axis, body z, and one about it"
+            )
+        turning = (I * omega**2).sum(axis=-1)
+        if ((mgl != 0) & (turning > LIGHTEST * np.abs(mgl))).any():
+            raise ValueError(
+                f"the weight is nothing beside the rotation (I ω² is more than {LIGHTEST:.0e} m g l): expected a slower "
+                "rotation, or a free body"
             )
         lead = np.broadcast_shapes(I.shape[:-1], mgl.shape, omega.shape[:-1], q.shape[:-1])
         unit = np.broadcast_to(quaternion.normalize(q), lead + (4,)).reshape(-1, 4)
