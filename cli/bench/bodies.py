@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.bench.measure import Measurement, measured, seconds
+from cli.bench.measure import Measurement, measured, peak, seconds
 from rigidbody3d import Body, Motion, inertia_of
 
 Real = NDArray[np.float64]
@@ -39,9 +39,8 @@ def measure(quick: bool) -> Iterator[Measurement]:
         for method, work_out in methods:
             call = partial(work_out, *given)
             error = _error(tensor, omega, alpha, mass, acceleration, call(), min(states, 20))
-            found = measured(
-                DOMAIN, work, method, call, size=states, error=error, budget=0.3 if last else 0.1
-            )
+            known = {"error": error, "bytes": float(peak(call))}
+            found = measured(DOMAIN, work, method, call, size=states, budget=0.3 if last else 0.1, **known)
             if last and work_out is _ours:
                 found = replace(found, aim_ns=20.0, floor="einsum", ratio=found.ns / beside, aim_ratio=1 / 3)
             yield found

@@ -43,8 +43,8 @@ def run(
         Path | None,
         typer.Option(
             metavar="FILE.md",
-            help="Write tables into FILE.md, between its marks <!-- bench:DOMAIN --> and <!-- end -->, and pictures "
-            "into the folder pictures beside it.",
+            help="Write tables into FILE.md, between its marks <!-- bench:DOMAIN --> and <!-- end --> (--stress: "
+            "<!-- bench:stress -->), and pictures into the folder pictures beside it.",
             dir_okay=False,
         ),
     ] = None,
@@ -60,8 +60,8 @@ def run(
         int | None,
         typer.Option(
             min=0,
-            help="With --stress: replay this one case of each campaign. With --fuzz: the first input's seed; "
-            "--fuzz 1 replays one.",
+            help="The seed of the first case of --stress and --fuzz. Alone: this one case of each campaign again; "
+            "--fuzz 1 --seed N: this one input.",
         ),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes for --fuzz.")] = 1,
@@ -82,13 +82,8 @@ def run(
         _fuzz(fuzz, seed or 0, workers, json=json, text=text, output=output)
         return
     if stress is not None or seed is not None:
-        _stress(
-            name or [],
-            options.quantity("--stress", stress, "time", positive=True) or 0.0,
-            seed,
-            text=text,
-            output=output,
-        )
+        seconds = options.quantity("--stress", stress, "time", positive=True)
+        _stress(name or [], seconds, seed or 0, docs, json=json, text=text, output=output)
         return
     for domain in name or ():
         if domain not in DOMAINS:
@@ -153,7 +148,16 @@ def _measure(domains: list[str], quick: bool, peers: bool) -> Iterator[Measureme
             yield from others.measure(domain, quick)
 
 
-def _stress(names: list[str], seconds: float, seed: int | None, *, text: bool, output: Path | None) -> None:
+def _stress(
+    names: list[str],
+    seconds: float | None,
+    first: int,
+    docs: Path | None,
+    *,
+    json: bool,
+    text: bool,
+    output: Path | None,
+) -> None:
     """Run campaigns with a progress bar; status 1 if an error lies beyond the program's own estimate too often."""
     from cli.bench.stress import Tally, campaigns, run
 
@@ -161,17 +165,23 @@ def _stress(names: list[str], seconds: float, seed: int | None, *, text: bool, o
     for name in names:
         if name not in known:
             raise typer.BadParameter(f"'{name}': expected some of {', '.join(known)}{nearest(name, known)}")
+    if docs is not None:
+        from cli.bench import page
+
+        page.check(docs, ["stress"])
     chosen = names or list(known)
     tallies: list[Tally] = []
     for name in chosen:
         with typer.progressbar(length=1000, label=name, file=sys.stderr) as bar:
-            if seed is not None:
-                tallies.append(next(run(name, 0.0, seed)))
+            if seconds is None:  # one case
+                tallies.append(next(run(name, 0.0, first)))
                 continue
             share, start = seconds / len(chosen), time.monotonic()
-            for tally in run(name, share):  # noqa: B007 the last tally is the campaign's
+            for tally in run(name, share, first):  # noqa: B007 the last tally is the campaign's
                 bar.update(int(1000 * min(1.0, (time.monotonic() - start) / share)) - bar.pos)
             tallies.append(tally)
+    if docs is not None:
+        page.write_stress(docs, tallies)
     columns: dict[str, list[Any]] = {
         "campaign": [t.name for t in tallies],
         "trials": [t.trials for t in tallies],
@@ -190,6 +200,7 @@ def _stress(names: list[str], seconds: float, seed: int | None, *, text: bool, o
             },
             columns,
         ),
+        json=json,
         text=text,
         output=output,
     )

@@ -158,7 +158,7 @@ def test_peers_that_are_missing_or_break_do_not_end_the_run(
 
 
 def test_the_pages_have_a_place_for_every_domain() -> None:
-    page.check(Path(__file__).parents[2] / "docs" / "benchmarks.md", ["aims", *DOMAINS])
+    page.check(Path(__file__).parents[2] / "docs" / "benchmarks.md", ["aims", "stress", *DOMAINS])
 
 
 def test_a_page_without_marks(tmp_path: Path) -> None:
@@ -171,6 +171,25 @@ def test_an_unknown_domain(dalembert: Dalembert) -> None:
     done = dalembert("bench", "rotor")
     assert done.returncode == 2
     assert "did you mean 'rotors'?" in done.stderr
+
+
+def test_campaigns_and_their_table(dalembert: Dalembert, tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- bench:stress -->\n<!-- end -->\nafter\n")
+    names = ("rotor scales", "nearly flat masses")
+    done = dalembert("bench", *names, "--stress", "2s", "--seed", "50", "--docs", "page.md", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)["campaigns"]
+    assert [row["campaign"] for row in found] == list(names)
+    assert all(row["share_bounded"] == 1 and 0 < row["worst_error_over_estimate"] < 1 for row in found)
+    table = page.read_text().split("\n\n")[1].splitlines()
+    assert [line.split(" | ")[0] for line in table[2:4]] == [f"| {name}" for name in names]
+    # one case again, by its seed
+    (again,) = json.loads(dalembert("bench", names[0], "--seed", found[0]["worst_seed"], "--json").stdout)[
+        "campaigns"
+    ]
+    assert again["trials"] == 1
+    assert again["worst_error_over_estimate"] == found[0]["worst_error_over_estimate"]
 
 
 def test_damaged_inputs(dalembert: Dalembert) -> None:
