@@ -9,7 +9,7 @@ points between the guess and it: nothing is marched in angle.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import factorial
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +33,9 @@ SAMPLES = 720  # of one turn, or of one mechanism's size of slide
 ORDER = 12  # of the series through a change point
 REACH = 0.03  # of its radius of convergence, within which it replaces the closed form
 DIP = 0.05  # a radicand below this may touch zero between two samples
+
+
+SAME = 1e-6  # change points nearer than this share of a turn are one
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,7 @@ class Track:
         self.whole = whole and not slide
         self._repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
         self.settled = False  # no change point anywhere, however far the input turns
+        self._period: tuple[float, dict[str, list[ChangePoint]]] | None = None  # where one turn begins, what it has
 
     # --- what poses ask ---------------------------------------------------------------------------------------
     def cover(self, low: float, high: float) -> None:
@@ -115,22 +119,40 @@ class Track:
             )
         with np.errstate(all="ignore"):
             while self.high < high:
-                self._scan(self.high, self.high + self.length)
+                self._turn(self.high)
                 self.high += self.length
                 if first and self._seen_all():
                     return
                 first = False
             while self.low > low:
-                self._scan(self.low - self.length, self.low)
                 self.low -= self.length
+                self._turn(self.low)
                 if first and self._seen_all():
                     return
                 first = False
 
     def _seen_all(self) -> bool:
-        """Whether the one turn looked through says it all."""
+        """Whether the one turn looked through says it all, or that it repeats."""
         self.settled = self._repeats and not any(len(f) for f in self.flips.values())
+        if self._repeats and not self.assembly.geared:
+            seam = self.low + (1 - SAME) * self.length  # the first point of the turn may be found at its end again
+            turn = {name: [c for c in points if c.input < seam] for name, points in self.changes.items()}
+            if not any(len(points) % 2 for points in turn.values()):  # every group is back on its branch
+                self._period = self.low, turn
         return self.settled
+
+    def _turn(self, a: float) -> None:
+        """Look through the turn that begins at a, or take over what a turn before it had."""
+        if self._period is None:
+            self._scan(a, a + self.length)
+            return
+        begin, turn = self._period
+        for name, points in turn.items():
+            for change in points:
+                where = change.input + self.length * round((a - begin) / self.length)
+                if np.abs(self.flips[name] - where).min() > SAME * self.length:
+                    self.flips[name] = np.sort(np.append(self.flips[name], where))
+                    self.changes[name].append(replace(change, input=where))
 
     def sign(self, group: Group, q: Number) -> Number:
         """The sign of the group's Jacobian at inputs q."""
@@ -265,7 +287,7 @@ class Track:
             edge = 1e-9 * self.length  # a change point at the seam of two chunks belongs to both
             if abs(depth) <= noise and a - edge <= where < b + edge:
                 known = self.flips.setdefault(group.name, np.empty(0))
-                if not len(known) or np.abs(known - where).min() > 1e-6 * self.length:
+                if not len(known) or np.abs(known - where).min() > SAME * self.length:
                     self._brackets = [
                         x for x in self._brackets if not (x[0] == group.name and x[1] <= where <= x[2])
                     ]

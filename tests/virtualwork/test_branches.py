@@ -9,6 +9,7 @@ import pytest
 
 from virtualwork import Guess, Guide, Input, Link, Mechanism
 from virtualwork.check import Check
+from virtualwork.track import Track
 
 TWO_TURNS = np.radians(np.arange(0.0, 721.0))
 
@@ -193,3 +194,24 @@ def test_a_kite_guessed_where_it_is_folded():
     motion = four_bar(2, 5, 5, 2, 0, 90, 90).motion(TWO_TURNS, speed=1.0)
     assert motion.assembled.all()
     assert np.abs(np.diff(np.unwrap(motion.link("rocker").angle))).max() < 0.0125
+
+
+@pytest.mark.parametrize("turns", [478, -478])
+def test_change_points_hundreds_of_turns_away_are_those_of_the_first_turn(turns, monkeypatch):
+    m = four_bar(0.3, 0.7, 0.3, 0.7, 60, 0, 60)
+    scans = []
+    scan = Track._scan
+    monkeypatch.setattr(Track, "_scan", lambda track, a, b: (scans.append(a), scan(track, a, b)))
+    q = 2 * math.pi * turns + np.linspace(0.0, 4 * math.pi, 101)
+    motion = m.motion(q, speed=1.0)
+    assert np.abs(np.exp(1j * motion.link("rocker").angle) - np.exp(1j * q)).max() < 1e-12
+    assert np.abs(motion.link("rocker").omega - 1).max() < 1e-11
+    assert len(scans) == 1
+
+
+def test_a_kite_is_looked_at_turn_by_turn():
+    """It is on its other branch after a turn: what the first turn has is not what the second has."""
+    m = four_bar(2.0, 2.0, 5.0, 5.0, 60, -30, 60)
+    near, far = m.motion(TWO_TURNS), m.motion(TWO_TURNS + 4 * math.pi * 7)
+    found = [np.exp(1j * motion.link("rocker").angle) for motion in (near, far)]
+    assert np.abs(found[0] - found[1]).max() < 1e-11
