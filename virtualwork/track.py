@@ -100,7 +100,8 @@ class Track:
         self.whole = whole and not slide
         self._repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
         self.settled = False  # no change point anywhere, however far the input turns
-        self._period: tuple[float, dict[str, list[ChangePoint]]] | None = None  # where one turn begins, what it has
+        # where one turn begins, and what it has
+        self._period: tuple[float, dict[str, list[ChangePoint]]] | None = None
 
     # --- what poses ask ---------------------------------------------------------------------------------------
     def cover(self, low: float, high: float) -> None:
@@ -135,7 +136,8 @@ class Track:
         """Whether the one turn looked through says it all, or that it repeats."""
         self.settled = self._repeats and not any(len(f) for f in self.flips.values())
         if self._repeats and not self.assembly.geared:
-            seam = self.low + (1 - SAME) * self.length  # the first point of the turn may be found at its end again
+            # the first point of the turn may be found at its end again
+            seam = self.low + (1 - SAME) * self.length
             turn = {name: [c for c in points if c.input < seam] for name, points in self.changes.items()}
             if not any(len(points) % 2 for points in turn.values()):  # every group is back on its branch
                 self._period = self.low, turn
