@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 import tracemalloc
 from collections.abc import Callable
@@ -26,7 +27,7 @@ class Measurement:
     """How many items one call works on; times are per item."""
     ns: float
     units: float
-    """The time as a multiple of the calibration loop's, measured in the same run."""
+    """The time as a multiple of the calibration loop's, measured side by side."""
     error: float | None = None
     """The worst error, over the size of what is sought."""
     aim_ns: float | None = None
@@ -51,13 +52,24 @@ patience = 1.0
 
 def seconds(call: Callable[[], Any], budget: float, clock: Callable[[], float] = time.process_time) -> float:
     """Return the CPU time of one call: the least over repetitions that fill `budget` seconds."""
+    return beside_the_unit(call, budget, clock)[0]
+
+
+def beside_the_unit(
+    call: Callable[[], Any], budget: float, clock: Callable[[], float] = time.process_time
+) -> tuple[float, float]:
+    """Return the least time of a call, s, and the least of the calibration loop in between its repetitions, ns.
+
+    A machine that others use too is slower in one second than in the next: measured side by side, both are slow alike.
+    """
     budget *= patience
     _keep_memory()
+    unit = _unit()
     start = clock()
     call()
     once = clock() - start
     if once > max(budget, 2.0):
-        return once
+        return once, min(unit, _unit())
     start = clock()
     call()
     once = max(clock() - start, 1e-7)
@@ -68,7 +80,8 @@ def seconds(call: Callable[[], Any], budget: float, clock: Callable[[], float] =
         for _ in range(repeat):
             call()
         best = min(best, (clock() - start) / repeat)
-    return best
+        unit = min(unit, _unit(4))
+    return best, min(unit, _unit())
 
 
 @cache
@@ -99,11 +112,23 @@ def peak(call: Callable[[], Any]) -> int:
             tracemalloc.stop()
 
 
+X, Y = np.linspace(0.0, 1.0, 4096), np.linspace(1.0, 2.0, 4096)
+
+
+def _unit(times: int = 32) -> float:
+    """Return the least of some times of the calibration loop, ns an element."""
+    best = math.inf
+    for _ in range(times):
+        start = time.process_time_ns()
+        np.sqrt(X * X + Y * Y)
+        best = min(best, (time.process_time_ns() - start) / len(X))
+    return best
+
+
 @cache
 def calibration() -> float:
     """Return the nanoseconds that one element of √(x² + y²) over 4096 doubles takes on this machine, in this run."""
-    x, y = np.linspace(0.0, 1.0, 4096), np.linspace(1.0, 2.0, 4096)
-    return seconds(lambda: np.sqrt(x * x + y * y), 0.3) / 4096 * 1e9
+    return min(_unit(1000) for _ in range(10))
 
 
 def measured(
@@ -117,8 +142,9 @@ def measured(
     **known: Any,
 ) -> Measurement:
     """Time a call that works on `size` items; `known` are further fields of the measurement."""
-    ns = seconds(call, budget) / size * 1e9
-    return Measurement(domain, work, method, size, ns, ns / calibration(), **known)
+    least, unit = beside_the_unit(call, budget)
+    ns = least / size * 1e9
+    return Measurement(domain, work, method, size, ns, ns / unit, **known)
 
 
 def exponent(sizes: ArrayLike, values: ArrayLike) -> float:
