@@ -208,7 +208,7 @@ def _shown(
         return digits.of_states(job) if job.only is None else digits.of_poses(job)
 
     def figure() -> Any:
-        if asked.forces and not graph and len(job.inputs.shown) > 2:
+        if asked.forces and not graph and len(job.inputs.shown) > 2 and job.motions[0].assembled.any():
             return asked.figure(job)
         from cli.plots import mechanism as pictures
 

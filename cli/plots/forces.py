@@ -39,8 +39,10 @@ def draw(job: Job) -> Figure:
     top.axhline(0, color="0.6", lw=0.8)
     if len(m.inputs) == 1:
         mean = float(np.trapezoid(d.effort[:, 0], x) / (x[-1] - x[0]))
-        top.axhline(mean, color="0.4", lw=1.0, ls=":", label=f"mean {mean:.4g}")
-    top.legend(fontsize=8, frameon=False)
+        if np.isfinite(mean):
+            top.axhline(mean, color="0.4", lw=1.0, ls=":", label=f"mean {mean:.4g}")
+    if top.get_legend_handles_labels()[0]:
+        top.legend(fontsize=8, frameon=False)
     top.set_ylabel("force at the input, N" if slide else "torque at the input, N·m")
     top.grid(color="0.9")
     for i, (joint, on, of) in enumerate(rows_of(job, motion)):
@@ -58,7 +60,8 @@ def draw(job: Job) -> Figure:
     bottom.set_xlabel(label)
     bottom.set_ylim(bottom=0)
     bottom.grid(color="0.9")
-    bottom.legend(fontsize=8, frameon=False, ncols=2)
+    if bottom.lines:  # statics may leave every joint force open
+        bottom.legend(fontsize=8, frameon=False, ncols=2)
     if not slide and x.max() - x.min() >= 180:
         bottom.set_xticks(
             np.arange(np.ceil(x.min() / 60) * 60, x.max() + 1, 60 if x.max() - x.min() <= 360 else 120)

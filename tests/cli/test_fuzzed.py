@@ -281,3 +281,15 @@ def test_a_change_point_where_another_group_has_no_direction(dalembert: Dalember
     assert moved != text
     file.write_text(moved)
     assert dalembert("mechanism", "lift.toml", "--sweep", "0.4m:1.15m:0.05m").returncode == 0
+
+
+def test_a_picture_of_forces_where_nothing_is_assembled(dalembert: Dalembert, tmp_path: Path) -> None:
+    assert dalembert("examples", "engine").returncode == 0
+    file = tmp_path / "engine.toml"
+    file.write_text(re.sub(r"^O = .*$", "O = [-415.7, 0]", file.read_text(), count=1, flags=re.MULTILINE))
+    done = dalembert(
+        "mechanism", "engine.toml", "--forces", "--sweep", "90deg:810deg:90deg", "--plot", "engine.png"
+    )
+    assert done.returncode == 1
+    assert "Warning" not in done.stderr
+    assert "cannot be assembled" in done.stderr
