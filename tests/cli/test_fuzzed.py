@@ -41,6 +41,16 @@ MECHANISMS = {
         CRANK + INPUT.replace("angle = 1", 'law = "close.csv"'),
         "too close in time",
     ),
+    "a group without an unknown of its own": (
+        """ground = { O = [0, 0] }
+links = { sun = { points = { O = [0, 0], P = [60, 0] } }, arm = { points = { O = [0, 0], P = [60, 0] } }, \
+planet = { points = { P = [0, 0], T = [40, 0] } } }
+gears = [{ links = ["sun", "planet"], ratio = -0.5, arm = "arm" }, { links = ["planet", "ground"], ratio = 0.4, arm = "arm" }]
+input = { link = "sun", angle = 0 }
+guess = { at = 0 }
+""".replace("\\\n", ""),
+        "it is a structure",
+    ),
 }  # fmt: skip
 LAWS = {
     "binary.csv": b"\xff\xfe\x00\xd8\0",
