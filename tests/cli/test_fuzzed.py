@@ -48,7 +48,7 @@ planet = { points = { P = [0, 0], T = [40, 0] } } }
 gears = [{ links = ["sun", "planet"], ratio = -0.5, arm = "arm" }, { links = ["planet", "ground"], ratio = 0.4, arm = "arm" }]
 input = { link = "sun", angle = 0 }
 guess = { at = 0 }
-""".replace("\\\n", ""),
+""",
         "it is a structure",
     ),
 }  # fmt: skip
