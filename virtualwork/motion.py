@@ -34,7 +34,7 @@ from virtualwork.dyads import Number
 from virtualwork.errors import DescriptionError
 from virtualwork.mechanism import GROUND, Point, as_point
 from virtualwork.newton import inverse_norm, stack
-from virtualwork.state import Jets, State, columns
+from virtualwork.state import SWEEP, Jets, State, columns
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -379,7 +379,7 @@ class Motion:
                     State([self.inputs[i : i + BLOCK, j] for j in range(k)], many=True)
                     for i in range(0, self.n, BLOCK)
                 ]
-                if k == 1 and self.n > 256:
+                if k == 1 and self.n > SWEEP:
                     _uniform(self.inputs[:, 0], self._blocks)
         return self._blocks
 

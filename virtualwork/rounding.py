@@ -25,7 +25,7 @@ import numpy as np
 
 from virtualwork.mechanism import GROUND
 from virtualwork.perturbation import Sizes, grown, inverse, kept, sum_of, value_of
-from virtualwork.state import Jets, State
+from virtualwork.state import SWEEP, Jets, State
 from virtualwork.steps import Angle, Group, Place, Slide, Term, Turn, combined
 
 if TYPE_CHECKING:
@@ -147,7 +147,10 @@ class Rounding:
     def _own(self, angle: Angle, own: dict[str, Any], st: State) -> Any:
         """The rounding of const + Σ k·input + Σ r·θ_base, the bases' own among it."""
         plain = len(angle.inputs) == 1 and angle.inputs[0][1] == 1.0
-        error: Any = 0.0
+        # in a sweep e^{iθ} is a product of three factors
+        error: Any = (
+            1.5 * EPS if angle.inputs and self.n > SWEEP and len(self.motion.mechanism.inputs) == 1 else 0.0
+        )
         for j, k in angle.inputs:
             error = error + abs(k) * self.given[:, j]
         # the constant of a gear is itself a difference of angles of this size

@@ -20,6 +20,8 @@ from virtualwork.mechanism import GROUND
 if TYPE_CHECKING:
     from virtualwork.track import Track
 
+SWEEP = 256  # from so many poses on, e^{iθ} of a uniform sweep is formed by angle addition
+
 
 class State:
     """Positions of one block of poses: rotations e^{iθ} of the bodies, points, slides.

@@ -13,6 +13,7 @@ from cli.bench.exact import DIGITS, Exact, need_mpmath
 from cli.bench.random_linkages import four_bar, geared_five_bar, slider_crank, triad, turning_block
 from virtualwork import Mechanism, MechanismError
 from virtualwork.motion import Motion
+from virtualwork.state import SWEEP
 
 try:
     import mpmath as mp
@@ -148,28 +149,28 @@ def _sweeps(rng: Generator) -> Pairs:
     there = np.flatnonzero(motion.assembled)
     found: Pairs = []
     for i in rng.choice(there, 4):
-        # what the sweep found at the pose, as a motion of that pose with its neighbours
-        part = m.motion(q[i], **rates)
-        if not part.assembled[0]:
+        alone = m.motion(q[i], **rates)
+        if not alone.assembled[0]:
             continue
-        found += _picked(motion, part, int(i))
+        first = max(0, int(i) - SWEEP)
+        found += _picked(motion, int(i), m.motion(q[first : i + SWEEP + 1], **rates), int(i) - first, alone)
     return found
 
 
-def _picked(sweep: Motion, alone: Motion, i: int) -> Pairs:
-    """One pose of a sweep against 50 digits; the bounds are those of the pose alone."""
+def _picked(sweep: Motion, i: int, near: Motion, k: int, alone: Motion) -> Pairs:
+    """One pose of a sweep against 50 digits; the bounds are those of a shorter sweep, in which it is pose k."""
     exact = Exact(alone)
     if not exact.closed:
         return []
     found: Pairs = []
     with mp.workdps(DIGITS):
         for name in sweep.mechanism.links:
-            link, bounds = sweep.link(name), alone.link(name)
+            link, bounds = sweep.link(name), near.link(name)
             for order, values in enumerate((link.angle, link.omega, link.alpha)):
                 apart = exact.angle(name, order) - mp.mpf(float(values[i]))
                 if order == 0:
                     apart -= 2 * mp.pi * mp.nint(apart / (2 * mp.pi))
-                found.append((_size(apart), float(bounds.error_estimate(order)[0])))
+                found.append((_size(apart), float(bounds.error_estimate(order)[k])))
     return found
 
 

@@ -301,6 +301,8 @@ def test_nothing_is_loaded_for_estimates_unless_asked() -> None:
         (groups._gears, 1604),
         (groups._gears, 1768),
         (groups._forces, 53),
+        # a swept e^{iθ} is a product of three factors
+        (groups._sweeps, 200051),
     ],
 )
 def test_worst_cases_of_campaigns(trial: tuple) -> None:  # type: ignore[type-arg]
