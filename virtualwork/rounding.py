@@ -110,8 +110,9 @@ class Rounding:
             if body == GROUND:
                 continue
             e = motion._join([st.turn[body] for st in states], complex)
-            length = np.abs(e)
-            found.turn[body] = e / length
+            with np.errstate(all="ignore"):  # a pose that is not assembled has none
+                length = np.abs(e)
+                found.turn[body] = e / length
             self._length[body] = np.abs(length - 1)
             known = all(body in st.angle for st in states)
             self._unwound[body] = np.abs(

@@ -312,6 +312,16 @@ def test_worst_cases_of_campaigns(trial: tuple) -> None:  # type: ignore[type-ar
     assert all(error <= bound for error, bound in pairs)
 
 
+def test_poses_without_assembly_have_no_estimate_and_raise_no_warning() -> None:
+    m = example("watt-six-bar")
+    motion = m.motion(np.linspace(0.0, 2 * math.pi, 400), speed=1.0)
+    assert 0 < motion.assembled.sum() < 400
+    for name in m.links:
+        link = motion.link(name)
+        for order, value in enumerate((link.angle, link.omega)):
+            assert (np.isnan(link.error_estimate(order)) == np.isnan(value)).all()
+
+
 def test_turns_backwards_are_settled_as_those_forwards() -> None:
     """A crank-rocker far back of its guess: one turn says it all, whichever way."""
     m = example("two-disc-four-bar")
