@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.dependence import EPS
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-EPS = float(np.finfo(float).eps)
 
 STARTS = 24
 """Directions from which the fit is started: it has few minima, all found from so many."""

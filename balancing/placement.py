@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.correction import correct
+from balancing.dependence import EPS
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)

@@ -36,11 +36,7 @@ def angle_error(vector: Any, bound: Any, degrees: Any) -> Real:
     known = error < size
     turn = np.arcsin(np.where(known, error / np.where(known, size, 1.0), 0.0))
     turn = np.where(known, turn, np.where(error > 0, np.pi, 0.0))
-    whole: Real = np.asarray(np.degrees(turn) + 2 * EPS * np.abs(shown))
-    # an angle that its digits round up to a full turn is none: a bound as large as itself makes it 0
-    safe = np.where((whole > 0) & (shown > 0), whole, 1.0)
-    step = 10.0 ** (3 - np.floor(np.log10(np.where(shown > 0, shown, 1.0) / safe)))
-    return np.where((shown > 0) & (whole > 0) & (shown + step / 2 >= 360.0), shown, whole)
+    return np.asarray(np.degrees(turn) + 2 * EPS * np.abs(shown))
 
 
 def angle_text(degrees: Any, spec: str) -> str:

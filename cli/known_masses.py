@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing import GRADES, CoincidentPlanes, allocate, by_size, correct
+from balancing import GRADES, CoincidentPlanes, Correction, allocate, by_size, correct
 from cli.digits import EPS, angle_error, angle_text, size_error, vector_error
 from cli.errors import DataError, quote
 from cli.planes import Planes
@@ -168,10 +168,9 @@ class _Balanced:
         shape = (n, 2) if bearings is not None else len(self.rotor_of_row)
         self.ideal = np.empty(len(self.rotor_of_row), dtype=complex)
         self.made = np.empty(len(self.rotor_of_row), dtype=complex)
-        self.rounding = np.empty(len(self.rotor_of_row))
         self.before: Complex = np.empty(shape, dtype=complex)  # in the tolerance planes
         self.after: Complex = np.empty(shape, dtype=complex)
-        solved = []
+        self.solved: list[tuple[NDArray[np.intp], NDArray[np.intp], Correction]] = []
         for group, masses, rows in self._groups():
             u = np.where(masses >= 0, rotors.moment[masses], 0)
             at = np.where(masses >= 0, z[masses], 0)
@@ -184,10 +183,9 @@ class _Balanced:
             self.couple[group] = fix.couple(self.about[group])
             self.ideal[rows] = fix.unbalance
             self.growth[group] = fix.amplification
-            self.rounding[rows] = fix.error_estimate()
-            solved.append((group, rows, fix))
+            self.solved.append((group, rows, fix))
         self._round()
-        for group, rows, fix in solved:
+        for group, rows, fix in self.solved:
             left = fix.residual_of(self.made[rows], self.about[group])
             self.residual_static[group], self.residual_couple[group] = left
             if bearings is not None:
@@ -275,7 +273,10 @@ class _Balanced:
         rotors, row = self.rotors, self.rotor_of_row
         angle = rotors.table.numbers["angle"]
         wrong = np.bincount(rotors.rotor, vector_error(np.abs(rotors.moment), angle.values, angle.unit))
-        bound = self.rounding + (wrong * self.growth)[row] + self._of_places()[row]
+        rounding = np.empty(len(row))
+        for _, rows, fix in self.solved:
+            rounding[rows] = fix.error_estimate()
+        bound = rounding + (wrong * self.growth)[row] + self._of_places()[row]
         radius = self.planes.radius[self.plane_of_row]
         return {
             f"unbalance_{rotors.unbalance_unit}": from_si(

@@ -23,8 +23,9 @@ import numpy as np
 
 from virtualwork.loads import Follower, InertiaForce, InertiaTorque, SpringEnd, Tabled, TorsionEnd
 from virtualwork.mechanism import GROUND
+from virtualwork.newton import EPS
 from virtualwork.perturbation import grown, inverse
-from virtualwork.rounding import ENTRIES, EPS
+from virtualwork.rounding import ENTRIES
 from virtualwork.work import carrier
 
 if TYPE_CHECKING:

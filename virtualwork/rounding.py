@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.mechanism import GROUND
+from virtualwork.newton import EPS
 from virtualwork.perturbation import Sizes, grown, inverse, kept, sum_of, value_of
 from virtualwork.state import SWEEP, Jets, State
 from virtualwork.steps import Angle, Group, Place, Slide, Term, Turn, combined
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
 
-EPS = float(np.finfo(float).eps)
 ROUNDINGS = 0.5  # roundings that a term collects, at worst, on its way into a sum: e^{iθ}, z·e^{iθ}, the sum
 FLOOR = (
     1e-13  # a singular value is not taken for smaller: the second order decides there, and does not see it
