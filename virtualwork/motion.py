@@ -34,7 +34,7 @@ from virtualwork.dyads import Number
 from virtualwork.errors import DescriptionError
 from virtualwork.mechanism import GROUND, Point, as_point
 from virtualwork.newton import inverse_norm, stack
-from virtualwork.state import SWEEP, Jets, State, columns
+from virtualwork.state import BLOCK, SWEEP, Jets, State, columns
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -45,8 +45,6 @@ if TYPE_CHECKING:
 
     Reals = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
-
-BLOCK = 8192
 
 
 class PointMotion:

@@ -16,7 +16,8 @@ from virtualwork.dyads import Number, dot
 from virtualwork.joints import Joint, Side
 from virtualwork.loads import path_reads, plus
 from virtualwork.mechanism import GROUND
-from virtualwork.scene import BLOCK, Block, Scene
+from virtualwork.scene import Block, Scene
+from virtualwork.state import BLOCK
 
 if TYPE_CHECKING:
     from virtualwork.mechanism import Mechanism

@@ -28,6 +28,7 @@ from virtualwork.loads import (
     times,
 )
 from virtualwork.mechanism import GROUND, Mechanism, TorsionSpring
+from virtualwork.state import BLOCK
 from virtualwork.steps import Place
 
 if TYPE_CHECKING:
@@ -40,8 +41,6 @@ if TYPE_CHECKING:
     from virtualwork.sums import Row
 
     Reals = NDArray[np.float64]
-
-BLOCK = 8192  # up to so many poses there is nothing to keep in cache
 
 
 class Block:

@@ -20,6 +20,7 @@ from virtualwork.mechanism import GROUND
 if TYPE_CHECKING:
     from virtualwork.track import Track
 
+BLOCK = 8192  # poses worked out together: their temporaries stay in the cache
 SWEEP = 256  # from so many poses on, e^{iθ} of a uniform sweep is formed by angle addition
 
 

@@ -20,7 +20,8 @@ import numpy as np
 from virtualwork.dyads import Number, dot
 from virtualwork.loads import Acting, Load, Rub, SpringEnd, TorsionEnd, plus, times
 from virtualwork.mechanism import GROUND
-from virtualwork.scene import BLOCK, Block, Scene
+from virtualwork.scene import Block, Scene
+from virtualwork.state import BLOCK
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
