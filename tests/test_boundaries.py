@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+GROUND = "dalembert"
 CORE = ("balancing", "virtualwork", "rigidbody3d")
 HEAVY = {"numpy", "pandas", "scipy", "matplotlib", "rich", "pydantic"}
 
@@ -33,14 +34,28 @@ def test_core_packages_stand_alone(package: str) -> None:
     files = sorted((ROOT / package).rglob("*.py"))
     assert files
     # pandas only for to_frame, never its reader; trimesh is the extra `mesh`
-    allowed = set(sys.stdlib_module_names) | {package, "numpy", "scipy", "pandas", "trimesh"}
+    allowed = set(sys.stdlib_module_names) | {package, GROUND, "numpy", "scipy", "pandas", "trimesh"}
     for file in files:
         assert imported(file) <= allowed, f"{file}: {imported(file) - allowed}"
         assert "read_csv" not in file.read_text(encoding="utf-8"), file
 
 
+def test_the_ground_stands_on_numpy_alone() -> None:
+    for file in sorted((ROOT / GROUND / "arithmetic").rglob("*.py")):
+        assert imported(file) <= set(sys.stdlib_module_names) | {GROUND, "numpy", "llvmlite"}, file
+
+
 def test_nothing_imports_the_tests_or_an_undeclared_package() -> None:
-    allowed = set(sys.stdlib_module_names) | {*CORE, "cli", "numpy", "scipy", "pandas", "typer", "matplotlib"}
+    allowed = set(sys.stdlib_module_names) | {
+        *CORE,
+        GROUND,
+        "cli",
+        "numpy",
+        "scipy",
+        "pandas",
+        "typer",
+        "matplotlib",
+    }
     for file in sorted((ROOT / "cli").rglob("*.py")):
         # the stress campaigns compare with mpmath, which the extra `test` brings
         here = allowed | {"mpmath"} if file.parent.name == "bench" else allowed
@@ -86,10 +101,10 @@ def test_the_wheel_holds_the_packages_and_the_examples(tmp_path: Path) -> None:
     held = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     tracked = {
         str(file.relative_to(ROOT))
-        for package in (*CORE, "cli")
+        for package in (GROUND, *CORE, "cli")
         for file in (ROOT / package).rglob("*")
         if file.is_file() and "__pycache__" not in file.parts
     }
     assert held == tracked
     assert "cli/examples/riul-rotor/rotor.csv" in held
-    assert {f"{package}/py.typed" for package in (*CORE, "cli")} <= held
+    assert {f"{package}/py.typed" for package in (GROUND, *CORE, "cli")} <= held
