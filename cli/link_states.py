@@ -14,7 +14,7 @@ from cli.errors import DataError, quote
 from cli.render import Shown, table_text
 from cli.tables import Table, read, spellings
 from cli.units import from_si, parse_number, to_si
-from virtualwork.linkstates import KINDS, Balance, LinkStates, UnitLoad, balance
+from virtualwork.textbook.link_states import KINDS, Balance, LinkStates, UnitLoad, balance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.errors import AssemblyError
+from virtualwork.describe.errors import AssemblyError
 from virtualwork.mechanism import GROUND
 from virtualwork.state import State
 
@@ -337,7 +337,7 @@ def constraint_jacobian(m: Mechanism, st: State) -> tuple[list[str], Reals]:
         slide = float(np.ravel(st.slide[i])[0])
         add(
             label,
-            [(g.link, m.links[g.link].points[g.point], 1.0), (g.on, through + slide * d, -1.0)],
+            [(g.link, m.bodies[g.link][g.point], 1.0), (g.on, through + slide * d, -1.0)],
             1j * d * on,
         )
         if g.is_slider:

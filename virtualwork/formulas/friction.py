@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from virtualwork.dyads import Number, dot
-from virtualwork.errors import DescriptionError
+from virtualwork.describe.errors import DescriptionError
+from virtualwork.formulas.closed_forms import Number, dot
+from virtualwork.formulas.loads import Acting, Rub, plus, times
+from virtualwork.formulas.reactions import Reactions
+from virtualwork.formulas.scene import Scene
 from virtualwork.joints import Joint, joints
-from virtualwork.loads import Acting, Rub, plus, times
 from virtualwork.mechanism import GROUND
-from virtualwork.reactions import Reactions
-from virtualwork.scene import Scene
-from virtualwork.steps import Term, combined
+from virtualwork.plan.steps import Term, combined
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,8 +58,9 @@ def loads(scene: Acting) -> list[Rub]:
                 found.append(Rub("friction", other, None, 0j, joint.key, number, -1.0))
             continue
         g = m.guides[joint.guide]
-        z = m.links[body].points[g.point]
-        found.append(Rub("friction", body, scene.path(body, z), z, joint.key, number, 1.0, joint.guide))
+        if body != GROUND:
+            z = m.links[body].points[g.point]
+            found.append(Rub("friction", body, scene.path(body, z), z, joint.key, number, 1.0, joint.guide))
         if other != GROUND:
             through = m.bodies[other][g.through] if isinstance(g.through, str) else g.through
             base, terms = scene.path(other, through)
