@@ -422,6 +422,8 @@ def known_by_guess(m: Mechanism) -> tuple[dict[str, float], dict[str, complex]]:
     for g in m.guides:
         if g.turned is not None and g.on == GROUND:
             angles.setdefault(g.link, g.angle + g.turned)
+        if g.turned is not None and g.link == GROUND:
+            angles.setdefault(g.on, -(g.angle + g.turned))
     before = -1
     while len(angles) + len(points) > before:
         before = len(angles) + len(points)

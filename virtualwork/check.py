@@ -337,7 +337,7 @@ def constraint_jacobian(m: Mechanism, st: State) -> tuple[list[str], Reals]:
         slide = float(np.ravel(st.slide[i])[0])
         add(
             label,
-            [(g.link, m.links[g.link].points[g.point], 1.0), (g.on, through + slide * d, -1.0)],
+            [(g.link, m.bodies[g.link][g.point], 1.0), (g.on, through + slide * d, -1.0)],
             1j * d * on,
         )
         if g.is_slider:

@@ -209,6 +209,8 @@ class _Reader:
         link = entry.get("link")
         if link is None:
             holders = [n for n, b in self.links.items() if point in b.points and n != entry.get("on")]
+            if not holders and point in self.bodies[GROUND]:
+                holders = [GROUND]
             if len(holders) != 1:
                 raise DescriptionError(
                     f"{where} link: missing; expected the link whose point {point} is guided"

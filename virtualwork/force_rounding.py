@@ -297,8 +297,9 @@ class ForceErrors:
                 if entry.slider == g.point:
                     force = force + np.abs(known[:, column["force", str(j), ""]])
             bent = force * turned[g.on]
-            lever = abs(m.links[g.link].points[g.point] - center[g.link])
-            put(g.link, bent, lever * (bent + force * turned[g.link]))
+            if g.link != GROUND:
+                lever = abs(m.links[g.link].points[g.point] - center[g.link])
+                put(g.link, bent, lever * (bent + force * turned[g.link]))
             if g.on != GROUND:
                 through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
                 slide = motion.slide_derivative(joint.guide, 0)

@@ -58,8 +58,9 @@ def loads(scene: Acting) -> list[Rub]:
                 found.append(Rub("friction", other, None, 0j, joint.key, number, -1.0))
             continue
         g = m.guides[joint.guide]
-        z = m.links[body].points[g.point]
-        found.append(Rub("friction", body, scene.path(body, z), z, joint.key, number, 1.0, joint.guide))
+        if body != GROUND:
+            z = m.links[body].points[g.point]
+            found.append(Rub("friction", body, scene.path(body, z), z, joint.key, number, 1.0, joint.guide))
         if other != GROUND:
             through = m.bodies[other][g.through] if isinstance(g.through, str) else g.through
             base, terms = scene.path(other, through)

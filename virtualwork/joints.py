@@ -57,8 +57,7 @@ class Order:
         for group in self.plan.groups:
             for c, closure in enumerate(group.closures):
                 key = f"pin:{closure.joint}" if closure.guide is None else f"guide:{closure.guide}"
-                body = closure.body if closure.guide is None else self.mechanism.guides[closure.guide].link
-                found[key, body] = group, c
+                found[key, closure.body] = group, c
         return found
 
     @cached_property

@@ -14,7 +14,7 @@ import numpy as np
 from virtualwork.bearing import carried
 from virtualwork.dyads import Number, dot
 from virtualwork.joints import Joint, Side
-from virtualwork.loads import path_reads, plus
+from virtualwork.loads import path_reads, plus, times
 from virtualwork.mechanism import GROUND
 from virtualwork.scene import Block, Scene
 from virtualwork.state import BLOCK
@@ -127,7 +127,11 @@ class Reactions:
         """The friction force along a guide belongs to its reaction."""
         total: Number = None
         for load in self.scene.rubs:
-            if load.path is not None and load.body == body and load.joint == joint.key:
+            if load.path is None or load.joint != joint.key:
+                continue
+            if body == GROUND:  # no load stands there: it feels the reverse of the other body's
+                total = plus(total, times(load.value(block), -1.0))
+            elif load.body == body:
                 total = plus(total, load.value(block))
         return total
 
