@@ -14,7 +14,7 @@ from cli.errors import DataError, quote
 from cli.read.tables import Table, read, spellings
 from cli.read.units import from_si, parse_number, to_si
 from cli.show.output import Shown, table_text
-from virtualwork.linkstates import KINDS, Balance, LinkStates, UnitLoad, balance
+from virtualwork.textbook.link_states import KINDS, Balance, LinkStates, UnitLoad, balance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

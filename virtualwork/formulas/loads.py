@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from virtualwork.dyads import Number, dot
+from virtualwork.formulas.closed_forms import Number, dot
+from virtualwork.formulas.quantities import Given, Rows, Sum, Turned
 from virtualwork.mechanism import GROUND, Force, Mechanism, Spring, Torque, TorsionSpring
-from virtualwork.steps import Place, Term, combined
-from virtualwork.sums import Given, Rows, Sum, Turned
+from virtualwork.plan.steps import Place, Term, combined
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from virtualwork.bearing import Bearing
-    from virtualwork.scene import Block
-    from virtualwork.steps import Plan
+    from virtualwork.formulas.load_paths import Bearing
+    from virtualwork.formulas.scene import Block
+    from virtualwork.plan.steps import Plan
 
     Reals = NDArray[np.float64]
 
@@ -335,14 +335,14 @@ class Acting:
     @cached_property
     def rubs(self) -> list[Rub]:
         """The friction loads, two for each pair that rubs: what the one side feels and its reaction."""
-        from virtualwork.friction import loads
+        from virtualwork.formulas.friction import loads
 
         return loads(self) if self.mechanism.friction and self.moves else []
 
     @cached_property
     def bearing(self) -> Bearing:
         """How the loads bear on what moves, and how joint forces follow."""
-        from virtualwork.bearing import Bearing
+        from virtualwork.formulas.load_paths import Bearing
 
         return Bearing(self)
 

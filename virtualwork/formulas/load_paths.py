@@ -26,19 +26,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.dyads import Number
+from virtualwork.formulas.closed_forms import Number
+from virtualwork.formulas.effort import carrier
+from virtualwork.formulas.loads import Acting, Rub
+from virtualwork.formulas.quantities import Passed, Row, Sum, in_order
 from virtualwork.joints import Order, Side
-from virtualwork.loads import Acting, Rub
 from virtualwork.mechanism import GROUND
 from virtualwork.newton import stack
-from virtualwork.steps import Group, Place, Term, Turn
-from virtualwork.sums import Passed, Row, Sum, in_order
-from virtualwork.work import carrier
+from virtualwork.plan.steps import Group, Place, Term, Turn
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from virtualwork.scene import Block, Scene
+    from virtualwork.formulas.scene import Block, Scene
 
     Reals = NDArray[np.float64]
     Hung = tuple[

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.bearing import carried
-from virtualwork.dyads import Number, dot
+from virtualwork.formulas.closed_forms import Number, dot
+from virtualwork.formulas.load_paths import carried
+from virtualwork.formulas.loads import path_reads, plus, times
+from virtualwork.formulas.scene import Block, Scene
 from virtualwork.joints import Joint, Side
-from virtualwork.loads import path_reads, plus, times
 from virtualwork.mechanism import GROUND
-from virtualwork.scene import Block, Scene
 from virtualwork.state import BLOCK
 
 if TYPE_CHECKING:

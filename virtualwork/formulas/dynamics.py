@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from virtualwork.bearing import carried
-from virtualwork.dyads import Number, cross
-from virtualwork.errors import DescriptionError
+from virtualwork.describe.errors import DescriptionError
+from virtualwork.formulas.closed_forms import Number, cross
+from virtualwork.formulas.effort import effort, finished, write_effort
+from virtualwork.formulas.load_paths import carried
+from virtualwork.formulas.loads import plus
+from virtualwork.formulas.reactions import Reactions
+from virtualwork.formulas.scene import Block, Scene
 from virtualwork.joints import Joint
-from virtualwork.loads import plus
 from virtualwork.mechanism import GROUND
-from virtualwork.reactions import Reactions
-from virtualwork.scene import Block, Scene
-from virtualwork.work import effort, finished, write_effort
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from virtualwork.force_rounding import ForceErrors
+    from virtualwork.bounds.forces import ForceErrors
+    from virtualwork.formulas.statics import Statics
     from virtualwork.motion import Motion
-    from virtualwork.statics import Statics
 
     Reals = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class Dynamics:
     def _settled(self) -> tuple[int, NDArray[np.bool_]]:
         if not self.scene.rubs:
             return 0, np.ones(self.motion.n, dtype=bool)
-        from virtualwork.friction import settle
+        from virtualwork.formulas.friction import settle
 
         return settle(self.scene)
 
@@ -86,7 +86,7 @@ class Dynamics:
         """All equilibrium equations at once, where the constraints are redundant; else None."""
         if not self.reactions.redundant:
             return None
-        from virtualwork.statics import Statics
+        from virtualwork.formulas.statics import Statics
 
         return Statics(self.reactions)
 
@@ -262,7 +262,7 @@ class Dynamics:
         >>> bool(abs(found.effort[0, 0] - 4.905) <= found.error_estimate().effort[0, 0] < 1e-14)
         True
         """
-        from virtualwork.force_rounding import ForceErrors
+        from virtualwork.bounds.forces import ForceErrors
 
         if self._errors is None:
             self._errors = ForceErrors(self)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.dyads import Number, dot
-from virtualwork.equilibrium import potential_of
-from virtualwork.loads import SpringEnd, TorsionEnd, path_reads, plus, times
-from virtualwork.scene import Block
-from virtualwork.work import displacement, power
+from virtualwork.formulas.closed_forms import Number, dot
+from virtualwork.formulas.effort import displacement, power
+from virtualwork.formulas.loads import SpringEnd, TorsionEnd, path_reads, plus, times
+from virtualwork.formulas.scene import Block
+from virtualwork.study.equilibrium import potential_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

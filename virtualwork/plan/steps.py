@@ -17,8 +17,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from virtualwork.graph import Blocks
 from virtualwork.mechanism import GROUND
+from virtualwork.plan.graph import Blocks
 
 
 @dataclass(frozen=True)

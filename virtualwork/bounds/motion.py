@@ -11,7 +11,7 @@ commute, (J·δx)⁽ᵏ⁾ = −ρ_k, so that by Leibniz's rule
 
     J·δx⁽ᵏ⁾ = −ρ_k − Σ_{j<k} C(k, j)·J⁽ᵏ⁻ʲ⁾·δx⁽ʲ⁾,      every δx⁽ᵏ⁾ = Σ_j A_kj·ρ_j,  |δx⁽ᵏ⁾| ≤ Σ_j |A_kj|·|ρ_j|.
 
-Close to a limit the second order counts too: see `virtualwork.perturbation`. The given data, dimensions and inputs,
+Close to a limit the second order counts too: see `virtualwork.bounds.second_order`. The given data, dimensions and inputs,
 are taken as exact.
 """
 
@@ -23,17 +23,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from virtualwork.bounds.second_order import Sizes, grown, inverse, kept, sum_of, value_of
 from virtualwork.mechanism import GROUND
 from virtualwork.newton import EPS
-from virtualwork.perturbation import Sizes, grown, inverse, kept, sum_of, value_of
+from virtualwork.plan.steps import Angle, Group, Place, Slide, Term, Turn, combined
 from virtualwork.state import SWEEP, Jets, State
-from virtualwork.steps import Angle, Group, Place, Slide, Term, Turn, combined
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork.motion import Motion
-    from virtualwork.steps import Closure
+    from virtualwork.plan.steps import Closure
 
     Reals = NDArray[np.float64]
     Complexes = NDArray[np.complex128]

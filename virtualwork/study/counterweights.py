@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from virtualwork.errors import DescriptionError
+from virtualwork.describe.errors import DescriptionError
 from virtualwork.mechanism import GROUND
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from weakref import proxy
 
 import numpy as np
 
-from virtualwork.dyads import Number
-from virtualwork.loads import (
+from virtualwork.formulas.closed_forms import Number
+from virtualwork.formulas.loads import (
     Acting,
     InertiaForce,
     InertiaTorque,
@@ -28,17 +28,17 @@ from virtualwork.loads import (
     times,
 )
 from virtualwork.mechanism import GROUND, Mechanism, TorsionSpring
+from virtualwork.plan.steps import Place
 from virtualwork.state import BLOCK
-from virtualwork.steps import Place
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from virtualwork.bearing import Bearing
+    from virtualwork.formulas.load_paths import Bearing
+    from virtualwork.formulas.quantities import Row
     from virtualwork.motion import Motion
+    from virtualwork.plan.steps import Plan
     from virtualwork.state import Jets, State
-    from virtualwork.steps import Plan
-    from virtualwork.sums import Row
 
     Reals = NDArray[np.float64]
 
@@ -166,7 +166,7 @@ class Scene:
     @cached_property
     def drive(self) -> Reals:
         """The effort at each input by virtual work, (n, k), as motors that other links carry need it."""
-        from virtualwork.work import effort
+        from virtualwork.formulas.effort import effort
 
         return effort(self)
 

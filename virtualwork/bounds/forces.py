@@ -1,6 +1,6 @@
 """Bounds of the rounding errors of forces: effort, joint forces, shaking force; dimensions, loads and inputs exact.
 
-Loads inherit the errors of the points and links on which they act (see `virtualwork.rounding`): −m a_G that of a_G, a
+Loads inherit the errors of the points and links on which they act (see `virtualwork.bounds.motion`): −m a_G that of a_G, a
 spring those of its ends. By virtual work τ = −Σ F·K, so that
 
     |δτ| ≤ Σ |δF||K| + |F||δK| + ε|F||K|,
@@ -21,20 +21,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.loads import Follower, InertiaForce, InertiaTorque, SpringEnd, Tabled, TorsionEnd
+from virtualwork.bounds.motion import ENTRIES
+from virtualwork.bounds.second_order import grown, inverse
+from virtualwork.formulas.effort import carrier
+from virtualwork.formulas.loads import Follower, InertiaForce, InertiaTorque, SpringEnd, Tabled, TorsionEnd
 from virtualwork.mechanism import GROUND
 from virtualwork.newton import EPS
-from virtualwork.perturbation import grown, inverse
-from virtualwork.rounding import ENTRIES
-from virtualwork.work import carrier
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from virtualwork.dynamics import Dynamics
-    from virtualwork.loads import Load
+    from virtualwork.formulas.dynamics import Dynamics
+    from virtualwork.formulas.loads import Load
+    from virtualwork.formulas.reactions import Joint
     from virtualwork.motion import Motion
-    from virtualwork.reactions import Joint
 
     Reals = NDArray[np.float64]
 
@@ -178,7 +178,7 @@ class ForceErrors:
     @cached_property
     def _unknowns(self) -> tuple[list[Any], Reals, Reals]:
         """The unknown forces of all links, their sizes and bounds, (n, unknowns); torques divided by the size."""
-        from virtualwork.statics import Statics
+        from virtualwork.formulas.statics import Statics
 
         d = self.dynamics
         statics = d.statics or Statics(d.reactions)

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from virtualwork.dyads import Number, dot
-from virtualwork.errors import DescriptionError
+from virtualwork.describe.errors import DescriptionError
+from virtualwork.formulas.closed_forms import Number, dot
+from virtualwork.formulas.loads import Acting, Rub, plus, times
+from virtualwork.formulas.reactions import Reactions
+from virtualwork.formulas.scene import Scene
 from virtualwork.joints import Joint, joints
-from virtualwork.loads import Acting, Rub, plus, times
 from virtualwork.mechanism import GROUND
-from virtualwork.reactions import Reactions
-from virtualwork.scene import Scene
-from virtualwork.steps import Term, combined
+from virtualwork.plan.steps import Term, combined
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

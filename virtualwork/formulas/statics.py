@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.dyads import cross
+from virtualwork.formulas.closed_forms import cross
 from virtualwork.mechanism import GROUND
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from virtualwork.formulas.reactions import Reactions
     from virtualwork.joints import Joint
     from virtualwork.mechanism import Mechanism
-    from virtualwork.reactions import Reactions
 
     Reals = NDArray[np.float64]
     Column = tuple[

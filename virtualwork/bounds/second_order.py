@@ -21,8 +21,8 @@ from virtualwork.mechanism import GROUND
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from virtualwork.plan.steps import Term
     from virtualwork.state import Jets
-    from virtualwork.steps import Term
 
     Reals = NDArray[np.float64]
 

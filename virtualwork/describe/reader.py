@@ -10,7 +10,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from virtualwork.errors import DescriptionError, MechanismError
+from virtualwork.describe.errors import DescriptionError, MechanismError
+from virtualwork.describe.units import EXPECTED, parse, scaled, unit
 from virtualwork.mechanism import (
     GROUND,
     Force,
@@ -26,7 +27,6 @@ from virtualwork.mechanism import (
     Torque,
     TorsionSpring,
 )
-from virtualwork.quantity import EXPECTED, parse, scaled, unit
 
 LARGEST = 1e60  # SI: no quantity of a machine is larger, and no product of five of them overflows
 TABLES = {

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.assur import direction
-from virtualwork.dyads import MANY, angle_and_slide, two_columns
+from virtualwork.formulas.closed_forms import MANY, angle_and_slide, two_columns
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

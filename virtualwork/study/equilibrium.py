@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.dyads import Number, dot
-from virtualwork.loads import (
+from virtualwork.formulas.closed_forms import Number, dot
+from virtualwork.formulas.effort import power
+from virtualwork.formulas.loads import (
     Constant,
     Follower,
     Load,
@@ -27,9 +28,8 @@ from virtualwork.loads import (
     plus,
     times,
 )
+from virtualwork.formulas.scene import Block, Scene
 from virtualwork.mechanism import GROUND
-from virtualwork.scene import Block, Scene
-from virtualwork.work import power
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

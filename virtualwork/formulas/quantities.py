@@ -13,13 +13,13 @@ from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from virtualwork.dyads import Number
+from virtualwork.formulas.closed_forms import Number
 from virtualwork.mechanism import GROUND
-from virtualwork.steps import Term
+from virtualwork.plan.steps import Term
 
 if TYPE_CHECKING:
-    from virtualwork.loads import Load
-    from virtualwork.scene import Block
+    from virtualwork.formulas.loads import Load
+    from virtualwork.formulas.scene import Block
     from virtualwork.state import Jets
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from virtualwork.errors import MobilityError
+from virtualwork.describe.errors import MobilityError
 from virtualwork.mechanism import GROUND
 
 if TYPE_CHECKING:
