@@ -14,9 +14,9 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from virtualwork.graph import Variable, decompose
 from virtualwork.mechanism import GROUND
-from virtualwork.steps import (
+from virtualwork.plan.graph import Variable, decompose
+from virtualwork.plan.steps import (
     Angle,
     Closure,
     Group,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.errors import AssemblyError
+from virtualwork.describe.errors import AssemblyError
 from virtualwork.mechanism import GROUND
 from virtualwork.state import State
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.errors import MechanismError
+from virtualwork.describe.errors import MechanismError
 from virtualwork.mechanism import GROUND
-from virtualwork.steps import Group
+from virtualwork.plan.steps import Group
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork.mechanism import Mechanism
-    from virtualwork.steps import Plan
+    from virtualwork.plan.steps import Plan
 
     Reals = NDArray[np.float64]
 

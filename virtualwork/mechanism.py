@@ -13,7 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
-from virtualwork.errors import DescriptionError
+from virtualwork.describe.errors import DescriptionError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -309,7 +309,7 @@ class Mechanism:
         DescriptionError
             Names the file, the table and the key, what was found and what was expected.
         """
-        from virtualwork.description import read
+        from virtualwork.describe.reader import read
 
         return read(Path(path))
 

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.assur import Group, Turn
-from virtualwork.dyads import Number
-from virtualwork.errors import MechanismError
-from virtualwork.series import branches
+from virtualwork.branch.change_point import branches
+from virtualwork.describe.errors import MechanismError
+from virtualwork.formulas.closed_forms import Number
 from virtualwork.state import Jets, State
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.mechanism.job import Job
-from cli.units import degrees
+from cli.read.units import degrees
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

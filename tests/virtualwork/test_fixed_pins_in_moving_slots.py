@@ -10,7 +10,7 @@ import pytest
 
 from virtualwork import Guess, Guide, Input, Link, Mechanism
 from virtualwork.check import Check
-from virtualwork.description import loads
+from virtualwork.describe.reader import loads
 from virtualwork.mechanism import Force, Friction
 
 TURN = np.radians(np.arange(0.0, 360.0, 7.0))
