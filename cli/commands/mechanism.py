@@ -10,8 +10,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli import options
-from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, csv_text, show, suffix_among
+from cli.read import options
+from cli.show.output import (
+    Digits,
+    Expect,
+    Json,
+    Output,
+    Plot,
+    Rtol,
+    Shown,
+    Text,
+    csv_text,
+    show,
+    suffix_among,
+)
 
 if TYPE_CHECKING:
     from cli.mechanism.asked import Asked

@@ -26,7 +26,7 @@ ORDERS = ("position", "velocity", "acceleration", "jerk")
 
 def load(path: str) -> Mechanism:
     """Read a description; - is standard input."""
-    from virtualwork.description import loads, read
+    from virtualwork.describe.reader import loads, read
 
     file = "standard input" if path == "-" else path
     try:
