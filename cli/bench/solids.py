@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError
-from rigidbody3d import Body, Motion, Shaft, principal
-from rigidbody3d.inertia import compose, turn
+from rigidbody3d import Body, Motion, Shaft, compose, principal
+from rigidbody3d.inertia import turn
 
 try:
     import mpmath as mp
