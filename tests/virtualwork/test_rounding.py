@@ -13,9 +13,9 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from cli.bench import groups, linkages, random_linkages
-from cli.bench.exact import Exact
-from cli.bench.groups import compare
+from benchmarks.stress import groups, linkages, random_linkages
+from benchmarks.stress.groups import compare
+from benchmarks.truth.mechanism import Exact
 from virtualwork import Guess, Guide, Input, Link, Mechanism
 from virtualwork.mechanism import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.study.cycle import Cycle
