@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from benchmarks.speed import DOMAINS
-from cli import options
 from cli.errors import DataError, nearest, one_line
-from cli.render import Json, Output, Plot, Shown, Text, show
+from cli.read import options
+from cli.show.output import Json, Output, Plot, Shown, Text, show
 
 if TYPE_CHECKING:
     from benchmarks.speed.measure import Measurement

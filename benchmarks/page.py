@@ -1,4 +1,4 @@
-"""The tables and pictures of a page of measurements: `dalembert bench --docs FILE.md` writes them, nothing by hand."""
+"""The tables and pictures of a page of measurements: `python -m benchmarks speed --docs FILE.md` writes them, nothing by hand."""
 
 from __future__ import annotations
 

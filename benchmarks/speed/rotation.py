@@ -114,7 +114,7 @@ def _top(states: int) -> Iterator[Measurement]:
     yield measured(DOMAIN, work, "closed form", attitude, size=states, aim_ns=2000.0)
     # one state after many nods: what the closed form is worth, and what the splitting keeps
     inertia, mgl, omega, start = [1.0, 1.0, 0.6], 1.2, [0.5, 1.0, 3.0], [0.8, 0.6, 0.0, 0.0]
-    last = np.array([200.0 if states < 10_000 else 2000.0])
+    last = np.array([20.0 if states < 10_000 else 2000.0])
     true = np.array([[float(x) for x in taylor(inertia, omega, float(last[0]), start, mgl)[1]]])
     work = f"heavy top, attitude after {last[0]:g} s"
     for method, options in (

@@ -1,7 +1,7 @@
 """Seeded random campaigns at singular places: the true error against the bound that the program itself gives.
 
 A campaign draws a case from a seed, solves it, and compares the error with the program's own estimate. A case is
-replayed by its seed. Short campaigns are run by the tests, long ones by `dalembert bench --stress 10min`.
+replayed by its seed. Short campaigns are run by the tests, long ones by `python -m benchmarks stress --time 10min`.
 """
 
 from __future__ import annotations
@@ -14,16 +14,9 @@ from importlib import import_module
 import numpy as np
 
 # the modules that have a dict CAMPAIGNS: name -> (what it does, trial(rng) -> [(error, bound), ...])
-MODULES = (
-    "benchmarks.speed.rotors",
-    "benchmarks.stress.linkages",
-    "benchmarks.stress.groups",
-    "benchmarks.stress.vibration",
-    "benchmarks.stress.placing",
-    "benchmarks.speed.rotation",
-    "benchmarks.stress.rotation",
-    "benchmarks.stress.solids",
-    "benchmarks.stress.gyroscopes",
+MODULES = tuple(
+    f"benchmarks.stress.{name}"
+    for name in ("rotors", "linkages", "groups", "vibration", "placing", "rotation", "solids", "gyroscopes")
 )
 
 Trial = Callable[[np.random.Generator], list[tuple[float, float]]]

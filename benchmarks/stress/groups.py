@@ -55,8 +55,8 @@ def compare(motion: Motion, i: int = 0, *, singular: bool = False) -> Pairs:
                         return []
                 found.append((_size(apart), float(link.error_estimate(order)[i])))
         last = list(m.links)[-1]
-        point = motion.at(last, m.size * (0.3 + 0.2j))
-        z = complex(point._z)
+        z = m.size * (0.3 + 0.2j)
+        point = motion.at(last, z)
         for order in range(3):
             apart = exact.point(last, z, order) - mp.mpc(complex(point.complex(order)[i]))
             found.append((_size(apart), float(point.error_estimate(order)[i])))
@@ -203,7 +203,7 @@ def _forces(rng: Generator) -> Pairs:
             if np.isfinite(force):
                 apart = mp.mpc(true[joint.key, body, 0], true[joint.key, body, 1]) - mp.mpc(complex(force))
                 found.append((_size(apart), float(bounds.joint_force(joint, body)[0])))
-        loads = exact._loads()
+        loads = exact.loads()
         apart = sum((load[2] for load in loads), mp.mpc(0)) - mp.mpc(*map(float, d.shaking[0][0]))
         found.append((_size(apart), float(bounds.shaking[0][0])))
     return found

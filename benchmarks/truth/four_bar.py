@@ -20,13 +20,13 @@ def coupler_point(a: Any, b: Any, c: Any, d: Any, angle: Any, side: int, omega: 
     v, w = mp.mpc(0, omega) * crank, -(omega**2) * crank
     p, q = pin - crank, pin - d
     # C turns about B and about D: v + iω₃p = iω₄q, then the accelerations likewise
-    w3, w4 = _two_rates(p, q, -v)
+    w3, w4 = two_rates(p, q, -v)
     rest = -w + w3**2 * p - w4**2 * q
-    _, a4 = _two_rates(p, q, rest)
+    _, a4 = two_rates(p, q, rest)
     return pin, mp.mpc(0, w4) * q, mp.mpc(0, a4) * q - w4**2 * q, h2
 
 
-def _two_rates(p: Any, q: Any, right: Any) -> tuple[Any, Any]:
+def two_rates(p: Any, q: Any, right: Any) -> tuple[Any, Any]:
     """Solve i·x·p - i·y·q = right for real x, y."""
     cross = mp.im(mp.conj(p) * q)
     r = right / mp.mpc(0, 1)

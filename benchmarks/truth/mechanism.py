@@ -283,7 +283,7 @@ class Exact:
         """A link's angle, unwrapped from the start, or its time derivative."""
         return self.theta[link][order] * math.factorial(order)
 
-    def _loads(self) -> list[tuple[str, complex, Any, Any]]:
+    def loads(self) -> list[tuple[str, complex, Any, Any]]:
         """(body, point, force, torque) of weights, inertia, forces, torques and springs."""
         m = self.m
         found: list[tuple[str, complex, Any, Any]] = []
@@ -312,7 +312,7 @@ class Exact:
         """The multipliers by label: ("pin:B", body, 0 or 1) the components on that body, ("input", "0", 0) the effort."""
         with mp.workdps(DIGITS):
             q = [mp.mpf(0)] * (3 * len(self.links))
-            for body, z, force, torque in self._loads():
+            for body, z, force, torque in self.loads():
                 c = 3 * self.links.index(body)
                 arm = mp.mpc(z) * mp.expj(self.theta[body][0])
                 q[c] += torque + mp.im(mp.conj(arm) * force)
