@@ -86,17 +86,22 @@ def inverse_norm(jacobian: Reals) -> Reals:
     return out
 
 
-def singular_poses(cols: list[list[Number]], angles: int, n: int) -> NDArray[np.bool_]:
-    """Which poses have a Jacobian whose smallest singular value is below 1e-6 of its largest."""
+def singular_values(cols: list[list[Number]], angles: int, n: int) -> Reals:
+    """The singular values of the Jacobian (lengths scaled) at each pose; NaN where it is not assembled."""
     jacobian = stack(cols, n)
-    size = np.abs(jacobian[:, :, :angles]).max(initial=0.0)
+    good = np.isfinite(jacobian).all(axis=(1, 2))
+    size = np.abs(jacobian[good][:, :, :angles]).max(initial=0.0)
     if angles and size > 0:
         jacobian[:, :, :angles] /= size
-    good = np.isfinite(jacobian).all(axis=(1, 2))
-    out = np.zeros(n, dtype=bool)
-    s = np.linalg.svd(jacobian[good], compute_uv=False)
-    out[good] = s[:, -1] < 1e-6 * s[:, 0]
+    out = np.full((n, min(jacobian.shape[1:])), np.nan)
+    out[good] = np.linalg.svd(jacobian[good], compute_uv=False)
     return out
+
+
+def singular_poses(cols: list[list[Number]], angles: int, n: int) -> NDArray[np.bool_]:
+    """Which poses have a Jacobian whose smallest singular value is below 1e-6 of its largest."""
+    s = singular_values(cols, angles, n)
+    return np.asarray(s[:, -1] < 1e-6 * s[:, 0])
 
 
 def solve_columns(cols: list[list[Number]], right: list[Number]) -> list[Number]:

@@ -15,6 +15,8 @@ import numpy as np
 
 from virtualwork.assur import Angle, Closure, Group, Place, Plan, Slide, Step, Term, Turn
 from virtualwork.formulas.closed_forms import (
+    Engine,
+    Folded,
     MANY,
     ONE,
     Number,
@@ -56,6 +58,7 @@ class State:
         self.slide: dict[int, Number] = {}
         self.margin: dict[str, Number] = {}
         self.spins: dict[int, Number] = {}  # e^{i·input}, where a sweep knows it already
+        self.folded: set[str] = set()  # groups that are singular in every pose
 
     def spin(self, j: int) -> Number:
         """e^{i·input j}, formed once."""
@@ -178,9 +181,10 @@ class Case:
             value = value + v
         return value
 
-    def solve(self, st: State, sign: Number, size: float) -> None:
-        """Write the group's rotations and slides into the state."""
+    def solve(self, st: State, sign: Number, size: float, folded: bool = False) -> None:
+        """Write the group's rotations and slides into the state; `folded`: its two assemblies meet in every pose."""
         group = self.group
+        xp: Engine = Folded(st.xp) if folded else st.xp
         w = st.point[self.closure.start] - st.point[self.closure.end]
         if self.known:
             w = w + st.sum(self.known)
@@ -190,23 +194,23 @@ class Case:
             )  # between points that stand: as in any array, what is divided by zero is infinite
         if group.kind == "RRR":
             a, b = group.angles
-            st.turn[a], st.turn[b], margin = two_angles(w, self.arm(0, st), self.arm(1, st), sign, st.xp)
+            st.turn[a], st.turn[b], margin = two_angles(w, self.arm(0, st), self.arm(1, st), sign, xp)
         elif group.kind == "RRP":
             (a,), (g,) = group.angles, group.slides
             z, body = self.rails[0]
-            st.turn[a], st.slide[g], margin = angle_and_slide(
-                w, self.arm(0, st), z * st.turn[body], sign, st.xp
-            )
+            st.turn[a], st.slide[g], margin = angle_and_slide(w, self.arm(0, st), z * st.turn[body], sign, xp)
         elif group.kind == "RPR":
             (a,), (g,) = group.angles, group.slides
             st.turn[a], st.slide[g], margin = turning_slide(
-                w, self.arm(0, st), self.rails[0][0], sign, size, st.xp
+                w, self.arm(0, st), self.rails[0][0], sign, size, xp
             )
         else:
             g, h = group.slides
             u, v = (z * st.turn[body] for z, body in self.rails)
             st.slide[g], st.slide[h], margin = two_slides(w, u, v)
         st.margin[group.name] = margin
+        if folded:
+            st.folded.add(group.name)
         for tie in group.ties:
             st.turn[tie.body] = st.rotate(tie.angle)
 
@@ -387,6 +391,9 @@ class Jets:
     def _group(self, group: Group, k: int) -> None:
         right = self.right_side(group, k)
         cols = self.columns(group)
+        if group.name in self.st.folded:
+            self.write(group, k, self._held(group, right))
+            return
         if group.kind != "Newton":
             (c1, c2), w = cols[0], right[0]
             inverse = self.inverse(group)
@@ -402,6 +409,16 @@ class Jets:
         if self.track is not None and self.track.changes:
             x = self.track.mend_rates(group, self.st.inputs[0], k, x)
         self.write(group, k, x)
+
+    def _held(self, group: Group, right: list[Number]) -> list[Number]:
+        """The unknowns' derivatives where J is singular in every pose: what the loops do not determine is NaN."""
+        from virtualwork.branch.folds import held
+        from virtualwork.newton import stack_rows
+
+        shape = np.shape(self.st.inputs[0])
+        n = int(np.prod(shape))
+        x = held(group, self.st, self.plan, stack_rows(right, n))
+        return [x[:, j] if shape else float(x[0, j]) for j in range(x.shape[1])]
 
     def write(self, group: Group, k: int, x: list[Number]) -> None:
         """Store the unknowns' k-th derivatives and those of the angles tied to them."""
