@@ -15,10 +15,10 @@ import numpy as np
 
 from virtualwork.assur import Angle, Closure, Group, Place, Plan, Slide, Step, Term, Turn
 from virtualwork.formulas.closed_forms import (
-    Engine,
-    Folded,
     MANY,
     ONE,
+    Engine,
+    Folded,
     Number,
     angle_and_slide,
     cross,

@@ -472,8 +472,8 @@ class Track:
     def turns(self) -> int | None:
         """How many turns of the input bring every group back to where it stood: the period of the branch.
 
-        A branch that passes an odd number of change points in a turn needs two; a fractional gear its own number.
-        None with a slide or several inputs, and where no number of turns up to `TURNS` does it.
+        A branch that passes an odd number of change points in a turn needs two; a fractional gear its own number. A
+        branch between two limits needs what tells its own inputs apart. None with a slide or several inputs, and where no number of turns up to `TURNS` does it.
         """
         if not self.active or self.assembly.mechanism.inputs[0].is_slide:
             return None
@@ -492,8 +492,20 @@ class Track:
             self.cover(self.start - n * self.length, self.start + self.length)
             # beyond a limit there is nothing to compare: what is not assembled contradicts nothing
             if not (np.abs(self._stands(q - n * self.length) - here) > SAME).any():
-                return n
-        return None
+                return self._between_limits(n)
+        return self._between_limits(None)
+
+    def _between_limits(self, n: int | None) -> int | None:
+        """The turns of a range between two limits; n where there is none."""
+        if n == 1 or not self.has_limits:
+            return n
+        shifts = (0.0,) if n is None else (0.0, n * self.length)
+        every = [(limit.input + shift, limit.side) for limit in self._ends() for shift in shifts]
+        above = [q for q, side in every if q > self.start and side < 0]
+        below = [q for q, side in every if q < self.start and side > 0]
+        if not above or not below:
+            return n
+        return max(1, int(np.ceil((min(above) - max(below)) / self.length)))
 
     def _stands(self, q: Reals) -> NDArray[np.complex128]:
         """Rotations and slides (over the size) of all groups at inputs q; NaN where not assembled."""
@@ -521,6 +533,10 @@ class Track:
         """Where the input can go no further, over one period of the branch or what was covered, to full precision."""
         back = self.length if self.assembly.mechanism.inputs[0].is_slide or not self._repeats else 0.0
         self.cover(self.start - back, self.start + (self.period or self.length))
+        return self._ends()
+
+    def _ends(self) -> list[Limit]:
+        """The limits in what was covered."""
         by_name = {g.name: g for g in self.plan.groups}
         found = [self._root(by_name[name], a, b) for name, a, b in self._brackets]
         for name, marched in self._marched.items():
