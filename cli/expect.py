@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,7 @@ def compare(columns: Columns, keys: Sequence[str], file: str, rtol: float) -> Re
                 f"{file}: the result has no column '{name}': expected some of "
                 f"{', '.join(columns)}{nearest(name, columns)}"
             )
+    expected.points(name for name in header if _is_number(columns[name]))
     matched = [name for name in header if name in keys]
     rows = list(_match(columns, file, expected.texts, matched, expected.rows))
     lines: dict[str, list[Any]] = {
@@ -63,6 +65,12 @@ def compare(columns: Columns, keys: Sequence[str], file: str, rtol: float) -> Re
     if not total:
         raise DataError(f"{file}: no expected value in it: nothing would be checked")
     return Report(lines, f"{total - wrong} of {total} values within {rtol:g}", wrong == 0)
+
+
+def _is_number(column: Sequence[Any]) -> bool:
+    """Tell whether a column of the result holds numbers: names and verdicts keep their commas."""
+    known = next((value for value in column if value is not None), None)
+    return isinstance(known, Real)
 
 
 def _match(
