@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 
 from cli.errors import DataError, nearest
 from cli.tables import read
-from cli.units import parse_number
+from cli.units import column_dimensions, parse_number
 
 Columns = Mapping[str, Sequence[Any]]
 
@@ -39,7 +39,7 @@ def compare(columns: Columns, keys: Sequence[str], file: str, rtol: float) -> Re
         if name not in columns:
             raise DataError(
                 f"{file}: the result has no column '{name}': expected some of "
-                f"{', '.join(columns)}{nearest(name, columns)}"
+                f"{', '.join(columns)}{nearest(name, _alike(name, columns))}"
             )
     expected.points(name for name in header if _is_number(columns[name]))
     matched = [name for name in header if name in keys]
@@ -65,6 +65,12 @@ def compare(columns: Columns, keys: Sequence[str], file: str, rtol: float) -> Re
     if not total:
         raise DataError(f"{file}: no expected value in it: nothing would be checked")
     return Report(lines, f"{total - wrong} of {total} values within {rtol:g}", wrong == 0)
+
+
+def _alike(name: str, columns: Iterable[str]) -> list[str]:
+    """Return the columns of the dimension that a name's unit has; all of them for a name without a unit."""
+    asked = column_dimensions(name)
+    return [column for column in columns if not asked or asked & column_dimensions(column)]
 
 
 def _is_number(column: Sequence[Any]) -> bool:

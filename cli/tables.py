@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.errors import DataError, cell_error, nearest, quote
-from cli.units import LARGEST, UNITS, find_unit, parse_number
+from cli.errors import DataError, cell_error, quote
+from cli.units import LARGEST, UNITS, find_unit, nearest_unit, parse_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -297,7 +297,7 @@ def _find_columns(
                 header = source.header[strays[0]]
                 suffix = header[len(name) + 1 :]
                 problem = f"the unknown unit '{suffix}'" if suffix else "no unit"
-                hint = nearest(suffix, UNITS[dimension]) if suffix else ""
+                hint = nearest_unit(suffix, dimension) if suffix else ""
                 raise DataError(
                     f"{source.file}: the column {header} has {problem}: expected {spellings(name, dimension)}{hint}"
                 )
