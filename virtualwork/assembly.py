@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, plan
-from virtualwork.dyads import Number, cross, dot
-from virtualwork.errors import AssemblyError, MobilityError
+from virtualwork.describe.errors import AssemblyError, MobilityError
+from virtualwork.formulas.closed_forms import Number, cross, dot
 from virtualwork.mechanism import GROUND
 from virtualwork.newton import newton, write_unknowns
 from virtualwork.state import Case, State, place
@@ -22,7 +22,7 @@ from virtualwork.state import Case, State, place
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from virtualwork.loads import Acting
+    from virtualwork.formulas.loads import Acting
     from virtualwork.mechanism import Mechanism
     from virtualwork.track import Track
 
@@ -422,6 +422,8 @@ def known_by_guess(m: Mechanism) -> tuple[dict[str, float], dict[str, complex]]:
     for g in m.guides:
         if g.turned is not None and g.on == GROUND:
             angles.setdefault(g.link, g.angle + g.turned)
+        if g.turned is not None and g.link == GROUND:
+            angles.setdefault(g.on, -(g.angle + g.turned))
     before = -1
     while len(angles) + len(points) > before:
         before = len(angles) + len(points)

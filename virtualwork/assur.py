@@ -14,9 +14,9 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from virtualwork.graph import Variable, decompose
 from virtualwork.mechanism import GROUND
-from virtualwork.steps import (
+from virtualwork.plan.graph import Variable, decompose
+from virtualwork.plan.steps import (
     Angle,
     Closure,
     Group,
@@ -119,7 +119,7 @@ class _Planner:
         """The point of guide i's link that runs in it: `link.point`."""
         g = self.m.guides[i]
         self.guide_nodes[i] = g.point
-        return self._place(g.point, g.link, self.m.links[g.link].points[g.point])
+        return self._place(g.point, g.link, self.m.bodies[g.link][g.point])
 
     def _through(self, i: int) -> complex:
         g = self.m.guides[i]
@@ -303,10 +303,10 @@ class _Planner:
             base, terms = chain(g.on, self._through(i))
             found = (
                 base,
-                combined((*terms, Term(d, g.on, i), Term(-self.m.links[body].points[g.point], body))),
+                combined((*terms, Term(d, g.on, i), Term(-self.m.bodies[body][g.point], body))),
             )
         elif g.on == body and g.link in placed:
-            base, terms = chain(g.link, self.m.links[g.link].points[g.point])
+            base, terms = chain(g.link, self.m.bodies[g.link][g.point])
             found = base, combined((*terms, Term(-self._through(i), body), Term(-d, body, i)))
         else:
             return None
@@ -387,10 +387,13 @@ class _Planner:
             if g.link in anchors and g.on in anchors and (f"guide {i}", "") not in self.used:
                 base, terms = chain(g.on, self._through(i))
                 line = base, combined((*terms, Term(self.directions[i], g.on, i)))
+                pin = chain(g.link, self.m.bodies[g.link][g.point])
                 self.used.add((f"guide {i}", ""))
-                self._close(
-                    closures, chain(g.link, self.m.links[g.link].points[g.point]), line, g.point, g.link, i
-                )
+                # the loop's force is that on a body which moves: of a fixed pin in a slot, on the slot's
+                if g.link == GROUND:
+                    self._close(closures, line, pin, g.point, g.on, i)
+                else:
+                    self._close(closures, pin, line, g.point, g.link, i)
         return closures, {b: a for b, a in anchors.items() if b not in self.anchors}
 
     def _close(

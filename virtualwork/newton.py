@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from virtualwork.dyads import Number
-from virtualwork.errors import AssemblyError
+from virtualwork.describe.errors import AssemblyError
+from virtualwork.formulas.closed_forms import Number
 from virtualwork.state import State, columns, loop
 
 if TYPE_CHECKING:
