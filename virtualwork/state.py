@@ -392,7 +392,9 @@ class Jets:
         right = self.right_side(group, k)
         cols = self.columns(group)
         if group.name in self.st.folded:
-            self.write(group, k, self._held(group, right))
+            from virtualwork.newton import solve_determined
+
+            self.write(group, k, solve_determined(cols, right, len(group.angles)))
             return
         if group.kind != "Newton":
             (c1, c2), w = cols[0], right[0]
@@ -409,16 +411,6 @@ class Jets:
         if self.track is not None and self.track.changes:
             x = self.track.mend_rates(group, self.st.inputs[0], k, x)
         self.write(group, k, x)
-
-    def _held(self, group: Group, right: list[Number]) -> list[Number]:
-        """The unknowns' derivatives where J is singular in every pose: what the loops do not determine is NaN."""
-        from virtualwork.branch.folds import held
-        from virtualwork.newton import stack_rows
-
-        shape = np.shape(self.st.inputs[0])
-        n = int(np.prod(shape))
-        x = held(group, self.st, self.plan, stack_rows(right, n))
-        return [x[:, j] if shape else float(x[0, j]) for j in range(x.shape[1])]
 
     def write(self, group: Group, k: int, x: list[Number]) -> None:
         """Store the unknowns' k-th derivatives and those of the angles tied to them."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from virtualwork.newton import gaps, singular_values, stack, stack_rows, write_unknowns
+from virtualwork.newton import SINGULAR, gaps, singular_values, stack, stack_rows, write_unknowns
 from virtualwork.state import State, columns, ratio
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     Reals = NDArray[np.float64]
 
-SINGULAR = 1e-6  # a singular value below this share of the largest is that of a null vector
 ROUNDS = 4  # of Gauss-Newton from half of the digits
 
 
@@ -74,28 +73,6 @@ def settle(group: Group, st: State, plan: Plan, x: Reals, size: float) -> Reals:
         step[good] = -(np.linalg.pinv(system[good]) @ right_side[good][..., None])[..., 0]
         out = out + step * scale
     write_unknowns(group, st, out)
-    return out
-
-
-def held(group: Group, st: State, plan: Plan, right: Reals) -> Reals:
-    """The rates that the loops determine though J is singular, (n, unknowns), from the right side (n, 2·loops).
-
-    Those that a null vector of J moves are NaN.
-    """
-    n = len(right)
-    jacobian = stack(columns(group, st, plan), n)
-    good = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
-    out = np.full((n, jacobian.shape[2]), np.nan)
-    if not good.any():
-        return out
-    size = np.abs(jacobian[good][:, :, : len(group.angles)]).max(initial=0.0) or 1.0
-    scale = np.array([1.0] * len(group.angles) + [size] * len(group.slides))
-    jacobian = jacobian * scale / size
-    _, s, null = np.linalg.svd(jacobian[good])
-    loose = s < SINGULAR * s[:, :1]
-    free = np.einsum("nk,nkj->nj", loose.astype(float), np.abs(null[:, : s.shape[1]])) > SINGULAR
-    least = -(np.linalg.pinv(jacobian[good], rcond=SINGULAR) @ (right[good] / size)[..., None])[..., 0]
-    out[good] = np.where(free, np.nan, least * scale)
     return out
 
 
