@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.branch.folds import settle, singular
-from virtualwork.newton import newton, solve, stack, stack_rows, write_unknowns
+from virtualwork.newton import newton, settle, singular, solve, stack, stack_rows, write_unknowns
 from virtualwork.state import Jets, State, columns
 
 if TYPE_CHECKING:
