@@ -88,7 +88,7 @@ def read_parts(path: str) -> Parts:
         else:
             mass[index], inertia[index] = _part(table, index, shape.lower(), row, warnings, name[index])
     missed = _check_tensors(table, mass, inertia, name, warnings)
-    for index in np.flatnonzero(mass == 0):
+    for index in np.flatnonzero(mass == 0).tolist():
         warnings.append(f"{table.file}: part {quote(name[index])}: mass 0: left out")
     kept = np.flatnonzero(mass)
     place = {index: at for at, index in enumerate(kept.tolist())}
