@@ -1,5 +1,6 @@
 """The ground: kinds of numbers, and what keeps their digits.
 
-`exact`: sums and products with their rounding errors; `doubled`: numbers of twice as many digits. Each is imported
+`exact`: sums and products with their rounding errors; `doubled`: numbers of twice as many digits; `bounded`: numbers
+that carry a bound of their error. Each is imported
 by its own name, so that nobody loads more than he uses.
 """
