@@ -37,12 +37,12 @@ def run(
         data = file.read_bytes()
         if here.name == EXPECTED and _is_an_examples(here) and here.read_bytes() != data:
             here = Path(f"{name}-{EXPECTED}")
-            print(f"{EXPECTED} is another example's: kept")
         known = _is_an_examples(here) or (here.is_file() and here.read_bytes() == data)
         if here.exists() and not known:
             raise DataError(f"{here}: there is another file of this name here: nothing was overwritten")
         write(here, data)
-        print(f"wrote {here}")
+        kept = "" if here.name == file.name else f" ({file.name} is another example's)"
+        print(f"wrote {here}{kept}")
     print(f"source: {described['source']}\nrun:\n  {described['command']}")
 
 
