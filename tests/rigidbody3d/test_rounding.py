@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from benchmarks.truth.rotation import taylor
+from dalembert.arithmetic.bounded import Bounded
+from dalembert.arithmetic.exact import EPS
 from rigidbody3d import Body, FreeBody, Motion, Shaft, Top, compose, integrate, principal, rounding, tensor
 from rigidbody3d.attitude import angle_between
-from rigidbody3d.rounding import EPS, Bounded
 
 
 def turned(found, exact) -> float:
