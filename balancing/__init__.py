@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from balancing.amplitudes import AmplitudeFit, influence_from_amplitudes
-    from balancing.balance import Balance, least_squares, minimax
+    from balancing.balance import Balance, initial_unbalance, least_squares, minimax
     from balancing.confidence import Readings, spread
     from balancing.correction import CoincidentPlanes, Correction, Unbalances, correct
     from balancing.dependence import (
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 # A rotor with known masses needs none of what vibration needs: each module is loaded when a name of it is asked for.
 _HOMES = {
     "balancing.amplitudes": "AmplitudeFit influence_from_amplitudes",
-    "balancing.balance": "Balance least_squares minimax",
+    "balancing.balance": "Balance initial_unbalance least_squares minimax",
     "balancing.confidence": "Readings spread",
     "balancing.correction": "CoincidentPlanes Correction Unbalances correct",
     "balancing.dependence": "DependentPlanes DependentTrials condition_number plane_significance unseen",
@@ -91,6 +91,7 @@ __all__ = [
     "influence_coefficients",
     "influence_error",
     "influence_from_amplitudes",
+    "initial_unbalance",
     "least_squares",
     "minimax",
     "permissible_unbalance",
