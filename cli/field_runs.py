@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.balance.solve import number_names
 from cli.errors import DataError, quote
-from cli.read.tables import Cells, Table, read
+from cli.read.tables import Cells, Table, number_names, read
 from cli.read.units import SMALLEST, UNITS, parse_number, phasor, to_si
 
 Real = NDArray[np.float64]

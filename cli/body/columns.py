@@ -11,7 +11,7 @@ from cli.read.parts import READ
 
 if TYPE_CHECKING:
     from cli.body.solve import Answer
-    from cli.show.output import Columns
+    from cli.show.shown import Columns
 
 Real = NDArray[np.float64]
 

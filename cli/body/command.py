@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.read import options
-from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+from cli.show.shown import Digits, Expect, Json, Output, Plot, Rtol, Text, show
 
 if TYPE_CHECKING:
     from cli.body.solve import ShaftWanted

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cli.read.parts import Parts, read_parts
 from cli.read.planes import Planes
 from cli.read.units import degrees
-from cli.show.output import Columns, Shown
+from cli.show.shown import Columns, Shown
 from rigidbody3d import Motion, Shaft
 
 if TYPE_CHECKING:

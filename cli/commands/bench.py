@@ -14,7 +14,7 @@ import typer
 
 from cli.errors import nearest, one_line
 from cli.read import options
-from cli.show.output import Json, Output, Plot, Shown, Text, show
+from cli.show.shown import Json, Output, Plot, Shown, Text, show
 
 if TYPE_CHECKING:
     from cli.bench.measure import Measurement

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cli.read import options
-from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
+from cli.show.shown import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
 
 if TYPE_CHECKING:
     from cli.mechanism.asked import Asked

@@ -402,3 +402,15 @@ def _read_large(source: _Source, table: Table, plan: _Plan, marker: str) -> bool
     table.rows = rows
     table.marks.update(marks)
     return True
+
+
+def number_names(names: list[str]) -> tuple[list[str], NDArray[np.intp]]:
+    """Number names in the order in which they first stand."""
+    if len(names) >= LARGE:
+        import pandas as pd
+
+        codes, unique = pd.factorize(np.array(names, dtype=object))
+        return unique.tolist(), codes.astype(np.intp)
+    first: dict[str, int] = {}
+    codes = np.array([first.setdefault(name, len(first)) for name in names], dtype=np.intp)
+    return list(first), codes

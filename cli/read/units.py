@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar, overload
 
 from cli.errors import nearest
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Unit = tuple[float, float]
+Scaled = TypeVar("Scaled", float, complex, "NDArray[np.float64]", "NDArray[np.complex128]")
 
 _LENGTH: dict[str, Unit] = {"m": (1, 1), "mm": (1, 1000), "cm": (1, 100), "um": (1, 10**6), "in": (127, 5000)}
 _LB = (45359237, 10**8)
@@ -105,13 +106,13 @@ def find_unit(dimension: str, suffix: str) -> str | None:
     return next((unit for unit in units if unit.lower() == suffix.lower()), None)
 
 
-def to_si(value: Any, dimension: str, unit: str) -> Any:
+def to_si(value: Scaled, dimension: str, unit: str) -> Scaled:
     """Convert a number or an array from `unit` to SI."""
     numerator, denominator = UNITS[dimension][unit]
     return value * numerator / denominator
 
 
-def from_si(value: Any, dimension: str, unit: str) -> Any:
+def from_si(value: Scaled, dimension: str, unit: str) -> Scaled:
     """Convert a number or an array from SI to `unit`."""
     numerator, denominator = UNITS[dimension][unit]
     return value * denominator / numerator
@@ -192,10 +193,15 @@ def phasor(magnitude: NDArray[np.float64], angle: NDArray[np.float64], unit: str
     return z
 
 
-def degrees(z: Any) -> Any:
+@overload
+def degrees(z: NDArray[np.complex128]) -> NDArray[np.float64]: ...
+@overload
+def degrees(z: complex) -> float: ...
+def degrees(z: complex | NDArray[np.complex128]) -> float | NDArray[np.float64]:
     """Return the angle of a complex number, or of each in an array, in degrees in [0, 360); 0 for zero."""
     import numpy as np
 
+    vector = np.asarray(z)
     # + 0.0: the angle of -0 is 0, not 180; and a tiny negative angle plus 360 rounds to 360 itself
-    angle = np.degrees(np.arctan2(np.imag(z) + 0.0, np.real(z) + 0.0)) % 360.0
+    angle = np.degrees(np.arctan2(vector.imag + 0.0, vector.real + 0.0)) % 360.0
     return np.where(angle >= 360.0, 0.0, angle)[()]

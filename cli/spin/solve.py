@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cli.errors import DataError, nearest
 from cli.read.units import LARGEST
-from cli.show.output import Columns, Shown
+from cli.show.shown import Columns, Shown
 from rigidbody3d import Body, FreeBody, FreeState, Top, TopState, Trajectory, check, integrate, principal
 from rigidbody3d import cones as cones_of
 from rigidbody3d import sleeping_threshold as threshold_of
