@@ -22,14 +22,14 @@ Scaled = TypeVar("Scaled", float, complex, "NDArray[np.float64]", "NDArray[np.co
 _LENGTH: dict[str, Unit] = {"m": (1, 1), "mm": (1, 1000), "cm": (1, 100), "um": (1, 10**6), "in": (127, 5000)}
 _LB = (45359237, 10**8)
 _OZ = (45359237, 16 * 10**8)
-_G0 = 9.80665
+G0 = 9.80665
 _TURN = (math.pi, 180)
 
 UNITS: dict[str, dict[str, Unit]] = {
     "number": {"": (1, 1)},
     "length": _LENGTH,
     "mass": {"kg": (1, 1), "g": (1, 1000), "mg": (1, 10**6), "lb": _LB, "oz": _OZ},
-    "force": {"N": (1, 1), "kN": (1000, 1), "lbf": (_LB[0] * _G0, _LB[1])},
+    "force": {"N": (1, 1), "kN": (1000, 1), "lbf": (_LB[0] * G0, _LB[1])},
     "angle": {"deg": _TURN, "rad": (1, 1)},
     "unbalance": {
         "kg_m": (1, 1),
@@ -55,7 +55,7 @@ UNITS: dict[str, dict[str, Unit]] = {
         "N_m": (1, 1),
         "N_mm": (1, 1000),
         "kN_m": (1000, 1),
-        "lbf_in": (_LB[0] * _G0 * 127, _LB[1] * 5000),
+        "lbf_in": (_LB[0] * G0 * 127, _LB[1] * 5000),
     },
     "density": {"kg_m3": (1, 1), "g_cm3": (1000, 1)},
     "area density": {"kg_m2": (1, 1), "g_cm2": (10, 1)},
@@ -76,7 +76,7 @@ AMPLITUDES: dict[str, Unit] = {
     "in_s": (127, 5000),
     "mm_s2": (1, 1000),
     "m_s2": (1, 1),
-    "g": (_G0, 1),
+    "g": (G0, 1),
 }
 # A tag says how it is read: peak, peak to peak, r.m.s.; amplitudes of different tags are different quantities.
 TAGS = ("", "_pk", "_pp", "_rms")
