@@ -10,16 +10,15 @@ from __future__ import annotations
 import csv
 import io
 import re
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cli.errors import DataError, cell_error, nearest, quote
+from cli.read.files import read_bytes
 from cli.read.units import LARGEST, UNITS, find_unit, parse_number
 
 if TYPE_CHECKING:
@@ -180,12 +179,7 @@ class _Source:
 
 
 def _open(path: str) -> _Source:
-    file = "standard input" if path == "-" else path
-    try:
-        data = sys.stdin.buffer.read() if path == "-" else Path(path).read_bytes()
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise DataError(f"{file}: {reason}") from None
+    file, data = read_bytes(path)
     warnings: list[str] = []
     text = _decode(file, data, warnings)
     source = _Source(file, text, _delimiter(text), [], warnings, text.count("\n") >= LARGE)
