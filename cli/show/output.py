@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cli.show.columns import Document
 
 
-def with_suffix(*suffixes: str) -> Callable[[Path | None], Path | None]:
+def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
     """Return the check of a file's option: its suffix is one of these."""
 
     def check(path: Path | None) -> Path | None:
@@ -46,7 +46,7 @@ class ShowOptions:
             "--output",
             metavar="FILE",
             help="Write the result to FILE (.csv or .json).",
-            callback=with_suffix(".csv", ".json"),
+            callback=suffix_among(".csv", ".json"),
         ),
     ] = None
     plot: Annotated[
@@ -55,7 +55,7 @@ class ShowOptions:
             "--plot",
             metavar="FILE",
             help="Write a picture to FILE (.svg, .png or .pdf).",
-            callback=with_suffix(".svg", ".png", ".pdf"),
+            callback=suffix_among(".svg", ".png", ".pdf"),
         ),
     ] = None
     expect: Annotated[
@@ -106,7 +106,9 @@ def show(result: Result, options: ShowOptions) -> None:
         from cli.show.expect import compare
 
         table = first()
-        report = compare(table.cells, table.keys, str(options.expect), options.rtol)
+        screen = result.screen
+        other = None if screen is None else lambda: screen().cells
+        report = compare(table.cells, table.keys, str(options.expect), options.rtol, other)
         checked = f"{table_text(report.columns)}\n{report.summary}"
     if options.digits:
         result, cut = _with_digits_that_hold(result, first)
@@ -148,8 +150,10 @@ def _with_digits_that_hold(result: Result, first: Callable[[], Table]) -> tuple[
     from cli.show.digits import digits_that_hold
 
     table, unknown = digits_that_hold(first())
+    screen = result.screen if result.screen is None else cache(result.screen)
+    if screen is not None and not any(column.error for column in table.columns):
+        unknown = digits_that_hold(screen())[1]
     noted = f"--digits: of {unknown} numbers no digit is known to hold; their cells are empty"
-    screen = result.screen
     return replace(
         result,
         warnings=[*result.warnings, *([noted] if unknown else [])],

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cli.show.columns import Column, Result, Table
-from cli.show.output import ShowOptions, with_suffix
+from cli.show.output import ShowOptions, suffix_among
 from cli.show.output import show as show_result
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ Output = Annotated[
         "--output",
         metavar="FILE",
         help="Write the result to FILE (.csv or .json).",
-        callback=with_suffix(".csv", ".json"),
+        callback=suffix_among(".csv", ".json"),
     ),
 ]
 Plot = Annotated[
@@ -36,7 +36,7 @@ Plot = Annotated[
         "--plot",
         metavar="FILE",
         help="Write a picture to FILE (.svg, .png or .pdf).",
-        callback=with_suffix(".svg", ".png", ".pdf"),
+        callback=suffix_among(".svg", ".png", ".pdf"),
     ),
 ]
 Expect = Annotated[
@@ -69,13 +69,15 @@ class Shown:
     afterword: Callable[[], str] = lambda: ""
     figure: Callable[[], Figure] | None = None
     errors: Callable[[], Columns] = dict
+    table_errors: Callable[[], Columns] | None = None
     warnings: list[str] = field(default_factory=list)
 
 
 def show(shown: Shown, *, beside: Mapping[Path, bytes] | None = None, **options: Any) -> None:
     errors = cache(shown.errors)
+    table_errors = errors if shown.table_errors is None else cache(shown.table_errors)
 
-    def of(columns: Columns) -> Table:
+    def of(columns: Columns, errors: Callable[[], Columns] = errors) -> Table:
         found = errors() if options.get("digits") else {}
         return Table(
             [
@@ -95,7 +97,7 @@ def show(shown: Shown, *, beside: Mapping[Path, bytes] | None = None, **options:
         Result(
             document=shown.document,
             tables={"": lambda: of(shown.columns)},
-            screen=None if table is None else lambda: of(table()),
+            screen=None if table is None else lambda: of(table(), table_errors),
             notes=shown.notes,
             afterword=shown.afterword,
             figure=shown.figure,
