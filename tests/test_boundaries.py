@@ -177,9 +177,6 @@ KNOWN: dict[str, set[str]] = {
     "rigidbody3d.shaft": {"circle"},
     "rigidbody3d.spin": {"circle"},
     "rigidbody3d.top": {"circle"},
-    "cli.body.columns": {"circle"},
-    "cli.body.picture": {"circle"},
-    "cli.body.solve": {"circle"},
     "cli.commands.__init__": {"no level"},
     "cli.commands.field": {"no level"},
     "cli.commands.mechanism": {"no level"},
@@ -198,8 +195,6 @@ KNOWN: dict[str, set[str]] = {
     "cli.plots.forces": {"no level"},
     "cli.plots.mechanism": {"no level"},
     "cli.plots.place": {"no level"},
-    "cli.spin.picture": {"circle"},
-    "cli.spin.solve": {"circle"},
 }
 
 
