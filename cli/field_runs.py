@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cli.errors import DataError, quote
 from cli.read.tables import Cells, Table, number_names, read
-from cli.read.units import SMALLEST, UNITS, parse_number, phasor, to_si
+from cli.read.units import SMALLEST, UNITS, phasor, to_si
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -413,9 +413,10 @@ class _Reader:
             try:
                 if len(parts) != names:
                     raise ValueError
-                values[i] = parse_number(parts[place])
+                values[i] = cells.number(parts[place])
             except ValueError:
                 many = f", {names} joined by ';' as in trial_plane" if names > 1 else ""
+                many += ", with a decimal comma as elsewhere in the file" if cells.decimal_comma else ""
                 raise self.fail(row, cells.header, text, expected + many) from None
         return values
 
