@@ -145,9 +145,6 @@ KNOWN: dict[str, set[str]] = {
     "virtualwork.study.cycle": {"imports virtualwork.motion, upwards", "reads _rates"},
     "virtualwork.study.equilibrium": {"imports virtualwork.mechanism, upwards", "reads _solve"},
     "virtualwork.track": {"circle", "no level"},
-    "cli.body.columns": {"circle"},
-    "cli.body.picture": {"circle"},
-    "cli.body.solve": {"circle"},
     "cli.commands.__init__": {"no level"},
     "cli.commands.field": {"no level"},
     "cli.commands.mechanism": {"no level"},
@@ -166,8 +163,6 @@ KNOWN: dict[str, set[str]] = {
     "cli.plots.forces": {"no level"},
     "cli.plots.mechanism": {"no level"},
     "cli.plots.place": {"no level"},
-    "cli.spin.picture": {"circle"},
-    "cli.spin.solve": {"circle"},
 }
 
 
