@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.errors import one_line
+from cli.read.files import refuse_inputs
 from cli.show.columns import Result, Table
 from cli.show.files import write
 from cli.show.text import csv_text, json_parts, paragraphs, table_text
@@ -113,6 +114,7 @@ def show(result: Result, options: ShowOptions) -> None:
     if options.digits:
         result, cut = _with_digits_that_hold(result, first)
         first = cache(lambda: cut)
+    refuse_inputs([path for path in (output, options.plot, *result.beside) if path is not None])
     for path, data in result.beside.items():
         write(path, data())
     if options.plot is not None and result.figure is not None:
