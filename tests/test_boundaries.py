@@ -360,7 +360,7 @@ def test_the_ground_stands_on_numpy_alone() -> None:
 
 
 def test_nothing_imports_the_tests_or_an_undeclared_package() -> None:
-    declared = {"numpy", "scipy", "pandas", "typer", "matplotlib", "trimesh", "llvmlite"}
+    declared = {"numpy", "scipy", "pandas", "typer", "matplotlib", "mpl_toolkits", "trimesh", "llvmlite"}
     for module, tree in trees().items():
         allowed = set(sys.stdlib_module_names) | set(INSTALLED) | declared
         if module.startswith("benchmarks.peers."):
