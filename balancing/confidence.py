@@ -9,8 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.balance import least_squares
 from balancing.dependence import adjoint
-from balancing.influence import influence_coefficients, least_squares
+from balancing.influence import influence_coefficients
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

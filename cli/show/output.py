@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cli.errors import DataError, one_line
+from cli.read.files import refuse_inputs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -107,6 +108,7 @@ def show(
     beside: Mapping[Path, bytes] | None = None,
 ) -> None:
     """Write the files asked for and those `beside` them, print the result, end with status 1 if an expectation is not met."""
+    written = [path for path in (output, plot) if path is not None]
     report = None
     if expect is not None:
         from cli.show.expect import compare
@@ -115,6 +117,7 @@ def show(
         checked = f"{table_text(report.columns)}\n{report.summary}"
     if digits:
         shown = _with_digits_that_hold(shown)
+    refuse_inputs([*written, *(beside or {})])
     for path, data in (beside or {}).items():
         write(path, data)
     if plot is not None and shown.figure is not None:
