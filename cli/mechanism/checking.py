@@ -108,7 +108,7 @@ def newton_tables(job: Job) -> tuple[list[AllAtOnce], dict[str, Any]]:
 
 def newton_text(document: dict[str, Any]) -> str:
     """The table of iterates, the Jacobian at the guess, and the difference to the closed form."""
-    from cli.show.output import table_text
+    from cli.show.text import table_text
 
     rows = document["iterates"]
     table = table_text({key: [row[key] for row in rows] for key in rows[0]})
