@@ -27,7 +27,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("optimality",),
         ("limited", "rounding"),
         ("influence", "qr"),
-        ("cones", "dependence", "phase", "rotor"),
+        ("cone_problem", "dependence", "phase", "rotor"),
     ),
     "virtualwork": (
         ("__init__",),
@@ -45,7 +45,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "rigidbody3d": (
         ("__init__",),
-        ("freebody", "gyroscope", "momentum", "shaft", "spin", "top"),
+        ("freebody", "gyroscope", "integration", "momentum", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("rounding_in_time",),
         ("inertia",),
