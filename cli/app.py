@@ -17,7 +17,7 @@ from cli.read.files import forget
 COMMANDS = {
     "balance": ("cli.balance.command", "Balance rotors from a table of known eccentric masses."),
     "field": ("cli.commands.field", "Balance rotors from measured vibration and trial masses."),
-    "place": ("cli.commands.place", "Put a correction where masses can go: holes, blades, weights in stock."),
+    "place": ("cli.place.command", "Put a correction where masses can go: holes, blades, weights in stock."),
     "mechanism": (
         "cli.commands.mechanism",
         "Solve a planar mechanism: motion, limits, torque, joint forces.",

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cli.place.read import Request, read_drill, read_planes, read_ratio, read_stock, read_vector
 from cli.read import options
-from cli.show.shown import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+from cli.show.columns import Result
+from cli.show.output import command
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
+@command
 def run(
     corrections: Annotated[
         list[str],
@@ -64,91 +70,39 @@ def run(
             "--remove", help="The vectors are material to REMOVE already: drill there, not opposite."
         ),
     ] = False,
-    json: Json = False,
-    output: Output = None,
-    plot: Plot = None,
-    expect: Expect = None,
-    rtol: Rtol = 1e-3,
-    text: Text = False,
-    digits: Digits = False,
-) -> None:
+) -> Result:
     """Put a correction where masses can go: holes, blades, weights in stock, another radius, drilling.
 
     Several corrections are combined first. Without --positions or --blades the result is the one mass.
     """
-    vectors = [_vector(spec) for spec in corrections]
-    at = options.quantity("--at-radius", at_radius, "length", positive=True)
-    to = options.quantity("--to-radius", to_radius, "length", positive=True)
-    if (at is None) != (to is None):
-        raise options.bad(
-            "--to-radius" if to is None else "--at-radius", "expected both --at-radius and --to-radius"
-        )
-    diameter = options.quantity("--drill", drill, "length", positive=True)
-    rho = options.quantity("--density", density, "density", positive=True)
-    if (diameter is None) != (rho is None):
-        raise options.bad("--density" if rho is None else "--drill", "expected both --drill and --density")
-    deepest = options.quantity("--max-depth", max_depth, "length", positive=True)
-    if deepest is not None and diameter is None:
-        raise options.bad("--max-depth", "is for --drill")
-    point = options.quantity("--drill-point", drill_point, "angle", positive=True)
-    assert point is not None
-    if point > 3.141592653589794:
-        raise options.bad("--drill-point", "expected at most 180deg")
-    weights = None
-    if stock is not None:
-        weights = [
-            options.quantity("--stock", part, "mass", positive=True) or 0.0 for part in stock.split(",")
-        ]
-        if diameter is not None:
-            raise options.bad("--stock", "weights from stock are not drilled: expected --stock or --drill")
-    moved = _planes(options.quantity("--at-z", at_z, "length"), to_z)
+    vectors = [read_vector(spec) for spec in corrections]
+    ratio = read_ratio(at_radius, to_radius)
+    drilled = read_drill(drill, density, drill_point, max_depth)
+    weights = read_stock(stock)
+    if weights is not None and drilled is not None:
+        raise options.bad("--stock", "weights from stock are not drilled: expected --stock or --drill")
+    moved = read_planes(at_z, to_z)
     chosen = options.places(positions, blades, first)
     if weights is not None and chosen is None:
         raise options.bad("--stock", "expected --positions or --blades for the weights to go to")
-    from cli import place_job as job
+    limit = options.quantity("--max-mass", max_mass, "mass", positive=True)
+    from cli.place import columns, words
+    from cli.place.solve import Placing
 
-    wanted = job.Wanted(
-        places=chosen,
-        limit=options.quantity("--max-mass", max_mass, "mass", positive=True),
-        stock=weights,
-        pieces=pieces,
-        max_pieces=max_pieces,
-        ratio=1.0 if at is None or to is None else at / to,
-        drill=None if diameter is None or rho is None else (diameter, rho, min(point, job.PI)),
-        deepest=deepest,
-        planes=moved,
-        remove=remove,
-        unit=vectors[0][0][1],
+    found = Placing(
+        Request(vectors, chosen, limit, weights, pieces, max_pieces, ratio, drilled, moved, remove)
     )
-    shown = job.place_corrections([(mass, angle) for mass, angle in vectors], wanted)
-    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)
 
+    def figure() -> Figure:
+        from cli.place.picture import draw
 
-def _planes(at: float | None, text: str | None) -> tuple[float, list[float]] | None:
-    """Read --at-z and --to-z."""
-    if (at is None) != (text is None):
-        raise options.bad("--to-z" if text is None else "--at-z", "expected both --at-z and --to-z")
-    if at is None or text is None:
-        return None
-    planes = [options.quantity("--to-z", part, "length") or 0.0 for part in text.split(":")]
-    if len(planes) < 2:
-        raise options.bad("--to-z", f"'{text}': expected two planes or more, such as 0mm:90mm")
-    if len(set(planes)) < len(planes):
-        raise options.bad("--to-z", f"'{text}': two planes lie at the same place")
-    return at, planes
+        return draw(found)
 
-
-def _vector(spec: str) -> tuple[tuple[float, str], tuple[float, str]]:
-    """Read `83.5g@308.87deg`."""
-    mass, mark, angle = spec.partition("@")
-    if not mark:
-        raise options.bad("MASS@ANGLE", f"'{spec}': expected a mass and an angle, such as 83.5g@308.87deg")
-    size, turn = (
-        options.with_unit("MASS@ANGLE", mass, "mass"),
-        options.with_unit("MASS@ANGLE", angle, "angle"),
+    return Result(
+        document=lambda: columns.document(found),
+        tables={"masses": lambda: columns.masses(found)},
+        notes=lambda: words.notes(found),
+        afterword=lambda: words.error(found),
+        figure=figure,
+        warnings=found.warnings,
     )
-    assert size is not None
-    assert turn is not None
-    if size[0] < 0:
-        raise options.bad("MASS@ANGLE", f"'{spec}': expected a mass that is not negative")
-    return size, turn
