@@ -16,7 +16,7 @@ from cli.read.files import forget
 # name -> (module with a function `run`, the line shown by `dalembert --help`)
 COMMANDS = {
     "balance": ("cli.balance.command", "Balance rotors from a table of known eccentric masses."),
-    "field": ("cli.commands.field", "Balance rotors from measured vibration and trial masses."),
+    "field": ("cli.field.command", "Balance rotors from measured vibration and trial masses."),
     "place": ("cli.place.command", "Put a correction where masses can go: holes, blades, weights in stock."),
     "mechanism": (
         "cli.commands.mechanism",
