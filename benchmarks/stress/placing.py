@@ -125,7 +125,7 @@ def _wrapped(rng: np.random.Generator) -> Pairs:
         path.write_text("\n".join(rows) + "\n")
         runs = read_runs(str(path), lagging=False, phaseless=False, stored_unit=None)
         columns = {c.header: c for c in corrections(FieldBalancing(runs, Request()), []).columns}
-    size, angle = (float(columns[name].values[0]) for name in ("mass_g", "angle_deg"))  # type: ignore[arg-type]
+    size, angle = (float(str(columns[name].values[0])) for name in ("mass_g", "angle_deg"))
     bound = {name: column.error() for name, column in columns.items() if column.error is not None}
     with mp.workdps(DIGITS):
         a, b = _vector(*v0), _vector(*v1)

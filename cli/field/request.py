@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cli.field.files import convert_amplitude
 from cli.field.runs import Runs
 from cli.read import options
 from cli.read.units import UNITS, amplitude_kind, parse_number, to_si
