@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -10,7 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cli.errors import one_line
 from cli.read import options
+from cli.read.files import refuse_inputs
 from cli.show.output import (
     Digits,
     Expect,
@@ -21,8 +24,10 @@ from cli.show.output import (
     Shown,
     Text,
     csv_text,
+    digits_that_hold,
     show,
     suffix_among,
+    write,
 )
 
 if TYPE_CHECKING:
@@ -159,6 +164,14 @@ def run(
     )
     try:
         job = _job(file, at, sweep, inputs, names, order, branch)
+        if (
+            as_csv
+            and not (json or text or tables[:1] not in ([], ["--forces"]) or plot or expect)
+            and job.is_long
+        ):
+            if not _stream(job, forces=forces, digits=digits, output=output, states=states):
+                raise typer.Exit(1)
+            return
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not json or expect is not None or output is not None
         document = json or (output is not None and output.suffix.lower() == ".json")
@@ -191,6 +204,48 @@ def run(
         raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
     if not any(job.assembled(motion).any() for motion in job.motions):
         raise typer.Exit(1)
+
+
+def _stream(job: Job, *, forces: bool, digits: bool, output: Path | None, states: Path | None) -> bool:
+    """Write the table of a long sweep a block of poses at a time; return whether some pose is assembled."""
+    from cli.mechanism import digits as bounds
+    from cli.mechanism import forces as of_forces
+    from cli.mechanism import poses
+    from cli.mechanism import states as of_states
+    from cli.mechanism.stream import Stream
+
+    form, errors = of_states.table, bounds.of_states
+    if forces:
+        form, errors = of_forces.table, bounds.of_forces
+    elif job.only is not None:
+        form, errors = poses.wide_table, bounds.of_poses
+    stream = Stream(job, forces)
+    unknown = 0
+
+    def parts(stream: Stream, form: Any, cut: bool) -> Iterator[str]:
+        nonlocal unknown
+        for i, (block, columns) in enumerate(stream.tables(form)):
+            off = errors(block) if cut else {}
+            if cut:
+                unknown += sum(sum(error == float("inf") for error in column) for column in off.values())
+            yield csv_text(digits_that_hold(columns, off) if cut else columns, header=i == 0)
+
+    refuse_inputs([path for path in (output, states) if path is not None])
+    if states is not None:
+        every = Stream(replace(job, only=None))
+        write(states, (part.encode() for part in parts(every, of_states.table, False)))
+    if output is not None:
+        write(output, (part.encode() for part in parts(stream, form, digits)))
+    else:
+        for part in parts(stream, form, digits):
+            sys.stdout.write(part)
+        sys.stdout.flush()
+    said = stream.warnings()
+    if unknown:
+        said.append(f"--digits: of {unknown} numbers no digit is known to hold; their cells are empty")
+    for warning in said:
+        print(f"warning: {one_line(warning)}", file=sys.stderr)
+    return stream.any_assembled
 
 
 def _as_csv(*, json: bool, text: bool, output: Path | None, expect: Path | None) -> bool:

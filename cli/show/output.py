@@ -159,13 +159,14 @@ def write(path: Path, data: bytes | Iterable[bytes]) -> None:
         raise DataError(f"{path}: cannot write: {error.strerror or error}") from None
 
 
-def csv_text(columns: Columns) -> str:
-    """Return CSV with every digit of every number."""
+def csv_text(columns: Columns, header: bool = True) -> str:
+    """Return CSV with every digit of every number; without its header for a further part of a table."""
     import csv
 
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(columns)
+    if header:
+        writer.writerow(columns)
     writer.writerows(zip(*map(_plain_column, columns.values()), strict=True))
     return stream.getvalue()
 
