@@ -133,7 +133,9 @@ class Assembly:
             self.track.close_newton(group, st)
             return
         case = self.cases[group.name]
-        if not tracked or not self.track.active:
+        if tracked and group.name in self.track.folded:
+            case.solve(st, self.signs[group.name], self.mechanism.size, folded=True)
+        elif not tracked or not self.track.active:
             case.solve(st, self.signs[group.name], self.mechanism.size)
         else:
             case.solve(st, self.track.sign(group, st.inputs[0]), self.mechanism.size)

@@ -44,6 +44,7 @@ def check_document(job: Job) -> dict[str, Any]:
         f"input_limits_{unit}": shown(check.input_limits),
         f"dead_points_{unit}": shown(check.dead_points),
         f"change_points_{unit}": shown(check.change_points),
+        **({"singular": list(check.singular)} if check.singular else {}),
     }
 
 
@@ -71,6 +72,8 @@ def check_text(document: dict[str, Any]) -> str:
             else ", ".join("open" if v is None else f"{v:.12g}" for v in values) + f" {unit}"
         )
         lines.append(f"{key.replace('_', ' ')}: {text}")
+    if "singular" in d:
+        lines.append(f"singular in every pose: {', '.join(d['singular'])}")
     return "\n".join(lines)
 
 
@@ -194,7 +197,7 @@ def limit_warnings(job: Job, counted: list[int] | None = None) -> list[str]:
                     text += f": the input {name} has the limit{'s' * (len(shown) > 1)} {values} {unit}"
             lines.append(text)
         lines += _branch_lines(job, assembly)
-        lines += assembly.warnings
+        lines += track.warnings()
     return list(dict.fromkeys(lines))
 
 

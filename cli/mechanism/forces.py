@@ -146,7 +146,8 @@ def troubles(job: Job) -> list[tuple[str, list[float]]]:
                 "the joint forces have no finite value: loads in line with the links at a dead or change point",
             ),
         ):
-            note(there & ~np.isfinite(values).all(axis=1) & ~d.locked, what)
+            if not motion.assembly.track.folded:  # singular in every pose: that is said once
+                note(there & ~np.isfinite(values).all(axis=1) & ~d.locked, what)
         if d.scene.rubs:
             note(there & d.locked, "friction locks the mechanism: no reaction balances its own friction")
     return found

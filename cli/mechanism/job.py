@@ -156,7 +156,7 @@ class Job:
         if poses * each > room:
             raise DataError(
                 f"{self.file}: {poses} poses of {len(self.links)} links and {len(self.points)} points would take "
-                f"{poses * each / 1e9:.2g} GB: expected at most {room / each:.0f} poses, or fewer names by --only, or CSV, which is not limited"
+                f"{float(f'{poses * each / 1e9:.2g}'):g} GB: expected at most {room / each:.0f} poses, or fewer names by --only, or CSV, which is not limited"
             )
 
     def assembled(self, motion: Motion) -> NDArray[np.bool_]:
