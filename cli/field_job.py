@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cli.field_solve import UNKNOWN_ANGLE, Solved, Solver, Wanted
 from cli.read.units import degrees, from_si, to_si
-from cli.show.output import Shown
+from cli.show.shown import Shown
 
 Real = NDArray[np.float64]
 

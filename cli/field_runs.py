@@ -9,9 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.balance.solve import number_names
 from cli.errors import DataError, quote
-from cli.read.tables import Cells, Table, read
+from cli.read.tables import Cells, Table, number_names, read
 from cli.read.units import SMALLEST, UNITS, phasor, to_si
 
 Real = NDArray[np.float64]

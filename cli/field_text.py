@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.read.rounding import angle_text
 from cli.read.units import degrees, from_si
-from cli.show.output import table_text
+from cli.show.text import angle_text, table_text
 
 if TYPE_CHECKING:
     from cli.field_job import Field, Solved

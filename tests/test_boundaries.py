@@ -63,7 +63,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "dalembert": (("__init__",), ("arithmetic",)),
     "benchmarks": (
-        ("__main__",),
+        ("__main__", "same_outputs", "trace_passes"),
         ("fuzz", "page", "peers"),
         ("speed", "stress"),
         ("scenes",),
@@ -141,9 +141,6 @@ KNOWN: dict[str, set[str]] = {
     "virtualwork.study.cycle": {"imports virtualwork.motion, upwards", "reads _rates"},
     "virtualwork.study.equilibrium": {"imports virtualwork.mechanism, upwards", "reads _solve"},
     "virtualwork.track": {"circle", "no level"},
-    "cli.body.columns": {"circle"},
-    "cli.body.picture": {"circle"},
-    "cli.body.solve": {"circle"},
     "cli.commands.__init__": {"no level"},
     "cli.commands.field": {"no level"},
     "cli.commands.mechanism": {"no level"},
@@ -162,8 +159,6 @@ KNOWN: dict[str, set[str]] = {
     "cli.plots.forces": {"no level"},
     "cli.plots.mechanism": {"no level"},
     "cli.plots.place": {"no level"},
-    "cli.spin.picture": {"circle"},
-    "cli.spin.solve": {"circle"},
 }
 
 
@@ -361,7 +356,7 @@ def test_the_ground_stands_on_numpy_alone() -> None:
 
 
 def test_nothing_imports_the_tests_or_an_undeclared_package() -> None:
-    declared = {"numpy", "scipy", "pandas", "typer", "matplotlib", "trimesh", "llvmlite"}
+    declared = {"numpy", "scipy", "pandas", "typer", "matplotlib", "mpl_toolkits", "trimesh", "llvmlite"}
     for module, tree in trees().items():
         allowed = set(sys.stdlib_module_names) | set(INSTALLED) | declared
         if module.startswith("benchmarks.peers."):

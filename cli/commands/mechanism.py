@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,21 +14,12 @@ import typer
 from cli.errors import one_line
 from cli.read import options
 from cli.read.files import refuse_inputs
-from cli.show.output import (
-    Digits,
-    Expect,
-    Json,
-    Output,
-    Plot,
-    Rtol,
-    Shown,
-    Text,
-    csv_text,
-    digits_that_hold,
-    show,
-    suffix_among,
-    write,
-)
+from cli.show.columns import Column, Table
+from cli.show.digits import digits_that_hold
+from cli.show.files import write
+from cli.show.output import suffix_among
+from cli.show.shown import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
+from cli.show.text import csv_text
 
 if TYPE_CHECKING:
     from cli.mechanism.asked import Asked
@@ -225,10 +216,10 @@ def _stream(job: Job, *, forces: bool, digits: bool, output: Path | None, states
     def parts(stream: Stream, form: Any, cut: bool) -> Iterator[str]:
         nonlocal unknown
         for i, (block, columns) in enumerate(stream.tables(form)):
-            off = errors(block) if cut else {}
             if cut:
-                unknown += sum(sum(error == float("inf") for error in column) for column in off.values())
-            yield csv_text(digits_that_hold(columns, off) if cut else columns, header=i == 0)
+                columns, without = _cut(columns, errors(block))
+                unknown += without
+            yield csv_text(columns, header=i == 0)
 
     refuse_inputs([path for path in (output, states) if path is not None])
     if states is not None:
@@ -246,6 +237,17 @@ def _stream(job: Job, *, forces: bool, digits: bool, output: Path | None, states
     for warning in said:
         print(f"warning: {one_line(warning)}", file=sys.stderr)
     return stream.any_assembled
+
+
+def _cut(columns: dict[str, Any], errors: Mapping[str, Any]) -> tuple[dict[str, Any], int]:
+    """Cut columns to the digits that hold; return also of how many numbers no digit is known."""
+    listed = []
+    for name, values in columns.items():
+        bounds = errors.get(name)
+        unit = "deg" * name.endswith("_deg")
+        listed.append(Column(name, unit, values, None if bounds is None else partial(list, bounds)))
+    table, unknown = digits_that_hold(Table(listed))
+    return {column.name: column.values for column in table.columns}, unknown
 
 
 def _as_csv(*, json: bool, text: bool, output: Path | None, expect: Path | None) -> bool:

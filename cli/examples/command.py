@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from cli.errors import DataError, nearest
-from cli.show.output import write
+from cli.show.files import write
 
 EXAMPLES = files("cli") / "examples"
 ABOUT = "example.toml"

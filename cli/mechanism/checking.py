@@ -108,7 +108,7 @@ def newton_tables(job: Job) -> tuple[list[AllAtOnce], dict[str, Any]]:
 
 def newton_text(document: dict[str, Any]) -> str:
     """The table of iterates, the Jacobian at the guess, and the difference to the closed form."""
-    from cli.show.output import table_text
+    from cli.show.text import table_text
 
     rows = document["iterates"]
     table = table_text({key: [row[key] for row in rows] for key in rows[0]})
@@ -175,15 +175,16 @@ def _on_branch(job: Job, track: Track, found: list[float], digits: int) -> list[
     return sorted({round(math.degrees(v) % full, digits) % full for v in found})
 
 
-def limit_warnings(job: Job, counted: list[int] | None = None) -> list[str]:
+def limit_warnings(job: Job, counted: list[tuple[int, int]] | None = None) -> list[str]:
     """One line for the poses that cannot be assembled, with the limit of the input that is near them; and branches.
 
-    `counted`: how many these are of each assembly, where blocks of poses have told it.
+    `counted`: how many these are of each assembly, and the first, where blocks of poses have told it.
     """
     lines = []
     if counted is None:
-        counted = [int((~job.assembled(motion)).sum()) for motion in job.motions]
-    for assembly, missing in zip(job.assemblies, counted, strict=True):
+        gaps = [~job.assembled(motion) for motion in job.motions]
+        counted = [(int(gap.sum()), int(np.argmax(gap))) for gap in gaps]
+    for assembly, (missing, first) in zip(job.assemblies, counted, strict=True):
         track = assembly.track
         name = job.mechanism.inputs[0].name
         if missing:
@@ -195,10 +196,31 @@ def limit_warnings(job: Job, counted: list[int] | None = None) -> list[str]:
                 if shown:
                     values = ", ".join(f"{v:.13g}" for v in shown)
                     text += f": the input {name} has the limit{'s' * (len(shown) > 1)} {values} {unit}"
-            lines.append(text)
+            lines.append(text + _shortfall(job, assembly, first))
         lines += _branch_lines(job, assembly)
         lines += track.warnings()
     return list(dict.fromkeys(lines))
+
+
+def _shortfall(job: Job, assembly: Assembly, i: int) -> str:
+    """By how much a pose does not close, and the nearest input where it would."""
+    from virtualwork.branch.shortfall import shortfall
+
+    pose = job.inputs.part(i, i + 1)
+    found = shortfall(assembly, tuple(pose.values[0].tolist()))
+    if found is None:
+        return ""
+    factor, unit = (1e3, "mm") if job.mechanism.size < 2 else (1.0, "m")
+    shown = ", ".join(
+        f"{v:.10g} {'m' if e.is_slide else 'deg'}"
+        for e, v in zip(job.mechanism.inputs, pose.shown[0], strict=True)
+    )
+    text = f"; at {shown}: {found.text(lambda v: f'{v * factor:.6g} {unit}')}"
+    if found.nearest is not None:
+        slide = job.mechanism.inputs[0].is_slide
+        there = found.nearest if slide else math.degrees(found.nearest)
+        text += f"; it would close at {there:.10g} {'m' if slide else 'deg'}"
+    return text
 
 
 def _branch_lines(job: Job, assembly: Assembly) -> list[str]:

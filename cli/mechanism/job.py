@@ -12,7 +12,7 @@ import numpy as np
 
 from cli.errors import DataError, memory, nearest
 from cli.mechanism.inputs import Inputs, Sweep
-from cli.read.files import read_bytes
+from cli.read.files import load as load_bytes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,8 +31,8 @@ def load(path: str) -> Mechanism:
     file = "standard input" if path == "-" else path
     try:
         if path == "-":
-            return loads(read_bytes(path).decode("utf-8-sig"), file, load=read_bytes)
-        return read(Path(path), read_bytes)
+            return loads(load_bytes(path).decode("utf-8-sig"), file, load=load_bytes)
+        return read(Path(path), load_bytes)
     except UnicodeDecodeError:
         raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
     except (OSError, ValueError) as error:

@@ -23,15 +23,15 @@ class Stream:
 
     Attributes
     ----------
-    missing : list of int
-        Poses of each assembly that cannot be assembled.
+    missing : list of (int, int)
+        Of each assembly how many poses cannot be assembled, and the first.
     troubles : dict
         What the forces cannot say -> the first inputs where, and at how many poses.
     """
 
     job: Job
     forces: bool = False
-    missing: list[int] = field(default_factory=list)
+    missing: list[tuple[int, int]] = field(default_factory=list)
     troubles: dict[str, tuple[list[float], int]] = field(default_factory=dict)
     said: dict[str, None] = field(default_factory=dict)
 
@@ -48,7 +48,7 @@ class Stream:
         for assembly in job.assemblies:
             if len(job.mechanism.inputs) == 1:
                 assembly.track.cover(*q.span)
-            self.missing.append(0)
+            self.missing.append((0, 0))
             for i in starts:
                 block = replace(job, inputs=q.part(i, i + BLOCK), warnings=[], block_of=job)
                 block.assemblies = (assembly,)
@@ -57,7 +57,9 @@ class Stream:
                 motion.input_error = float(np.finfo(float).eps) * np.abs(motion.inputs)
                 block.motions = (motion,)
                 yield block
-                self.missing[-1] += int((~block.assembled(motion)).sum())
+                gap = ~block.assembled(motion)
+                count, at = self.missing[-1]
+                self.missing[-1] = count + int(gap.sum()), at if count else i + int(np.argmax(gap))
                 if self.forces:
                     self._note(block)
 
@@ -100,4 +102,4 @@ class Stream:
     @property
     def any_assembled(self) -> bool:
         """Whether some pose could be assembled."""
-        return any(count < self.job.inputs.n for count in self.missing)
+        return any(count < self.job.inputs.n for count, _ in self.missing)

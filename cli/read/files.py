@@ -10,6 +10,8 @@ from pathlib import Path
 
 import typer
 
+from cli.errors import DataError
+
 # device and inode: a link to a file is the file
 _read: set[tuple[int, int]] = set()
 
@@ -27,9 +29,19 @@ def note(path: str | Path) -> Path:
     return Path(path)
 
 
-def read_bytes(path: str | Path) -> bytes:
+def load(path: str | Path) -> bytes:
     """Read a file, or standard input for `-`; OSError or ValueError where it cannot be."""
     return sys.stdin.buffer.read() if path == "-" else note(path).read_bytes()
+
+
+def read_bytes(path: str) -> tuple[str, bytes]:
+    """Read a file: what messages call it, and what it holds."""
+    file = "standard input" if path == "-" else path
+    try:
+        return file, load(path)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise DataError(f"{file}: {reason}") from None
 
 
 def refuse_inputs(outputs: Iterable[Path]) -> None:

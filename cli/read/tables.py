@@ -223,12 +223,7 @@ class _Source:
 
 
 def _open(path: str) -> _Source:
-    file = "standard input" if path == "-" else path
-    try:
-        data = read_bytes(path)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise DataError(f"{file}: {reason}") from None
+    file, data = read_bytes(path)
     warnings: list[str] = []
     text = _decode(file, data, warnings)
     source = _Source(file, text, _delimiter(text), [], warnings, text.count("\n") >= LARGE)
@@ -442,3 +437,15 @@ def _read_large(source: _Source, table: Table, plan: _Plan, marker: str) -> bool
     table.rows = rows
     table.marks.update(marks)
     return True
+
+
+def number_names(names: list[str]) -> tuple[list[str], NDArray[np.intp]]:
+    """Number names in the order in which they first stand."""
+    if len(names) >= LARGE:
+        import pandas as pd
+
+        codes, unique = pd.factorize(np.array(names, dtype=object))
+        return unique.tolist(), codes.astype(np.intp)
+    first: dict[str, int] = {}
+    codes = np.array([first.setdefault(name, len(first)) for name in names], dtype=np.intp)
+    return list(first), codes
