@@ -27,7 +27,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("optimality",),
         ("limited", "rounding"),
         ("influence", "qr"),
-        ("cones", "dependence", "rotor"),
+        ("cones", "dependence", "phase", "rotor"),
     ),
     "virtualwork": (
         ("__init__",),
