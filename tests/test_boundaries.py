@@ -142,23 +142,11 @@ KNOWN: dict[str, set[str]] = {
     "virtualwork.study.equilibrium": {"imports virtualwork.mechanism, upwards", "reads _solve"},
     "virtualwork.track": {"circle", "no level"},
     "cli.commands.__init__": {"no level"},
-    "cli.commands.field": {"no level"},
     "cli.commands.mechanism": {"no level"},
-    "cli.commands.place": {"no level"},
-    "cli.field_digits": {"circle", "no level"},
-    "cli.field_files": {"no level"},
-    "cli.field_job": {"circle", "no level"},
-    "cli.field_report": {"no level"},
-    "cli.field_runs": {"no level"},
-    "cli.field_solve": {"no level"},
-    "cli.field_text": {"circle", "no level", "reads _amount", "reads _unit", "reads _verdict"},
     "cli.mechanism.poses": {"reads _marched"},
-    "cli.place_job": {"no level"},
     "cli.plots.__init__": {"no level"},
-    "cli.plots.field": {"circle", "no level", "reads _amount", "reads _unit"},
     "cli.plots.forces": {"no level"},
     "cli.plots.mechanism": {"no level"},
-    "cli.plots.place": {"no level"},
 }
 
 
