@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.field.rounding import correction_errors, uncertainty_share
 from cli.field.runs import Real
 from cli.field.solve import FieldBalancing
 from cli.read.rounding import angle_error, size_error
@@ -26,6 +25,8 @@ def corrections(found: FieldBalancing, warnings: list[str]) -> Table:
 
     @cache
     def bounds() -> list[Real]:
+        from cli.field.rounding import correction_errors
+
         return [correction_errors(found, solved, warnings) for solved in found.solved]
 
     def size() -> Real:
@@ -48,6 +49,8 @@ def corrections(found: FieldBalancing, warnings: list[str]) -> Table:
         along, across = (found.rows([pair[k] for pair in pairs]) for k in (0, 1))
 
         def share(of: Real) -> Real:
+            from cli.field.rounding import uncertainty_share
+
             pairs = zip(found.solved, bounds(), strict=True)
             return found.rows([uncertainty_share(found, *pair) for pair in pairs]) * np.nan_to_num(of)
 
