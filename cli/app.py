@@ -19,7 +19,7 @@ COMMANDS = {
     "field": ("cli.field.command", "Balance rotors from measured vibration and trial masses."),
     "place": ("cli.place.command", "Put a correction where masses can go: holes, blades, weights in stock."),
     "mechanism": (
-        "cli.commands.mechanism",
+        "cli.mechanism.command",
         "Solve a planar mechanism: motion, limits, torque, joint forces.",
     ),
     "work": ("cli.work.command", "Find the load that balances a table of link states, by virtual work."),
