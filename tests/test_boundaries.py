@@ -141,12 +141,7 @@ KNOWN: dict[str, set[str]] = {
     "virtualwork.study.cycle": {"imports virtualwork.motion, upwards", "reads _rates"},
     "virtualwork.study.equilibrium": {"imports virtualwork.mechanism, upwards", "reads _solve"},
     "virtualwork.track": {"circle", "no level"},
-    "cli.commands.__init__": {"no level"},
-    "cli.mechanism.command": {"no level"},
     "cli.mechanism.poses": {"reads _marched"},
-    "cli.plots.__init__": {"no level"},
-    "cli.mechanism.force_picture": {"no level"},
-    "cli.mechanism.picture": {"no level"},
 }
 
 
