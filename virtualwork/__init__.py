@@ -1,6 +1,8 @@
 """Planar mechanisms: kinematics, and equilibrium at rest and in motion by virtual work."""
 
-from virtualwork.combination import (
+from virtualwork.describe.errors import AssemblyError, DescriptionError, MechanismError, MobilityError
+from virtualwork.mechanism import Gear, Guess, Guide, Input, Link, Mechanism
+from virtualwork.textbook.combinations import (
     block_on_bar,
     crank_rod_piston,
     on_incline,
@@ -9,8 +11,6 @@ from virtualwork.combination import (
     second_point,
     sense,
 )
-from virtualwork.errors import AssemblyError, DescriptionError, MechanismError, MobilityError
-from virtualwork.mechanism import Gear, Guess, Guide, Input, Link, Mechanism
 
 __all__ = [
     "AssemblyError",

@@ -12,18 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, plan
-from virtualwork.dyads import Number, cross, dot
-from virtualwork.errors import AssemblyError, MobilityError
-from virtualwork.guess import known_by_guess
-from virtualwork.newton import newton, write_unknowns
-from virtualwork.starts import every_solution, guessed_unknowns
+from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, known_by_guess, plan
+from virtualwork.describe.errors import AssemblyError, MobilityError
+from virtualwork.formulas.closed_forms import Number, cross, dot
+from virtualwork.newton import every_solution, guessed_unknowns, newton, write_unknowns
 from virtualwork.state import Case, State, place
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from virtualwork.loads import Acting
+    from virtualwork.formulas.loads import Acting
     from virtualwork.mechanism import Mechanism
     from virtualwork.track import Track
 

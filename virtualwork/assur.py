@@ -14,10 +14,11 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
-from virtualwork.graph import Variable, decompose
-from virtualwork.guess import known_by_guess
+import numpy as np
+
 from virtualwork.mechanism import GROUND
-from virtualwork.steps import (
+from virtualwork.plan.graph import Variable, decompose
+from virtualwork.plan.steps import (
     Angle,
     Closure,
     Group,
@@ -72,6 +73,39 @@ def plan(m: Mechanism, *, merged: bool = False, phases: Mapping[int, float] | No
     return _Planner(m, merged, phases or {}).run()
 
 
+def known_by_guess(m: Mechanism) -> tuple[dict[str, float], dict[str, complex]]:
+    """Rough link angles and point positions from the guess, the ground and the inputs, as far as they reach."""
+    angles = dict(m.guess.angles)
+    points = dict(m.ground) | dict(m.guess.points)
+    for j, e in enumerate(m.inputs):
+        if e.link is not None and e.on == GROUND:
+            angles[e.link] = m.at[j]
+    for g in m.guides:
+        if g.turned is not None and g.on == GROUND:
+            angles.setdefault(g.link, g.angle + g.turned)
+        if g.turned is not None and g.link == GROUND:
+            angles.setdefault(g.on, -(g.angle + g.turned))
+    before = -1
+    while len(angles) + len(points) > before:
+        before = len(angles) + len(points)
+        for name, link in m.links.items():
+            here = [p for p in link.points if p in points]
+            if name not in angles and len(here) >= 2:
+                ends = max(
+                    ((a, b) for a in here for b in here),
+                    key=lambda ab: abs(link.points[ab[1]] - link.points[ab[0]]),
+                )
+                local = link.points[ends[1]] - link.points[ends[0]]
+                seen = points[ends[1]] - points[ends[0]]
+                if local and seen:
+                    angles[name] = float(np.angle(seen / local))
+            if name in angles and here:
+                turn = np.exp(1j * angles[name])
+                for p, z in link.points.items():
+                    points.setdefault(p, complex(points[here[0]] + (z - link.points[here[0]]) * turn))
+    return angles, points
+
+
 class _Planner:
     """Walks the blocks in order and writes the steps."""
 
@@ -124,7 +158,7 @@ class _Planner:
         """The point of guide i's link that runs in it: `link.point`."""
         g = self.m.guides[i]
         self.guide_nodes[i] = g.point
-        return self._place(g.point, g.link, self.m.links[g.link].points[g.point])
+        return self._place(g.point, g.link, self.m.bodies[g.link][g.point])
 
     def _through(self, i: int) -> complex:
         g = self.m.guides[i]
@@ -306,10 +340,10 @@ class _Planner:
             base, terms = chain(g.on, self._through(i))
             found = (
                 base,
-                combined((*terms, Term(d, g.on, i), Term(-self.m.links[body].points[g.point], body))),
+                combined((*terms, Term(d, g.on, i), Term(-self.m.bodies[body][g.point], body))),
             )
         elif g.on == body and g.link in placed:
-            base, terms = chain(g.link, self.m.links[g.link].points[g.point])
+            base, terms = chain(g.link, self.m.bodies[g.link][g.point])
             found = base, combined((*terms, Term(-self._through(i), body), Term(-d, body, i)))
         else:
             return None
@@ -390,10 +424,13 @@ class _Planner:
             if g.link in anchors and g.on in anchors and (f"guide {i}", "") not in self.used:
                 base, terms = chain(g.on, self._through(i))
                 line = base, combined((*terms, Term(self.directions[i], g.on, i)))
+                pin = chain(g.link, self.m.bodies[g.link][g.point])
                 self.used.add((f"guide {i}", ""))
-                self._close(
-                    closures, chain(g.link, self.m.links[g.link].points[g.point]), line, g.point, g.link, i
-                )
+                # the loop's force is that on a body which moves: of a fixed pin in a slot, on the slot's
+                if g.link == GROUND:
+                    self._close(closures, line, pin, g.point, g.on, i)
+                else:
+                    self._close(closures, pin, line, g.point, g.link, i)
         return closures, {b: a for b, a in anchors.items() if b not in self.anchors}
 
     def _close(

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.errors import MechanismError
+from virtualwork.describe.errors import MechanismError
 from virtualwork.mechanism import GROUND
-from virtualwork.steps import Group
+from virtualwork.plan.steps import Group
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork.mechanism import Mechanism
-    from virtualwork.steps import Plan
+    from virtualwork.plan.steps import Plan
 
     Reals = NDArray[np.float64]
 
@@ -57,8 +57,7 @@ class Order:
         for group in self.plan.groups:
             for c, closure in enumerate(group.closures):
                 key = f"pin:{closure.joint}" if closure.guide is None else f"guide:{closure.guide}"
-                body = closure.body if closure.guide is None else self.mechanism.guides[closure.guide].link
-                found[key, body] = group, c
+                found[key, closure.body] = group, c
         return found
 
     @cached_property

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
-from virtualwork.errors import DescriptionError
+from virtualwork.describe.errors import DescriptionError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -77,7 +77,8 @@ class Guide:
 
     The line runs through `through` (a named point of `on`, or coordinates in its axes), at `angle` to its x-axis.
     `turned` None is a slot, the link may turn; a number is a prism: the link's x-axis stands at `turned` to the
-    line. The slide is the signed distance of the point from `through` along the line.
+    line. The slide is the signed distance of the point from `through` along the line. `link` may be the ground: a fixed
+    pin in a moving slot, or a fixed block on which a rail slides.
     """
 
     point: str
@@ -318,7 +319,7 @@ class Mechanism:
         DescriptionError
             Names the file, the table and the key, what was found and what was expected.
         """
-        from virtualwork.description import read
+        from virtualwork.describe.reader import read
 
         return read(Path(path))
 
@@ -438,9 +439,10 @@ def _validate(m: Mechanism) -> None:
             raise DescriptionError(f"[links.{name}]: mass and inertia must not be negative")
     for i, guide in enumerate(m.guides):
         where = f"[[{'sliders' if guide.is_slider else 'slots'}]] {i + 1} ({guide.point})"
-        known(guide.link, m.links, where + " link", "link")
+        known(guide.link, bodies, where + " link", "link")
         known(guide.on, bodies, where + " on", "link")
-        known(guide.point, m.links[guide.link].points, where + " point", f"point of link {guide.link}")
+        owner = GROUND if guide.link == GROUND else f"link {guide.link}"
+        known(guide.point, bodies[guide.link], where + " point", f"point of {owner}")
         if isinstance(guide.through, str):
             known(guide.through, bodies[guide.on], where + " through", f"point of {guide.on}")
         if guide.link == guide.on:

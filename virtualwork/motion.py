@@ -30,8 +30,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.assur import Group, Step, Term
-from virtualwork.dyads import Number
-from virtualwork.errors import DescriptionError
+from virtualwork.describe.errors import DescriptionError
+from virtualwork.formulas.closed_forms import Number
 from virtualwork.mechanism import GROUND, Point, as_point
 from virtualwork.newton import inverse_norm, stack
 from virtualwork.state import BLOCK, SWEEP, Jets, State, columns
@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from virtualwork.assembly import Assembly
-    from virtualwork.dynamics import Dynamics
-    from virtualwork.rounding import Rounding
+    from virtualwork.bounds.motion import Rounding
+    from virtualwork.formulas.dynamics import Dynamics
 
     Reals = NDArray[np.float64]
     Complexes = NDArray[np.complex128]
@@ -87,7 +87,7 @@ class PointMotion:
         """Return a bound (n,) of the rounding error of the position (order 0), velocity (1), acceleration (2) or jerk.
 
         It is the length of the error, in the unit of the quantity; the dimensions and the input are taken as exact.
-        Infinite where no digit is known, within rounding of a limit of the input. See `virtualwork.rounding`.
+        Infinite where no digit is known, within rounding of a limit of the input. See `virtualwork.bounds.motion`.
 
         Examples
         --------
@@ -143,7 +143,7 @@ class LinkMotion:
     def error_estimate(self, order: int = 0) -> Reals:
         """Return a bound (n,) of the rounding error of the angle (order 0, rad), ω (1), α (2) or the angular jerk (3).
 
-        The dimensions and the input are taken as exact. See `virtualwork.rounding`.
+        The dimensions and the input are taken as exact. See `virtualwork.bounds.motion`.
         """
         return self._motion.rounding.angle(self._body, order)
 
@@ -181,7 +181,7 @@ class SlideMotion:
     def error_estimate(self, order: int = 0) -> Reals:
         """Return a bound (n,) of the rounding error of the slide (order 0, m), its speed (1), acceleration (2) or jerk (3).
 
-        The dimensions and the input are taken as exact. See `virtualwork.rounding`.
+        The dimensions and the input are taken as exact. See `virtualwork.bounds.motion`.
         """
         return self._motion.rounding.slide(self._guide, order)
 
@@ -305,7 +305,7 @@ class Motion:
     @cached_property
     def dynamics(self) -> Dynamics:
         """All forces of this motion, each formed when first asked for."""
-        from virtualwork.dynamics import Dynamics
+        from virtualwork.formulas.dynamics import Dynamics
 
         self._states()
         # the forces hold this motion's solution and not the motion, which holds them: in a ring of references the
@@ -357,7 +357,7 @@ class Motion:
     @cached_property
     def rounding(self) -> Rounding:
         """Bounds of the rounding errors of this motion, each formed when first asked for."""
-        from virtualwork.rounding import Rounding
+        from virtualwork.bounds.motion import Rounding
 
         return Rounding(self)
 

@@ -14,7 +14,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.assur import Angle, Closure, Group, Place, Plan, Slide, Step, Term, Turn
-from virtualwork.dyads import MANY, ONE, Number, angle_and_slide, cross, turning_slide, two_angles, two_slides
+from virtualwork.formulas.closed_forms import (
+    MANY,
+    ONE,
+    Number,
+    angle_and_slide,
+    cross,
+    turning_slide,
+    two_angles,
+    two_slides,
+)
 from virtualwork.mechanism import GROUND
 
 if TYPE_CHECKING:

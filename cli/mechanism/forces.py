@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.mechanism.job import Job
+    from virtualwork.formulas.reactions import Joint
     from virtualwork.motion import Motion
-    from virtualwork.reactions import Joint
 
 Column = list[Any]
 GROUND = "ground"
@@ -172,7 +172,7 @@ def _listed(job: Job, bad: NDArray[np.bool_], what: str) -> list[str]:
 
 def cycle(job: Job, coefficient: float | None) -> dict[str, Any]:
     """Mean, peak and RMS effort over the sweep, work, energy error, flywheel."""
-    from virtualwork.cycle import Cycle
+    from virtualwork.study.cycle import Cycle
 
     motion = job.motions[0]
     m = job.mechanism
@@ -233,7 +233,7 @@ def _split_unit(key: str) -> tuple[str, str]:
 
 def equilibria(job: Job, swept: bool) -> tuple[list[dict[str, Any]], list[str]]:
     """The positions where the loads balance without effort, and what to say of them."""
-    from virtualwork.equilibrium import equilibria as search
+    from virtualwork.study.equilibrium import equilibria as search
 
     m = job.mechanism
     spans = None
@@ -286,7 +286,7 @@ def equilibria_text(rows: list[dict[str, Any]]) -> str:
 
 def counterweights(job: Job, links: list[str]) -> dict[str, Any]:
     """Counterweights on links that leave the least RMS shaking force over the sweep."""
-    from virtualwork.counterweights import least_squares
+    from virtualwork.study.counterweights import least_squares
 
     weights, before, after = least_squares(job.motions[0], links)
 
@@ -324,7 +324,7 @@ def counterweights_text(part: dict[str, Any]) -> str:
 
 def explain_text(job: Job) -> str:
     """Which loads did work, which do none, which are absent, which reactions were formed."""
-    from virtualwork.work import ledger
+    from virtualwork.formulas.effort import ledger
 
     motion = job.motions[0]
     lines = ["forces:"]

@@ -132,7 +132,7 @@ def _virtual(motion: Motion, name: str, j: int) -> Part:
 
 def _marks(motion: Motion, field: int | None) -> list[Mark]:
     """The marks of every input's effort, with the velocities of one field (None: the motion's own)."""
-    from virtualwork.work import carrier
+    from virtualwork.formulas.effort import carrier
 
     m, n = motion.mechanism, motion.n
     found: list[Mark] = []

@@ -170,7 +170,7 @@ def test_states_and_their_balance(
                 at = exact.point(row["link"], center, order)
                 assert holds(row[names[0]], mp.re(at)) + holds(row[names[1]], mp.im(at)) > least // 2
     states = tmp_path / "states.csv"
-    assert dalembert("mechanism", four_bar, "--at", f"{angle}deg", "-o", states).returncode == 0
+    assert dalembert("mechanism", four_bar, "--at", f"{angle}deg", "--states", states).returncode == 0
     (found,) = table(dalembert("work", states, "--digits"))
     power = mp.mpf(0)
     with mp.workdps(50):

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from virtualwork.linkstates import LinkStates, UnitLoad, balance
+from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
 
 
 def slider_crank(r: float, length: float, theta: float, omega: float) -> tuple[float, float]:

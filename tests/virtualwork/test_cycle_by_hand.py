@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from virtualwork import DescriptionError, Guess, Guide, Input, Link, Mechanism
-from virtualwork.counterweights import berkof_lowen, least_squares
-from virtualwork.cycle import Cycle
 from virtualwork.mechanism import Friction, Spring, Torque, TorsionSpring
+from virtualwork.study.counterweights import berkof_lowen, least_squares
+from virtualwork.study.cycle import Cycle
 
 G = 9.81
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from virtualwork import Gear, Guess, Input, Link, Mechanism
+from virtualwork.formulas.effort import ledger
 from virtualwork.mechanism import Motor, Spring, Torque, TorsionSpring
-from virtualwork.work import ledger
 
 G = 9.81
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.equilibrium import equilibria
 from virtualwork.mechanism import Force, Spring, Torque, TorsionSpring
+from virtualwork.study.equilibrium import equilibria
 
 G = 9.81
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from virtualwork import Guess, Input, Link, Mechanism
+from virtualwork.formulas.scene import Block
 from virtualwork.mechanism import Motor
-from virtualwork.scene import Block
 
 SWEEP = np.linspace(0, 2 * np.pi, 361)
 
@@ -34,7 +34,7 @@ def four_bar() -> Mechanism:
 
 def test_what_is_formed_for_one_joint_force_serves_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
     """The loop's forces are solved once for each block, however the joint forces are asked for."""
-    from virtualwork.bearing import Solved
+    from virtualwork.formulas.load_paths import Solved
 
     count = 0
     solve = Solved.form

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from virtualwork import DescriptionError, Guess, Guide, Input, Link, Mechanism
+from virtualwork.formulas.effort import ledger
 from virtualwork.mechanism import Friction, Torque
-from virtualwork.work import ledger
 
 G = 9.81
 

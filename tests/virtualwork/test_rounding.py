@@ -17,10 +17,10 @@ from cli.bench import groups, linkages, random_linkages
 from cli.bench.exact import Exact
 from cli.bench.groups import compare
 from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.cycle import Cycle
-from virtualwork.equilibrium import equilibria
-from virtualwork.linkstates import LinkStates, UnitLoad, balance
 from virtualwork.mechanism import Force, Friction, Motor, Spring, Torque, TorsionSpring
+from virtualwork.study.cycle import Cycle
+from virtualwork.study.equilibrium import equilibria
+from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
 
 EXAMPLES = files("cli") / "examples"
 
@@ -216,8 +216,8 @@ def test_poses_beyond_what_fits_are_taken_in_parts(monkeypatch: pytest.MonkeyPat
     m = heavy(example("toggle-clamp"))
     q = m.at[0] + np.linspace(0, 0.1, 7)
     whole = m.motion(q, 2.0, 0.5).dynamics.error_estimate().newton_euler
-    monkeypatch.setattr("virtualwork.force_rounding.ENTRIES", 100)
-    monkeypatch.setattr("virtualwork.rounding.ENTRIES", 10)
+    monkeypatch.setattr("virtualwork.bounds.forces.ENTRIES", 100)
+    monkeypatch.setattr("virtualwork.bounds.motion.ENTRIES", 10)
     parts = m.motion(q, 2.0, 0.5).dynamics.error_estimate().newton_euler
     assert parts == pytest.approx(whole, rel=0.5)
 

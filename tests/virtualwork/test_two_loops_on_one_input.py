@@ -9,7 +9,7 @@ import pytest
 
 from virtualwork import Guess, Input, Link, Mechanism
 from virtualwork.check import Check
-from virtualwork.errors import MechanismError
+from virtualwork.describe.errors import MechanismError
 
 
 def both() -> Mechanism:

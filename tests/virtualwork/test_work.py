@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.counterweights import berkof_lowen, least_squares
-from virtualwork.cycle import Cycle
-from virtualwork.equilibrium import equilibria
-from virtualwork.errors import DescriptionError
+from virtualwork.describe.errors import DescriptionError
+from virtualwork.formulas.effort import ledger
 from virtualwork.mechanism import Force, Friction, Motor, Spring, Torque, TorsionSpring
-from virtualwork.work import ledger
+from virtualwork.study.counterweights import berkof_lowen, least_squares
+from virtualwork.study.cycle import Cycle
+from virtualwork.study.equilibrium import equilibria
 
 
 def four_bar(**given: Any) -> Mechanism:

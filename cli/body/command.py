@@ -1,0 +1,153 @@
+"""`dalembert body`: mass properties, angular momentum, d'Alembert's wrench, a shaft on two bearings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.read import options
+from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+
+if TYPE_CHECKING:
+    from cli.body.solve import ShaftWanted
+
+_VECTOR = "X,Y,Z"
+
+
+def run(
+    parts: Annotated[str, typer.Argument(metavar="PARTS", help="CSV of parts; - is standard input.")],
+    omega: Annotated[
+        str | None, typer.Option(metavar=_VECTOR, help="Angular velocity, rad/s, such as 0,4,12.")
+    ] = None,
+    alpha: Annotated[
+        str | None,
+        typer.Option(
+            metavar=_VECTOR, help="Its rate, rad/s²; with --frame-omega: that of its components there."
+        ),
+    ] = None,
+    frame_omega: Annotated[
+        str | None,
+        typer.Option(metavar=_VECTOR, help="Angular velocity of axes that do not turn with the body, rad/s."),
+    ] = None,
+    about: Annotated[
+        str | None,
+        typer.Option(metavar=_VECTOR, help="A point fixed in space to take the momentum about, m."),
+    ] = None,
+    fixed: Annotated[
+        str | None,
+        typer.Option(metavar=_VECTOR, help="The body turns about this point, m: the centre of mass follows."),
+    ] = None,
+    velocity: Annotated[
+        str | None, typer.Option(metavar=_VECTOR, help="Velocity of the centre of mass, m/s.")
+    ] = None,
+    acceleration: Annotated[
+        str | None, typer.Option(metavar=_VECTOR, help="Acceleration of the centre of mass, m/s².")
+    ] = None,
+    shaft: Annotated[
+        str | None,
+        typer.Option(metavar="Z1:Z2", help="The parts turn about z on bearings there, such as 0mm:400mm."),
+    ] = None,
+    speed: Annotated[str | None, typer.Option(help="Speed of the shaft, such as 1200rpm.")] = None,
+    speed_rate: Annotated[
+        str | None, typer.Option(metavar="RATE", help="Its rate, such as 10rad_s2.")
+    ] = None,
+    gravity: Annotated[
+        str | None, typer.Option(metavar=_VECTOR, help="Gravity on the shaft, m/s², such as 0,-9.81,0.")
+    ] = None,
+    correct: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME:Z:RADIUS", help="A correction plane of the shaft, such as A:0mm:20mm."),
+    ] = None,
+    json: Json = False,
+    output: Output = None,
+    plot: Plot = None,
+    expect: Expect = None,
+    rtol: Rtol = 1e-3,
+    text: Text = False,
+    digits: Digits = False,
+) -> None:
+    """Put a body together from parts: mass, centre of mass, inertia; its angular momentum and what its motion asks for.
+
+    PARTS has the columns part, shape, mass_* (a hole: negative) or density_*, x_* y_* z_* of its centre of mass,
+    axis_x axis_y axis_z (default z), rx_* ry_* rz_* (a further turn about the fixed axes in that order), and the
+    dimensions of its shape: point; rod length; disk, ring radius; arc radius, angle; cylinder, cone radius, length;
+    tube radius, inner_radius, length; box width, height, depth; plate width, height; sphere radius, inner_radius;
+    tensor ixx iyy izz ixy ixz iyz, products as +∫xy dm; mesh file, file_unit (STL, OBJ). Thin shapes take linear_density_* or area_density_*.
+    """
+    from cli.body import solve as job
+
+    wanted = job.Wanted(
+        omega=options.vector("--omega", omega, "speed"),
+        alpha=options.vector("--alpha", alpha, "angular acceleration"),
+        frame_omega=options.vector("--frame-omega", frame_omega, "speed"),
+        about=options.vector("--about", about, "length"),
+        fixed=options.vector("--fixed", fixed, "length"),
+        velocity=options.vector("--velocity", velocity, "velocity"),
+        acceleration=options.vector("--acceleration", acceleration, "acceleration"),
+        shaft=_shaft(shaft, speed, speed_rate, gravity, correct),
+    )
+    for flag, given in (("--velocity", velocity), ("--acceleration", acceleration)):
+        if given is not None and fixed is not None:
+            raise options.bad(
+                flag, "the motion of the centre of mass follows from --fixed: expected one of them"
+            )
+    if shaft is not None:
+        for flag, given in (
+            ("--omega", omega),
+            ("--alpha", alpha),
+            ("--frame-omega", frame_omega),
+            ("--fixed", fixed),
+            ("--velocity", velocity),
+            ("--acceleration", acceleration),
+        ):
+            if given is not None:
+                raise options.bad(flag, "a shaft turns about z at --speed and --speed-rate")
+    show(
+        job.solve(parts, wanted),
+        json=json,
+        output=output,
+        plot=plot,
+        expect=expect,
+        rtol=rtol,
+        text=text,
+        digits=digits,
+    )
+
+
+def _shaft(
+    shaft: str | None,
+    speed: str | None,
+    speed_rate: str | None,
+    gravity: str | None,
+    correct: list[str] | None,
+) -> ShaftWanted | None:
+    from cli.body.solve import ShaftWanted
+    from cli.read.planes import from_options
+
+    if shaft is None:
+        for flag, given in (
+            ("--speed", speed),
+            ("--speed-rate", speed_rate),
+            ("--gravity", gravity),
+            ("--correct", correct),
+        ):
+            if given:
+                raise options.bad(flag, "this is for a shaft: expected --shaft Z1:Z2 too")
+        return None
+    ends = shaft.split(":")
+    if len(ends) != 2:
+        raise options.bad("--shaft", f"'{shaft}': expected Z1:Z2, such as 0mm:400mm")
+    z1, z2 = (options.quantity("--shaft", end, "length") or 0.0 for end in ends)
+    if z1 == z2:
+        raise options.bad("--shaft", f"'{shaft}': the two bearings lie at the same place")
+    planes = from_options(correct, "--correct") if correct else None
+    if planes is not None and planes.z is None:
+        raise options.bad("--correct", "a correction plane of a shaft needs its place: NAME:Z:RADIUS")
+    return ShaftWanted(
+        bearings=(z1, z2),
+        speed=options.quantity("--speed", speed, "speed") or 0.0,
+        speed_rate=options.quantity("--speed-rate", speed_rate, "angular acceleration") or 0.0,
+        gravity=options.vector("--gravity", gravity, "acceleration") or (0.0, 0.0, 0.0),
+        planes=planes,
+    )

@@ -1,0 +1,59 @@
+"""`dalembert examples`: the worked examples, listed or written into the current folder."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cli.errors import DataError, nearest
+from cli.show.output import write
+
+EXAMPLES = files("cli") / "examples"
+ABOUT = "example.toml"
+
+
+def run(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="The example to write here.")] = None,
+) -> None:
+    """List the worked examples; with NAME, write its input files into the current folder and show its command."""
+    if name is None:
+        about = {folder: describe(folder) for folder in names()}
+        width = max(map(len, about))
+        for folder, described in about.items():
+            print(f"{folder.ljust(width)}  {described['line']}")
+        return
+    if name not in names():
+        raise DataError(f"no example '{name}': expected one of {', '.join(names())}{nearest(name, names())}")
+    described = describe(name)
+    for file in sorted(EXAMPLES.joinpath(name).iterdir(), key=lambda file: file.name):
+        if file.name == ABOUT:
+            continue
+        here = Path(file.name)
+        data = file.read_bytes()
+        if here.exists() and not _is_an_examples(here):
+            raise DataError(f"{file.name}: there is another file of this name here: nothing was overwritten")
+        write(here, data)
+        print(f"wrote {file.name}")
+    print(f"source: {described['source']}\nrun:\n  {described['command']}")
+
+
+def _is_an_examples(here: Path) -> bool:
+    """Whether a file is as some example wrote it, so that nothing of the user's is lost by writing over it."""
+    return here.is_file() and any(
+        folder.joinpath(here.name).is_file() and folder.joinpath(here.name).read_bytes() == here.read_bytes()
+        for folder in EXAMPLES.iterdir()
+    )
+
+
+def names() -> list[str]:
+    """Return the names of the examples, in order."""
+    return sorted(folder.name for folder in EXAMPLES.iterdir() if folder.joinpath(ABOUT).is_file())
+
+
+def describe(name: str) -> dict[str, Any]:
+    """Return what an example's `example.toml` says of it: line, command, source."""
+    return tomllib.loads(EXAMPLES.joinpath(name, ABOUT).read_text(encoding="utf-8"))

@@ -1,0 +1,116 @@
+"""Option values with a unit; a bad one is wrong usage, status 2."""
+
+from __future__ import annotations
+
+import typer
+
+from cli.read.units import SMALLEST, UNITS, parse_number, parse_quantity, to_si
+
+STATES = 250_000  # what a gigabyte holds, integrated and shown
+PLACES = 10_000  # holes or blades on one rotor
+
+
+def whole(text: str) -> int:
+    """Read a whole number that is not negative; -1 where it is none, or one of more than 18 digits."""
+    text = text.strip()
+    return int(text) if text.isascii() and text.isdecimal() and len(text) <= 18 else -1
+
+
+def bad(flag: str, message: object) -> typer.BadParameter:
+    """Make the usage error of an option."""
+    return typer.BadParameter(str(message), param_hint=flag)
+
+
+def with_unit(
+    flag: str, text: str | None, dimension: str, *, positive: bool = False
+) -> tuple[float, str] | None:
+    """Read a value and the unit it was given in; None stays None."""
+    if text is None:
+        return None
+    try:
+        value, unit = parse_quantity(text, dimension)
+    except ValueError as error:
+        raise bad(flag, error) from None
+    if positive and not value >= SMALLEST:
+        raise bad(flag, f"'{text}': expected a positive value")
+    return value, unit
+
+
+def quantity(flag: str, text: str | None, dimension: str, *, positive: bool = False) -> float | None:
+    """Read a value in SI; None stays None."""
+    given = with_unit(flag, text, dimension, positive=positive)
+    return None if given is None else float(to_si(given[0], dimension, given[1]))
+
+
+def plane_vector(flag: str, text: str) -> complex:
+    """Read `X,Y` in SI as x + iy."""
+    parts = text.split(",")
+    try:
+        if len(parts) != 2:
+            raise ValueError
+        return complex(parse_number(parts[0]), parse_number(parts[1]))
+    except ValueError:
+        raise bad(flag, f"'{text}': expected two numbers X,Y, such as 0,-9.81") from None
+
+
+def vector(flag: str, text: str | None, dimension: str) -> tuple[float, float, float] | None:
+    """Read `x,y,z` in SI, or in the units that stand with the numbers; a unit behind the last serves all without one."""
+    if text is None:
+        return None
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 3:
+        raise bad(flag, f"'{text}': expected three numbers x,y,z")
+    try:
+        given = [_number_and_unit(part, dimension) for part in parts]
+    except ValueError as error:
+        raise bad(flag, f"'{text}': expected three numbers x,y,z: {error}") from None
+    shared = given[2][1] or next(iter(UNITS[dimension]))
+    x, y, z = (float(to_si(value, dimension, unit or shared)) for value, unit in given)
+    return x, y, z
+
+
+def _number_and_unit(text: str, dimension: str) -> tuple[float, str]:
+    try:
+        return parse_number(text), ""
+    except ValueError:
+        return parse_quantity(text, dimension)
+
+
+def number_or_quantity(flag: str, text: str, dimension: str) -> float:
+    """Read a value in SI, or in the unit that stands with it."""
+    try:
+        value, unit = _number_and_unit(text.strip(), dimension)
+    except ValueError as error:
+        raise bad(flag, error) from None
+    return float(to_si(value, dimension, unit or next(iter(UNITS[dimension]))))
+
+
+def time_range(flag: str, text: str) -> list[float]:
+    """Read `START:STOP:STEP` or `START:STOP/N` (N equal steps); a step that divides the range includes its end."""
+    steps = None
+    body = text
+    if "/" in text:
+        body, _, number = text.partition("/")
+        if whole(number) < 1:
+            raise bad(flag, f"'{text}': expected a number of equal steps after the /, such as 0:10/1000")
+        steps = whole(number)
+    parts = body.split(":")
+    if len(parts) != (2 if steps else 3):
+        raise bad(flag, f"'{text}': expected START:STOP:STEP or START:STOP/N, such as 0:10:0.01")
+    values = [number_or_quantity(flag, part, "time") for part in parts]
+    start, stop = values[:2]
+    if steps is None:
+        step = values[2]
+        if step == 0 or (stop - start) * step < 0:
+            raise bad(flag, f"'{text}': a step of {step:g} s never gets from {start:g} s to {stop:g} s")
+        ratio = (stop - start) / step
+        if ratio > STATES:
+            raise bad(flag, f"'{text}': {ratio:.3g} states: expected at most {STATES}")
+        steps = round(ratio)
+        if abs(ratio - steps) > 1e-9 * max(1.0, ratio):
+            return [start + i * step for i in range(int(ratio) + 1)]
+        if steps == 0:
+            return [start]
+    if steps > STATES:
+        raise bad(flag, f"'{text}': {steps:.3g} states: expected at most {STATES}")
+    return [start + (stop - start) * i / steps for i in range(steps + 1)]

@@ -1,0 +1,321 @@
+"""A body from a CSV of parts: each row a shape with its mass, place and orientation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.errors import DataError, nearest, quote
+from cli.read.tables import Table, read
+from cli.read.units import UNITS, cosine_sine, to_si
+from rigidbody3d import Body, check, compose, load_mesh, mesh, tensor
+from rigidbody3d.shapes import SHAPES
+
+if TYPE_CHECKING:
+    from rigidbody3d.rounding import BodyError
+
+Array = NDArray[np.float64]
+
+READ = 2 * float(np.finfo(float).eps)
+"""By how much of itself a number may be off once it is read and put into SI: three roundings, and one to spare."""
+LENGTHS = ("radius", "inner_radius", "length", "width", "height", "depth")
+MOMENTS = ("ixx", "iyy", "izz")
+PRODUCTS = ("ixy", "ixz", "iyz")
+DENSITIES = {3: "density", 2: "area_density", 1: "linear_density"}
+TENSOR = "tensor"
+MESH = "mesh"
+_NUMBERS = {
+    "mass": "mass",
+    "density": "density",
+    "area_density": "area density",
+    "linear_density": "linear density",
+    **dict.fromkeys(("x", "y", "z", *LENGTHS), "length"),
+    **dict.fromkeys(("axis_x", "axis_y", "axis_z"), "number"),
+    **dict.fromkeys(("rx", "ry", "rz", "angle"), "angle"),
+    **dict.fromkeys((*MOMENTS, *PRODUCTS), "inertia"),
+}
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The parts as read, and the body they make."""
+
+    file: str
+    name: list[str]
+    shape: list[str]
+    each: Body
+    """Mass (k,), centre (k, 3), tensor (k, 3, 3) of the parts."""
+    whole: Body
+    warnings: list[str]
+
+
+def read_parts(path: str) -> Parts:
+    """Read a table of parts and put them together."""
+    table = read(path, numbers=_NUMBERS, texts=["part", "shape", "file", "file_unit"], blank=list(_NUMBERS))
+    if "shape" not in table.texts:
+        raise DataError(f"{table.file}: no column shape (the header is: {', '.join(table.header)})")
+    values = {
+        name: to_si(column.values, _NUMBERS[name], column.unit) + 0.0
+        for name, column in table.numbers.items()
+        if name not in ("rx", "ry", "rz")
+    }
+    turns = _turns(table)
+    name = table.texts.get("part", [str(index + 1) for index in range(table.rows)])
+    mass, inertia = np.empty(table.rows), np.empty((table.rows, 3, 3))
+    center = np.stack([np.nan_to_num(values.get(axis, np.zeros(table.rows))) for axis in "xyz"], axis=-1)
+    folder = Path() if path == "-" else Path(path).parent
+    warnings = list(table.warnings)
+    rows: list[dict[str, float]] = []
+    meshes: dict[int, Callable[[], tuple[float, float]]] = {}
+    columns = {
+        key: column.tolist() for key, column in values.items()
+    }  # row by row Python's numbers are faster
+    for index, shape in enumerate(table.texts["shape"]):
+        row = {key: value for key, column in columns.items() if (value := column[index]) == value}
+        rows.append(row)
+        if shape.lower() == MESH:
+            mass[index], own, inertia[index], meshes[index] = _mesh(table, index, row, folder)
+            if not row.keys() & {"x", "y", "z"}:  # it stays where the file has it
+                center[index] = own
+        else:
+            mass[index], inertia[index] = _part(table, index, shape.lower(), row, warnings, name[index])
+    _check_tensors(table, mass, inertia)
+    rotation = turns @ _along(table, values)
+    shapes = [shape.lower() for shape in table.texts["shape"]]
+    drawn = Body(mass, center, inertia, partial(_reading, shapes, rows, meshes, mass, center, inertia))
+    turned = drawn.turned(rotation)
+    each = replace(turned, rounding=partial(_turning, drawn, rotation, table))
+    total = mass.sum()
+    if not total > 0:
+        raise DataError(
+            f"{table.file}: the masses add up to {total:g} kg: expected a positive total (a hole is a negative mass)"
+        )
+    whole = compose(each)
+    verdict = check(whole.inertia)
+    if not verdict.valid:
+        raise DataError(
+            f"{table.file}: no body is made of these parts: {verdict.reason}: is a hole outside its part?"
+        )
+    return Parts(table.file, name, shapes, each, whole, warnings)
+
+
+def _part(
+    table: Table, index: int, shape: str, row: dict[str, float], warnings: list[str], name: str
+) -> tuple[float, Array]:
+    """Return the mass of a part and its tensor along its own axes."""
+    known = [*SHAPES, TENSOR, MESH]
+    if shape not in known:
+        expected = f"one of {', '.join(known)}{nearest(shape, known)}"
+        raise table.error(index, "shape", table.texts["shape"][index], expected)
+    needed = MOMENTS if shape == TENSOR else SHAPES[shape].dimensions
+    optional = PRODUCTS if shape == TENSOR else SHAPES[shape].optional
+    for dimension in needed:
+        if dimension not in row:
+            column = table.numbers[dimension].header if dimension in table.numbers else dimension
+            raise table.error(index, column, "", f"a value: a {shape} needs {', '.join(needed)}")
+    unused = [
+        key for key in (*LENGTHS, "angle", *MOMENTS, *PRODUCTS) if key in row and key not in needed + optional
+    ]
+    if unused:
+        warnings.append(f"{table.file}: part {quote(name)}: a {shape} has no {', '.join(unused)}: not used")
+    dimensions = {key: row[key] for key in needed + optional if key in row}
+    if shape != TENSOR:
+        for key, value in dimensions.items():
+            if value < 0 or (value == 0 and key != "inner_radius"):
+                raise table.error(index, table.numbers[key].header, f"{value:g}", "a positive number")
+        if dimensions.get("inner_radius", 0.0) > dimensions.get("radius", np.inf):
+            raise table.error(
+                index,
+                table.numbers["inner_radius"].header,
+                f"{row['inner_radius']:g}",
+                "no more than the radius",
+            )
+    mass = _mass(table, index, shape, row, dimensions)
+    if shape != TENSOR:
+        formulas: Any = SHAPES[shape]  # they hold for plain numbers too, and those are faster one by one
+        full = dict.fromkeys(formulas.optional, 0.0) | dimensions
+        return mass, np.diag([mass * moment for moment in formulas.moments(**full)])
+    given = tensor(*(row.get(key, 0.0) for key in (*MOMENTS, *PRODUCTS)))
+    # a hole's tensor may be given as that of the material taken away, or already with its sign
+    if mass < 0 and np.trace(given) > 0:
+        given = -given
+    return mass, given
+
+
+def _check_tensors(table: Table, mass: Array, inertia: Array) -> None:
+    """Refuse a given tensor that no body can have; all at once, for one by one takes long."""
+    rows = [index for index, shape in enumerate(table.texts["shape"]) if shape.lower() == TENSOR]
+    if not rows:
+        return
+    verdict = check(inertia[rows] * np.sign(mass[rows])[:, None, None])
+    if not verdict.valid.all():
+        index = rows[int(np.argmin(verdict.valid))]
+        column = table.numbers["ixx"]
+        raise table.error(
+            index,
+            column.header,
+            f"{to_si(column.values[index], 'inertia', column.unit):g}",
+            f"a tensor that a body can have: {verdict.reason}",
+        )
+
+
+def _mesh(
+    table: Table, index: int, row: dict[str, float], folder: Path
+) -> tuple[float, Array, Array, Callable[[], tuple[float, float]]]:
+    """Return mass, centre of mass and tensor of a closed mesh from a file, and what bounds their rounding."""
+    cell = table.texts.get("file", [""] * table.rows)[index]
+    unit = table.texts.get("file_unit", [""] * table.rows)[index]
+    if not cell:
+        raise table.error(index, "file", "", "the name of an STL or OBJ file")
+    if unit not in UNITS["length"]:
+        raise table.error(
+            index, "file_unit", unit, f"the file's unit of length: {', '.join(UNITS['length'])}"
+        )
+    if ("mass" in row) == ("density" in row) or not row.get("density", 1.0) > 0 or row.get("mass", 1.0) == 0:
+        raise table.error(index, "shape", MESH, "with it a mass, or a positive density_kg_m3")
+    try:
+        vertices, faces = load_mesh(str(folder / cell))
+        vertices = to_si(vertices, "length", unit)
+        volume, center, inertia = mesh(vertices, faces)
+    except ImportError:
+        raise DataError(
+            f"{table.file}: a mesh needs trimesh: install dalembert with its extra, dalembert[mesh]"
+        ) from None
+    except ValueError as error:
+        raise table.error(index, "file", cell, f"a closed mesh: {error}") from None
+    density = row["density"] if "density" in row else row["mass"] / float(volume)
+    rough = partial(_rough, vertices, faces, float(volume))
+    return density * float(volume), center, density * inertia, rough
+
+
+def _rough(vertices: Array, faces: NDArray[np.int64], volume: float) -> tuple[float, float]:
+    """Return by how much, of the volume, the sum over a mesh's faces may be off, and how far its corners lie."""
+    corners = vertices[faces]
+    spread = corners - vertices[np.unique(faces)].mean(axis=0)
+    reach = float(np.sqrt(np.square(spread).sum(axis=-1)).max())
+    # a corner moves by its own rounding, and all that its faces sweep with it
+    sizes = np.abs(np.linalg.det(spread)) + reach**2 * READ * np.abs(corners).max()
+    return READ * len(faces) * float(sizes.sum()) / volume, reach
+
+
+def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimensions: dict[str, float]) -> float:
+    densities = [key for key in DENSITIES.values() if key in row]
+    if "mass" in row:
+        if densities:
+            raise table.error(
+                index,
+                table.numbers[densities[0]].header,
+                f"{row[densities[0]]:g}",
+                "mass or density, not both",
+            )
+        if row["mass"] == 0:
+            raise table.error(index, table.numbers["mass"].header, "0", "a mass that is not zero")
+        return row["mass"]
+    if not densities:
+        raise table.error(index, "mass", "", "a mass, or a density where the shape has a volume")
+    key = densities[0]
+    header = table.numbers[key].header
+    if not row[key] > 0:
+        raise table.error(index, header, f"{row[key]:g}", "a positive density (a hole is a negative mass)")
+    kind = 0 if shape == TENSOR else SHAPES[shape].thin
+    if DENSITIES.get(kind) != key or len(densities) > 1:
+        wanted = f"{DENSITIES[kind]} or mass" if kind else "mass"
+        raise table.error(index, header, f"{row[key]:g}", f"{wanted} for a {shape}")
+    known: Any = SHAPES[shape]
+    mass = row[key] * float(known.measure(**dict.fromkeys(known.optional, 0.0) | dimensions))
+    if mass == 0:
+        raise table.error(index, header, f"{row[key]:g}", "a mass that is not zero: this shape has no volume")
+    return mass
+
+
+def _reading(
+    shapes: list[str],
+    rows: list[dict[str, float]],
+    meshes: dict[int, Callable[[], tuple[float, float]]],
+    mass: Array,
+    center: Array,
+    inertia: Array,
+) -> BodyError:
+    """Bound what is off in the parts before they are turned: numbers as read, and their shapes' formulas."""
+    from rigidbody3d.rounding import BodyError, Bounded, shaped
+
+    masses, tensors = READ * np.abs(mass), READ * np.abs(inertia)
+    centers = READ * np.abs(center)
+    for i, (shape, row) in enumerate(zip(shapes, rows, strict=True)):
+        if i in meshes:
+            rough, reach = meshes[i]()
+            masses[i] += rough * np.abs(mass[i])
+            centers[i] += rough * reach
+            tensors[i] += rough * np.abs(mass[i]) * reach**2
+        if shape not in SHAPES:
+            continue
+        known = SHAPES[shape]
+        names = known.dimensions + known.optional
+        given = {key: Bounded(row[key], READ * row[key]) for key in names if key in row}
+        given |= {key: Bounded(0.0) for key in known.optional if key not in row}
+        m = Bounded(mass[i], masses[i])
+        if "mass" not in row and known.measure is not None:
+            m = Bounded(row[DENSITIES[known.thin]], masses[i] / mass[i] * row[DENSITIES[known.thin]])
+            m = m * known.measure(**given)
+        masses[i], tensors[i] = m.error, shaped(shape, m, given).error
+    return BodyError(masses, centers, tensors)
+
+
+def _turning(drawn: Body, rotation: Array, table: Table) -> BodyError:
+    """Bound the parts as turned: a matrix of zeros and ones is exact, another has its angles' own rounding."""
+    from rigidbody3d.rounding import turned
+
+    angle = np.zeros(table.rows)
+    for name in ("rx", "ry", "rz"):
+        if name in table.numbers:
+            column = table.numbers[name]
+            angle += np.abs(np.nan_to_num(to_si(column.values, "angle", column.unit)))
+    plain = np.isin(rotation, (-1.0, 0.0, 1.0)).all(axis=(-1, -2))
+    off = np.where(plain, 0.0, READ * (4 + angle))
+    return turned(drawn, rotation, None, np.broadcast_to(off[:, None, None], rotation.shape))
+
+
+def _turns(table: Table) -> Array:
+    """The turn about the fixed x, then y, then z, (k, 3, 3); degrees are exact at quarter turns."""
+    out = np.broadcast_to(np.eye(3), (table.rows, 3, 3))
+    for axis, name in enumerate(("rx", "ry", "rz")):
+        if name in table.numbers:
+            c, s = cosine_sine(np.nan_to_num(table.numbers[name].values), table.numbers[name].unit)
+            turn = np.zeros((table.rows, 3, 3))
+            p, q = (axis + 1) % 3, (axis + 2) % 3
+            turn[:, axis, axis] = 1.0
+            turn[:, p, p] = turn[:, q, q] = c
+            turn[:, p, q], turn[:, q, p] = -s, s
+            out = turn @ out
+    return out
+
+
+def _along(table: Table, values: dict[str, Array]) -> Array:
+    """The shortest turn that brings z onto each part's axis, (k, 3, 3); about x where the axis is -z."""
+    given = [values.get(f"axis_{axis}") for axis in "xyz"]
+    if all(column is None for column in given):
+        return np.broadcast_to(np.eye(3), (table.rows, 3, 3))
+    axis = np.stack([np.zeros(table.rows) if column is None else column for column in given], axis=-1)
+    axis = np.where(np.isnan(axis).all(axis=-1, keepdims=True), [0.0, 0.0, 1.0], np.nan_to_num(axis))
+    size = np.sqrt(np.square(axis).sum(axis=-1))
+    if (size == 0).any():
+        index = int(np.argmin(size))
+        header = next(table.numbers[f"axis_{a}"].header for a in "zyx" if f"axis_{a}" in table.numbers)
+        raise table.error(index, header, "0", "an axis that is not zero in every component")
+    x, y, z = (axis / size[:, None]).T
+    across = x * x + y * y
+    # 1/(1 + z), by the other quotient where z is near -1
+    k = np.where(z >= 0, 1 / (1 + np.abs(z)), (1 + np.abs(z)) / np.where(across > 0, across, 1.0))
+    flat = across == 0
+    turn = np.empty((table.rows, 3, 3))
+    turn[:, 0, 0], turn[:, 0, 1], turn[:, 0, 2] = 1 - k * x * x, -k * x * y, x
+    turn[:, 1, 0], turn[:, 1, 1], turn[:, 1, 2] = -k * x * y, 1 - k * y * y, y
+    turn[:, 2, 0], turn[:, 2, 1], turn[:, 2, 2] = -x, -y, z
+    turn[flat & (z < 0)] = np.diag([1.0, -1.0, -1.0])
+    return turn

@@ -1,0 +1,159 @@
+"""Correction planes, from options (`A:0mm:20mm`) or from a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.errors import DataError, quote
+from cli.read.options import bad
+from cli.read.tables import read
+from cli.read.units import SMALLEST, parse_quantity, to_si
+
+
+@dataclass(frozen=True)
+class Planes:
+    """Correction planes, in SI; `rotor` names each plane's rotor where they differ from rotor to rotor."""
+
+    name: list[str]
+    z: NDArray[np.float64] | None
+    radius: NDArray[np.float64]
+    z_unit: str
+    radius_unit: str
+    file: str = "--plane"
+    rotor: list[str] | None = None
+
+    @property
+    def several(self) -> bool:
+        """Whether any rotor has more than one plane: then the axial positions count."""
+        owners = self.rotor or ["" for _ in self.name]
+        return len(set(owners)) < len(owners)
+
+    def rows(self, rotors: Sequence[str], table: str) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return for each rotor the number of its first plane and how many it has.
+
+        Raises DataError where a rotor has no plane, or a plane's rotor is not in the table.
+        """
+        if self.rotor is None:
+            return np.zeros(len(rotors), dtype=np.intp), np.full(len(rotors), len(self.name))
+        count: dict[str, int] = {}
+        for owner in self.rotor:
+            count[owner] = count.get(owner, 0) + 1
+        if strange := count.keys() - set(rotors):
+            raise DataError(f"{self.file}: planes for rotor {quote(min(strange))}, which {table} lacks")
+        start = dict(zip(count, np.cumsum([0, *count.values()]).tolist(), strict=False))
+        for rotor in rotors:
+            if rotor not in count:
+                raise DataError(
+                    f"{self.file}: no plane for rotor {quote(rotor)} of {table}: expected at least one"
+                )
+        return np.array([start[r] for r in rotors], dtype=np.intp), np.array(
+            [count[r] for r in rotors], dtype=np.intp
+        )
+
+
+def from_options(specs: Sequence[str], flag: str = "--plane") -> Planes:
+    """Read `NAME:RADIUS` (once) or `NAME:Z:RADIUS` (each)."""
+    names: list[str] = []
+    z: list[tuple[float, str]] = []
+    radii: list[tuple[float, str]] = []
+    for spec in specs:
+        parts = spec.rsplit(":", 2)
+        try:
+            if len(parts) < 2 or not parts[0].strip():
+                raise ValueError(
+                    f"'{spec}': expected NAME:Z:RADIUS, such as A:0mm:20mm, or for one plane NAME:RADIUS"
+                )
+            radius = parse_quantity(parts[-1], "length")
+            if len(parts) == 3:
+                z.append(parse_quantity(parts[1], "length"))
+        except ValueError as error:
+            raise bad(flag, error) from None
+        if not radius[0] >= SMALLEST:
+            raise bad(flag, f"'{spec}': expected a positive radius")
+        if parts[0].strip() in names:
+            raise bad(flag, f"the plane {parts[0].strip()} is given twice")
+        names.append(parts[0].strip())
+        radii.append(radius)
+    if (z and len(z) < len(names)) or (len(names) > 1 and not z):
+        raise bad(
+            flag, "with more than one plane each needs its axial position: NAME:Z:RADIUS, such as A:0mm:20mm"
+        )
+    planes = Planes(
+        names,
+        np.array([to_si(value, "length", unit) for value, unit in z]) if z else None,
+        np.array([to_si(value, "length", unit) for value, unit in radii]),
+        z[0][1] if z else "",
+        radii[0][1],
+        flag,
+    )
+    if (pair := _together(planes, range(len(names)))) is not None:
+        raise bad(flag, _same_place(planes, *pair))
+    return planes
+
+
+def from_table(path: str) -> Planes:
+    """Read a table with the columns plane, radius_* and, but for single planes, z_*; rotor where they differ."""
+    table = read(path, numbers={"z": "length", "radius": "length"}, texts=["plane", "rotor"])
+    if "plane" not in table.texts:
+        raise DataError(f"{table.file}: no column plane (the header is: {', '.join(table.header)})")
+    radius = table.require("radius", "length")
+    table.reject(~(radius.values >= SMALLEST), "radius", "a positive radius")
+    names, rotor = table.texts["plane"], table.texts.get("rotor")
+    owners = rotor or [""] * len(names)
+    seen: set[tuple[str, str]] = set()
+    for index, named in enumerate(zip(owners, names, strict=True)):
+        if named in seen:
+            of = f" for rotor {quote(named[0])}" if rotor else ""
+            raise table.error(index, "plane", names[index], f"each plane once{of}")
+        seen.add(named)
+    if len(set(owners)) < len(owners):
+        table.require("z", "length")
+    z = table.numbers.get("z")
+    order = sorted(range(len(names)), key=_first_place(owners).__getitem__)
+    planes = Planes(
+        [names[i] for i in order],
+        to_si(z.values, "length", z.unit)[order] if z else None,
+        to_si(radius.values, "length", radius.unit)[order],
+        z.unit if z else "",
+        radius.unit,
+        table.file,
+        [owners[i] for i in order] if rotor else None,
+    )
+    start = 0
+    for stop in range(1, len(names) + 1):
+        if stop == len(names) or (planes.rotor and planes.rotor[stop] != planes.rotor[start]):
+            if (pair := _together(planes, range(start, stop))) is not None:
+                raise DataError(f"{table.file}: {_same_place(planes, *pair)}")
+            start = stop
+    return planes
+
+
+def _first_place(owners: Sequence[str]) -> list[int]:
+    """Return for each entry the place where its owner first stands: sorting by it keeps owners together."""
+    first: dict[str, int] = {}
+    return [first.setdefault(owner, index) for index, owner in enumerate(owners)]
+
+
+def _together(planes: Planes, among: range) -> tuple[int, int] | None:
+    """Return two planes at one place, if there are."""
+    if planes.z is None:
+        return None
+    seen: dict[float, int] = {}
+    for index in among:
+        other = seen.setdefault(float(planes.z[index]), index)
+        if other != index:
+            return other, index
+    return None
+
+
+def _same_place(planes: Planes, one: int, other: int) -> str:
+    of = f" of rotor {quote(planes.rotor[one])}" if planes.rotor else ""
+    assert planes.z is not None
+    return (
+        f"the planes {planes.name[one]} and {planes.name[other]}{of} lie at the same place, z = {planes.z[one]:g} m: "
+        "together they cannot correct a couple; expected different places"
+    )

@@ -1,0 +1,45 @@
+"""How far the numbers of a table can be from what its digits say once they are vectors, and vectors from numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cli.read.units import to_si
+
+Real = NDArray[np.float64]
+
+EPS = float(np.finfo(float).eps)
+
+
+def vector_error(size: ArrayLike, angle: ArrayLike, unit: str) -> Real:
+    """Bound the error of a vector of a size and an angle read as decimals: of a large angle the last place counts.
+
+    A whole number of degrees is exact as it is written.
+    """
+    given = np.asarray(angle, dtype=float)
+    last = np.where((given == np.rint(given)) & (unit == "deg"), 0.0, np.spacing(np.abs(given)) / 2)
+    return np.asarray(np.abs(size) * (3 * EPS + to_si(last, "angle", unit)))
+
+
+def size_error(vector: Any, bound: ArrayLike) -> Real:
+    """Bound the error of a vector's size, once more converted to a unit."""
+    return np.asarray(bound + 3 * EPS * np.abs(vector))
+
+
+def angle_error(vector: Any, bound: Any, degrees: Any) -> Real:
+    """Bound the error of a vector's angle, degrees: half a turn where not even its direction is known."""
+    size = np.asarray(np.abs(vector), dtype=float)
+    error, shown = np.asarray(bound, dtype=float), np.asarray(degrees, dtype=float)
+    known = error < size
+    turn = np.arcsin(np.where(known, error / np.where(known, size, 1.0), 0.0))
+    turn = np.where(known, turn, np.where(error > 0, np.pi, 0.0))
+    return np.asarray(np.degrees(turn) + 2 * EPS * np.abs(shown))
+
+
+def angle_text(degrees: Any, spec: str) -> str:
+    """Format an angle in [0, 360); what rounds to a full turn is 0."""
+    text = format(float(degrees), spec)
+    return format(0.0, spec) if float(text) == 360.0 else text

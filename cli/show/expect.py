@@ -1,0 +1,144 @@
+"""The exercise check: a result beside the values that were expected."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cli.errors import DataError, nearest
+from cli.read.tables import read
+from cli.read.units import parse_number
+
+Columns = Mapping[str, Sequence[Any]]
+
+
+@dataclass(frozen=True)
+class Report:
+    """A row for each expected cell, and whether all hold."""
+
+    columns: Columns
+    summary: str
+    passed: bool
+
+
+def compare(
+    columns: Columns,
+    keys: Sequence[str],
+    file: str,
+    rtol: float,
+    other: Callable[[], Columns] | None = None,
+) -> Report:
+    """Compare a result with a file of expected values, cell by cell.
+
+    Rows are matched by the key columns that the file has, else by their order. A number holds where its
+    relative error is at most `rtol`, an angle where it is off by at most `rtol` radians, modulo a turn; an
+    expected zero is measured against the largest value in its column. Empty cells expect nothing. An input is a
+    key where no `step` is given: its row is the nearest within `rtol`. `other` is the result's other table, for a
+    file with columns of that one.
+    """
+    expected = read(file, texts=None)
+    header = list(expected.texts)
+    if other is not None and not columns.keys() >= set(header) and (table := other()).keys() >= set(header):
+        columns = table
+    for name in header:
+        if name not in columns:
+            raise DataError(
+                f"{file}: the result has no column '{name}': expected some of "
+                f"{', '.join(columns)}{nearest(name, columns)}"
+            )
+    matched = [name for name in header if name in keys and not (is_input(name) and "step" in header)]
+    rows = list(_match(columns, file, expected.texts, matched, expected.rows, rtol))
+    named = [key for key in keys if key in columns and (key in matched or not is_input(key))]
+    lines: dict[str, list[Any]] = {
+        name: [] for name in ("row", "column", "value", "expected", "error", "verdict")
+    }
+    for index, row in enumerate(rows):
+        for name in header:
+            wanted = expected.texts[name][index]
+            if name in matched or not wanted:
+                continue
+            value = columns[name][row]
+            number, error = _error(name, value, wanted, columns[name])
+            holds = error <= rtol
+            label = "/".join(str(columns[key][row]) for key in named) or str(row + 1)
+            for key, item in zip(
+                lines, (label, name, value, number, error, "ok" if holds else "WRONG"), strict=True
+            ):
+                lines[key].append(item)
+    wrong = lines["verdict"].count("WRONG")
+    total = len(lines["verdict"])
+    if not total:
+        raise DataError(f"{file}: no expected value in it: nothing would be checked")
+    return Report(lines, f"{total - wrong} of {total} values within {rtol:g}", wrong == 0)
+
+
+def is_input(name: str) -> bool:
+    """Whether a column holds a pose's input: a key that is a number."""
+    return name.endswith(("input_deg", "input_m"))
+
+
+def _match(
+    columns: Columns, file: str, expected: dict[str, list[str]], keys: list[str], rows: int, rtol: float
+) -> Iterator[int]:
+    """Yield for each expected row the result's row."""
+    length = len(next(iter(columns.values())))
+    if not keys:
+        if rows > length:
+            raise DataError(
+                f"{file}: row {length + 1}: expected {length} rows, as many as the result has, found {rows}"
+            )
+        yield from range(rows)
+        return
+    names, numbers = [k for k in keys if not is_input(k)], [k for k in keys if is_input(k)]
+    places: dict[tuple[str, ...], list[int]] = {}
+    for row in range(length):
+        places.setdefault(tuple(str(columns[key][row]) for key in names), []).append(row)
+    for index in range(rows):
+        left = places.get(tuple(expected[name][index] for name in names), [])
+        for name in numbers:
+            left = _nearest(name, columns[name], left, expected[name][index], rtol)
+        if not left:
+            named = ", ".join(f"{name} {expected[name][index]}" for name in keys)
+            raise DataError(f"{file}: row {index + 1}: the result has no (further) row with {named}")
+        yield left[0]
+        places[tuple(expected[name][index] for name in names)].remove(left[0])
+
+
+def _nearest(name: str, column: Sequence[Any], rows: list[int], wanted: str, rtol: float) -> list[int]:
+    """The rows whose number comes nearest to the one wanted, within the tolerance."""
+    try:
+        number = parse_number(wanted)
+    except ValueError:
+        return []
+    away = np.array([column[row] for row in rows], dtype=float) - number
+    if name.endswith("_deg"):  # first the same angle, and of 0° and 360° the one that is meant
+        turned = np.abs(np.radians(np.remainder(away + 180.0, 360.0) - 180.0))
+        best = turned <= min(rtol, turned.min(initial=np.inf) + 1e-12)
+    else:
+        best = np.abs(away) <= rtol * max(abs(number), np.abs(away).max(initial=0.0))
+    away = np.where(best, np.abs(away), np.inf)
+    return [row for row, d in zip(rows, away, strict=True) if d < np.inf and d == away.min()]
+
+
+def _error(name: str, value: Any, wanted: str, column: Any) -> tuple[Any, float]:
+    """Return the expected value and the error of the found one."""
+    if isinstance(value, str):
+        return wanted, 0.0 if value == wanted else math.inf
+    if isinstance(value, (bool, np.bool_)):
+        return wanted, 0.0 if str(bool(value)).lower() == wanted.lower() else math.inf
+    try:
+        number = parse_number(wanted)
+    except ValueError:
+        return wanted, math.inf
+    if value is None or value != value:
+        return number, math.inf
+    if name.endswith("_deg"):
+        return number, abs(math.radians(math.remainder(value - number, 360.0)))
+    if name.endswith("angle_rad"):
+        return number, abs(math.remainder(value - number, math.tau))
+    scale = abs(number) or max((abs(other) for other in column if other is not None), default=0.0)
+    return number, abs(value - number) / scale if scale else abs(value - number)

@@ -1,0 +1,71 @@
+"""`dalembert spin`: the rotation of a body in time."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from cli.read import options
+from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+
+
+class Method(StrEnum):
+    """How the rotation is found."""
+
+    exact = "exact"
+    integrate = "integrate"
+
+
+class Integrator(StrEnum):
+    """What integrates it."""
+
+    dop853 = "DOP853"
+    splitting = "splitting"
+
+
+def run(
+    body: Annotated[
+        str, typer.Argument(metavar="BODY.toml", help="The body and its state; - is standard input.")
+    ],
+    time: Annotated[
+        str | None,
+        typer.Option(metavar="START:STOP:STEP", help="Times in seconds, such as 0:10:0.01 or 0:10/1000."),
+    ] = None,
+    at: Annotated[list[str] | None, typer.Option(metavar="T", help="A time, s; may be repeated.")] = None,
+    method: Annotated[
+        Method | None,
+        typer.Option(
+            help="Default: exact wherever a closed form exists, else integrate.", show_default=False
+        ),
+    ] = None,
+    integrator: Annotated[
+        Integrator, typer.Option(help="For integration; the splitting is for a symmetric top.")
+    ] = Integrator.dop853,
+    json: Json = False,
+    output: Output = None,
+    plot: Plot = None,
+    expect: Expect = None,
+    rtol: Rtol = 1e-3,
+    text: Text = False,
+    digits: Digits = False,
+) -> None:
+    """Turn a body through time: angular velocity, attitude, momentum and energy at any instant.
+
+    BODY.toml holds inertia = [I1, I2, I3] (or a 3 × 3 matrix, or parts = "parts.csv"), kg·m²; omega in body axes,
+    rad/s; attitude = [w, x, y, z], body to space (default [1, 0, 0, 0]); if wanted a table [top] with mgl in N·m
+    (then inertia is about the fixed point, the axis is body z and gravity acts along -z of space), or torque =
+    [x, y, z] in N·m with frame = "body" or "space".
+    """
+    from cli.spin import solve as job
+
+    if time is not None and at:
+        raise options.bad("--at", "expected --time or --at, not both")
+    times = options.time_range("--time", time) if time is not None else [_time(text) for text in at or ["0"]]
+    shown = job.solve(body, times, method.value if method else None, integrator.value)
+    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)
+
+
+def _time(text: str) -> float:
+    return options.number_or_quantity("--at", text, "time")

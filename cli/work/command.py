@@ -1,0 +1,46 @@
+"""`dalembert work`: the balance of virtual power of a table of link states."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cli.read import options
+from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+
+
+def run(
+    states: Annotated[
+        str,
+        typer.Argument(
+            metavar="STATES", help="CSV of link states, the unknown marked ?; - is standard input."
+        ),
+    ],
+    gravity: Annotated[
+        str | None, typer.Option(metavar="GX,GY", help="Gravity, m/s², such as 0,-9.81 (default: none).")
+    ] = None,
+    ledger: Annotated[
+        bool, typer.Option("--ledger", help="Show the power of every term instead of the unknowns.")
+    ] = False,
+    json: Json = False,
+    output: Output = None,
+    plot: Plot = None,
+    expect: Expect = None,
+    rtol: Rtol = 1e-3,
+    text: Text = False,
+    digits: Digits = False,
+) -> None:
+    """Find the unknown force or torque that balances a table of link states, by virtual power.
+
+    STATES has one row per link (and per step): link, mass_*, inertia_*, vx_* vy_* and ax_* ay_* of the centre of
+    mass, omega_*, alpha_*, the applied force fx_* fy_* with the velocity fvx_* fvy_* of its point, torque_*; * is
+    a unit: mass_kg, vx_m_s, omega_rad_s, torque_N_m. Empty cells are zero (fv: the centre of mass's). One force or
+    torque cell holds ?; several unknowns are marked ?NAME and need as many velocity fields, told apart by a
+    column field.
+    """
+    g = 0j if gravity is None else options.plane_vector("--gravity", gravity)
+    from cli.work import solve as job
+
+    shown = job.balanced(job.read_states(states), g, ledger=ledger)
+    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)

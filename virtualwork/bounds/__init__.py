@@ -1,0 +1,1 @@
+"""Bounds of the rounding errors of motions and forces."""

@@ -1,0 +1,224 @@
+"""The effort at the inputs by virtual work: the velocity coefficients are the virtual displacements.
+
+For a unit of input j every point moves by K_j = ∂P/∂q_j and every link turns by κ_j = ∂θ/∂q_j, so that by
+d'Alembert's principle (Riul, unit II, eqs. 3 and 5, divided by the input's own displacement)
+
+    τ_j + Σ F·K_j + Σ T κ_j = 0,      F, T with the inertia loads −m a_G and −I α.
+
+Joint forces do no work and do not appear. A load whose point cannot move has no K and is never evaluated.
+
+Every K_j is Σ i z e^{iθ} κ_j over the links between the ground and the point. The effort gathers the loads by links
+first, Q_θ = Σ T + Σ (z e^{iθ}) × F, and is −Σ Q_θ κ_j; the ledger takes the loads one by one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from virtualwork.formulas.closed_forms import Number, dot
+from virtualwork.formulas.loads import Acting, Load, Rub, SpringEnd, TorsionEnd, plus, times
+from virtualwork.formulas.scene import Block, Scene
+from virtualwork.mechanism import GROUND
+from virtualwork.state import BLOCK
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Reals = NDArray[np.float64]
+
+
+def displacement(load: Load, block: Block, j: int) -> Number:
+    """The virtual displacement on which a load does work, for a unit of input j; None where it cannot move.
+
+    Of a spring between two moving points the first end carries the whole relative displacement, the second none:
+    action and reaction are one term. So does the friction of a guide on a moving link, whose displacement is the slide.
+    """
+    if isinstance(load, SpringEnd):
+        assert load.path is not None
+        assert load.spring is not None
+        if not load.first and load.spring.between[0][0] != GROUND:
+            return None
+        return plus(block.coefficient(load.path, j), times(block.coefficient(load.other, j), -1.0))
+    if isinstance(load, TorsionEnd):
+        assert load.spring is not None
+        a, b = load.spring.links
+        if load.sign < 0 and a != GROUND:
+            return None
+        turn = plus(block.turning(a, j), times(block.turning(b, j), -1.0))
+        return times(turn, load.sign)
+    if isinstance(load, Rub) and load.guide is not None and _rail(load, block) != GROUND:
+        if load.sign < 0:
+            return None
+        along = block.scene.plan.directions[load.guide] * block.st.turn[_rail(load, block)]
+        return times(block.by[j].slide[load.guide][0], along)
+    if load.path is None:
+        return block.turning(load.body, j)
+    return block.coefficient(load.path, j)
+
+
+def _rail(load: Rub, block: Block) -> str:
+    """The body that carries the guide in which a load rubs."""
+    assert load.guide is not None
+    return block.scene.mechanism.guides[load.guide].on
+
+
+def power(load: Load, block: Block, j: int) -> Number:
+    """The virtual work of a load for a unit of input j, or None: it is not evaluated where nothing moves."""
+    moved = displacement(load, block, j)
+    if moved is None:
+        return None
+    value = block.keep(load)
+    if value is None:
+        return None
+    return value * moved if load.path is None else dot(value, moved)
+
+
+def effort(scene: Scene) -> Reals:
+    """The effort at each input by virtual work, (n, k): N·m at a turning input, N at a slide."""
+    out = np.zeros((scene.motion.n, len(scene.mechanism.inputs)))
+
+    def work(block: Block) -> None:
+        write_effort(scene, block, out)
+        if scene.motion.n > BLOCK:
+            block.forget(lasting=True)
+
+    scene.each((), work)
+    return finished(scene, out)
+
+
+def write_effort(scene: Scene, block: Block, out: Reals) -> None:
+    """The generalized forces over one block."""
+    bearing = scene.bearing
+    for j in range(out.shape[1]):
+        total: Number = None
+        for body, guide, load in bearing.working:
+            moved = block.by[j].slide[guide][0] if body is None else block.turning(body, j)
+            if moved is not None:  # what cannot move is not evaluated
+                value = bearing.value(block, load)
+                total = plus(total, value if isinstance(moved, float) and moved == 1 else times(value, moved))
+        if total is not None:
+            np.negative(total, out=out[block.rows, j])
+            bad = _singular(scene, block, j)
+            if bad is not False:
+                out[block.rows, j][bad] = np.nan
+
+
+def finished(scene: Scene, out: Reals) -> Reals:
+    """The generalized forces as efforts: NaN where not assembled, no −0, through motors' carriers."""
+    if scene.lost is not None:
+        out[scene.lost] = np.nan
+    out += 0.0
+    return through_carriers(scene, out)
+
+
+def _singular(scene: Scene, block: Block, j: int) -> Any:
+    """Where a link turns more than 10¹³ times as fast as the input: at a dead point to rounding, no number is left."""
+    reach = scene.mechanism.size if scene.mechanism.inputs[j].is_slide else 1.0
+    found: Any = False
+    for group in scene.plan.groups:
+        for body in group.angles:
+            known = block.by[j].angle.get(body)
+            if not known or known[0] is None:
+                continue
+            # the norm over the block is above its largest entry: in most blocks it says that no link is so fast
+            if not np.sqrt(np.vdot(known[0], known[0])) * reach < 1e13:
+                found = found | ~(np.abs(known[0]) * reach < 1e13)
+    return found
+
+
+def carrier(scene: Scene | Acting, j: int) -> str:
+    """The body that feels the reaction of input j's torque: the carrier of its motor, else what it is driven on."""
+    entry = scene.mechanism.inputs[j]
+    return next((m.carrier for m in scene.mechanism.motors if m.drives == entry.link), entry.on)
+
+
+def through_carriers(scene: Scene, force: Reals) -> Reals:
+    """Turn generalized forces at the inputs into motor torques, where a motor sits on another body than `on`.
+
+    A motor's torque T acts on the driven link and −T on its carrier (000 §2.3), so Σ_j T_j ∂(θ_driven − θ_carrier)_j/∂q_i
+    is the generalized force i.
+    """
+    inputs = scene.mechanism.inputs
+    k = len(inputs)
+    moved = [j for j, e in enumerate(inputs) if not e.is_slide and carrier(scene, j) != e.on]
+    if not moved:
+        return force
+    motion = scene.motion
+    matrix = np.broadcast_to(np.eye(k), (motion.n, k, k)).copy()
+    for j in moved:
+        for i in range(k):
+            driven = motion.angle_coefficient(str(inputs[j].link), i)
+            matrix[:, i, j] = driven - motion.angle_coefficient(carrier(scene, j), i)
+    if k == 1:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(force / matrix[:, 0])
+    good: Any = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(force).all(axis=1)
+    out = np.full_like(force, np.nan)
+    regular: Any = np.asarray(
+        good & (np.abs(np.linalg.det(np.where(good[:, None, None], matrix, np.eye(k)))) > 1e-14)
+    )
+    out[regular] = np.linalg.solve(matrix[regular], force[regular][..., None])[..., 0]
+    return out
+
+
+def ledger(scene: Scene, j: int = 0) -> tuple[dict[str, Reals], list[str], list[str]]:
+    """Each load's virtual work for a unit of input j, which loads do none, and which are absent.
+
+    Returns
+    -------
+    works : dict of load name to (n,), N·m (or N for a slide)
+    workless : list of str
+        Loads that act where nothing can move: they were left out.
+    absent : list of str
+        Kinds of loads that the scene does not have, and why.
+    """
+    works: dict[str, Reals] = {}
+    workless: list[str] = []
+    for block in scene.blocks():
+        for load in [*scene.loads, *scene.rubs]:
+            value = power(load, block, j)
+            if value is None:
+                if (
+                    displacement(load, block, j) is None
+                    and load.name not in workless
+                    and not _reaction_end(load)
+                ):
+                    workless.append(load.name)
+                continue
+            known = works.setdefault(load.name, np.zeros(scene.motion.n))
+            known[block.rows] += value
+    return works, [name for name in workless if name not in works], absent(scene)
+
+
+def _reaction_end(load: Load) -> bool:
+    """Whether a load is the second side of a pair whose work its first side carries."""
+    return (
+        (isinstance(load, SpringEnd) and not load.first)
+        or (isinstance(load, TorsionEnd) and load.sign < 0)
+        or (isinstance(load, Rub) and load.guide is not None and load.sign < 0)
+    )
+
+
+def absent(scene: Scene) -> list[str]:
+    """Which terms of eq. (5) the scene does not have, and why: they are never formed."""
+    m, found = scene.mechanism, []
+    massless = [body for body, r in scene.rigid.items() if not r.mass]
+    if massless:
+        found.append(f"{', '.join(massless)}: no weight and no inertia force, for there is no mass")
+    flat = [body for body, r in scene.rigid.items() if r.mass and not r.inertia]
+    if flat:
+        found.append(f"{', '.join(flat)}: no inertia torque, for there is no inertia")
+    if not m.gravity:
+        found.append("no weights: gravity is zero")
+    if not scene.moves:
+        found.append("no inertia loads, no damping, no friction: speed and acceleration are zero")
+    for what, entries in (
+        ("applied forces", m.forces),
+        ("applied torques", m.torques),
+        ("springs", m.springs),
+    ):
+        if not entries:
+            found.append(f"no {what} in the file")
+    return found

@@ -1,0 +1,164 @@
+"""Joint forces by Newton and Euler over the poses of a motion, each formed when it is asked for.
+
+How they follow from each other is worked out once for a mechanism (`bearing`); here the sums become arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from virtualwork.formulas.closed_forms import Number, dot
+from virtualwork.formulas.load_paths import carried
+from virtualwork.formulas.loads import path_reads, plus, times
+from virtualwork.formulas.scene import Block, Scene
+from virtualwork.joints import Joint, Side
+from virtualwork.mechanism import GROUND
+from virtualwork.state import BLOCK
+
+if TYPE_CHECKING:
+    from virtualwork.mechanism import Mechanism
+
+__all__ = ["Joint", "Reactions"]
+
+
+class Reactions:
+    """The joint forces of a scene, each formed when it is first asked for."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.bearing = scene.bearing
+        self.order = self.bearing.order
+        self.plan = scene.plan
+        self.mechanism: Mechanism = scene.mechanism
+        self.joints, self.by_key = self.order.joints, self.order.by_key
+
+    @property
+    def formed(self) -> set[str]:
+        """The names of what has been formed, for `--explain` and the tests."""
+        return self.scene.formed
+
+    @property
+    def redundant(self) -> bool:
+        """Whether statics cannot give every joint force: more unknowns than equations."""
+        return self.order.redundant
+
+    # --- values over one block ------------------------------------------------------------------------------------
+    def force(self, block: Block, body: str) -> Number:
+        """The sum of the loads on a body."""
+        return self.bearing.force(body).value(block)
+
+    def moment(self, block: Block, body: str) -> Number:
+        """The moment of the loads on a body about its centre of mass."""
+        return self.bearing.moment(body, self.scene.rigid[body].center).value(block)
+
+    def on_side(self, block: Block, side: Side) -> Number:
+        """The force of a joint on a body, complex; None where it is zero throughout."""
+        joint, body = side
+        self.formed.add(f"{joint} on {body}")
+        return self.bearing.value(block, self.bearing.side(side))
+
+    def place(self, block: Block, side: Side) -> Number:
+        """Where a joint's force acts, from the body's centre of mass, in ground axes."""
+        body = side[1]
+        z, guide, direction = self.bearing.place(side)
+        z -= self.scene.rigid[body].center
+        return (z if guide is None else z + direction * block.st.slide[guide]) * block.st.turn[body]
+
+    # --- over all poses -------------------------------------------------------------------------------------------
+    @cached_property
+    def keys(self) -> tuple[str, ...]:
+        """What the places of all joints hang on."""
+        keys: set[str] = set()
+        for body in self.mechanism.links:
+            keys |= path_reads(self.scene.path(body, self.scene.rigid[body].center)) | {f"angle:{body}"}
+        for i in range(len(self.mechanism.guides)):
+            keys.add(f"slide:{i}")
+        for group in self.plan.groups:
+            keys |= self.plan.reads(group) | set(self.plan.writes(group))
+        return tuple(sorted(keys))
+
+    def blocks(self) -> list[Block]:
+        """The scene's blocks, with what all joints' places hang on."""
+        return self.scene.blocks(self.keys)
+
+    def over(
+        self,
+        *forms: Callable[[Block], Number],
+        kind: type = float,
+        also: Callable[[Block], None] | None = None,
+    ) -> list[Any]:
+        """Quantities over all blocks, formed block by block together; NaN where a pose is not assembled.
+
+        `also` is called with each block while what they are made of is there.
+        """
+        if carried(self.scene):
+            _ = self.scene.drive  # over all poses, before the blocks are solved one by one
+        n = self.scene.motion.n
+        found: list[Any] = [np.empty(n, dtype=kind) for _ in forms]
+
+        def work(block: Block) -> None:
+            for out, form in zip(found, forms, strict=True):
+                value = form(block)
+                out[block.rows] = 0.0 if value is None else value
+            if also is not None:
+                also(block)
+            if n > BLOCK:  # over a long sweep what the quantities were made of is not kept
+                block.forget(lasting=True)
+
+        self.scene.each(self.keys, work)
+        if self.scene.lost is not None:
+            for out in found:
+                out[self.scene.lost] = np.nan
+        return found
+
+    def joint_force(self, block: Block, joint: Joint, body: str) -> Number:
+        """The force of a joint on a body over a block, without the force of an input that drives it."""
+        value = plus(self.on_side(block, (joint.key, body)), self._rubbed(block, joint, body))
+        if joint.guide is not None and value is not None and self._driving(joint.guide) is not None:
+            rail = self.rail(block, joint.guide)
+            value = value - dot(value, rail) * rail
+        return value
+
+    def _rubbed(self, block: Block, joint: Joint, body: str) -> Number:
+        """The friction force along a guide belongs to its reaction."""
+        total: Number = None
+        for load in self.scene.rubs:
+            if load.path is None or load.joint != joint.key:
+                continue
+            if body == GROUND:  # no load stands there: it feels the reverse of the other body's
+                total = plus(total, times(load.value(block), -1.0))
+            elif load.body == body:
+                total = plus(total, load.value(block))
+        return total
+
+    def _driving(self, guide: int) -> int | None:
+        point = self.mechanism.guides[guide].point
+        return next((j for j, e in enumerate(self.mechanism.inputs) if e.slider == point), None)
+
+    def rail(self, block: Block, guide: int | None) -> Number:
+        """The direction of a guide, a unit vector."""
+        assert guide is not None
+        on = self.mechanism.guides[guide].on
+        d = self.plan.directions[guide]
+        return d if on == GROUND else d * block.st.turn[on]
+
+    def guide_moment(self, block: Block, guide: int, body: str) -> Number:
+        """The moment a guide puts on one of its bodies about its point, over a block."""
+        g = self.mechanism.guides[guide]
+        if not g.is_slider:
+            return None
+        couple = self.bearing.couple("guide", guide)
+        return self.bearing.value(block, couple if body == g.link else couple.times(-1.0))
+
+    def effort(self, block: Block, j: int) -> Number:
+        """The effort at input j by Newton and Euler: ΣM = 0 of the driven link, or the force along the slide."""
+        entry = self.mechanism.inputs[j]
+        if not entry.is_slide:
+            return self.bearing.value(block, self.bearing.couple("input", j))
+        guide = next(i for i, g in enumerate(self.mechanism.guides) if g.point == entry.slider)
+        value = self.on_side(block, (f"guide:{guide}", self.mechanism.guides[guide].link))
+        return None if value is None else dot(value, self.rail(block, guide))

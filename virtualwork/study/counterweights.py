@@ -1,0 +1,130 @@
+"""Counterweights that balance the shaking force of a mechanism: completely, or best in the mean square.
+
+The bridge between a rotor and a mechanism: on a link that turns about a fixed pivot a counterweight of mass times
+radius u (complex, in the link's axes) adds the shaking force −u·d²(e^{iθ})/dt². The shaking force is linear in u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from virtualwork.describe.errors import DescriptionError
+from virtualwork.mechanism import GROUND
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from virtualwork.mechanism import Mechanism
+    from virtualwork.motion import Motion
+
+    Complexes = NDArray[np.complex128]
+
+
+def pivot(mechanism: Mechanism, link: str) -> complex:
+    """The point of a link that is pinned to the ground.
+
+    Raises
+    ------
+    DescriptionError
+        Where the link has none: a counterweight on it would shake with its own mass.
+    """
+    if link not in mechanism.links:
+        raise DescriptionError(f"counterweights: unknown link '{link}'")
+    for name, bodies in mechanism.pins.items():
+        if GROUND in bodies and link in bodies:
+            return mechanism.links[link].points[name]
+    raise DescriptionError(
+        f"counterweights: link '{link}' does not turn about a pin of the ground: expected one that does"
+    )
+
+
+def least_squares(motion: Motion, links: Sequence[str]) -> tuple[dict[str, complex], Complexes, Complexes]:
+    """Return the counterweights on links with a fixed pivot that leave the least RMS shaking force of inertia.
+
+    Parameters
+    ----------
+    motion : Motion
+        The cycle to be balanced, at a speed other than zero.
+    links : sequence of str
+        Which links carry a counterweight.
+
+    Returns
+    -------
+    weights : dict of link to mass times radius, complex kg·m in the link's axes, from its pivot
+    before, after : complex (n,)
+        The shaking force of inertia, N, without and with them.
+
+    Notes
+    -----
+    Solved by orthogonal factors, never by normal equations. Where two links turn alike (a parallelogram's cranks)
+    only the sum of their counterweights counts: that is an error and names them.
+    """
+    scene = motion.dynamics.scene
+    if not scene.moves:
+        raise DescriptionError("counterweights: the speed is zero: expected a motion that shakes")
+    before = np.zeros(motion.n, complex)
+    for block in scene.blocks():
+        for load in scene.loads:
+            if load.kind == "inertia force":
+                value = block.keep(load)
+                if value is not None:
+                    before[block.rows] += value
+    columns = []
+    for link in links:
+        z = pivot(motion.mechanism, link)
+        # of two points a metre apart on the link, about a fixed pivot: −d²(e^{iθ})/dt²
+        columns.append(-motion.at(link, z + 1.0).complex(2))
+    matrix = np.stack(columns, axis=1)
+    rows = np.isfinite(before) & np.isfinite(matrix).all(axis=1) & motion.assembled
+    size = np.linalg.norm(matrix[rows], axis=0)
+    u, s, vh = np.linalg.svd(matrix[rows] / size, full_matrices=False)
+    if not s[-1] > 1e-10 * s[0]:
+        part = np.abs(vh[-1]) > 1e-6
+        alike = ", ".join(link for link, own in zip(links, part, strict=True) if own)
+        raise DescriptionError(
+            f"counterweights: {alike} turn alike: only a combination of theirs counts; leave one out"
+        )
+    weights = (vh.conj().T @ ((u.conj().T @ -before[rows]) / s)) / size
+    after = before + matrix @ weights
+    return dict(zip(links, (complex(w) for w in weights), strict=True)), before, after
+
+
+def berkof_lowen(mechanism: Mechanism, crank: str, coupler: str, rocker: str) -> dict[str, complex]:
+    """Return the counterweights on crank and rocker that balance a four-bar's shaking force completely.
+
+    R. S. Berkof and G. G. Lowen (J. Eng. Ind. 91, 1969, 21): the common centre of mass rests where, by the loop
+    closure, the coupler's mass is shared between its two pins, m₃ (1 − z₃/l₃) at the crank's and m₃ z₃/l₃ at the
+    rocker's (complex shares, z₃ in the coupler's axes along its pins), and each turning link is balanced with its share.
+
+    Returns
+    -------
+    dict of link to mass times radius, complex kg·m, in the link's axes from its pivot; for the crank and the rocker
+
+    Examples
+    --------
+    >>> from virtualwork.mechanism import Link, Mechanism
+    >>> four = Mechanism({"A": 0j, "D": 4}, {"crank": Link({"A": 0j, "B": 1}, mass=1, center=0.5),
+    ...     "coupler": Link({"B": 0j, "C": 3}, mass=3, center=1), "rocker": Link({"D": 0j, "C": 2}, mass=2, center=1)})
+    >>> berkof_lowen(four, "crank", "coupler", "rocker")
+    {'crank': (-2.5-0j), 'rocker': (-4-0j)}
+    """
+    links = mechanism.links
+
+    def shared(a: str, b: str) -> str:
+        common = [p for p in links[a].points if p in links[b].points]
+        if len(common) != 1:
+            raise DescriptionError(f"counterweights: {a} and {b} are not pinned to each other at one point")
+        return common[0]
+
+    b, c = shared(crank, coupler), shared(coupler, rocker)
+    body = links[coupler]
+    share = (body.center - body.points[b]) / (body.points[c] - body.points[b])
+    found = {}
+    for link, point, part in ((crank, b, 1 - share), (rocker, c, share)):
+        base = pivot(mechanism, link)
+        own = links[link].mass * (links[link].center - base)
+        found[link] = -(own + body.mass * part * (links[link].points[point] - base))
+    return found

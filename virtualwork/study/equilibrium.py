@@ -1,0 +1,412 @@
+"""Where a mechanism rests under its loads without effort, and whether it stays there.
+
+At rest the effort is τ_j = −Q_j with the generalized force Q_j = Σ F·K_j + Σ T κ_j (Riul, unit II, eq. 3). A position
+with Q = 0 is an equilibrium; it is stable where the second variation of the potential is positive (Lagrange and
+Dirichlet), V″ = −∂Q/∂q. The derivative is exact: ∂Q/∂q needs the second-order coefficients L = ∂²P/∂q², and no
+difference of neighbouring positions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import combinations, product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from virtualwork.formulas.closed_forms import Number, dot
+from virtualwork.formulas.effort import power
+from virtualwork.formulas.loads import (
+    Constant,
+    Follower,
+    Load,
+    Path,
+    SpringEnd,
+    Tabled,
+    TorsionEnd,
+    path_reads,
+    plus,
+    times,
+)
+from virtualwork.formulas.scene import Block, Scene
+from virtualwork.mechanism import GROUND
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from virtualwork.mechanism import Mechanism
+    from virtualwork.state import Jets
+
+    Reals = NDArray[np.float64]
+
+SAMPLES = 1440
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A position of rest.
+
+    `inputs` are the inputs, rad or m; `stable` is None where the second variation does not decide; `stiffness` is
+    V″ (the smallest eigenvalue for several inputs); `potential` is V, J, None under loads that have none.
+    """
+
+    inputs: tuple[float, ...]
+    stable: bool | None
+    stiffness: float
+    potential: float | None
+    mechanism: Mechanism | None = field(default=None, repr=False, compare=False)
+
+    def error_estimate(self) -> tuple[float, ...]:
+        """Return a bound of the rounding error of each input, rad or m: the error of Q over its slope, |V″⁻¹|·δQ.
+
+        Infinite where the second variation vanishes. The dimensions and the loads are taken as exact.
+
+        Examples
+        --------
+        >>> from virtualwork.mechanism import Input, Link, Mechanism
+        >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="bob"),
+        ...                      gravity=-9.81j)
+        >>> down = equilibria(pendulum).found[1]
+        >>> abs(down.inputs[0] - 1.5 * np.pi) < down.error_estimate()[0] < 1e-14
+        True
+        """
+        assert self.mechanism is not None
+        rest = Rest(self.mechanism, np.array([self.inputs]))
+        error = rest.motion.dynamics.error_estimate().generalized[0]
+        stiffness = rest.hessian()[0]
+        # the search ends where half a bracket, or a step, is below two units in the last digit
+        own = 4 * EPS * np.maximum(np.abs(self.inputs), 2 * np.pi / SAMPLES)
+        try:
+            moved = np.abs(np.linalg.inv(stiffness)) @ error
+        except np.linalg.LinAlgError:
+            moved = np.full(len(own), np.inf)
+        return tuple((moved + own).tolist())
+
+
+@dataclass(frozen=True)
+class Equilibria:
+    """All equilibria found.
+
+    `everywhere`: the loads balance in every position of the range. `region`: with several inputs, positions of rest
+    fill a part of the range and are not listed. `loaded`: something acts at rest.
+    """
+
+    found: tuple[Equilibrium, ...]
+    everywhere: bool = False
+    region: bool = False
+    loaded: bool = True
+
+
+def _second(load: Load, block: Block, jets: Jets) -> Number:
+    """The derivative of a load's virtual work along the direction of the jets."""
+
+    def vector(path: Path | None, k: int) -> Number:
+        assert path is not None
+        return jets.vector(path[0], path[1], k)
+
+    def angle(body: str, k: int) -> Number:
+        return None if body == GROUND else jets.angle[body][k - 1]
+
+    if isinstance(load, SpringEnd):
+        s = load.spring
+        assert s is not None
+        assert load.path is not None
+        if (not load.first and s.between[0][0] != GROUND) or not s.stiffness:
+            return None
+        d = block.position(load.other) - block.position(load.path)
+        d1 = plus(vector(load.other, 1), times(vector(load.path, 1), -1.0))
+        d2 = plus(vector(load.other, 2), times(vector(load.path, 2), -1.0))
+        if d1 is None:
+            return None
+        share: Number = 1.0
+        turn: Number = 0.0
+        if s.free_length:
+            length = abs(d)
+            share, turn = 1 - s.free_length / length, s.free_length / length**3 * dot(d, d1) ** 2
+        bend = dot(d1, d1) if d2 is None else dot(d1, d1) + dot(d, d2)
+        return -s.stiffness * (share * bend + turn)
+    if isinstance(load, TorsionEnd):
+        t = load.spring
+        assert t is not None
+        if (load.sign < 0 and t.links[0] != GROUND) or not t.stiffness:
+            return None
+        a, b = t.links
+        r1 = plus(angle(b, 1), times(angle(a, 1), -1.0))
+        r2 = plus(angle(b, 2), times(angle(a, 2), -1.0))
+        if r1 is None:
+            return None
+        return -t.stiffness * plus(r1 * r1, times(block.scene.wound(block, t), r2))
+    value = block.keep(load)
+    if value is None:
+        return None
+    if load.path is None:
+        return times(angle(load.body, 2), value)
+    second, first = vector(load.path, 2), vector(load.path, 1)
+    total: Number = None if second is None else dot(value, second)
+    if first is not None and isinstance(load, Follower):
+        turning = angle(load.body, 1)
+        total = plus(total, None if turning is None else dot(1j * value * turning, first))
+    if first is not None and isinstance(load, Tabled):
+        total = plus(total, dot(load.slope(block), first))
+    return total
+
+
+def potential_of(load: Load, block: Block) -> Number:
+    """The potential of a load; NaN for one that has none."""
+    if isinstance(load, SpringEnd):
+        assert load.spring is not None
+        assert load.path is not None
+        if not load.first and load.spring.between[0][0] != GROUND:
+            return None
+        stretch = abs(block.position(load.other) - block.position(load.path)) - load.spring.free_length
+        return 0.5 * load.spring.stiffness * stretch * stretch
+    if isinstance(load, TorsionEnd):
+        assert load.spring is not None
+        if load.sign < 0 and load.spring.links[0] != GROUND:
+            return None
+        angle = block.scene.wound(block, load.spring)
+        return 0.5 * load.spring.stiffness * angle * angle
+    if isinstance(load, Constant) and load.path is not None:
+        return -dot(load.amount, block.position(load.path))
+    if isinstance(load, Constant):
+        known = block.scene.plan.angles[load.body]
+        if known.bases:
+            return np.nan  # a torque on a link whose whole turns are not known
+        return -load.amount * block.st.affine(known)
+    return np.nan
+
+
+class Rest:
+    """Generalized forces, their derivative and the potential of a mechanism at rest at given inputs (n, k)."""
+
+    def __init__(self, mechanism: Mechanism, inputs: Reals) -> None:
+        self.mechanism, self.inputs = mechanism, inputs
+        self.k = inputs.shape[1]
+        self.motion = mechanism.motion(inputs if self.k > 1 else inputs[:, 0], 0.0, 0.0)
+        self.scene = Scene(self.motion, at_rest=True)
+
+    def force(self) -> tuple[Reals, Reals]:
+        """Q and the sum of the sizes of its terms, each (n, k)."""
+        n = len(self.inputs)
+        total, size = np.zeros((n, self.k)), np.zeros((n, self.k))
+        for block in self.scene.blocks():
+            for j in range(self.k):
+                for load in self.scene.loads:
+                    value = power(load, block, j)
+                    if value is not None:
+                        total[block.rows, j] += value
+                        size[block.rows, j] += np.abs(value)
+        total[np.logical_not(self.motion.assembled)] = np.nan
+        return total, size
+
+    def along(self, direction: Reals) -> Reals:
+        """∂Q/∂q along a direction in the inputs, times the direction: d²(work), (n,)."""
+        motion = (
+            self.motion
+            if self.k == 1
+            else self.mechanism.motion(self.inputs, direction[None] * np.ones((len(self.inputs), 1)), 0.0)
+        )
+        scene = self.scene if self.k == 1 else Scene(motion, at_rest=True)
+        keys = tuple(sorted(scene.reads(scene.loads)))
+        jets = motion._solve(keys, 2)
+        total = np.zeros(len(self.inputs))
+        for i, block in enumerate(scene.blocks()):
+            for load in scene.loads:
+                value = _second(load, block, jets[i])
+                if value is not None:
+                    total[block.rows] += value
+        return total * (direction[0] ** 2 if self.k == 1 else 1.0)
+
+    def hessian(self) -> Reals:
+        """V″, (n, k, k), by polarization of exact second derivatives along the inputs and their pairs."""
+        k = self.k
+        unit = np.eye(k)
+        out = np.zeros((len(self.inputs), k, k))
+        for i in range(k):
+            out[:, i, i] = -self.along(unit[i])
+        for i, j in combinations(range(k), 2):
+            both = -self.along(unit[i] + unit[j])
+            out[:, i, j] = out[:, j, i] = (both - out[:, i, i] - out[:, j, j]) / 2
+        return out
+
+    def potential(self) -> Reals:
+        """V, (n,) J; NaN where a load has no potential."""
+        total = np.zeros(len(self.inputs))
+        keys = {key for load in self.scene.loads if load.path is not None for key in path_reads(load.path)}
+        for block in self.scene.blocks(sorted(keys)):
+            for load in self.scene.loads:
+                value = potential_of(load, block)
+                if value is not None:
+                    total[block.rows] += value
+        return total
+
+
+def equilibria(mechanism: Mechanism, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:
+    """Return every position in which a mechanism rests under its loads without effort, each stable or not.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With its gravity, constant and follower forces, torques, springs. Dampers and friction do not act at rest.
+    spans : array (k, 2), optional
+        The range of each input, rad or m. Default: a whole turn; for a slide, two sizes of the mechanism either way.
+    samples : int
+        How finely the range of one input is looked through for sign changes; every root is then found to rounding.
+
+    Returns
+    -------
+    Equilibria
+
+    Examples
+    --------
+    A pendulum hangs stably and stands unstably.
+
+    >>> from virtualwork.mechanism import Input, Link, Mechanism
+    >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="bob"),
+    ...                      gravity=-9.81j)
+    >>> [(round(float(np.degrees(e.inputs[0]))), e.stable) for e in equilibria(pendulum).found]
+    [(90, False), (270, True)]
+    """
+    k = len(mechanism.inputs)
+    at = np.asarray(mechanism.at, dtype=float)
+    if spans is None:
+        slide = np.array([e.is_slide for e in mechanism.inputs])
+        low = np.where(slide, at - 2 * mechanism.size, 0.0)
+        high = np.where(slide, at + 2 * mechanism.size, 2 * np.pi)
+        ranges = np.stack([low, high], axis=1)
+    else:
+        ranges = np.asarray(spans, dtype=float).reshape(k, 2)
+    return _one(mechanism, ranges[0], samples) if k == 1 else _many(mechanism, ranges)
+
+
+def _one(mechanism: Mechanism, span: Reals, samples: int) -> Equilibria:
+    whole = not mechanism.inputs[0].is_slide and abs(span[1] - span[0] - 2 * np.pi) < 1e-12
+    q = np.linspace(span[0], span[1], samples + 1)
+    rest = Rest(mechanism, q[:, None])
+    force, size = (values[:, 0] for values in rest.force())
+    good = np.isfinite(force)
+    if not good.any():
+        return Equilibria(())
+    scale = float(size[good].max())
+    # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart
+    if not np.median(np.abs(force[good])) > 1e-12 * scale:
+        return Equilibria((), everywhere=True, loaded=scale > 0)
+    slope = rest.along(np.ones(1))
+    # what the rounding of the terms, or of the input itself, makes of zero: the end of a range may be a root
+    shift = 2 * EPS * np.abs(q * np.where(np.isfinite(slope), slope, 0.0))
+    tiny = np.abs(force) <= 64 * EPS * size + shift
+    sign = np.where(tiny, 0.0, np.sign(force))
+    roots = list(q[tiny & good])
+    here = np.flatnonzero(good[:-1] & good[1:] & (sign[:-1] * sign[1:] < 0))
+    if len(here):
+        roots += list(_refine(mechanism, q[here], q[here + 1], force[here]))
+    # a root that the force only touches: its derivative changes sign where it is small
+    touch = np.flatnonzero(good[:-1] & good[1:] & (sign[:-1] * sign[1:] > 0) & (slope[:-1] * slope[1:] < 0))
+    touch = touch[np.minimum(np.abs(force[touch]), np.abs(force[touch + 1])) < 1e-4 * scale]
+    if len(touch):
+        flat = _refine(mechanism, q[touch], q[touch + 1], slope[touch], order=1)
+        value, around = (v[:, 0] for v in Rest(mechanism, flat[:, None]).force())
+        roots += list(flat[np.abs(value) <= 1e-13 * np.maximum(around, scale)])
+    roots = sorted(roots)
+    if whole and len(roots) > 1 and roots[-1] - roots[0] > 2 * np.pi - 1e-9:
+        roots.pop()
+    unit = 1.0 if not mechanism.inputs[0].is_slide else mechanism.size
+    distinct = [root for i, root in enumerate(roots) if i == 0 or root - roots[i - 1] > 1e-8 * unit]
+    return _judged(mechanism, np.array(distinct)[:, None], scale)
+
+
+def _refine(mechanism: Mechanism, low: Reals, high: Reals, at_low: Reals, order: int = 0) -> Reals:
+    """Roots of Q (order 0) or of ∂Q/∂q (order 1) in brackets, all at once: Newton's step where it stays inside."""
+    a, b, below = low.copy(), high.copy(), np.sign(at_low)
+    x = (a + b) / 2
+    for _ in range(80):
+        rest = Rest(mechanism, x[:, None])
+        value = rest.force()[0][:, 0] if order == 0 else rest.along(np.ones(1))
+        left = np.sign(value) == below
+        a, b = np.where(left, x, a), np.where(left, b, x)
+        step = (a + b) / 2
+        if order == 0:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                newton = x - value / rest.along(np.ones(1))
+            step = np.where((newton > a) & (newton < b), newton, step)
+            step = np.where(value == 0, x, step)
+        if (np.abs(step - x) <= 2 * EPS * np.maximum(np.abs(x), np.abs(high - low))).all():
+            break
+        x = step
+    return np.asarray(x)
+
+
+def _judged(mechanism: Mechanism, inputs: Reals, scale: float) -> Equilibria:
+    """Stability and potential of the positions found; those that are none (a pole between two signs) are dropped."""
+    if not len(inputs):
+        return Equilibria(())
+    rest = Rest(mechanism, inputs)
+    force, size = rest.force()
+    true = (np.abs(force) <= 1e-8 * np.maximum(size, 1e-3 * scale)).all(axis=1)
+    hessian, potential = rest.hessian(), rest.potential()
+    found = []
+    for i in np.flatnonzero(true):
+        low = float(np.linalg.eigvalsh(hessian[i])[0])
+        small = 1e-9 * max(float(np.abs(hessian[i]).max()), scale * 1e-3)
+        found.append(
+            Equilibrium(
+                tuple(float(v) for v in inputs[i]),
+                None if abs(low) <= small else low > 0,
+                low,
+                float(potential[i]) if np.isfinite(potential[i]) else None,
+                mechanism,
+            )
+        )
+    return Equilibria(tuple(found))
+
+
+def _many(mechanism: Mechanism, ranges: Reals) -> Equilibria:
+    """Several inputs: Newton on Q from a grid of starts, all at once."""
+    k = len(ranges)
+    per = max(4, round(4000 ** (1 / k)))
+    per = min(per, 40)
+    axes = [np.linspace(low, high, per, endpoint=False) + (high - low) / (2 * per) for low, high in ranges]
+    x = np.array(list(product(*axes)))
+    force, size = Rest(mechanism, x).force()
+    good = np.isfinite(force).all(axis=1)
+    if not good.any():
+        return Equilibria(())
+    x = x[good]
+    scale = float(size[good].max())
+    # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart
+    if not np.median(np.abs(force[good])) > 1e-12 * scale:
+        return Equilibria((), everywhere=True, loaded=scale > 0)
+    # the most promising starts: where no neighbour is nearer to balance would do; a few hundred suffice
+    x = x[np.argsort(np.abs(force[good]).max(axis=1))[:400]]
+    reach = (ranges[:, 1] - ranges[:, 0]) / per
+    for _ in range(60):
+        rest = Rest(mechanism, x)
+        force, _ = rest.force()
+        stiff = rest.hessian()
+        keep = np.isfinite(force).all(axis=1) & np.isfinite(stiff).all(axis=(1, 2))
+        x, force, stiff = x[keep], force[keep], stiff[keep]
+        if not len(x):
+            return Equilibria(())
+        step = np.stack([np.linalg.lstsq(h, f, rcond=1e-12)[0] for h, f in zip(stiff, force, strict=True)])
+        step *= np.minimum(1.0, 1.0 / np.maximum(np.abs(step / reach).max(axis=1), 1e-300))[:, None]
+        x = x + step
+        if (np.abs(step) <= 4 * EPS * np.maximum(np.abs(x), reach)).all():
+            break
+    force, size = Rest(mechanism, x).force()
+    settled = (np.abs(force) <= 1e-10 * np.maximum(size, 1e-3 * scale)).all(axis=1)
+    x = x[settled]
+    turning = np.array([not e.is_slide for e in mechanism.inputs])
+    x = np.where(turning, np.mod(x, 2 * np.pi), x)
+    x = np.where(turning & (2 * np.pi - x < 1e-9), 0.0, x)
+    unit = np.where(turning, 1.0, mechanism.size)
+    distinct: list[Any] = []
+    for row in x[np.lexsort(np.round(x / unit, 7).T[::-1])] if len(x) else []:
+        gaps = [(row - other) / unit for other in distinct]
+        gaps = [np.where(turning, np.abs(np.angle(np.exp(1j * gap))), np.abs(gap)) for gap in gaps]
+        if not any((gap < 1e-6).all() for gap in gaps):
+            distinct.append(row)
+    judged = _judged(mechanism, np.array(distinct).reshape(-1, k), scale)
+    undecided = sum(e.stable is None for e in judged.found)
+    # isolated equilibria are few; dozens that no second variation tells apart are points of a continuum
+    return Equilibria((), region=True) if undecided > 32 else judged

@@ -1,0 +1,1 @@
+"""Formulas of the books that need no mechanism: combinations of motion, tables of link states."""
