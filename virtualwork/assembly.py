@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, known_by_guess, plan
-from virtualwork.describe.errors import AssemblyError, MobilityError
+from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError
 from virtualwork.formulas.closed_forms import Number, cross, dot
-from virtualwork.newton import every_solution, guessed_unknowns, newton, write_unknowns
-from virtualwork.state import Case, State, place
+from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
+from virtualwork.newton import every_solution, guessed_unknowns, newton, singular_poses, write_unknowns
+from virtualwork.state import Case, State, columns, place
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -164,7 +165,51 @@ class _Chooser:
         self.phases: dict[int, float] = {}  # of the gears: Σ c·θ
 
     def choose(self) -> Assembly:
+        """The assembly; a mechanism of which a part floats is refused by that part's name."""
         st = State(list(self.m.at), many=False)
+        try:
+            if any(2 * len(g.closures) < len(g.angles) + len(g.slides) for g in self.plan.groups):
+                raise MobilityError("[input]: constraints that depend on each other leave a part free")
+            found = self._choose(st)
+        except (MechanismError, ZeroDivisionError) as error:
+            self._refuse_floating()
+            if isinstance(error, MechanismError):
+                raise
+            raise AssemblyError(
+                "[guess] at: singular there, so that no direction is determined; give another `at`"
+            ) from None
+        if self._singular(found, st):
+            self._refuse_floating()
+        return found
+
+    def _singular(self, found: Assembly, st: State) -> bool:
+        """Whether a group has a singular Jacobian at the guess, or none at all."""
+        for group in found.plan.groups:
+            if group.kind != "Newton":
+                if not st.margin.get(group.name, 0.0) > 1e-12:
+                    return True
+            elif singular_poses(columns(group, st, found.plan), len(group.angles), 1)[0]:
+                return True
+        return False
+
+    def _refuse_floating(self) -> None:
+        """Refuse a mechanism of which a part is free though the count of its joints and inputs says otherwise."""
+        x = []
+        for name, link in self.m.links.items():
+            turn = complex(np.exp(1j * self.angles.get(name, 0.0)))
+            origin = next((self.points[p] - z * turn for p, z in link.points.items() if p in self.points), 0j)
+            x += [self.angles.get(name, 0.0), origin.real / self.m.size, origin.imag / self.m.size]
+        found = hidden_freedom(self.m, np.array(x))
+        if found is not None:
+            links, joints = found
+            names = ", ".join(e.name for e in self.m.inputs)
+            raise MobilityError(
+                f"a free degree of freedom: {', '.join(links)} can still move while every input ({names}) is held, "
+                f"though by the count the mobility is {self.plan.blocks.mobility}: {', '.join(joints)} "
+                "depend on each other; join the part that is free"
+            )
+
+    def _choose(self, st: State) -> Assembly:
         signs: dict[str, int] = {}
         starts: dict[str, Any] = {}
         steps: list[Step] = []
@@ -198,9 +243,7 @@ class _Chooser:
 
     def _refuse_overdriven(self, done: Plan, st: State) -> None:
         """Constraints that depend on each other may leave less motion than there are inputs."""
-        from virtualwork.check import constraint_jacobian
-
-        _, jacobian = constraint_jacobian(self.m, st)
+        jacobian = Constraints.at(self.m, coordinates(self.m, done, st), {}).jacobian
         try:
             s = np.linalg.svd(jacobian, compute_uv=False)
         except np.linalg.LinAlgError:
@@ -221,7 +264,7 @@ class _Chooser:
         Of more of them all but the last are those of the guessed angles.
         """
         angle = step.angle
-        for i, p in angle.gears[:-1]:
+        for i, _ in angle.gears[:-1]:
             self.phases.setdefault(i, self._constant(i, st))
         for i, p in angle.gears[-1:]:
             if i not in self.phases and all(b in st.angle for b, _ in angle.bases):
@@ -340,7 +383,7 @@ class _Chooser:
             raise AssemblyError(self._choices(group, [t for _, t in found]))
         best = int(np.argmin(distances))
         sign, chosen = found[best]
-        for name in ("turn", "point", "slide", "angle"):
+        for name in ("turn", "point", "slide", "angle", "margin"):
             getattr(st, name).update(getattr(chosen, name))
         return sign
 

@@ -203,15 +203,13 @@ class _Planner:
         own = {body: body for body in group.angles}
         for tie in group.ties:
             bases = [(b, r) for b, r in tie.angle.bases if b in group.angles]
-            if (
-                len(bases) != 1
-                or len(tie.angle.bases) != 1
-                or bases[0][1] != 1.0
-                or tie.angle.gears
-            ):
+            if len(bases) != 1 or len(tie.angle.bases) != 1 or bases[0][1] != 1.0 or tie.angle.gears:
                 return "Newton"
             own[tie.body] = bases[0][0]
         terms = group.closures[0].terms
+        held = {own.get(t.body) for t in terms} | {t.slide for t in terms}
+        if not held.issuperset((*group.angles, *group.slides)):
+            return "Newton"  # an unknown that its loop does not hold
         turning = {own.get(t.body) for t in terms if t.slide in group.slides and t.slide is not None}
         if len(group.angles) == 2:
             return "RRR"
@@ -249,7 +247,9 @@ class _Planner:
                 if body not in fresh:
                     known = _plus(known, self.angles[body], -factor)
             unknown = {body: factor for body, factor in c.items() if body in fresh}
-            if right.gears:  # its constant is that of the guess, at once where no link before it has to be placed
+            if (
+                right.gears
+            ):  # its constant is that of the guess, at once where no link before it has to be placed
                 there = known.at(self.m.at)
                 if there is None:
                     known = _plus(known, right, 1.0)
