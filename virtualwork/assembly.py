@@ -16,7 +16,7 @@ from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, known_by_gu
 from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError
 from virtualwork.formulas.closed_forms import Number, cross, dot
 from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
-from virtualwork.newton import every_solution, guessed_unknowns, newton, singular_poses, write_unknowns
+from virtualwork.newton import every_solution, guessed_unknowns, newton, stack, write_unknowns
 from virtualwork.state import Case, State, columns, place
 
 if TYPE_CHECKING:
@@ -188,8 +188,11 @@ class _Chooser:
             if group.kind != "Newton":
                 if not st.margin.get(group.name, 0.0) > 1e-12:
                     return True
-            elif singular_poses(columns(group, st, found.plan), len(group.angles), 1)[0]:
-                return True
+            else:
+                jacobian = stack(columns(group, st, found.plan), 1)[0]
+                jacobian[:, : len(group.angles)] /= self.m.size
+                if not np.linalg.cond(jacobian) < 1e9:
+                    return True
         return False
 
     def _refuse_floating(self) -> None:

@@ -56,12 +56,15 @@ class Constraints:
     jacobian : array (constraints, 3·links)
     inputs : array (inputs, 3·links)
         The Jacobian of the inputs.
+    driving : array (inputs,)
+        The inputs themselves.
     """
 
     labels: list[str]
     values: Reals
     jacobian: Reals
     inputs: Reals
+    driving: Reals
 
     @classmethod
     def at(cls, m: Mechanism, x: Reals, phases: Mapping[int, float]) -> Constraints:
@@ -92,8 +95,8 @@ class Constraints:
                 along = cmath.exp(1j * g.angle)
                 rows.between("", (g.link, m.bodies[g.link][g.point]), (g.on, through), along, on=g.on)
         every = np.array(rows.rows).reshape(-1, len(x))
-        values = np.array(rows.values[:joints])
-        return cls(rows.labels[:joints], values, every[:joints], every[joints:])
+        values = np.array(rows.values)
+        return cls(rows.labels[:joints], values[:joints], every[:joints], every[joints:], values[joints:])
 
     @property
     def driven(self) -> Reals:
@@ -174,17 +177,23 @@ def hidden_freedom(m: Mechanism, x: Reals) -> tuple[tuple[str, ...], tuple[str, 
         for i, gear in enumerate(m.gears)
     }
     start = _settled(m, x, phases)
-    if start is None or _free(Constraints.at(m, start, phases).driven) is None:
+    if start is None:
         return None
-    null = _free(Constraints.at(m, start, phases).jacobian)
+    here = Constraints.at(m, start, phases)
+    if _free(here.driven) is None:
+        return None
+    # a little farther on the input's way, either side; where it cannot move, wherever anything can
+    there = [_settled(m, start, phases, here.driving + side * STEP) for side in (1, -1)]
+    null = _free(here.jacobian)
+    if all(pose is None for pose in there) and null is not None:
+        for k in (1.0, 2.0, 3.0):
+            mix = null @ np.cos(k * np.sqrt(np.arange(1, 1 + null.shape[1])))
+            there.append(_settled(m, start + STEP * mix, phases))
     found = None
-    for k in (1.0, 2.0, 3.0):
-        # any mixture of what can move, no two alike
-        mix = np.cos(k * np.sqrt(np.arange(1, 1 + null.shape[1]))) if null is not None else None
-        there = None if mix is None else _settled(m, start + STEP * (null @ mix), phases)
-        if there is None or np.abs(there - start).max() < 0.01 * STEP:
+    for pose in there:
+        if pose is None:
             continue
-        here = Constraints.at(m, there, phases)
+        here = Constraints.at(m, pose, phases)
         free = _free(here.driven)
         if free is None:
             return None
@@ -202,15 +211,20 @@ def _free(jacobian: Reals) -> Reals | None:
     return np.asarray(vt[rank:].T) if rank < len(vt) else None
 
 
-def _settled(m: Mechanism, x: Reals, phases: Mapping[int, float]) -> Reals | None:
-    """The pose nearby at which all joints close, by Gauss-Newton steps of least norm; None where there is none."""
-    for _ in range(20):
+def _settled(
+    m: Mechanism, x: Reals, phases: Mapping[int, float], driving: Reals | None = None
+) -> Reals | None:
+    """The pose nearby at which all joints close, with the inputs free or given; None where there is none."""
+    for _ in range(30):
         here = Constraints.at(m, x, phases)
-        if not np.isfinite(here.jacobian).all() or not np.isfinite(here.values).all():
+        values, jacobian = here.values, here.jacobian
+        if driving is not None:
+            values, jacobian = np.append(values, here.driving - driving), here.driven
+        if not np.isfinite(jacobian).all() or not np.isfinite(values).all():
             return None
-        step = np.linalg.lstsq(here.jacobian, -here.values, rcond=RANK)[0]
-        x = x + step * min(1.0, 0.5 / max(float(np.abs(step).max(initial=0.0)), 1e-300))
+        # Gauss-Newton steps of least norm
+        step = np.linalg.lstsq(jacobian, -values, rcond=RANK)[0]
         if np.abs(step).max(initial=0.0) < 1e-11:
-            break
-    closed = np.abs(Constraints.at(m, x, phases).values).max(initial=0.0) < 1e-9
-    return x if closed else None
+            return x if np.abs(values).max(initial=0.0) < 1e-9 else None
+        x = x + step * min(1.0, 0.5 / float(np.abs(step).max()))
+    return None
