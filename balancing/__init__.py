@@ -19,7 +19,13 @@ if TYPE_CHECKING:
         plane_significance,
         unseen,
     )
-    from balancing.influence import Balance, Infeasible, influence_coefficients, least_squares
+    from balancing.influence import (
+        Balance,
+        Infeasible,
+        influence_coefficients,
+        initial_unbalance,
+        least_squares,
+    )
     from balancing.least_maximum import minimax
     from balancing.placement import Placement, drill_depth, place, place_from_stock, transfer
     from balancing.rotor import by_size
@@ -41,7 +47,7 @@ _HOMES = {
     "balancing.confidence": "Readings spread",
     "balancing.correction": "CoincidentPlanes Correction Unbalances correct",
     "balancing.dependence": "DependentPlanes DependentTrials condition_number plane_significance unseen",
-    "balancing.influence": "Balance Infeasible influence_coefficients least_squares",
+    "balancing.influence": "Balance Infeasible influence_coefficients initial_unbalance least_squares",
     "balancing.least_maximum": "minimax",
     "balancing.placement": "Placement drill_depth place place_from_stock transfer",
     "balancing.rotor": "by_size",
@@ -89,6 +95,7 @@ __all__ = [
     "influence_coefficients",
     "influence_error",
     "influence_from_amplitudes",
+    "initial_unbalance",
     "least_squares",
     "minimax",
     "permissible_unbalance",

@@ -182,8 +182,8 @@ class Field(Solver):
                         {
                             "plane": plane,
                             "permissible_kg_m": share,
-                            "initial_kg_m": before,
-                            "within": before <= share,
+                            "initial_kg_m": _number(before),
+                            "within": before <= share if np.isfinite(before) else None,
                         }
                         for plane, share, before in self._verdict(solved, i)
                     ],

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cli.balance.solve import number_names
 from cli.errors import DataError, quote
 from cli.read.tables import Cells, Table, read
-from cli.read.units import SMALLEST, UNITS, parse_number, phasor, to_si
+from cli.read.units import SMALLEST, UNITS, phasor, to_si
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -414,9 +414,10 @@ class _Reader:
             try:
                 if len(parts) != names:
                     raise ValueError
-                values[i] = parse_number(parts[place])
+                values[i] = cells.number(parts[place])
             except ValueError:
                 many = f", {names} joined by ';' as in trial_plane" if names > 1 else ""
+                many += ", with a decimal comma as elsewhere in the file" if cells.decimal_comma else ""
                 raise self.fail(row, cells.header, text, expected + many) from None
         return values
 

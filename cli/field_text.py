@@ -165,9 +165,13 @@ def verdict(field: Field, solved: Solved, i: int) -> list[str]:
         f"tolerance{' ' + grade if grade else ''}: U_per = {from_si(whole, 'unbalance', 'g_mm'):.6g} g·mm, shared equally"
     ]
     for plane, share, before in field._verdict(solved, i):
+        initial = (
+            "not determined"
+            if np.isnan(before)
+            else f"{from_si(before, 'unbalance', 'g_mm'):.6g} g·mm ({'within' if before <= share else 'beyond'})"
+        )
         lines.append(
-            f"  plane {plane}: permissible {from_si(share, 'unbalance', 'g_mm'):.6g}, initial "
-            f"{from_si(before, 'unbalance', 'g_mm'):.6g} g·mm ({'within' if before <= share else 'beyond'})"
+            f"  plane {plane}: permissible {from_si(share, 'unbalance', 'g_mm'):.6g}, initial {initial}"
         )
     return lines
 

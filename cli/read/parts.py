@@ -243,7 +243,8 @@ def _reading(
     inertia: Array,
 ) -> BodyError:
     """Bound what is off in the parts before they are turned: numbers as read, and their shapes' formulas."""
-    from rigidbody3d.rounding import BodyError, Bounded, shaped
+    from dalembert.arithmetic.bounded import Bounded
+    from rigidbody3d.rounding import BodyError, shaped
 
     masses, tensors = READ * np.abs(mass), READ * np.abs(inertia)
     centers = READ * np.abs(center)
@@ -278,7 +279,7 @@ def _turning(drawn: Body, rotation: Array, table: Table) -> BodyError:
             angle += np.abs(np.nan_to_num(to_si(column.values, "angle", column.unit)))
     plain = np.isin(rotation, (-1.0, 0.0, 1.0)).all(axis=(-1, -2))
     off = np.where(plain, 0.0, READ * (4 + angle))
-    return turned(drawn, rotation, None, np.broadcast_to(off[:, None, None], rotation.shape))
+    return turned(drawn.numbers, rotation, None, np.broadcast_to(off[:, None, None], rotation.shape))
 
 
 def _turns(table: Table) -> Array:

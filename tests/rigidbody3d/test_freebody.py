@@ -217,7 +217,7 @@ def test_blocks_do_not_show() -> None:
 
 
 def test_only_what_is_asked_for_is_computed(monkeypatch) -> None:
-    import rigidbody3d.freebody as module
+    import rigidbody3d.free_rotation as module
 
     calls = []
     real = module.third

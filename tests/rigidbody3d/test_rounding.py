@@ -8,9 +8,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from dalembert.arithmetic.bounded import Bounded
+from dalembert.arithmetic.exact import EPS
 from rigidbody3d import Body, FreeBody, Motion, Shaft, Top, compose, integrate, principal, rounding, tensor
 from rigidbody3d.attitude import angle_between
-from rigidbody3d.rounding import EPS, Bounded
 
 
 def turned(found, exact) -> float:
