@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork import Guess, Input, Link, Mechanism
+from virtualwork.describe.errors import MechanismError
 from virtualwork.mechanism import GROUND, Gear, Guide
 
 if TYPE_CHECKING:
@@ -341,3 +342,39 @@ def newton(t: Topology, x: Reals, inputs: tuple[float, ...]) -> Reals | None:
         if np.abs(step).max() < 1e-13:
             return x
     return x if np.abs(step).max() < 1e-9 else None
+
+
+def verdict(t: Topology) -> str:
+    """What the program makes of a mechanism at the very pose that its guess gives.
+
+    Returns
+    -------
+    str
+        "put together" where every link stands within rounding of where it was drawn; "refused" where the constraints do
+        not determine the pose and the program says so; everything else is a fault and says what is wrong.
+    """
+    regular = regularity(t)
+    at = np.array([t.inputs]) if len(t.inputs) > 1 else np.array(t.inputs)
+    try:
+        motion = t.mechanism.motion(at)
+        closed = bool(motion.assembled[0])
+        away = _away(t, motion, 0, t.unknowns()) if closed else math.nan
+    except MechanismError as error:
+        return "refused" if regular <= REGULAR else f"refused though regular: {error}"
+    except Exception as error:
+        return f"internal error: {error!r}"
+    if not closed:
+        return "refused" if regular <= REGULAR else "not assembled at its own guess"
+    return "put together" if away < 1e-10 / max(regular, 1e-5) else f"{away:.2g} away from its guess"
+
+
+def _away(t: Topology, motion: Any, i: int, x: Reals) -> float:
+    """How far pose i is from x: chords of the unit circle, and m of every point."""
+    away = 0.0
+    for k, (body, link) in enumerate(t.mechanism.links.items()):
+        turn = cmath.exp(1j * x[3 * k + 2])
+        away = max(away, abs(cmath.exp(1j * motion.link(body).angle[i]) - turn))
+        for z in link.points.values():
+            there = complex(x[3 * k], x[3 * k + 1]) + z * turn
+            away = max(away, abs(motion.at(body, z).complex(0)[i] - there))
+    return away
