@@ -414,8 +414,8 @@ class _Chooser:
             if body in self.angles and body in st.turn:
                 total += abs(complex(st.turn[body]) - np.exp(1j * self.angles[body])) ** 2
             base, terms = self.plan.anchors[body]
-            placed = base in st.point and all(t.slide is None or t.slide in st.slide for t in terms)
-            if placed and body in st.turn:
+            placed = all(t.body in st.turn and (t.slide is None or t.slide in st.slide) for t in terms)
+            if placed and base in st.point and body in st.turn:
                 for name, z in self.m.links[body].points.items():
                     if name in self.points:
                         here = st.point[base] + st.sum(terms) + z * st.turn[body]

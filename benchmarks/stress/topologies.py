@@ -233,7 +233,7 @@ def _join(made: _Builder, left: int) -> bool:
     return not loose and all(made.points[b] for b in made.names)
 
 
-def _rows(t: Topology) -> list[tuple[str, tuple[Any, ...]]]:
+def rows(t: Topology) -> list[tuple[str, tuple[Any, ...]]]:
     """Every scalar or vector constraint as data: pins, guides, turns (Σ c·θ = const), slides that are driven."""
     m = t.mechanism
     rows: list[tuple[str, tuple[Any, ...]]] = []
@@ -269,10 +269,10 @@ def _seat(t: Topology, x: Any, body: str, z: complex) -> tuple[complex, complex,
 
 def constraints(t: Topology, x: Reals, inputs: tuple[float, ...]) -> Reals:
     """What every constraint leaves at x (x, y, θ of every link), (3·links,): m, or rad."""
-    return _evaluate(t, x, inputs)[0]
+    return evaluate(t, x, inputs)[0]
 
 
-def _evaluate(t: Topology, x: Reals, inputs: tuple[float, ...]) -> tuple[Reals, Reals]:
+def evaluate(t: Topology, x: Reals, inputs: tuple[float, ...]) -> tuple[Reals, Reals]:
     """Every constraint and its Jacobian."""
     out: list[float] = []
     jacobian: list[Reals] = []
@@ -293,7 +293,7 @@ def _evaluate(t: Topology, x: Reals, inputs: tuple[float, ...]) -> tuple[Reals, 
         turned = (along.conjugate() * 1j * arm).real
         return [(i, sign * along.real), (i + 1, sign * along.imag), (i + 2, sign * turned)]
 
-    for kind, data in _rows(t):
+    for kind, data in rows(t):
         if kind == "pin":
             (p, arm_p, i), (q, arm_q, k) = _seat(t, x, *data[:2]), _seat(t, x, *data[2:])
             for along in (1 + 0j, 1j):
@@ -321,7 +321,7 @@ def _evaluate(t: Topology, x: Reals, inputs: tuple[float, ...]) -> tuple[Reals, 
 
 def regularity(t: Topology) -> float:
     """The least singular value of all constraints at the pose over the largest; 0 where their number does not fit."""
-    jacobian = _evaluate(t, t.unknowns(), t.inputs)[1]
+    jacobian = evaluate(t, t.unknowns(), t.inputs)[1]
     if jacobian.shape[0] != jacobian.shape[1]:
         return 0.0
     s = np.linalg.svd(jacobian, compute_uv=False)
@@ -331,7 +331,7 @@ def regularity(t: Topology) -> float:
 def newton(t: Topology, x: Reals, inputs: tuple[float, ...]) -> Reals | None:
     """All constraints at once by Newton-Raphson from x; None where it does not converge or J turns singular."""
     for _ in range(12):
-        value, jacobian = _evaluate(t, x, inputs)
+        value, jacobian = evaluate(t, x, inputs)
         try:
             step = np.linalg.solve(jacobian, value)
         except np.linalg.LinAlgError:
