@@ -39,6 +39,7 @@ Complex = NDArray[np.complex128]
 
 NEARLY = 0.1  # a plane whose effect others bring about but for this share is said to be nearly dependent
 SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
+MANY = 200  # rotors whose uncertainties are worked out unasked
 SHOWN = 5  # of so many rotors the same is said, of the others together
 UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
 
@@ -156,9 +157,19 @@ class Solver:
         )
         if wanted.tolerance is not None:
             solved.unbalance = initial_unbalance(alpha, initial, group.weights, singular=SINGULAR)
-        if wanted.reading_error is not None:
-            self._confidence(solved, runout)
+        limited = bool(wanted.objective == "minimax" or wanted.max_mass or wanted.max_residual is not None)
+        if wanted.reading_error is not None or self._repeats_tell(group, limited):
+            self._confidence(solved, runout, limited)
         return solved
+
+    def _repeats_tell(self, group: Group, limited: bool) -> bool:
+        """Whether the scatter of repeats is to give uncertainties that nobody asked for."""
+        if self.wanted.four_run or not group.reading_sd.any():
+            return False
+        if len(group.rotors) <= (SHOWN if limited else MANY):
+            return True
+        self.warn("uncertainties of so many rotors are worked out with --reading-error alone")
+        return False
 
     def limits(self, planes: list[str]) -> Real | None:
         given = self.wanted.max_mass
@@ -284,13 +295,11 @@ class Solver:
                     self.warn(text)
         return fits
 
-    def _confidence(self, solved: Solved, runout: Complex) -> None:
+    def _confidence(self, solved: Solved, runout: Complex, limited: bool) -> None:
         """Propagate the reading errors, rotor by rotor."""
-        assert self.wanted.reading_error is not None
-        relative, angle = self.wanted.reading_error
+        relative, angle = self.wanted.reading_error or (0.0, 0.0)
         group, wanted = solved.group, self.wanted
         covariances, residuals = [], []
-        limited = wanted.objective == "minimax" or wanted.max_mass or wanted.max_residual is not None
         draws = wanted.monte_carlo or 4000
         for i in range(len(group.rotors)):
             readings = Readings(
@@ -301,6 +310,8 @@ class Solver:
                 trial_masses=None if self.stored is not None else group.on[i],
                 influence=solved.alpha[i],
                 runout=runout,
+                scatter=group.mean_error[i] if group.reading_sd[i] else None,
+                degrees_of_freedom=group.repeats,
             )
             w = None if group.weights is None else group.weights[i]
             total = solved.total[i]

@@ -129,7 +129,9 @@ class Assembly:
             self.track.close_newton(group, st)
             return
         case = self.cases[group.name]
-        if not tracked or not self.track.active:
+        if tracked and group.name in self.track.folded:
+            case.solve(st, self.signs[group.name], self.mechanism.size, folded=True)
+        elif not tracked or not self.track.active:
             case.solve(st, self.signs[group.name], self.mechanism.size)
         else:
             case.solve(st, self.track.sign(group, st.inputs[0]), self.mechanism.size)
@@ -191,7 +193,7 @@ class _Chooser:
             else:
                 jacobian = stack(columns(group, st, found.plan), 1)[0]
                 jacobian[:, : len(group.angles)] /= self.m.size
-                if not np.linalg.cond(jacobian) < 1e9:
+                if not np.isfinite(jacobian).all() or not np.linalg.cond(jacobian) < 1e9:
                     return True
         return False
 

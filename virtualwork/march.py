@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.newton import newton, solve, stack, stack_rows, write_unknowns
+from virtualwork.newton import newton, settle, singular, solve, stack, stack_rows, write_unknowns
 from virtualwork.state import Jets, State, columns
 
 if TYPE_CHECKING:
@@ -111,9 +111,23 @@ class March:
         self.stopped[side] = True
         self.ends.append((self._limit(side), -side))
 
+    def singular(self) -> bool:
+        """Whether the Jacobian is singular at all nodes."""
+        some = np.unique(np.linspace(0, len(self.q) - 1, 24).astype(int))
+        st = State([np.array(self.q)[some]], many=True)
+        with np.errstate(all="ignore"):
+            self.assembly.run(self.before, st)
+            write_unknowns(self.group, st, np.array(self.x)[some])
+        return singular(self.group, st, self.assembly.plan, len(some))
+
     @property
     def crossings(self) -> list[float]:
-        """The change points met: where the determinant goes through zero and the branch goes on."""
+        """The change points met: where the determinant goes through zero and the branch goes on.
+
+        Where it is zero in every pose its sign is noise, and there are none.
+        """
+        if self.group.name in self.track.folded:
+            return []
         for a, b in self._crossed:
             if (a, b) not in self._found:
                 centre, half = (a + b) / 2, (b - a) / 2
@@ -216,6 +230,9 @@ class March:
         start[~inside] = np.nan
         with np.errstate(all="ignore"):
             found, closed = newton(self.group, many, self.assembly.plan, start, self.size)
+            if self.group.name in self.track.folded:
+                found = settle(self.group, many, self.assembly.plan, found, self.size)
+                st.folded.add(self.group.name)
         found[~(closed & inside)] = np.nan
         write_unknowns(self.group, st, found)
         st.margin[self.group.name] = (

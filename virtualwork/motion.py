@@ -352,6 +352,8 @@ class Motion:
                 jacobian = stack(columns(group, st, merged), length)
                 jacobian[:, :, : len(group.angles)] /= size
                 whole[rows] = inverse_norm(jacobian)
+                if st.folded:
+                    whole[rows][np.isfinite(whole[rows])] = np.inf
         return whole
 
     @cached_property

@@ -13,7 +13,7 @@ import numpy as np
 from virtualwork.describe.errors import AssemblyError
 from virtualwork.formulas.closed_forms import Number, dot
 from virtualwork.mechanism import GROUND
-from virtualwork.state import State, columns, loop
+from virtualwork.state import State, columns, loop, ratio
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
 
 EPS = float(np.finfo(float).eps)
+ROUNDS = 4  # of Gauss-Newton to a double root, from half of the digits
+SINGULAR = 1e-6  # a singular value below this share of the largest is that of a null vector
 
 
 def stack(cols: list[list[Number]], n: int) -> Reals:
@@ -90,17 +92,22 @@ def inverse_norm(jacobian: Reals) -> Reals:
     return out
 
 
-def singular_poses(cols: list[list[Number]], angles: int, n: int) -> NDArray[np.bool_]:
-    """Which poses have a Jacobian whose smallest singular value is below 1e-6 of its largest."""
+def singular_values(cols: list[list[Number]], angles: int, n: int) -> Reals:
+    """The singular values of the Jacobian (lengths scaled) at each pose; NaN where it is not assembled."""
     jacobian = stack(cols, n)
-    size = np.abs(jacobian[:, :, :angles]).max(initial=0.0)
+    good = np.isfinite(jacobian).all(axis=(1, 2))
+    size = np.abs(jacobian[good][:, :, :angles]).max(initial=0.0)
     if angles and size > 0:
         jacobian[:, :, :angles] /= size
-    good = np.isfinite(jacobian).all(axis=(1, 2))
-    out = np.zeros(n, dtype=bool)
-    s = np.linalg.svd(jacobian[good], compute_uv=False)
-    out[good] = s[:, -1] < 1e-6 * s[:, 0]
+    out = np.full((n, min(jacobian.shape[1:])), np.nan)
+    out[good] = np.linalg.svd(jacobian[good], compute_uv=False)
     return out
+
+
+def singular_poses(cols: list[list[Number]], angles: int, n: int) -> NDArray[np.bool_]:
+    """Which poses have a Jacobian whose smallest singular value is below 1e-6 of its largest."""
+    s = singular_values(cols, angles, n)
+    return np.asarray(s[:, -1] < SINGULAR * s[:, 0])
 
 
 def solve_columns(cols: list[list[Number]], right: list[Number]) -> list[Number]:
@@ -109,6 +116,25 @@ def solve_columns(cols: list[list[Number]], right: list[Number]) -> list[Number]
     n = int(np.prod(shape))
     x = solve(stack(cols, n), -stack_rows(right, n))
     return [x[:, j] if shape else float(x[0, j]) for j in range(x.shape[1])]
+
+
+def solve_determined(cols: list[list[Number]], right: list[Number], angles: int) -> list[Number]:
+    """The same where J is singular in every pose: what a null vector of J moves is not determined, and NaN."""
+    shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(w) for w in right))
+    n = int(np.prod(shape))
+    jacobian, w = stack(cols, n), stack_rows(right, n)
+    good = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(w).all(axis=1)
+    out = np.full((n, jacobian.shape[2]), np.nan)
+    if good.any():
+        size = np.abs(jacobian[good][:, :, :angles]).max(initial=0.0) or 1.0
+        scale = np.array([1.0] * angles + [size] * (jacobian.shape[2] - angles))
+        jacobian = jacobian[good] * scale / size
+        _, s, null = np.linalg.svd(jacobian)
+        loose = (s < SINGULAR * s[:, :1]).astype(float)
+        free = np.einsum("nk,nkj->nj", loose, np.abs(null[:, : s.shape[1]])) > SINGULAR
+        least = -(np.linalg.pinv(jacobian, rcond=SINGULAR) @ (w[good] / size)[..., None])[..., 0]
+        out[good] = np.where(free, np.nan, least * scale)
+    return [out[:, j] if shape else float(out[0, j]) for j in range(out.shape[1])]
 
 
 def write_unknowns(group: Group, st: State, x: Reals) -> None:
@@ -298,6 +324,70 @@ def every_solution(group: Group, st: State, plan_: Plan, size: float) -> Any:
         else:
             keep.append(row)
     return np.array(keep)
+
+
+# --- singular in every pose -----------------------------------------------------------------------------------------
+# Two assemblies that meet all along, as a bar with its pins in two parallel slots exactly its own length apart: the
+# loops hold the place and not, to first order, its rate. J has a null vector v at every pose, and Newton's method alone
+# leaves half of the digits. The place is a double root; nᵀJ·v = 0 with the left null vector n belongs to its equations,
+# and with it the root is simple again (deflation: T. Ojika, S. Watanabe, T. Mitsui, J. Math. Anal. Appl. 96 (1983) 463).
+
+
+def bent(group: Group, st: State, plan: Plan, v: Reals) -> Reals:
+    """The derivative of J·v along each unknown, (n, 2·loops, unknowns), for directions v (n, unknowns)."""
+    angles = len(group.angles)
+    rows = []
+    for closure in group.closures:
+        row = [np.zeros(len(v), complex) for _ in range(v.shape[1])]
+        for t in closure.terms:
+            r = [ratio(plan, group, t.body, a) for a in group.angles]
+            own = angles + group.slides.index(t.slide) if t.slide in group.slides else None
+            turned = sum(f * v[:, j] for j, f in enumerate(r))
+            moved = 0.0 if own is None else v[:, own]
+            length = 1.0 if t.slide is None else st.slide[t.slide]
+            e = t.z * st.turn[t.body]
+            for j, f in enumerate(r):
+                if f:
+                    row[j] = row[j] + f * (1j * moved - turned * length) * e
+            if own is not None:
+                row[own] = row[own] + 1j * turned * e
+        rows.append(row)
+    return stack(rows, len(v))
+
+
+def settle(group: Group, st: State, plan: Plan, x: Reals, size: float) -> Reals:
+    """The double root next to x, (n, unknowns), by Gauss-Newton on the loops and on nᵀJ·v = 0."""
+    n, u = x.shape
+    scale = np.array([1.0] * len(group.angles) + [size] * len(group.slides))
+    out = x.copy()
+    for _ in range(ROUNDS):
+        write_unknowns(group, st, out)
+        gap = stack_rows(gaps(group, st), n) / size
+        jacobian = stack(columns(group, st, plan), n) * scale / size
+        good = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(gap).all(axis=1)
+        left, s, right = np.linalg.svd(np.where(good[:, None, None], jacobian, 0.0))
+        loose = int(np.median((s[good] < SINGULAR * s[good][:, :1]).sum(axis=1))) if good.any() else 0
+        rows, rest = [jacobian], [gap]
+        for b in range(u - loose, u):
+            v = right[:, b]
+            turning = bent(group, st, plan, v * scale) * scale / size
+            pull = jacobian @ v[..., None]
+            for a in range(u - loose, u):
+                rows.append(left[:, None, :, a] @ turning)
+                rest.append((left[:, None, :, a] @ pull)[..., 0])
+        system, right_side = np.concatenate(rows, axis=1), np.concatenate(rest, axis=1)
+        step = np.zeros((n, u))
+        step[good] = -(np.linalg.pinv(system[good]) @ right_side[good][..., None])[..., 0]
+        out = out + step * scale
+    write_unknowns(group, st, out)
+    return out
+
+
+def singular(group: Group, st: State, plan: Plan, n: int) -> bool:
+    """Whether J is singular at all of the state's poses that are assembled."""
+    s = singular_values(columns(group, st, plan), len(group.angles), n)
+    s = s[np.isfinite(s).all(axis=1)]
+    return len(s) > 4 and bool((s[:, -1] < SINGULAR * s[:, 0]).all())
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,8 @@ from virtualwork.assur import Angle, Closure, Group, Place, Plan, Slide, Step, T
 from virtualwork.formulas.closed_forms import (
     MANY,
     ONE,
+    Engine,
+    Folded,
     Number,
     angle_and_slide,
     cross,
@@ -56,6 +58,7 @@ class State:
         self.slide: dict[int, Number] = {}
         self.margin: dict[str, Number] = {}
         self.spins: dict[int, Number] = {}  # e^{i·input}, where a sweep knows it already
+        self.folded: set[str] = set()  # groups that are singular in every pose
 
     def spin(self, j: int) -> Number:
         """e^{i·input j}, formed once."""
@@ -184,9 +187,10 @@ class Case:
         relative = self.tie.get(body, Angle())
         return z * st.exp(st.affine(relative)) if relative.inputs else z
 
-    def solve(self, st: State, sign: Number, size: float) -> None:
-        """Write the group's rotations and slides into the state."""
+    def solve(self, st: State, sign: Number, size: float, folded: bool = False) -> None:
+        """Write the group's rotations and slides into the state; `folded`: its two assemblies meet in every pose."""
         group = self.group
+        xp: Engine = Folded(st.xp) if folded else st.xp
         w = st.point[self.closure.start] - st.point[self.closure.end]
         if self.known:
             w = w + st.sum(self.known)
@@ -196,23 +200,21 @@ class Case:
             )  # between points that stand: as in any array, what is divided by zero is infinite
         if group.kind == "RRR":
             a, b = group.angles
-            st.turn[a], st.turn[b], margin = two_angles(w, self.arm(0, st), self.arm(1, st), sign, st.xp)
+            st.turn[a], st.turn[b], margin = two_angles(w, self.arm(0, st), self.arm(1, st), sign, xp)
         elif group.kind == "RRP":
             (a,), (g,) = group.angles, group.slides
             z, body = self.rails[0]
-            st.turn[a], st.slide[g], margin = angle_and_slide(
-                w, self.arm(0, st), z * st.turn[body], sign, st.xp
-            )
+            st.turn[a], st.slide[g], margin = angle_and_slide(w, self.arm(0, st), z * st.turn[body], sign, xp)
         elif group.kind == "RPR":
             (a,), (g,) = group.angles, group.slides
-            st.turn[a], st.slide[g], margin = turning_slide(
-                w, self.arm(0, st), self.rail(st), sign, size, st.xp
-            )
+            st.turn[a], st.slide[g], margin = turning_slide(w, self.arm(0, st), self.rail(st), sign, size, xp)
         else:
             g, h = group.slides
             u, v = (z * st.turn[body] for z, body in self.rails)
             st.slide[g], st.slide[h], margin = two_slides(w, u, v)
         st.margin[group.name] = margin
+        if folded:
+            st.folded.add(group.name)
         for tie in group.ties:
             st.turn[tie.body] = st.rotate(tie.angle)
 
@@ -393,6 +395,11 @@ class Jets:
     def _group(self, group: Group, k: int) -> None:
         right = self.right_side(group, k)
         cols = self.columns(group)
+        if group.name in self.st.folded:
+            from virtualwork.newton import solve_determined
+
+            self.write(group, k, solve_determined(cols, right, len(group.angles)))
+            return
         if group.kind != "Newton":
             (c1, c2), w = cols[0], right[0]
             inverse = self.inverse(group)

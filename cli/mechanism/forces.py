@@ -131,7 +131,8 @@ def warnings(job: Job) -> list[str]:
             ),
         ):
             bad = there & ~np.isfinite(values).all(axis=1) & ~d.locked
-            found += _listed(job, bad, what)
+            if not motion.assembly.track.folded:  # singular in every pose: that is said once
+                found += _listed(job, bad, what)
         if d.scene.rubs:
             found += _listed(
                 job, there & d.locked, "friction locks the mechanism: no reaction balances its own friction"

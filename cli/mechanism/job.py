@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,6 +12,7 @@ import numpy as np
 
 from cli.errors import MEMORY, DataError, nearest
 from cli.mechanism.inputs import Inputs
+from cli.read.files import load as load_bytes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,8 +31,8 @@ def load(path: str) -> Mechanism:
     file = "standard input" if path == "-" else path
     try:
         if path == "-":
-            return loads(sys.stdin.buffer.read().decode("utf-8-sig"), file)
-        return read(Path(path))
+            return loads(load_bytes(path).decode("utf-8-sig"), file, load=load_bytes)
+        return read(Path(path), load_bytes)
     except UnicodeDecodeError:
         raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
     except (OSError, ValueError) as error:

@@ -10,16 +10,16 @@ from __future__ import annotations
 import csv
 import io
 import re
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import islice
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cli.errors import DataError, cell_error, quote
+from cli.read.files import read_bytes
 from cli.read.units import LARGEST, UNITS, find_unit, nearest_unit, parse_number
 
 if TYPE_CHECKING:
@@ -65,6 +65,20 @@ class Table:
     warnings: list[str] = field(default_factory=list)
     _source: _Source | None = None
 
+    @cached_property
+    def _written(self) -> list[list[str]]:
+        assert self._source is not None
+        return [cells for _, cells in self._source.records()]
+
+    def written(self, index: int, quantity: str) -> str:
+        """Return a cell of a number column as the file wrote it; looked up for messages only."""
+        return self._written[index + 1][self.header.index(self.numbers[quantity].header)].strip()
+
+    def wrong(self, index: int, quantity: str, expected: str) -> DataError:
+        """Make the one line for a number: column and value as the file wrote them."""
+        column = self.numbers[quantity].header
+        return self.error(index, column, self.written(index, quantity), expected)
+
     def points(self, names: Iterable[str]) -> None:
         """Write a point for the decimal comma in these columns of texts, where a comma cannot part cells."""
         columns = {name: self.texts[name] for name in names}
@@ -90,9 +104,7 @@ class Table:
     def reject(self, bad: NDArray[np.bool_], quantity: str, expected: str) -> None:
         """Raise the error of the first cell of a number column for which `bad` holds."""
         if bad.any():
-            index = int(np.argmax(bad))
-            column = self.numbers[quantity]
-            raise self.error(index, column.header, f"{column.values[index]:g}", expected)
+            raise self.wrong(int(np.argmax(bad)), quantity, expected)
 
     def require(self, quantity: str, dimension: str) -> Numbers:
         """Return a column of numbers, or say that the table lacks it."""
@@ -211,12 +223,7 @@ class _Source:
 
 
 def _open(path: str) -> _Source:
-    file = "standard input" if path == "-" else path
-    try:
-        data = sys.stdin.buffer.read() if path == "-" else Path(path).read_bytes()
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise DataError(f"{file}: {reason}") from None
+    file, data = read_bytes(path)
     warnings: list[str] = []
     text = _decode(file, data, warnings)
     source = _Source(file, text, _delimiter(text), [], warnings, text.count("\n") >= LARGE)
@@ -430,3 +437,15 @@ def _read_large(source: _Source, table: Table, plan: _Plan, marker: str) -> bool
     table.rows = rows
     table.marks.update(marks)
     return True
+
+
+def number_names(names: list[str]) -> tuple[list[str], NDArray[np.intp]]:
+    """Number names in the order in which they first stand."""
+    if len(names) >= LARGE:
+        import pandas as pd
+
+        codes, unique = pd.factorize(np.array(names, dtype=object))
+        return unique.tolist(), codes.astype(np.intp)
+    first: dict[str, int] = {}
+    codes = np.array([first.setdefault(name, len(first)) for name in names], dtype=np.intp)
+    return list(first), codes

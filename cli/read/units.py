@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar, overload
 
 from cli.errors import nearest
 
@@ -17,18 +17,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Unit = tuple[float, float]
+Scaled = TypeVar("Scaled", float, complex, "NDArray[np.float64]", "NDArray[np.complex128]")
 
 _LENGTH: dict[str, Unit] = {"m": (1, 1), "mm": (1, 1000), "cm": (1, 100), "um": (1, 10**6), "in": (127, 5000)}
 _LB = (45359237, 10**8)
 _OZ = (45359237, 16 * 10**8)
-_G0 = 9.80665
+G0 = 9.80665
 _TURN = (math.pi, 180)
 
 UNITS: dict[str, dict[str, Unit]] = {
     "number": {"": (1, 1)},
     "length": _LENGTH,
     "mass": {"kg": (1, 1), "g": (1, 1000), "mg": (1, 10**6), "lb": _LB, "oz": _OZ},
-    "force": {"N": (1, 1), "kN": (1000, 1), "lbf": (_LB[0] * _G0, _LB[1])},
+    "force": {"N": (1, 1), "kN": (1000, 1), "lbf": (_LB[0] * G0, _LB[1])},
     "angle": {"deg": _TURN, "rad": (1, 1)},
     "unbalance": {
         "kg_m": (1, 1),
@@ -54,7 +55,7 @@ UNITS: dict[str, dict[str, Unit]] = {
         "N_m": (1, 1),
         "N_mm": (1, 1000),
         "kN_m": (1000, 1),
-        "lbf_in": (_LB[0] * _G0 * 127, _LB[1] * 5000),
+        "lbf_in": (_LB[0] * G0 * 127, _LB[1] * 5000),
     },
     "density": {"kg_m3": (1, 1), "g_cm3": (1000, 1)},
     "area density": {"kg_m2": (1, 1), "g_cm2": (10, 1)},
@@ -74,7 +75,7 @@ AMPLITUDES: dict[str, dict[str, Unit]] = {
         "in": (127, 5000),
     },
     "velocity": {"mm_s": (1, 1000), "m_s": (1, 1), "in_s": (127, 5000)},
-    "acceleration": {"mm_s2": (1, 1000), "m_s2": (1, 1), "g": (_G0, 1)},
+    "acceleration": {"mm_s2": (1, 1000), "m_s2": (1, 1), "g": (G0, 1)},
     "voltage": {"V": (1, 1), "mV": (1, 1000)},
     "digital signal": {"counts": (1, 1)},
 }
@@ -149,13 +150,13 @@ def nearest_unit(suffix: str, dimension: str) -> str:
     return nearest(suffix, filter(like, UNITS[dimension]), cutoff=0.75) if len(suffix) > 3 else ""
 
 
-def to_si(value: Any, dimension: str, unit: str) -> Any:
+def to_si(value: Scaled, dimension: str, unit: str) -> Scaled:
     """Convert a number or an array from `unit` to SI."""
     numerator, denominator = UNITS[dimension][unit]
     return value * numerator / denominator
 
 
-def from_si(value: Any, dimension: str, unit: str) -> Any:
+def from_si(value: Scaled, dimension: str, unit: str) -> Scaled:
     """Convert a number or an array from SI to `unit`."""
     numerator, denominator = UNITS[dimension][unit]
     return value * denominator / numerator
@@ -236,10 +237,15 @@ def phasor(magnitude: NDArray[np.float64], angle: NDArray[np.float64], unit: str
     return z
 
 
-def degrees(z: Any) -> Any:
+@overload
+def degrees(z: NDArray[np.complex128]) -> NDArray[np.float64]: ...
+@overload
+def degrees(z: complex) -> float: ...
+def degrees(z: complex | NDArray[np.complex128]) -> float | NDArray[np.float64]:
     """Return the angle of a complex number, or of each in an array, in degrees in [0, 360); 0 for zero."""
     import numpy as np
 
+    vector = np.asarray(z)
     # + 0.0: the angle of -0 is 0, not 180; and a tiny negative angle plus 360 rounds to 360 itself
-    angle = np.degrees(np.arctan2(np.imag(z) + 0.0, np.real(z) + 0.0)) % 360.0
+    angle = np.degrees(np.arctan2(vector.imag + 0.0, vector.real + 0.0)) % 360.0
     return np.where(angle >= 360.0, 0.0, angle)[()]

@@ -14,7 +14,7 @@ from cli.errors import DataError, nearest
 from cli.read.tables import read
 from cli.read.units import column_dimensions, parse_number
 
-Columns = Mapping[str, Sequence[Any]]
+Columns = Mapping[str, Any]
 
 
 @dataclass(frozen=True)

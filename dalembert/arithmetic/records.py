@@ -89,7 +89,7 @@ def components(name: str, vector: ArrayLike, of: str = "xyz") -> dict[str, NDArr
     """Return a vector's (..., k) components as columns; `*` in the name stands for the component's letter.
 
     >>> components("omega_*_rad_s", [1.0, 2.0, 3.0])["omega_y_rad_s"]
-    np.float64(2.0)
+    array(2.)
     """
     v = np.asarray(vector)
     return {name.replace("*", letter): v[..., i] for i, letter in enumerate(of)}

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import csv
 import itertools
 import math
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from virtualwork.describe.errors import DescriptionError, MechanismError
+from virtualwork.describe.tables import rows
 from virtualwork.describe.units import EXPECTED, parse, scaled, unit
 from virtualwork.mechanism import (
     GROUND,
@@ -35,8 +37,8 @@ TABLES = {
 }  # fmt: skip
 
 
-def read(path: Path) -> Mechanism:
-    """Read a mechanism from a TOML file.
+def read(path: Path, load: Callable[[Path], bytes] = Path.read_bytes) -> Mechanism:
+    """Read a mechanism from a TOML file; `load` reads it and the tables beside it.
 
     Raises
     ------
@@ -45,11 +47,16 @@ def read(path: Path) -> Mechanism:
     OSError
         Where the file cannot be read.
     """
-    return loads(path.read_text(encoding="utf-8-sig"), str(path), path.parent)
+    return loads(load(path).decode("utf-8-sig"), str(path), path.parent, load)
 
 
-def loads(text: str, file: str = "<text>", folder: Path | None = None) -> Mechanism:
-    """Read a mechanism from TOML text; `folder` is where its input tables lie."""
+def loads(
+    text: str,
+    file: str = "<text>",
+    folder: Path | None = None,
+    load: Callable[[Path], bytes] = Path.read_bytes,
+) -> Mechanism:
+    """Read a mechanism from TOML text; `folder` is where its input tables lie, which `load` reads."""
     try:
         data = tomllib.loads(text)
     except RecursionError:
@@ -57,7 +64,7 @@ def loads(text: str, file: str = "<text>", folder: Path | None = None) -> Mechan
     except ValueError as error:  # a TOMLDecodeError, or a number of thousands of digits
         raise DescriptionError(f"{file}: no valid TOML: {error}") from None
     try:
-        return _Reader(data, folder or Path()).mechanism()
+        return _Reader(data, folder or Path(), load).mechanism()
     except MechanismError as error:
         raise type(error)(f"{file}: {error}") from None
 
@@ -65,8 +72,8 @@ def loads(text: str, file: str = "<text>", folder: Path | None = None) -> Mechan
 class _Reader:
     """Walks the tables; every complaint names the table and the key."""
 
-    def __init__(self, data: dict[str, Any], folder: Path) -> None:
-        self.data, self.folder = data, folder
+    def __init__(self, data: dict[str, Any], folder: Path, load: Callable[[Path], bytes]) -> None:
+        self.data, self.folder, self.load = data, folder, load
         _known(data, TABLES, "the file", "table")
         units = data.get("units", {})
         _known(units, {"length", "angle"}, "[units]", "key")
@@ -300,11 +307,8 @@ class _Reader:
 
     def csv(self, name: Any, where: str) -> list[dict[str, str]]:
         """The rows of a CSV file beside this one."""
-        import csv
-
         try:
-            with (self.folder / str(name)).open(newline="", encoding="utf-8-sig") as stream:
-                return list(csv.DictReader(stream))
+            return rows(self.load(self.folder / str(name)))
         except (OSError, ValueError, csv.Error):
             raise _wrong(where, name, "a CSV file that can be read") from None
 
@@ -443,10 +447,7 @@ class _Reader:
             raise _wrong(f"{where} between", ends, 'two points such as ["crank.B", "ground.D"]')
         found = []
         for end in ends:
-            link, dot, point = str(end).rpartition(".")
-            if not dot:
-                raise _wrong(f"{where} between", end, 'a link and its point such as "crank.B"')
-            self.body(link, f"{where} between")
+            link, point = self.point_of(end, f"{where} between")
             found.append((link, self.place(link, point, f"{where} between")))
         return Spring(
             (found[0], found[1]),
@@ -454,6 +455,20 @@ class _Reader:
             self.number(entry.get("free_length", 0.0), "length", f"{where} free_length"),
             self.number(entry.get("damping", 0.0), "damping", f"{where} damping"),
         )
+
+    def point_of(self, name: Any, where: str) -> tuple[str, str]:
+        """`crank.B`, or the plain name of a point that one body alone has: the body and the point."""
+        link, dot, point = str(name).rpartition(".")
+        if dot:
+            return self.body(link, where), point
+        owners = [body for body, points in self.bodies.items() if name in points]
+        if len(owners) != 1:
+            known = {p for points in self.bodies.values() for p in points}
+            expected = " or ".join(f'"{body}.{name}"' for body in owners)
+            raise _wrong(
+                where, name, expected or f'a link and its point such as "crank.B"{_hint(name, known)}'
+            )
+        return owners[0], str(name)
 
     def torsion(self, entry: dict[str, Any], i: int) -> TorsionSpring:
         where = f"[[torsion_springs]] {i}"

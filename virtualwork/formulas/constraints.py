@@ -197,6 +197,11 @@ def hidden_freedom(m: Mechanism, x: Reals) -> tuple[tuple[str, ...], tuple[str, 
         free = _free(here.driven)
         if free is None:
             return None
+        # a double root is no freedom: it comes back
+        mix = free @ np.cos(np.sqrt(np.arange(1, 1 + free.shape[1])))
+        away = _settled(m, pose + STEP * mix, phases, here.driving)
+        if away is None or np.abs(away - pose).max() < 0.1 * STEP * np.abs(mix).max():
+            return None
         moves = np.abs(free).max(axis=1).reshape(-1, 3).max(axis=1)
         links = tuple(link for link, size in zip(m.links, moves, strict=True) if size > 1e-6)
         labels = [*here.labels, *(f"input {e.name}" for e in m.inputs)]
