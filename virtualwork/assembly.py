@@ -137,7 +137,8 @@ class Assembly:
             case.solve(st, self.track.sign(group, st.inputs[0]), self.mechanism.size)
             self.track.mend(group, st)
         for body in self.geared.intersection(group.members):
-            st.angle[body] = self.track.unwound(body, st.inputs[0], np.angle(st.turn[body]), tracked)
+            angle = np.angle(st.turn[body])
+            st.angle[body] = self.track.unwound(body, st.inputs[0], angle) if tracked else angle
 
     def state(
         self, inputs: tuple[float, ...], targets: Iterable[str] | None = None, tracked: bool = True
