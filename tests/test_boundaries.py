@@ -27,7 +27,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("optimality",),
         ("limited", "rounding"),
         ("influence", "qr"),
-        ("cones", "dependence", "rotor"),
+        ("cones", "dependence", "phase", "rotor"),
     ),
     "virtualwork": (
         ("__init__",),
@@ -63,7 +63,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "dalembert": (("__init__",), ("arithmetic",)),
     "benchmarks": (
-        ("__main__",),
+        ("__main__", "same_outputs", "trace_passes"),
         ("fuzz", "page", "peers"),
         ("speed", "stress"),
         ("scenes",),
