@@ -16,7 +16,15 @@ from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, known_by_gu
 from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError
 from virtualwork.formulas.closed_forms import Number, cross, dot
 from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
-from virtualwork.newton import every_solution, guessed_unknowns, newton, stack, write_unknowns
+from virtualwork.newton import (
+    every_solution,
+    gaps,
+    guessed_unknowns,
+    newton,
+    stack,
+    stack_rows,
+    write_unknowns,
+)
 from virtualwork.state import Case, State, columns, place
 
 if TYPE_CHECKING:
@@ -448,12 +456,15 @@ class _Chooser:
         many = State([np.array([q]) for q in st.inputs], many=True)
         many.turn, many.point, many.slide = dict(st.turn), dict(st.point), dict(st.slide)
         many.angle = dict(st.angle)
+        why = ""
         start = guessed_unknowns(group, many, self.angles, self.points, self.m, self.plan)
         if start is not None:
             x, closed = newton(group, many, self.plan, start, self.m.size)
             if closed[0]:
                 self._take(group, st, x)
                 return x[0]
+            left = float(np.linalg.norm(stack_rows(gaps(group, many), 1)))
+            why = f": from the guess on its loops stay {left:.6g} m apart"
         found = every_solution(group, many, self.plan, self.m.size)
         if len(found) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
             raise MobilityError(
@@ -462,7 +473,7 @@ class _Chooser:
             )
         if len(found) == 0:
             raise AssemblyError(
-                f"[guess] at: {group.name} cannot be assembled there (Newton-Raphson from many starts finds no "
+                f"[guess] at: {group.name} cannot be assembled there{why} (Newton-Raphson from many starts finds no "
                 "closed loop); give an `at` where it can, or check the lengths"
             )
         states = []
