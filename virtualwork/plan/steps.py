@@ -32,19 +32,16 @@ class Term:
 
 @dataclass(frozen=True)
 class Angle:
-    """θ = const + Σ k·input + Σ r·θ_base + Σ p·K_gear.
-
-    K is the constant of a gear, K = Σ c·θ of its links: the guess gives it once the links before it are placed.
-    """
+    """θ = const + Σ k·input + Σ r·θ_base. `phase`: const is such that θ takes this value at the guess."""
 
     const: float = 0.0
     inputs: tuple[tuple[int, float], ...] = ()
     bases: tuple[tuple[str, float], ...] = ()
-    gears: tuple[tuple[int, float], ...] = ()
+    phase: float | None = None
 
     def at(self, inputs: tuple[float, ...]) -> float | None:
         """The angle at given inputs, or None where it hangs on other angles."""
-        if self.bases or self.gears:
+        if self.bases or self.phase is not None:
             return None
         return self.const + sum(k * inputs[j] for j, k in self.inputs)
 
