@@ -97,8 +97,9 @@ KNOWN: dict[str, set[str]] = {
     },
     "virtualwork.bounds.second_order": {"circle", "imports virtualwork.mechanism, upwards"},
     "virtualwork.branch.change_point": {"circle"},
-    "virtualwork.check": {"circle", "no level", "reads _marched"},
+    "virtualwork.check": {"no level", "reads _marched"},
     "virtualwork.describe.reader": {"circle", "imports virtualwork.mechanism, upwards"},
+    "virtualwork.formulas.constraints": {"circle", "imports virtualwork.mechanism, upwards"},
     "virtualwork.formulas.dynamics": {
         "circle",
         "imports virtualwork.bounds.forces, upwards",

@@ -16,6 +16,9 @@ from cli.errors import LONGEST
 from cli.mechanism.read import wanted
 from cli.mechanism.solve import Job, load
 
+# each is a whole command, or several
+pytestmark = pytest.mark.slow
+
 Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 COMMAND = Path(sys.executable).with_name("dalembert")
 
