@@ -231,6 +231,7 @@ HUGE = ["mass_kg", "radius_mm", "angle_deg", "z_mm"]
 )
 @example(head=HUGE, rows=[["1e308", "1e308", "0", "0"]], delimiter=",", newline="\n")
 @example(head=HUGE, rows=[["1e300", "1e3", "0", "1e300"]], delimiter=",", newline="\n")
+@pytest.mark.slow
 def test_random_tables_never_break_the_command(
     head: list[str],
     rows: list[list[str]],

@@ -27,7 +27,7 @@ from virtualwork.bounds.second_order import Sizes, grown, inverse, kept, sum_of,
 from virtualwork.mechanism import GROUND
 from virtualwork.newton import EPS
 from virtualwork.plan.steps import Angle, Group, Place, Slide, Term, Turn, combined
-from virtualwork.state import SWEEP, Jets, State
+from virtualwork.state import Jets, State
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -150,7 +150,9 @@ class Rounding:
         plain = len(angle.inputs) == 1 and angle.inputs[0][1] == 1.0
         # in a sweep e^{iθ} is a product of three factors
         error: Any = (
-            1.5 * EPS if angle.inputs and self.n > SWEEP and len(self.motion.mechanism.inputs) == 1 else 0.0
+            1.5 * EPS
+            if angle.inputs and self.motion.swept and len(self.motion.mechanism.inputs) == 1
+            else 0.0
         )
         for j, k in angle.inputs:
             error = error + abs(k) * self.given[:, j]

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cli.errors import one_line
 from cli.read import options
+from cli.read.files import refuse_inputs
+from cli.show.columns import Column, Table
+from cli.show.digits import digits_that_hold
+from cli.show.files import write
 from cli.show.output import suffix_among
 from cli.show.shown import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
 from cli.show.text import csv_text
 
 if TYPE_CHECKING:
     from cli.mechanism.asked import Asked
-    from cli.mechanism.job import Job
+    from cli.mechanism.solve import Job
 
 
 def run(
@@ -105,7 +111,7 @@ def run(
     for each pose and link (what `dalembert work` reads); with --only or --forces a row for each pose. In a pipe
     --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
     """
-    from cli.mechanism.job import ORDERS
+    from cli.mechanism.solve import ORDERS
 
     if order is not None and order not in ORDERS:
         raise options.bad("--order", f"'{order}': expected {', '.join(ORDERS)}")
@@ -149,6 +155,14 @@ def run(
     )
     try:
         job = _job(file, at, sweep, inputs, names, order, branch)
+        if (
+            as_csv
+            and not (json or text or tables[:1] not in ([], ["--forces"]) or plot or expect)
+            and job.is_long
+        ):
+            if not _stream(job, forces=forces, digits=digits, output=output, states=states):
+                raise typer.Exit(1)
+            return
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not json or expect is not None or output is not None
         document = json or (output is not None and output.suffix.lower() == ".json")
@@ -183,6 +197,59 @@ def run(
         raise typer.Exit(1)
 
 
+def _stream(job: Job, *, forces: bool, digits: bool, output: Path | None, states: Path | None) -> bool:
+    """Write the table of a long sweep a block of poses at a time; return whether some pose is assembled."""
+    from cli.mechanism import forces as of_forces
+    from cli.mechanism import poses
+    from cli.mechanism import rounding as bounds
+    from cli.mechanism import states as of_states
+    from cli.mechanism.stream import Stream
+
+    form, errors = of_states.table, bounds.of_states
+    if forces:
+        form, errors = of_forces.table, bounds.of_forces
+    elif job.only is not None:
+        form, errors = poses.wide_table, bounds.of_poses
+    stream = Stream(job, forces)
+    unknown = 0
+
+    def parts(stream: Stream, form: Any, cut: bool) -> Iterator[str]:
+        nonlocal unknown
+        for i, (block, columns) in enumerate(stream.tables(form)):
+            if cut:
+                columns, without = _cut(columns, errors(block))
+                unknown += without
+            yield csv_text(columns, header=i == 0)
+
+    refuse_inputs([path for path in (output, states) if path is not None])
+    if states is not None:
+        every = Stream(replace(job, only=None))
+        write(states, (part.encode() for part in parts(every, of_states.table, False)))
+    if output is not None:
+        write(output, (part.encode() for part in parts(stream, form, digits)))
+    else:
+        for part in parts(stream, form, digits):
+            sys.stdout.write(part)
+        sys.stdout.flush()
+    said = stream.warnings()
+    if unknown:
+        said.append(f"--digits: of {unknown} numbers no digit is known to hold; their cells are empty")
+    for warning in said:
+        print(f"warning: {one_line(warning)}", file=sys.stderr)
+    return stream.any_assembled
+
+
+def _cut(columns: dict[str, Any], errors: Mapping[str, Any]) -> tuple[dict[str, Any], int]:
+    """Cut columns to the digits that hold; return also of how many numbers no digit is known."""
+    listed = []
+    for name, values in columns.items():
+        bounds = errors.get(name)
+        unit = "deg" * name.endswith("_deg")
+        listed.append(Column(name, unit, values, None if bounds is None else partial(list, bounds)))
+    table, unknown = digits_that_hold(Table(listed))
+    return {column.name: column.values for column in table.columns}, unknown
+
+
 def _as_csv(*, json: bool, text: bool, output: Path | None, expect: Path | None) -> bool:
     """Whether the answer is written as CSV: to a file, or to a pipe."""
     if output is not None:
@@ -208,8 +275,8 @@ def _job(
     order: str | None,
     branch: str | None,
 ) -> Job:
-    from cli.mechanism.inputs import wanted
-    from cli.mechanism.job import ORDERS, Job, load
+    from cli.mechanism.read import wanted
+    from cli.mechanism.solve import ORDERS, Job, load
 
     m = load(file)
     q = wanted(m, at, sweep, inputs)
@@ -275,7 +342,7 @@ def _shown(
         return "\n\n".join([*after, *asked.text(of_forces), *told, *(asked.explain(job) if explain else [])])
 
     def errors() -> dict[str, Any]:
-        from cli.mechanism import digits
+        from cli.mechanism import rounding as digits
 
         if not table:
             return {}
@@ -286,7 +353,7 @@ def _shown(
     def figure() -> Any:
         if asked.forces and not graph and len(job.inputs.shown) > 2 and job.motions[0].assembled.any():
             return asked.figure(job)
-        from cli.plots import mechanism as pictures
+        from cli.mechanism import picture as pictures
 
         return pictures.graphs(job, graph) if graph else pictures.draw(job)
 
