@@ -165,7 +165,7 @@ def _damped(
     lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1])
     zeros = np.zeros((*lead, a.shape[-1]))
 
-    def joined(one: NDArray[Kind], other: NDArray[Kind], axis: int) -> NDArray[Kind]:
+    def joined(one: NDArray[Kind], other: NDArray[Kind] | Real, axis: int) -> NDArray[Kind]:
         axes = -axis
         shape = lead + one.shape[-axes:], lead + other.shape[-axes:]
         return np.concatenate([np.broadcast_to(one, shape[0]), np.broadcast_to(other, shape[1])], axis=axis)
