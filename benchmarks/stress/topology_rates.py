@@ -157,6 +157,6 @@ def rates(rng: np.random.Generator) -> list[tuple[float, float]]:
 CAMPAIGNS = {
     "any topology": (
         "links, slots, prisms and gears joined at random, at the pose they were drawn in",
-        _rates,
+        rates,
     ),
 }
