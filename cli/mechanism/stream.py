@@ -12,7 +12,7 @@ from virtualwork.motion import EvenSweep, Motion
 from virtualwork.state import BLOCK
 
 if TYPE_CHECKING:
-    from cli.mechanism.job import Job
+    from cli.mechanism.solve import Job
 
 Columns = dict[str, Sequence[Any]]
 
