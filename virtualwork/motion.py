@@ -508,6 +508,10 @@ class Motion:
         return self._join(parts, kind)
 
     # --- quantities -------------------------------------------------------------------------------------------
+    def rate(self, j: int, order: int) -> Reals:
+        """The order-th derivative of input j in time, (n,)."""
+        return np.broadcast_to(np.asarray(self._rates[order - 1][j], dtype=float), (self.n,))
+
     def angle(self, body: str) -> Reals:
         """A link's angle, (n,) rad."""
         self._solve((f"angle:{body}",), 0)
