@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.phase import angle_of
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import record, table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -18,7 +23,8 @@ STARTS = 24
 """Directions from which the fit is started: it has few minima, all found from so many."""
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class AmplitudeFit:
     """Influence coefficients of one plane from amplitudes; see `influence_from_amplitudes`."""
 
@@ -33,6 +39,17 @@ class AmplitudeFit:
     trials: Real
     trial_masses: Complex
 
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with a row per sensor: initial, influence (size per kg, angle_deg), misfit, condition_number."""
+        columns = {
+            "initial": self.initial,
+            "influence_per_kg": np.abs(self.influence),
+            "angle_deg": np.degrees(angle_of(self.influence)),
+            "misfit": self.misfit,
+            "condition_number": self.condition_number,
+        }
+        return table(columns, ("sensor",))
+
     @cached_property
     def _at(self) -> _Normal:
         """The normal equations at the coefficients, relative to each sensor's initial amplitude and to the masses."""
@@ -44,7 +61,8 @@ class AmplitudeFit:
     def condition_number(self) -> Real:
         """By what factor relative errors of the readings can grow in the coefficient, (s,); inf where circles touch."""
         at = self._at
-        gain = np.linalg.norm(at.gain(at.rows), axis=-2).max(axis=-1)  # largest |∂z/∂R| over the runs
+        # largest |∂z/∂R| over the runs
+        gain = np.linalg.norm(at.gain(at.rows), axis=-2).max(axis=-1)
         size = np.abs(self.influence) * np.abs(self.trial_masses).max() / self.initial
         return np.asarray(gain * (self.trials / self.initial).max(axis=0) / np.where(size > 0, size, np.nan))
 
@@ -159,8 +177,8 @@ class _Normal(NamedTuple):
         return np.asarray(self.inverse @ np.swapaxes(rows, -1, -2))
 
 
-def _normal(z: Complex, read: Real, t: Complex) -> _Normal:
-    """Work out the normal equations at z (n,) for readings (n, r) or (r,)."""
+def _derivatives(z: Complex, read: Real, t: Complex) -> tuple[Real, Real, Real, Real, Real]:
+    """Return |y|, the misfits f, their derivatives (n, r, 2), and Σ ½f² in second derivatives, first without curvature."""
     y = 1 + z[:, None] * t
     length = np.abs(y)
     u = y / np.where(length > 0, length, 1.0)
@@ -170,7 +188,13 @@ def _normal(z: Complex, read: Real, t: Complex) -> _Normal:
     rows = np.stack([slope.real, -slope.imag], axis=-1)
     across = np.stack([slope.imag, slope.real], axis=-1)
     bend = np.where(length > 1e-12, f / np.where(length > 0, length, 1.0), 0.0)
-    hessian = np.einsum("nrk,nrl->nkl", rows, rows) + np.einsum("nr,nrk,nrl->nkl", bend, across, across)
+    normal = np.einsum("nrk,nrl->nkl", rows, rows)
+    return length, f, rows, normal, normal + np.einsum("nr,nrk,nrl->nkl", bend, across, across)
+
+
+def _normal(z: Complex, read: Real, t: Complex) -> _Normal:
+    """Work out the normal equations at z (n,) for readings (n, r) or (r,)."""
+    length, f, rows, _, hessian = _derivatives(z, read, t)
     a, b, c = hessian[:, 0, 0], hessian[:, 0, 1], hessian[:, 1, 1]
     det = a * c - b * b
     sure = np.abs(det) > 64 * EPS * (np.abs(a * c) + b * b)
@@ -188,19 +212,8 @@ def _fit(read: Real, t: Complex) -> tuple[complex, float, complex]:
     damping = np.full(z.shape, 1e-3)
     cost = _cost(z, read, t)
     for _ in range(80):
-        y = 1 + z[:, None] * t
-        length = np.abs(y)
-        u = y / np.where(length > 0, length, 1.0)
-        f = length - read
-        # d|y| = Re(ū t dz): rows (Re, -Im) of ū t
-        slope = u.conj() * t
-        j = np.stack([slope.real, -slope.imag], axis=-1)
-        gradient = np.einsum("nrk,nr->nk", j, f)
-        # exact curvature: |y|'' = (Im ū t dz)²/|y|
-        across = np.stack([slope.imag, slope.real], axis=-1)
-        bend = np.where(length > 1e-12, f / np.where(length > 0, length, 1.0), 0.0)
-        normal = np.einsum("nrk,nrl->nkl", j, j)
-        hessian = normal + np.einsum("nr,nrk,nrl->nkl", bend, across, across)
+        _, f, rows, normal, hessian = _derivatives(z, read, t)
+        gradient = np.einsum("nrk,nr->nk", rows, f)
         definite = (hessian[:, 0, 0] > 0) & (
             np.linalg.det(hessian) > 1e-9 * np.trace(hessian, axis1=1, axis2=2) ** 2
         )

@@ -15,17 +15,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.dependence import DependentPlanes, adjoint, columns_scaled, condition_number
 from balancing.limited import limited_least_squares, smallest_maximum
+from balancing.phase import angle_of
 from balancing.qr import smallest_squares
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import numbers, record, table
 
 if TYPE_CHECKING:
-    from balancing.rounding import Bounds, Case
+    import pandas as pd
+
+    from balancing.rounding import Bounds, Solved
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Balance:
     """Corrections from influence coefficients; see `least_squares` and `minimax`."""
 
@@ -47,6 +52,20 @@ class Balance:
 
     singular_values: Real | None = field(default=None, repr=False, compare=False)
     """Of the scaled coefficients, (..., p), where they are known from the solution."""
+
+    def __repr__(self) -> str:
+        largest = numbers(self.residual_max)
+        return f"<Balance: corrections {numbers(self.corrections)} kg leave at most {largest}>"
+
+    def to_frame(self, of: str = "corrections") -> pd.DataFrame:
+        """Return a table with a row per plane (mass_kg, angle_deg), or `of="residual"` per sensor (amplitude, phase_deg)."""
+        if of == "corrections":
+            names, values, axis = ("mass_kg", "angle_deg"), self.corrections, "plane"
+        elif of == "residual":
+            names, values, axis = ("amplitude", "phase_deg"), self.residual, "sensor"
+        else:
+            raise ValueError(f"'{of}': expected corrections or residual")
+        return table({names[0]: np.abs(values), names[1]: np.degrees(angle_of(values))}, ("rotor", axis))
 
     @cached_property
     def residual(self) -> Complex:
@@ -104,9 +123,9 @@ class Balance:
         >>> bool((abs(fix.corrections - [17 / 21, 31 / 21]) <= fix.error_estimate()).all())
         True
         """
-        case = self._case(influence_error, initial_error)
+        solved = self._solved(influence_error, initial_error)
         exact = influence_error is None and initial_error is None
-        bounds = (self._bounds if exact else self._bounds_of(case))[0]
+        bounds = (self._bounds if exact else self._bounds_of(solved))[0]
         if quantity == "corrections":
             return bounds.solution
         if quantity == "residual":
@@ -116,7 +135,7 @@ class Balance:
             if self.bound is not None and self.weights is None:
                 # the true optimum lies between the dual bound and what was found
                 gap = max(float(self.residual_max) - self.bound, 0.0)
-                largest = np.minimum(largest, gap + case.evaluation_error.max())
+                largest = np.minimum(largest, gap + solved.evaluation_error.max())
             return np.asarray(largest)
         if quantity == "residual_rms":
             return np.asarray(np.sqrt(np.square(bounds.residual).mean(axis=-1)) + 8 * EPS * self.residual_rms)
@@ -129,25 +148,27 @@ class Balance:
 
     @cached_property
     def _bounds(self) -> tuple[Bounds, str]:
-        return self._bounds_of(self._case())
+        return self._bounds_of(self._solved())
 
-    def _case(self, influence_error: ArrayLike | None = None, initial_error: ArrayLike | None = None) -> Case:
-        from balancing.rounding import Case
+    def _solved(
+        self, influence_error: ArrayLike | None = None, initial_error: ArrayLike | None = None
+    ) -> Solved:
+        from balancing.rounding import Solved
 
         of_influence, of_initial = (
             None if error is None else np.asarray(error, dtype=float)
             for error in (influence_error, initial_error)
         )
-        return Case(self.influence, self.initial, self.corrections, self.weights, of_influence, of_initial)
+        return Solved(self.influence, self.initial, self.corrections, self.weights, of_influence, of_initial)
 
-    def _bounds_of(self, case: Case) -> tuple[Bounds, str]:
+    def _bounds_of(self, solved: Solved) -> tuple[Bounds, str]:
         if self._free:
             from balancing.rounding import least_squares_bounds
 
-            return least_squares_bounds(case, self.residual, self.ridge), ""
+            return least_squares_bounds(solved, self.residual, self.ridge), ""
         from balancing.optimality import optimum_bounds
 
-        return optimum_bounds(case, self.bound is not None, self.max_mass, self.max_residual)
+        return optimum_bounds(solved, self.bound is not None, self.max_mass, self.max_residual)
 
     @property
     def _free(self) -> bool:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from balancing.run_log import JointFit, joint_fit
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -49,6 +50,7 @@ def _chance(share: Real, nu: Real, tests: Real | int) -> Real:
     return np.asarray(np.minimum(tests * np.clip(1 - share, 0.0, 1.0) ** (nu - 1), 1.0))
 
 
+@record
 class Repeat(NamedTuple):
     """Two readings of one channel with the same masses on, and how probable so large a difference is by chance."""
 

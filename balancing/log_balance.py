@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.propagation import components, response
 from balancing.run_log import Errors, JointFit
+from dalembert.arithmetic.records import record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -35,7 +36,8 @@ def region_factor(probability: float, degrees_of_freedom: ArrayLike, dimensions:
     return np.asarray(np.sqrt(np.where(nu > 0, square, np.nan)))
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class LogBalance:
     """Corrections of a rotor whose log was fitted, and their doubt.
 
@@ -67,8 +69,9 @@ class LogBalance:
 
     def _by_channel(self) -> tuple[Complex, Real, Real]:
         """Direction and deviations of the readings of each channel, (..., s, r) each."""
-        unit, along, across, _ = self.errors
-        return np.swapaxes(unit, -1, -2), np.swapaxes(along, -1, -2), np.swapaxes(across, -1, -2)
+        errors = self.errors
+        along, across = np.swapaxes(errors.along, -1, -2), np.swapaxes(errors.across, -1, -2)
+        return np.swapaxes(errors.unit, -1, -2), along, across
 
     def _each(self) -> tuple[Complex, Real, Real]:
         """The same of all readings in one row, (..., s·r) each."""

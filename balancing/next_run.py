@@ -10,11 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.log_balance import LogBalance
 from balancing.propagation import response
+from dalembert.arithmetic.records import record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
+@record
 class NextRun(NamedTuple):
     """Masses to have on the rotor in the next run, and the uncertainty of the corrections before and after it."""
 

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.correction import correct
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import record, table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Placement:
     """Masses at given positions; see `place` and `place_from_stock`."""
 
@@ -28,6 +34,10 @@ class Placement:
     """No masses at these positions, within the limits, come nearer to the target than this, kg."""
     free: tuple[int, ...] = ()
     """The positions whose masses were worked out; the others are full, empty, or weights from stock."""
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with a row per position: angle_deg, mass_kg."""
+        return table({"angle_deg": np.degrees(self.angles), "mass_kg": self.masses}, ("position",))
 
     @property
     def total(self) -> complex:
@@ -107,7 +117,8 @@ def place(target: complex, angles: ArrayLike, max_mass: ArrayLike | None = None)
     if not np.isfinite(limit).all():
         sines = np.abs(np.imag(np.roll(arms, -1) * arms.conj()))
         slimmest = float(sines[sines > 1e-9].min(initial=1.0))
-        limit = np.where(np.isfinite(limit), limit, 4 * size / slimmest)  # more than any share can be
+        # more than any share can be
+        limit = np.where(np.isfinite(limit), limit, 4 * size / slimmest)
     masses, free = _exact(goal, arms, limit) or _nearest(goal, arms, limit)
     found = np.zeros(n)
     found[order] = np.where(masses > 4e-15 * size, masses, 0.0)
@@ -237,7 +248,8 @@ def place_from_stock(
     room = max(2 * int(np.log(SUMS) / np.log(len(loads))), 2)
     used = np.argsort(away, kind="stable")[:room]
     halves = []
-    for part in (used[0::2], used[1::2]):  # every other one: both halves reach in all directions
+    # every other one: both halves reach in all directions
+    for part in (used[0::2], used[1::2]):
         sums, mass, count = np.zeros(1, dtype=complex), np.zeros(1), np.zeros(1, dtype=np.intp)
         choice = np.zeros((1, len(part)), dtype=np.int16)
         for column, position in enumerate(part):
@@ -281,7 +293,8 @@ def place_from_stock(
                 found = (least, float(ma[a[i]] + mb[b[j]]), int(a[i]), int(b[j]))
                 if best is None or found[0] < best[0] - slack or found[1] < best[1] - slack:
                     best = found
-    assert best is not None  # no weight anywhere is always a choice
+    # no weight anywhere is always a choice
+    assert best is not None
     masses = np.zeros(len(theta))
     masses[used[0::2]], masses[used[1::2]] = loads[xa[best[2]]], loads[xb[best[3]]]
     return Placement(goal, theta, masses, best[0] if room >= len(theta) else 0.0)

@@ -11,9 +11,8 @@ circular, E|ε|² = σ²/weight, of one σ for all channels of a machine.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from balancing.dependence import threshold
 from balancing.qr import factors
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -35,7 +35,9 @@ class Undetermined(ValueError):
         super().__init__(message)
 
 
-class Errors(NamedTuple):
+@record
+@dataclass(frozen=True, eq=False, repr=False)
+class Errors:
     """Standard deviations of readings, independent of one another: along the direction `unit` and across it."""
 
     unit: Complex
@@ -46,7 +48,8 @@ class Errors(NamedTuple):
     """Complex, of the estimate they are; inf where they are known. (...)"""
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class JointFit:
     """Initial vibration and influence coefficients of every channel; see `joint_fit`."""
 
@@ -58,9 +61,9 @@ class JointFit:
     """(..., r, s)."""
     unknowns: Complex
     """θ = (x₀, α), (..., s, 1 + p)."""
-    gain: Complex = field(repr=False)
+    gain: Complex
     """θ = gain y, (..., s, 1 + p, r); 0 where a reading is missing."""
-    leverage: Real = field(repr=False)
+    leverage: Real
     """h, how far a reading is its own fitted value, in [0, 1], (..., r, s)."""
 
     @property

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.bounded import Bounded, apply, stack
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import record
 from rigidbody3d.shapes import SHAPES
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ def times(I: Bounded, w: Bounded) -> Bounded:
 # --- mass properties ---
 
 
+@record
 class BodyError(NamedTuple):
     """Bounds of the rounding errors of a body's mass (...), centre (..., 3) and tensor (..., 3, 3)."""
 
@@ -224,7 +226,8 @@ def shaft(
     m, c, I = body
     z1, z2 = (bearings[..., i] for i in range(2))
     weight = m[..., None] * gravity
-    U = m[..., None] * c[..., :2]  # x and y as the last axis
+    # x and y as the last axis
+    U = m[..., None] * c[..., :2]
     push, pull = -(speed**2), speed_rate
 
     def moment(z: Bounded) -> Bounded:

@@ -28,7 +28,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("optimality",),
         ("limited", "rounding", "run_log"),
         ("influence", "propagation", "qr"),
-        ("cones", "dependence", "rotor"),
+        ("cone_problem", "dependence", "phase", "rotor"),
     ),
     "virtualwork": (
         ("__init__",),
@@ -46,7 +46,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "rigidbody3d": (
         ("__init__",),
-        ("freebody", "gyroscope", "momentum", "shaft", "spin", "top"),
+        ("freebody", "gyroscope", "integration", "momentum", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("rounding_in_time",),
         ("inertia",),
@@ -98,8 +98,9 @@ KNOWN: dict[str, set[str]] = {
     },
     "virtualwork.bounds.second_order": {"circle", "imports virtualwork.mechanism, upwards"},
     "virtualwork.branch.change_point": {"circle"},
-    "virtualwork.check": {"circle", "no level", "reads _marched"},
+    "virtualwork.check": {"no level", "reads _marched"},
     "virtualwork.describe.reader": {"circle", "imports virtualwork.mechanism, upwards"},
+    "virtualwork.formulas.constraints": {"circle", "imports virtualwork.mechanism, upwards"},
     "virtualwork.formulas.dynamics": {
         "circle",
         "imports virtualwork.bounds.forces, upwards",
@@ -142,24 +143,7 @@ KNOWN: dict[str, set[str]] = {
     "virtualwork.study.cycle": {"imports virtualwork.motion, upwards", "reads _rates"},
     "virtualwork.study.equilibrium": {"imports virtualwork.mechanism, upwards", "reads _solve"},
     "virtualwork.track": {"circle", "no level"},
-    "cli.commands.__init__": {"no level"},
-    "cli.commands.field": {"no level"},
-    "cli.commands.mechanism": {"no level"},
-    "cli.commands.place": {"no level"},
-    "cli.field_digits": {"circle", "no level"},
-    "cli.field_files": {"no level"},
-    "cli.field_job": {"circle", "no level"},
-    "cli.field_report": {"no level"},
-    "cli.field_runs": {"no level"},
-    "cli.field_solve": {"no level"},
-    "cli.field_text": {"circle", "no level", "reads _amount", "reads _unit", "reads _verdict"},
     "cli.mechanism.poses": {"reads _marched"},
-    "cli.place_job": {"no level"},
-    "cli.plots.__init__": {"no level"},
-    "cli.plots.field": {"circle", "no level", "reads _amount", "reads _unit"},
-    "cli.plots.forces": {"no level"},
-    "cli.plots.mechanism": {"no level"},
-    "cli.plots.place": {"no level"},
 }
 
 

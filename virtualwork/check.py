@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.describe.errors import AssemblyError
+from virtualwork.formulas.constraints import Constraints, coordinates, dependent
 from virtualwork.mechanism import GROUND
 from virtualwork.state import State
 
@@ -73,18 +74,13 @@ class Check:
 
     @cached_property
     def _rank(self) -> tuple[int, tuple[str, ...]]:
-        labels, jacobian = constraint_jacobian(self.mechanism, self._typical())
-        if not len(labels):
+        m, plan = self.mechanism, self.assembly.plan
+        here = Constraints.at(m, coordinates(m, plan, self._typical()), self.assembly.phases)
+        if not len(here.labels):
             return 0, ()
-        if not np.isfinite(jacobian).all():
+        if not np.isfinite(here.jacobian).all():
             raise AssemblyError("assembled at no pose of the motion where the joints' rank could be told")
-        u, s, _ = np.linalg.svd(jacobian)
-        rank = int((s > 1e-9 * s[0]).sum())
-        left = u[:, rank:]
-        dependent = [
-            label for label, row in zip(labels, left, strict=True) if np.abs(row).max(initial=0) > 1e-6
-        ]
-        return rank, tuple(dict.fromkeys(dependent))
+        return dependent(here.labels, here.jacobian)
 
     @property
     def mobility_by_rank(self) -> int:
@@ -299,67 +295,6 @@ def _cycles(order: list[str], pins: dict[frozenset[str], list[str]]) -> list[tup
                     ):
                         found.append((a, b, c, d))
     return found
-
-
-def constraint_jacobian(m: Mechanism, st: State) -> tuple[list[str], Reals]:
-    """The Jacobian of every joint's constraints in the coordinates (θ, x, y) of each link, lengths over the size.
-
-    Returns
-    -------
-    labels : list of str
-        The joint of each row.
-    jacobian : array (constraints, 3·links)
-    """
-    column = {link: 3 * i for i, link in enumerate(m.links)}
-    size = m.size
-    labels: list[str] = []
-    rows: list[Reals] = []
-
-    def vector(body: str, z: complex) -> tuple[complex, complex, complex]:
-        """Derivatives of a point of a body along its θ, x, y."""
-        return 1j * z * complex(np.ravel(st.turn[body])[0]) / size, 1.0, 1j
-
-    def add(label: str, parts: list[tuple[str, complex, float]], normal: complex | None = None) -> None:
-        """Σ sign·point = 0, in x and y, or along a normal only."""
-        both = [1.0 + 0j, 1j] if normal is None else [normal]
-        for n in both:
-            row = np.zeros(3 * len(column))
-            for body, z, sign in parts:
-                if body != GROUND:
-                    for k, v in enumerate(vector(body, z)):
-                        row[column[body] + k] += sign * (v.real * n.real + v.imag * n.imag)
-            labels.append(label)
-            rows.append(row)
-
-    def turn(label: str, parts: list[tuple[str, float]]) -> None:
-        row = np.zeros(3 * len(column))
-        for body, factor in parts:
-            if body != GROUND:
-                row[column[body]] += factor
-        labels.append(label)
-        rows.append(row)
-
-    for pin, bodies in m.pins.items():
-        first = bodies[0]
-        for other in bodies[1:]:
-            add(f"pin {pin}", [(first, m.bodies[first][pin], 1.0), (other, m.bodies[other][pin], -1.0)])
-    for i, g in enumerate(m.guides):
-        label = f"{'slider' if g.is_slider else 'slot'} {g.point}"
-        through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
-        d = complex(math.cos(g.angle), math.sin(g.angle))
-        on = complex(np.ravel(st.turn[g.on])[0])
-        slide = float(np.ravel(st.slide[i])[0])
-        add(
-            label,
-            [(g.link, m.bodies[g.link][g.point], 1.0), (g.on, through + slide * d, -1.0)],
-            1j * d * on,
-        )
-        if g.is_slider:
-            turn(label, [(g.link, 1.0), (g.on, -1.0)])
-    for gear in m.gears:
-        a, b = gear.links
-        turn(f"gear {a}-{b}", [(b, 1.0), (a, -gear.ratio), (gear.arm, gear.ratio - 1.0)])
-    return labels, np.array(rows) if rows else np.zeros((0, 3 * len(column)))
 
 
 def _motion(assembly: Assembly, inputs: tuple[float, ...]) -> Any:

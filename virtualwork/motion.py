@@ -194,6 +194,8 @@ class Motion:
     Attributes
     ----------
     inputs : array (n, k)
+    block_of : EvenSweep, optional
+        The sweep that these inputs are `BLOCK` poses of: they have the digits of the sweep solved whole.
     input_error : float or array (n, k)
         Bound of the inputs' own errors, for the estimates of rounding errors: 0 where they are exact as given.
     solved : list of (step, order)
@@ -207,8 +209,10 @@ class Motion:
         speed: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
         jerk: ArrayLike | None = None,
+        block_of: EvenSweep | None = None,
     ) -> None:
         self.assembly = assembly
+        self.block_of = block_of
         self.mechanism = m = assembly.mechanism
         k = len(m.inputs)
         if angle is None:
@@ -286,6 +290,11 @@ class Motion:
             if guide.point == name:
                 return SlideMotion(self, i)
         raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
+
+    @property
+    def swept(self) -> bool:
+        """Whether this is a sweep of so many poses, or a block of one, that e^{iq} is formed by angle addition."""
+        return self.n > SWEEP or self.block_of is not None
 
     @cached_property
     def assembled(self) -> NDArray[np.bool_]:
@@ -372,15 +381,16 @@ class Motion:
             if k == 1 and self.n:
                 q = self.inputs[:, 0]
                 self.assembly.track.cover(float(q.min()), float(q.max()))
-            if self.n == 1:
+            if self.n == 1 and self.block_of is None:
                 self._blocks = [State([float(v) for v in self.inputs[0]], many=False)]
             else:
                 self._blocks = [
                     State([self.inputs[i : i + BLOCK, j] for j in range(k)], many=True)
                     for i in range(0, self.n, BLOCK)
                 ]
-                if k == 1 and self.n > SWEEP:
-                    _uniform(self.inputs[:, 0], self._blocks)
+                if k == 1 and self.swept:
+                    q = self.inputs[:, 0]
+                    _uniform(q, self._blocks, self.block_of or EvenSweep(q[0], q[-1], self.n))
         return self._blocks
 
     def _rows(self) -> Iterable[tuple[slice, State]]:
@@ -498,6 +508,10 @@ class Motion:
         return self._join(parts, kind)
 
     # --- quantities -------------------------------------------------------------------------------------------
+    def rate(self, j: int, order: int) -> Reals:
+        """The order-th derivative of input j in time, (n,)."""
+        return np.broadcast_to(np.asarray(self._rates[order - 1][j], dtype=float), (self.n,))
+
     def angle(self, body: str) -> Reals:
         """A link's angle, (n,) rad."""
         self._solve((f"angle:{body}",), 0)
@@ -585,36 +599,70 @@ class Motion:
         ]
 
 
-def _uniform(q: Reals, blocks: list[State]) -> None:
-    """Give the blocks of a uniform sweep e^{iq} by angle addition: e^{i(q0 + jh)} = e^{iq0}·e^{ijh}.
+class EvenSweep:
+    """An even sweep of an input, whose e^{iq} follow by angle addition: e^{i(q0 + jh)} = e^{iq0}·e^{ijh}.
 
     Each factor is rounded once and the product twice, whatever the length of the sweep; the sweep's own rounding,
-    the difference between q and q0 + jh, is put back to first order, which is exact here.
+    the difference between q and q0 + jh, is put back to first order, which is exact here. A block of `BLOCK` poses
+    needs no other block of the sweep.
+
+    Parameters
+    ----------
+    first, last : float
+        rad.
+    n : int
+        Number of poses.
+    even : bool
+        False where some block is known not to be even: then none is taken as such.
+
+    Examples
+    --------
+    >>> sweep = EvenSweep(0.0, 6.0, 7)
+    >>> bool(np.allclose(sweep.turns(np.arange(7.0)), np.exp(1j * np.arange(7.0)), rtol=1e-15))
+    True
+    >>> sweep.turns(np.arange(7.0) ** 2) is None
+    True
     """
-    n = len(q)
-    h = (q[-1] - q[0]) / (n - 1)
-    top = max(abs(q[0]), abs(q[-1]))
-    size = min(n, BLOCK)
-    ramp = h * np.arange(size)
-    offs = []
-    with np.errstate(invalid="ignore"):
-        for i, st in enumerate(blocks):
-            off = (st.inputs[0] - q[i * BLOCK]) - ramp[: len(st.inputs[0])]
-            bound = 64 * np.finfo(float).eps * max(top, 1e-3)
-            if not (off.max() <= bound and off.min() >= -bound):
-                return
-            offs.append(off)
-    table = np.empty(size, complex)
-    np.cos(ramp, out=table.real)
-    np.sin(ramp, out=table.imag)
-    for i, (st, off) in enumerate(zip(blocks, offs, strict=True)):
-        length = len(off)
-        e = table[:length] * complex(np.cos(q[i * BLOCK]), np.sin(q[i * BLOCK]))
-        turn = np.empty(length, complex)
+
+    def __init__(self, first: float, last: float, n: int, even: bool = True) -> None:
+        self.even = even
+        h = (last - first) / (n - 1)
+        self.ramp = h * np.arange(min(n, BLOCK))
+        self.bound = 64 * np.finfo(float).eps * max(abs(first), abs(last), 1e-3)
+
+    @cached_property
+    def _table(self) -> Complexes:
+        table = np.empty(len(self.ramp), complex)
+        np.cos(self.ramp, out=table.real)
+        np.sin(self.ramp, out=table.imag)
+        return table
+
+    def off(self, q: Reals) -> Reals | None:
+        """By how much a block's inputs are off from even steps; None where they are not even to rounding."""
+        with np.errstate(invalid="ignore"):
+            off = (q - q[0]) - self.ramp[: len(q)]
+            return off if off.max() <= self.bound and off.min() >= -self.bound else None
+
+    def turns(self, q: Reals) -> Complexes | None:
+        """e^{iq} of a block, (≤ BLOCK,); None where the sweep is not even."""
+        off = self.off(q) if self.even else None
+        if off is None:
+            return None
+        e = self._table[: len(q)] * complex(np.cos(q[0]), np.sin(q[0]))
+        turn = np.empty(len(q), complex)
         turn.real = 1.0
         turn.imag = off
         e *= turn
-        st.spins[0] = e
+        return e
+
+
+def _uniform(q: Reals, blocks: list[State], sweep: EvenSweep) -> None:
+    """Give the blocks of an even sweep their e^{iq}; where one block is not even, none gets them."""
+    if all(sweep.off(q[i : i + BLOCK]) is not None for i in range(0, len(q), BLOCK)):
+        for st in blocks:
+            turns = sweep.turns(np.asarray(st.inputs[0]))
+            if turns is not None:
+                st.spins[0] = turns
 
 
 def _pairs(z: Complexes) -> Reals:

@@ -6,19 +6,23 @@ x_{k+1} = x_k − Φ⁻¹ f(x_k), on every pose of a block together; a step that
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from virtualwork.describe.errors import AssemblyError
-from virtualwork.formulas.closed_forms import Number
+from virtualwork.formulas.closed_forms import Number, dot
+from virtualwork.mechanism import GROUND
 from virtualwork.state import State, columns, loop, ratio
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from virtualwork.assembly import Assembly
     from virtualwork.assur import Group, Plan
+    from virtualwork.mechanism import Mechanism
 
     Reals = NDArray[np.float64]
 
@@ -223,12 +227,103 @@ def newton(
         if table is not None:
             table.append(Iterate(k, x[0].copy(), float(norm[0])))
         # of dependent constraints rounding leaves a gap that no step makes less: it is closed, and stays as it is
-        done = done | (worse & (norm <= 1e-12 * size))
+        # and a pose that no part of the step brings nearer to closing will not close
+        done = done | worse if damped else done
         small = (norm <= 64 * EPS * size) & (big <= 1e-7)
         done = done | small | ~np.isfinite(norm)
     write_unknowns(group, st, x)
     closed = np.isfinite(norm) & (norm <= 1e-12 * size)
     return x, closed
+
+
+def guessed_unknowns(
+    group: Group,
+    st: State,
+    angles: Mapping[str, float],
+    points: Mapping[str, complex],
+    m: Mechanism,
+    plan_: Plan,
+) -> Any:
+    """A Newton group's unknowns from the guess, or None where an angle is not known.
+
+    A slide is that of the guessed points; where they do not say, it closes the loops as nearly as it can.
+    """
+    if any(b not in angles for b in group.angles):
+        return None
+    x = np.zeros((1, len(group.angles) + len(group.slides)))
+    x[0, : len(group.angles)] = [angles[b] for b in group.angles]
+    write_unknowns(group, st, x)
+    left = []
+    for j, g in enumerate(group.slides, len(group.angles)):
+        guide = m.guides[g]
+        through = guide.through if not isinstance(guide.through, str) else m.bodies[guide.on][guide.through]
+        on = complex(np.ravel(st.turn[guide.on])[0])
+        origin = _origin(guide.on, through, on, points, m)
+        if guide.point in points and origin is not None:
+            x[0, j] = dot(points[guide.point] - origin, plan_.directions[g] * on)
+        else:
+            left.append(j)
+    write_unknowns(group, st, x)
+    if left:
+        # the loops are linear in the slides
+        along, gap = stack(columns(group, st, plan_), 1)[0][:, left], stack_rows(gaps(group, st), 1)[0]
+        if np.isfinite(along).all() and np.isfinite(gap).all():
+            x[0, left] = np.linalg.lstsq(along, -gap)[0]
+            write_unknowns(group, st, x)
+    return x
+
+
+def _origin(
+    body: str, z: complex, turn: complex, points: Mapping[str, complex], m: Mechanism
+) -> complex | None:
+    if body == GROUND:
+        return z
+    for name, local in m.links[body].points.items():
+        if name in points:
+            return points[name] + (z - local) * turn
+    return None
+
+
+def every_solution(group: Group, st: State, plan_: Plan, size: float) -> Any:
+    """Every assembly of a Newton group at one input, by damped Newton from many starts spread evenly.
+
+    A systematic multi-start (Kronecker sequence of the generalised golden ratio): it finds what it finds, and does
+    not prove that there is no other.
+    """
+    n = len(group.angles) + len(group.slides)
+    starts = min(4096, 128 * n)
+    g = 1.0
+    for _ in range(64):
+        g = (1 + g) ** (1 / (n + 1))
+    u = (0.5 + np.outer(np.arange(1, starts + 1), g ** -np.arange(1.0, n + 1))) % 1.0
+    x0 = np.empty((starts, n))
+    na = len(group.angles)
+    x0[:, :na] = u[:, :na] * 2 * np.pi
+    x0[:, na:] = (2 * u[:, na:] - 1) * size
+    many = State([np.full(starts, np.ravel(q)[0]) for q in st.inputs], many=True)
+    many.turn, many.point, many.slide, many.angle = (
+        dict(st.turn),
+        dict(st.point),
+        dict(st.slide),
+        dict(st.angle),
+    )
+    with np.errstate(all="ignore"):
+        x, closed = newton(group, many, plan_, x0, size)
+    x = x[closed]
+    if not len(x):
+        return x
+    x[:, :na] = (x[:, :na] + np.pi) % (2 * np.pi) - np.pi
+    keep: list[Any] = []
+    for row in x:
+        for other in keep:
+            d = row - other
+            d[:na] = np.abs(np.exp(1j * row[:na]) - np.exp(1j * other[:na]))
+            d[na:] /= size
+            if np.abs(d).max() < 1e-6:
+                break
+        else:
+            keep.append(row)
+    return np.array(keep)
 
 
 # --- singular in every pose -----------------------------------------------------------------------------------------
@@ -331,8 +426,7 @@ def all_at_once(assembly: Assembly, inputs: tuple[float, ...], limit: int = 50) 
     AssemblyError
         Where the guess does not give every unknown angle.
     """
-    from virtualwork.assembly import guessed_unknowns, known_by_guess
-    from virtualwork.assur import Turn
+    from virtualwork.assur import Turn, known_by_guess
 
     m = assembly.mechanism
     merged, group = assembly.merged

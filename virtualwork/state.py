@@ -168,8 +168,8 @@ class Case:
             rail = [t for t in closure.terms if t.slide == g]
             t = rail[0]
             relative = tie.get(t.body, Angle())
-            turned = t.z * complex(np.exp(1j * relative.const)) if group.kind == "RPR" else t.z
-            self.rails.append((turned, t.body))
+            plain = group.kind == "RPR" and not relative.inputs
+            self.rails.append((t.z * complex(np.exp(1j * relative.const)) if plain else t.z, t.body))
 
     def arm(self, i: int, st: State) -> Number:
         """The arm of unknown angle i."""
@@ -182,6 +182,12 @@ class Case:
                 v = v * st.slide[t.slide]
             value = value + v
         return value
+
+    def rail(self, st: State) -> Number:
+        """The direction of a slide that turns with the unknown angle, relative to it."""
+        z, body = self.rails[0]
+        relative = self.tie.get(body, Angle())
+        return z * st.exp(st.affine(relative)) if relative.inputs else z
 
     def offset(self, st: State) -> Number:
         """W: the known part of the loop."""
@@ -198,7 +204,7 @@ class Case:
             v, u = (z * st.turn[body] for z, body in self.rails)
         else:
             z, body = self.rails[0]
-            v, u = self.arm(0, st), z * st.turn[body] if group.kind == "RRP" else z
+            v, u = self.arm(0, st), z * st.turn[body] if group.kind == "RRP" else self.rail(st)
         return gap_of(group.kind, group.angles, w, complex(v), complex(u))
 
     def solve(self, st: State, sign: Number, size: float, folded: bool = False) -> None:
@@ -219,9 +225,7 @@ class Case:
             st.turn[a], st.slide[g], margin = angle_and_slide(w, self.arm(0, st), z * st.turn[body], sign, xp)
         elif group.kind == "RPR":
             (a,), (g,) = group.angles, group.slides
-            st.turn[a], st.slide[g], margin = turning_slide(
-                w, self.arm(0, st), self.rails[0][0], sign, size, xp
-            )
+            st.turn[a], st.slide[g], margin = turning_slide(w, self.arm(0, st), self.rail(st), sign, size, xp)
         else:
             g, h = group.slides
             u, v = (z * st.turn[body] for z, body in self.rails)

@@ -214,9 +214,9 @@ class Track:
                     x[j][i] = rate[j]
         return x
 
-    def unwound(self, body: str, q: Number, angle: Number, tracked: bool = True) -> Number:
+    def unwound(self, body: str, q: Number, angle: Number) -> Number:
         """An angle with its whole turns, counted from the guess."""
-        if not tracked or not self.active or body not in self._wound:
+        if not self.active or body not in self._wound:
             return angle
         nodes, turns = self._wound[body]
         good = np.isfinite(turns)

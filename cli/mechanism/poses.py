@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.mechanism.job import Job
+from cli.mechanism.solve import Job
 from cli.read.units import degrees
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def wide_table(job: Job) -> dict[str, Column]:
     """One row for each pose and assembly: what --only asks for, side by side."""
     table: dict[str, Column] = {}
     inputs = inputs_of(job)
-    several = len(job.motions) > 1
+    several = job.several
 
     def put(key: str, values: Column, rows: int) -> None:
         table.setdefault(key, [None] * 0)

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cli.mechanism.job import Job
 from cli.mechanism.poses import cells, of_link, pair
+from cli.mechanism.solve import Job
 
 if TYPE_CHECKING:
     from virtualwork.motion import Motion
@@ -57,7 +57,7 @@ def table(job: Job) -> dict[str, list[Any]]:
 def rows(job: Job) -> list[tuple[Place, dict[str, Any]]]:
     """The table's rows, each with what it holds."""
     found: list[tuple[Place, dict[str, Any]]] = []
-    several = len(job.motions) > 1
+    several = job.several
     for assembly, motion in zip(job.assemblies, job.motions, strict=True):
         order = job.order
         massive = any(r.mass or r.inertia for r in motion.dynamics.scene.rigid.values())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -165,7 +167,8 @@ def covered(machines: int, runs: int, channels: int, planes: int, seed: int) -> 
     if not fit.degrees_of_freedom.all():
         # nothing left over: the errors are stated
         fit = joint_fit(readings, masses)
-        known = fit.scatter()._replace(
+        known = replace(
+            fit.scatter(),
             along=np.full(readings.shape, sd / np.sqrt(2)),
             across=np.full(readings.shape, sd / np.sqrt(2)),
             degrees_of_freedom=np.full(machines, np.inf),
@@ -301,8 +304,10 @@ def test_no_run_on_a_fine_grid_tells_more_than_the_suggested_one(planes: int, ch
         reading = fit.fitted(w[None])
         longer = joint_fit(np.concatenate([readings, reading]), np.concatenate([masses, w[None]]))
         sd = float(fit.residual_sd) / np.sqrt(2)
-        errors = longer.scatter()._replace(
-            along=np.full(longer.readings.shape, sd), across=np.full(longer.readings.shape, sd)
+        errors = replace(
+            longer.scatter(),
+            along=np.full(longer.readings.shape, sd),
+            across=np.full(longer.readings.shape, sd),
         )
         covariance = LogBalance(longer, found.corrections, errors).covariance
         return float(np.sqrt(np.trace(covariance, axis1=1, axis2=2).sum() / (2 * planes)))

@@ -13,8 +13,11 @@ from pathlib import Path
 import pytest
 
 from cli.errors import LONGEST
-from cli.mechanism.inputs import wanted
-from cli.mechanism.job import Job, load
+from cli.mechanism.read import wanted
+from cli.mechanism.solve import Job, load
+
+# each is a whole command, or several
+pytestmark = pytest.mark.slow
 
 Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 COMMAND = Path(sys.executable).with_name("dalembert")
@@ -112,9 +115,9 @@ def test_links_that_differ_beyond_all_numbers(dalembert: Dalembert, tmp_path: Pa
 
 
 LARGE = [
-    ("mechanism", "klann.toml", "--sweep", "0deg:360deg/1999999", "--json"),
-    ("mechanism", "klann.toml", "--sweep", "0deg:360deg/1000000"),
-    ("mechanism", "klann.toml", "--sweep", "0deg:360deg/1000000", "--only", "H,G,F", "-o", "h.json"),
+    ("mechanism", "klann.toml", "--sweep", "0deg:360deg/999999999", "--json"),
+    ("mechanism", "klann.toml", "--sweep", "0deg:360deg/999999999", "--text"),
+    ("mechanism", "klann.toml", "--sweep", "0deg:360deg/999999999", "--only", "H,G,F", "-o", "h.json"),
 ]
 
 

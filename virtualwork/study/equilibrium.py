@@ -171,7 +171,7 @@ def potential_of(load: Load, block: Block) -> Number:
         return -dot(load.amount, block.position(load.path))
     if isinstance(load, Constant):
         known = block.scene.plan.angles[load.body]
-        if known.bases or known.phase is not None:
+        if known.bases:
             return np.nan  # a torque on a link whose whole turns are not known
         return -load.amount * block.st.affine(known)
     return np.nan
