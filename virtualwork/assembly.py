@@ -14,16 +14,16 @@ import numpy as np
 
 from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, plan
 from virtualwork.describe.errors import AssemblyError, MobilityError
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Number, cross, dot
-from virtualwork.mechanism import GROUND
 from virtualwork.newton import newton, write_unknowns
 from virtualwork.state import Case, State, place
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from virtualwork.describe.description import Description
     from virtualwork.formulas.loads import Acting
-    from virtualwork.mechanism import Mechanism
     from virtualwork.track import Track
 
 TIE = 1e-9  # two assemblies nearer than this, relative to the mechanism's size, are one
@@ -34,7 +34,7 @@ class Assembly:
 
     Attributes
     ----------
-    mechanism : Mechanism
+    mechanism : Description
     plan : Plan
         The order of solution.
     signs : dict of group name to ±1
@@ -45,7 +45,7 @@ class Assembly:
 
     def __init__(
         self,
-        mechanism: Mechanism,
+        mechanism: Description,
         plan_: Plan,
         signs: Mapping[str, int],
         starts: Mapping[str, Any],
@@ -60,7 +60,7 @@ class Assembly:
         self.acting: dict[bool, Acting] = {}  # the loads at rest and in motion, for all motions
 
     @classmethod
-    def from_guess(cls, m: Mechanism) -> Assembly:
+    def from_guess(cls, m: Description) -> Assembly:
         """The assembly that the guess chooses.
 
         Raises
@@ -159,7 +159,7 @@ class Assembly:
 class _Chooser:
     """Reads the guess and picks each group's assembly in the order of solution."""
 
-    def __init__(self, m: Mechanism) -> None:
+    def __init__(self, m: Description) -> None:
         self.m = m
         self.plan = plan(m)
         if not m.inputs:
@@ -412,7 +412,7 @@ class _Chooser:
         write_unknowns(group, st, x)
 
 
-def known_by_guess(m: Mechanism) -> tuple[dict[str, float], dict[str, complex]]:
+def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]]:
     """Rough link angles and point positions from the guess, the ground and the inputs, as far as they reach."""
     angles = dict(m.guess.angles)
     points = dict(m.ground) | dict(m.guess.points)
@@ -450,7 +450,7 @@ def guessed_unknowns(
     st: State,
     angles: Mapping[str, float],
     points: Mapping[str, complex],
-    m: Mechanism,
+    m: Description,
     plan_: Plan,
 ) -> Any:
     """A Newton group's unknowns from the guess, or None where an angle is not known; slides by projection."""
@@ -471,7 +471,7 @@ def guessed_unknowns(
 
 
 def _origin(
-    body: str, z: complex, turn: complex, points: Mapping[str, complex], m: Mechanism
+    body: str, z: complex, turn: complex, points: Mapping[str, complex], m: Description
 ) -> complex | None:
     if body == GROUND:
         return z
@@ -523,9 +523,8 @@ def every_solution(group: Group, st: State, plan_: Plan, size: float) -> Any:
     return np.array(keep)
 
 
-def all_assemblies(m: Mechanism) -> tuple[Assembly, ...]:
+def all_assemblies(chosen: Assembly) -> tuple[Assembly, ...]:
     """Every assembly at the guess's input: all signs of the closed forms, all solutions found for the others."""
-    chosen = m.assembly
     found = [chosen]
     for signs, starts in _combinations(chosen):
         if signs != chosen.signs or any(
@@ -533,7 +532,7 @@ def all_assemblies(m: Mechanism) -> tuple[Assembly, ...]:
             > 1e-6
             for k in starts
         ):
-            found.append(Assembly(m, chosen.plan, signs, starts, len(found) + 1))
+            found.append(Assembly(chosen.mechanism, chosen.plan, signs, starts, len(found) + 1))
     return tuple(found)
 
 

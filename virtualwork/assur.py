@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from virtualwork.mechanism import GROUND
+from virtualwork.describe.parts import GROUND
 from virtualwork.plan.graph import Variable, decompose
 from virtualwork.plan.steps import (
     Angle,
@@ -31,7 +31,7 @@ from virtualwork.plan.steps import (
 )
 
 if TYPE_CHECKING:
-    from virtualwork.mechanism import Mechanism
+    from virtualwork.describe.description import Description
 
 # the position of a point: a known node, and what is added to it
 Chain = tuple[str | None, tuple[Term, ...]]
@@ -51,12 +51,12 @@ def direction(angle: float) -> complex:
     return complex(math.cos(angle), math.sin(angle))
 
 
-def plan(m: Mechanism, *, merged: bool = False) -> Plan:
+def plan(m: Description, *, merged: bool = False) -> Plan:
     """The order of solution of a mechanism.
 
     Parameters
     ----------
-    m : Mechanism
+    m : Description
     merged : bool
         All loops at once in one group (the Newton-Raphson of 003) instead of group by group.
 
@@ -71,7 +71,7 @@ def plan(m: Mechanism, *, merged: bool = False) -> Plan:
 class _Planner:
     """Walks the blocks in order and writes the steps."""
 
-    def __init__(self, m: Mechanism, merged: bool) -> None:
+    def __init__(self, m: Description, merged: bool) -> None:
         self.m, self.merged = m, merged
         self.steps: list[Step] = []
         self.angles: dict[str, Angle] = {GROUND: Angle()}

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.describe.errors import AssemblyError
-from virtualwork.mechanism import GROUND
+from virtualwork.describe.parts import GROUND
 from virtualwork.state import State
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork.assembly import Assembly
-    from virtualwork.mechanism import Mechanism
+    from virtualwork.describe.description import Description
     from virtualwork.motion import Motion
 
     Reals = NDArray[np.float64]
@@ -62,7 +62,7 @@ class Check:
         self.assembly = assembly
 
     @property
-    def mechanism(self) -> Mechanism:
+    def mechanism(self) -> Description:
         """What is checked."""
         return self.assembly.mechanism
 
@@ -287,7 +287,7 @@ def _cycles(order: list[str], pins: dict[frozenset[str], list[str]]) -> list[tup
     return found
 
 
-def constraint_jacobian(m: Mechanism, st: State) -> tuple[list[str], Reals]:
+def constraint_jacobian(m: Description, st: State) -> tuple[list[str], Reals]:
     """The Jacobian of every joint's constraints in the coordinates (θ, x, y) of each link, lengths over the size.
 
     Returns

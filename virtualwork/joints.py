@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.describe.errors import MechanismError
-from virtualwork.mechanism import GROUND
+from virtualwork.describe.parts import GROUND
 from virtualwork.plan.steps import Group
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from virtualwork.mechanism import Mechanism
+    from virtualwork.describe.description import Description
     from virtualwork.plan.steps import Plan
 
     Reals = NDArray[np.float64]
@@ -33,7 +33,7 @@ class Joint:
     guide: int | None = None
 
 
-def joints(m: Mechanism) -> list[Joint]:
+def joints(m: Description) -> list[Joint]:
     """Every joint of the mechanism: pins in the order of the file, then guides."""
     found = [Joint(f"pin:{name}", name, bodies) for name, bodies in m.pins.items()]
     order = list(m.bodies)
@@ -45,7 +45,7 @@ def joints(m: Mechanism) -> list[Joint]:
 class Order:
     """How each joint force is found: as a multiplier of a loop, or from the balance of a body or a pin."""
 
-    def __init__(self, mechanism: Mechanism, plan: Plan) -> None:
+    def __init__(self, mechanism: Description, plan: Plan) -> None:
         self.mechanism, self.plan = mechanism, plan
         self.joints = joints(mechanism)
         self.by_key = {joint.key: joint for joint in self.joints}

@@ -31,8 +31,8 @@ import numpy as np
 
 from virtualwork.assur import Group, Step, Term
 from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe.parts import GROUND, Point, as_point
 from virtualwork.formulas.closed_forms import Number
-from virtualwork.mechanism import GROUND, Point, as_point
 from virtualwork.newton import inverse_norm, stack
 from virtualwork.state import BLOCK, SWEEP, Jets, State, columns
 
@@ -93,7 +93,7 @@ class PointMotion:
         --------
         A crank of length 1 at 60°: y = √3/2.
 
-        >>> from virtualwork.mechanism import Input, Link, Mechanism
+        >>> from virtualwork import Input, Link, Mechanism
         >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
         >>> point = crank.motion(np.pi / 3).point("P")
         >>> bool(abs(point.position[0, 1] - np.sqrt(0.75)) <= point.error_estimate()[0] < 1e-15)

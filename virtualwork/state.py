@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.assur import Angle, Closure, Group, Place, Plan, Slide, Step, Term, Turn
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import (
     MANY,
     ONE,
@@ -24,7 +25,6 @@ from virtualwork.formulas.closed_forms import (
     two_angles,
     two_slides,
 )
-from virtualwork.mechanism import GROUND
 
 if TYPE_CHECKING:
     from virtualwork.track import Track

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.errors import DataError
+from virtualwork import GROUND
 from virtualwork.assur import direction
-from virtualwork.mechanism import GROUND
 
 try:
     import mpmath as mp
@@ -22,7 +22,7 @@ except ImportError:  # an extra of the tests: only campaigns need it
     mp = None
 
 if TYPE_CHECKING:
-    from virtualwork.mechanism import Guide, Mechanism
+    from virtualwork import Guide, Mechanism
     from virtualwork.motion import Motion
 
 DIGITS = 50

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from cli.bench.measure import Measurement, around, measured, peak, reference, worst
 from cli.bench.scenes import chain, four_bar, klann, sweep
+from virtualwork import Mechanism
 from virtualwork.assembly import Assembly
 from virtualwork.assur import Group, plan
-from virtualwork.mechanism import Mechanism
 from virtualwork.motion import Motion
 from virtualwork.newton import newton
 from virtualwork.state import State

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from cli.bench.measure import Measurement, measured, seconds
 from cli.bench.scenes import loaded_klann
-from virtualwork import state
+from virtualwork import Mechanism, state
 from virtualwork.formulas import closed_forms as dyads
 from virtualwork.formulas import load_paths as bearing
 from virtualwork.formulas import loads
 from virtualwork.formulas import quantities as sums
 from virtualwork.formulas.reactions import Reactions
-from virtualwork.mechanism import Mechanism
 from virtualwork.motion import Motion
 
 Real = NDArray[np.float64]

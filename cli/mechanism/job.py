@@ -26,13 +26,13 @@ ORDERS = ("position", "velocity", "acceleration", "jerk")
 
 def load(path: str) -> Mechanism:
     """Read a description; - is standard input."""
-    from virtualwork.describe.reader import loads, read
+    from virtualwork import Mechanism
 
     file = "standard input" if path == "-" else path
     try:
         if path == "-":
-            return loads(sys.stdin.buffer.read().decode("utf-8-sig"), file)
-        return read(Path(path))
+            return Mechanism.from_toml_text(sys.stdin.buffer.read().decode("utf-8-sig"), file)
+        return Mechanism.from_toml(Path(path))
     except UnicodeDecodeError:
         raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
     except (OSError, ValueError) as error:

@@ -8,8 +8,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.mechanism import GROUND
+from virtualwork import GROUND, Guess, Guide, Input, Link, Mechanism
 
 mp.mp.dps = 50
 

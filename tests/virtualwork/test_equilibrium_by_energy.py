@@ -10,8 +10,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.mechanism import Force, Spring, Torque, TorsionSpring
+from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque, TorsionSpring
 from virtualwork.study.equilibrium import equilibria
 
 G = 9.81

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from virtualwork import Guess, Guide, Input, Link, Mechanism
+from virtualwork import Force, Friction, Guess, Guide, Input, Link, Mechanism
 from virtualwork.check import Check
 from virtualwork.describe.reader import loads
-from virtualwork.mechanism import Force, Friction
 
 TURN = np.radians(np.arange(0.0, 360.0, 7.0))
 GROUND = {"O": (0, 0), "P": (0.3, 0.05)}

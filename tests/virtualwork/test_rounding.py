@@ -16,8 +16,19 @@ import pytest
 from cli.bench import groups, linkages, random_linkages
 from cli.bench.exact import Exact
 from cli.bench.groups import compare
-from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.mechanism import Force, Friction, Motor, Spring, Torque, TorsionSpring
+from virtualwork import (
+    Force,
+    Friction,
+    Guess,
+    Guide,
+    Input,
+    Link,
+    Mechanism,
+    Motor,
+    Spring,
+    Torque,
+    TorsionSpring,
+)
 from virtualwork.study.cycle import Cycle
 from virtualwork.study.equilibrium import equilibria
 from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance

@@ -8,10 +8,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from virtualwork import Guess, Guide, Input, Link, Mechanism
+from virtualwork import (
+    Force,
+    Friction,
+    Guess,
+    Guide,
+    Input,
+    Link,
+    Mechanism,
+    Motor,
+    Spring,
+    Torque,
+    TorsionSpring,
+)
 from virtualwork.describe.errors import DescriptionError
 from virtualwork.formulas.effort import ledger
-from virtualwork.mechanism import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.study.counterweights import berkof_lowen, least_squares
 from virtualwork.study.cycle import Cycle
 from virtualwork.study.equilibrium import equilibria

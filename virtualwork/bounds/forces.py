@@ -23,9 +23,9 @@ import numpy as np
 
 from virtualwork.bounds.motion import ENTRIES
 from virtualwork.bounds.second_order import grown, inverse
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.effort import carrier
 from virtualwork.formulas.loads import Follower, InertiaForce, InertiaTorque, SpringEnd, Tabled, TorsionEnd
-from virtualwork.mechanism import GROUND
 from virtualwork.newton import EPS
 
 if TYPE_CHECKING:

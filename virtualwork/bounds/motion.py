@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.bounds.second_order import Sizes, grown, inverse, kept, sum_of, value_of
-from virtualwork.mechanism import GROUND
+from virtualwork.describe.parts import GROUND
 from virtualwork.newton import EPS
 from virtualwork.plan.steps import Angle, Group, Place, Slide, Term, Turn, combined
 from virtualwork.state import SWEEP, Jets, State

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.mechanism import GROUND
+from virtualwork.describe.parts import GROUND
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

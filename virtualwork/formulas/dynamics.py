@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Number, cross
 from virtualwork.formulas.effort import effort, finished, write_effort
 from virtualwork.formulas.load_paths import carried
@@ -16,7 +17,6 @@ from virtualwork.formulas.loads import plus
 from virtualwork.formulas.reactions import Reactions
 from virtualwork.formulas.scene import Block, Scene
 from virtualwork.joints import Joint
-from virtualwork.mechanism import GROUND
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -255,7 +255,7 @@ class Dynamics:
         --------
         A weight of 2·9.81 N on an arm of 0.5 m at 60°:
 
-        >>> from virtualwork.mechanism import Input, Link, Mechanism
+        >>> from virtualwork import Input, Link, Mechanism
         >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="arm"),
         ...                 gravity=-9.81j)
         >>> found = arm.motion(np.pi / 3).dynamics

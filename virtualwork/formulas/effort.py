@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Number, dot
 from virtualwork.formulas.loads import Acting, Load, Rub, SpringEnd, TorsionEnd, plus, times
 from virtualwork.formulas.scene import Block, Scene
-from virtualwork.mechanism import GROUND
 from virtualwork.state import BLOCK
 
 if TYPE_CHECKING:

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Number, dot
 from virtualwork.formulas.loads import Acting, Rub, plus, times
 from virtualwork.formulas.reactions import Reactions
 from virtualwork.formulas.scene import Scene
 from virtualwork.joints import Joint, joints
-from virtualwork.mechanism import GROUND
 from virtualwork.plan.steps import Term, combined
 
 if TYPE_CHECKING:

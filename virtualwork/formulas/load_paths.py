@@ -26,12 +26,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Number
 from virtualwork.formulas.effort import carrier
 from virtualwork.formulas.loads import Acting, Rub
 from virtualwork.formulas.quantities import Passed, Row, Sum, in_order
 from virtualwork.joints import Order, Side
-from virtualwork.mechanism import GROUND
 from virtualwork.newton import stack
 from virtualwork.plan.steps import Group, Place, Term, Turn
 

@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from virtualwork.describe.description import Description
+from virtualwork.describe.loads import Force, Spring, Torque, TorsionSpring
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Number, dot
 from virtualwork.formulas.quantities import Given, Rows, Sum, Turned
-from virtualwork.mechanism import GROUND, Force, Mechanism, Spring, Torque, TorsionSpring
 from virtualwork.plan.steps import Place, Term, combined
 
 if TYPE_CHECKING:
@@ -39,12 +41,12 @@ class Rigid:
     inertia: float
 
 
-def rigid(m: Mechanism, body: str) -> Rigid:
+def rigid(m: Description, body: str) -> Rigid:
     """Mass properties of a link with the motors it carries (000 §2.3: their mass and centre join the link).
 
     The common centre is Σ m z / Σ m, and the inertia about it gains Σ m |z − z_G|² (Steiner).
 
-    >>> from virtualwork.mechanism import Link, Motor
+    >>> from virtualwork import Link, Motor
     >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": 1}, mass=2, center=0.25, inertia=0.1)},
     ...                 motors=[Motor("arm", "tool", mass=1, center=1)])
     >>> rigid(arm, "arm")
@@ -258,7 +260,7 @@ class Acting:
     It hangs on no motion: an assembly makes it once for rest and once for all motions.
     """
 
-    def __init__(self, mechanism: Mechanism, plan: Plan, moves: bool) -> None:
+    def __init__(self, mechanism: Description, plan: Plan, moves: bool) -> None:
         self.mechanism, self.plan, self.moves = mechanism, plan, moves
         self.rows = Rows()
         self._paths: dict[tuple[str, complex], Path] = {}
@@ -354,7 +356,7 @@ class Acting:
     def acceleration(self, path: Path) -> Sum:
         """The acceleration of a point: Σ z·(s e^{iθ})″, from the point its body hangs on.
 
-        >>> from virtualwork.mechanism import Input, Link
+        >>> from virtualwork import Input, Link
         >>> crank = Mechanism({"A": 0j}, {"crank": Link({"A": 0j})}, inputs=Input(link="crank"))
         >>> acting = Acting(crank, crank.assembly.plan, moves=True)
         >>> [(row.kind, row.name, z) for row, z in acting.acceleration(acting.path("crank", 0.5j)).items()]

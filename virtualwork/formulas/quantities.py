@@ -13,8 +13,8 @@ from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Number
-from virtualwork.mechanism import GROUND
 from virtualwork.plan.steps import Term
 
 if TYPE_CHECKING:

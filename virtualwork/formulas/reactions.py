@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Number, dot
 from virtualwork.formulas.load_paths import carried
 from virtualwork.formulas.loads import path_reads, plus, times
 from virtualwork.formulas.scene import Block, Scene
 from virtualwork.joints import Joint, Side
-from virtualwork.mechanism import GROUND
 from virtualwork.state import BLOCK
 
 if TYPE_CHECKING:
-    from virtualwork.mechanism import Mechanism
+    from virtualwork.describe.description import Description
 
 __all__ = ["Joint", "Reactions"]
 
@@ -33,7 +33,7 @@ class Reactions:
         self.bearing = scene.bearing
         self.order = self.bearing.order
         self.plan = scene.plan
-        self.mechanism: Mechanism = scene.mechanism
+        self.mechanism: Description = scene.mechanism
         self.joints, self.by_key = self.order.joints, self.order.by_key
 
     @property

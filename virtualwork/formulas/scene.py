@@ -12,6 +12,9 @@ from weakref import proxy
 
 import numpy as np
 
+from virtualwork.describe.description import Description
+from virtualwork.describe.loads import TorsionSpring
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Number
 from virtualwork.formulas.loads import (
     Acting,
@@ -27,7 +30,6 @@ from virtualwork.formulas.loads import (
     plus,
     times,
 )
-from virtualwork.mechanism import GROUND, Mechanism, TorsionSpring
 from virtualwork.plan.steps import Place
 from virtualwork.state import BLOCK
 
@@ -143,7 +145,7 @@ class Scene:
 
     def __init__(self, motion: Motion, *, at_rest: bool = False) -> None:
         self.motion = motion
-        self.mechanism: Mechanism = motion.mechanism
+        self.mechanism: Description = motion.mechanism
         self.plan: Plan = motion.assembly.plan
         self.at_rest = at_rest
         self.formed: set[str] = set()

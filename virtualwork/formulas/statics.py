@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import cross
-from virtualwork.mechanism import GROUND
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from virtualwork.describe.description import Description
     from virtualwork.formulas.reactions import Reactions
     from virtualwork.joints import Joint
-    from virtualwork.mechanism import Mechanism
 
     Reals = NDArray[np.float64]
     Column = tuple[
@@ -44,7 +44,7 @@ class Statics:
 
     def __init__(self, reactions: Reactions) -> None:
         self.reactions = reactions
-        mechanism: Mechanism = reactions.scene.mechanism
+        mechanism: Description = reactions.scene.mechanism
         self.mechanism = mechanism
         self.n = reactions.scene.motion.n
         self.size: float = mechanism.size
@@ -72,7 +72,7 @@ class Statics:
     def _system(self) -> tuple[Reals, Reals]:
         """A (n, equations, unknowns) and b (n, equations); moments and torques are divided by the size."""
         r = self.reactions
-        m: Mechanism = self.mechanism
+        m: Description = self.mechanism
         links = list(m.links)
         free_pins = [joint for joint in r.joints if joint.guide is None and GROUND not in joint.bodies]
         rows = 3 * len(links) + 2 * len(free_pins)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from virtualwork.describe.errors import MobilityError
-from virtualwork.mechanism import GROUND
+from virtualwork.describe.parts import GROUND
 
 if TYPE_CHECKING:
-    from virtualwork.mechanism import Mechanism
+    from virtualwork.describe.description import Description
 
 # ("angle", link), ("x", link), ("y", link), ("px", pin), ("py", pin), ("slide", guide)
 Variable = tuple[str, str]
@@ -33,7 +33,7 @@ class Blocks:
     mobility: int  # Grübler's: coordinates less equations of joints
 
 
-def equations(m: Mechanism) -> tuple[list[Variable], list[Equation]]:
+def equations(m: Description) -> tuple[list[Variable], list[Equation]]:
     """The coordinates of a mechanism and the scalar equations of its inputs and joints."""
     variables: list[Variable] = []
     for link in m.links:
@@ -75,7 +75,7 @@ def equations(m: Mechanism) -> tuple[list[Variable], list[Equation]]:
     return variables, rows
 
 
-def decompose(m: Mechanism) -> Blocks:
+def decompose(m: Description) -> Blocks:
     """Split the coordinates of a mechanism into irreducible blocks, in their order of solution.
 
     Raises
@@ -132,7 +132,7 @@ def _match(rows: list[Equation]) -> dict[Variable, int]:
 
 
 def _refuse_free(
-    m: Mechanism,
+    m: Description,
     variables: list[Variable],
     rows: list[Equation],
     of_variable: dict[Variable, int],

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from virtualwork.mechanism import GROUND
+from virtualwork.describe.parts import GROUND
 from virtualwork.plan.graph import Blocks
 
 

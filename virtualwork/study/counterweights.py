@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from virtualwork.describe.errors import DescriptionError
-from virtualwork.mechanism import GROUND
+from virtualwork.describe.parts import GROUND
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from virtualwork.mechanism import Mechanism
+    from virtualwork.describe.description import Description
     from virtualwork.motion import Motion
 
     Complexes = NDArray[np.complex128]
 
 
-def pivot(mechanism: Mechanism, link: str) -> complex:
+def pivot(mechanism: Description, link: str) -> complex:
     """The point of a link that is pinned to the ground.
 
     Raises
@@ -92,7 +92,7 @@ def least_squares(motion: Motion, links: Sequence[str]) -> tuple[dict[str, compl
     return dict(zip(links, (complex(w) for w in weights), strict=True)), before, after
 
 
-def berkof_lowen(mechanism: Mechanism, crank: str, coupler: str, rocker: str) -> dict[str, complex]:
+def berkof_lowen(mechanism: Description, crank: str, coupler: str, rocker: str) -> dict[str, complex]:
     """Return the counterweights on crank and rocker that balance a four-bar's shaking force completely.
 
     R. S. Berkof and G. G. Lowen (J. Eng. Ind. 91, 1969, 21): the common centre of mass rests where, by the loop
@@ -105,7 +105,7 @@ def berkof_lowen(mechanism: Mechanism, crank: str, coupler: str, rocker: str) ->
 
     Examples
     --------
-    >>> from virtualwork.mechanism import Link, Mechanism
+    >>> from virtualwork import Link, Mechanism
     >>> four = Mechanism({"A": 0j, "D": 4}, {"crank": Link({"A": 0j, "B": 1}, mass=1, center=0.5),
     ...     "coupler": Link({"B": 0j, "C": 3}, mass=3, center=1), "rocker": Link({"D": 0j, "C": 2}, mass=2, center=1)})
     >>> berkof_lowen(four, "crank", "coupler", "rocker")

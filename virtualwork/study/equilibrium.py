@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Number, dot
 from virtualwork.formulas.effort import power
 from virtualwork.formulas.loads import (
@@ -29,12 +30,11 @@ from virtualwork.formulas.loads import (
     times,
 )
 from virtualwork.formulas.scene import Block, Scene
-from virtualwork.mechanism import GROUND
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from virtualwork.mechanism import Mechanism
+    from virtualwork.describe.description import Description
     from virtualwork.state import Jets
 
     Reals = NDArray[np.float64]
@@ -55,7 +55,7 @@ class Equilibrium:
     stable: bool | None
     stiffness: float
     potential: float | None
-    mechanism: Mechanism | None = field(default=None, repr=False, compare=False)
+    mechanism: Description | None = field(default=None, repr=False, compare=False)
 
     def error_estimate(self) -> tuple[float, ...]:
         """Return a bound of the rounding error of each input, rad or m: the error of Q over its slope, |V″⁻¹|·δQ.
@@ -64,7 +64,7 @@ class Equilibrium:
 
         Examples
         --------
-        >>> from virtualwork.mechanism import Input, Link, Mechanism
+        >>> from virtualwork import Input, Link, Mechanism
         >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="bob"),
         ...                      gravity=-9.81j)
         >>> down = equilibria(pendulum).found[1]
@@ -180,7 +180,7 @@ def potential_of(load: Load, block: Block) -> Number:
 class Rest:
     """Generalized forces, their derivative and the potential of a mechanism at rest at given inputs (n, k)."""
 
-    def __init__(self, mechanism: Mechanism, inputs: Reals) -> None:
+    def __init__(self, mechanism: Description, inputs: Reals) -> None:
         self.mechanism, self.inputs = mechanism, inputs
         self.k = inputs.shape[1]
         self.motion = mechanism.motion(inputs if self.k > 1 else inputs[:, 0], 0.0, 0.0)
@@ -242,12 +242,12 @@ class Rest:
         return total
 
 
-def equilibria(mechanism: Mechanism, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:
+def equilibria(mechanism: Description, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:
     """Return every position in which a mechanism rests under its loads without effort, each stable or not.
 
     Parameters
     ----------
-    mechanism : Mechanism
+    mechanism : Description
         With its gravity, constant and follower forces, torques, springs. Dampers and friction do not act at rest.
     spans : array (k, 2), optional
         The range of each input, rad or m. Default: a whole turn; for a slide, two sizes of the mechanism either way.
@@ -262,7 +262,7 @@ def equilibria(mechanism: Mechanism, spans: ArrayLike | None = None, samples: in
     --------
     A pendulum hangs stably and stands unstably.
 
-    >>> from virtualwork.mechanism import Input, Link, Mechanism
+    >>> from virtualwork import Input, Link, Mechanism
     >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="bob"),
     ...                      gravity=-9.81j)
     >>> [(round(float(np.degrees(e.inputs[0]))), e.stable) for e in equilibria(pendulum).found]
@@ -280,7 +280,7 @@ def equilibria(mechanism: Mechanism, spans: ArrayLike | None = None, samples: in
     return _one(mechanism, ranges[0], samples) if k == 1 else _many(mechanism, ranges)
 
 
-def _one(mechanism: Mechanism, span: Reals, samples: int) -> Equilibria:
+def _one(mechanism: Description, span: Reals, samples: int) -> Equilibria:
     whole = not mechanism.inputs[0].is_slide and abs(span[1] - span[0] - 2 * np.pi) < 1e-12
     q = np.linspace(span[0], span[1], samples + 1)
     rest = Rest(mechanism, q[:, None])
@@ -316,7 +316,7 @@ def _one(mechanism: Mechanism, span: Reals, samples: int) -> Equilibria:
     return _judged(mechanism, np.array(distinct)[:, None], scale)
 
 
-def _refine(mechanism: Mechanism, low: Reals, high: Reals, at_low: Reals, order: int = 0) -> Reals:
+def _refine(mechanism: Description, low: Reals, high: Reals, at_low: Reals, order: int = 0) -> Reals:
     """Roots of Q (order 0) or of ∂Q/∂q (order 1) in brackets, all at once: Newton's step where it stays inside."""
     a, b, below = low.copy(), high.copy(), np.sign(at_low)
     x = (a + b) / 2
@@ -337,7 +337,7 @@ def _refine(mechanism: Mechanism, low: Reals, high: Reals, at_low: Reals, order:
     return np.asarray(x)
 
 
-def _judged(mechanism: Mechanism, inputs: Reals, scale: float) -> Equilibria:
+def _judged(mechanism: Description, inputs: Reals, scale: float) -> Equilibria:
     """Stability and potential of the positions found; those that are none (a pole between two signs) are dropped."""
     if not len(inputs):
         return Equilibria(())
@@ -361,7 +361,7 @@ def _judged(mechanism: Mechanism, inputs: Reals, scale: float) -> Equilibria:
     return Equilibria(tuple(found))
 
 
-def _many(mechanism: Mechanism, ranges: Reals) -> Equilibria:
+def _many(mechanism: Description, ranges: Reals) -> Equilibria:
     """Several inputs: Newton on Q from a grid of starts, all at once."""
     k = len(ranges)
     per = max(4, round(4000 ** (1 / k)))
