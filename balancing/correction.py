@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.rotor import BLOCK
-from balancing.summation import exact_sum, two_product, two_sum
+from dalembert.arithmetic.exact import exact_sum, two_product, two_sum
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -296,7 +296,7 @@ def correct(moment: ArrayLike, z: ArrayLike = 0.0, planes: ArrayLike = (0.0,)) -
 
     Notes
     -----
-    J. A. Riul, Dinâmica das Máquinas II, eqs. (6)-(21); the sums are compensated (`balancing.summation`).
+    J. A. Riul, Dinâmica das Máquinas II, eqs. (6)-(21); the sums are compensated (`dalembert.arithmetic.exact`).
 
     Examples
     --------

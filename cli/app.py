@@ -14,18 +14,18 @@ from cli.errors import DataError, one_line
 
 # name -> (module with a function `run`, the line shown by `dalembert --help`)
 COMMANDS = {
-    "balance": ("cli.commands.balance", "Balance rotors from a table of known eccentric masses."),
+    "balance": ("cli.balance.command", "Balance rotors from a table of known eccentric masses."),
     "field": ("cli.commands.field", "Balance rotors from measured vibration and trial masses."),
     "place": ("cli.commands.place", "Put a correction where masses can go: holes, blades, weights in stock."),
     "mechanism": (
         "cli.commands.mechanism",
         "Solve a planar mechanism: motion, limits, torque, joint forces.",
     ),
-    "work": ("cli.commands.work", "Find the load that balances a table of link states, by virtual work."),
-    "body": ("cli.commands.body", "Put a body together: inertia, angular momentum, shaft reactions."),
-    "spin": ("cli.commands.spin", "Turn a body through time: free, under gravity, under a torque."),
+    "work": ("cli.work.command", "Find the load that balances a table of link states, by virtual work."),
+    "body": ("cli.body.command", "Put a body together: inertia, angular momentum, shaft reactions."),
+    "spin": ("cli.spin.command", "Turn a body through time: free, under gravity, under a torque."),
     "bench": ("cli.commands.bench", "Measure run time against error."),
-    "examples": ("cli.commands.examples", "List the worked examples, or write one into the current folder."),
+    "examples": ("cli.examples.command", "List the worked examples, or write one into the current folder."),
 }
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import Balance, condition_number, influence_error
-from cli.digits import EPS, angle_error, size_error
-from cli.units import degrees, from_si, to_si
+from cli.read.rounding import EPS, angle_error, size_error
+from cli.read.units import degrees, from_si, to_si
 
 if TYPE_CHECKING:
     from cli.field_job import Field, Solved

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from cli.errors import DataError, quote
 from cli.field_runs import Channel, Runs, apart
-from cli.tables import Table, read
-from cli.units import UNITS, amplitude_kind, from_si, phasor, to_si
+from cli.read.tables import Table, read
+from cli.read.units import UNITS, amplitude_kind, from_si, phasor, to_si
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

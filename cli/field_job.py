@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.field_solve import UNKNOWN_ANGLE, Solved, Solver, Wanted
-from cli.render import Shown
-from cli.units import degrees, from_si, to_si
+from cli.read.units import degrees, from_si, to_si
+from cli.show.output import Shown
 
 Real = NDArray[np.float64]
 

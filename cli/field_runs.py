@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from cli.balance.solve import number_names
 from cli.errors import DataError, quote
-from cli.known_masses import number_names
-from cli.tables import Cells, Table, read
-from cli.units import SMALLEST, UNITS, parse_number, phasor, to_si
+from cli.read.tables import Cells, Table, read
+from cli.read.units import SMALLEST, UNITS, parse_number, phasor, to_si
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -306,7 +306,7 @@ class _Reader:
 
     def _vibration_error(self, rows: Rows) -> Real:
         """Bound the errors of readings and of their share in a mean, (g, n)."""
-        from cli.digits import EPS, vector_error
+        from cli.read.rounding import EPS, vector_error
 
         size = self.table.numbers["amplitude"].values
         phase = self.table.numbers.get("phase")
@@ -315,7 +315,7 @@ class _Reader:
 
     def _mass_error(self, rows: Rows, trials: list[Trial], shape: tuple[int, ...]) -> Real:
         """Bound the errors of what was on the rotor in each run, (g, r, p)."""
-        from cli.digits import vector_error
+        from cli.read.rounding import vector_error
 
         error = np.zeros(shape)
         standing = np.zeros((shape[0], shape[2]))

@@ -30,8 +30,8 @@ from balancing import (
 from cli.errors import DataError
 from cli.field_files import Stored
 from cli.field_runs import Group, Runs
-from cli.options import bad
-from cli.units import degrees, from_si
+from cli.read.options import bad
+from cli.read.units import degrees, from_si
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.digits import angle_text
-from cli.render import table_text
-from cli.units import degrees, from_si
+from cli.read.rounding import angle_text
+from cli.read.units import degrees, from_si
+from cli.show.output import table_text
 
 if TYPE_CHECKING:
     from cli.field_job import Field, Solved
@@ -60,7 +60,7 @@ def influence_table(field: Field, solved: Solved, i: int) -> dict[str, list[Any]
     """The influence coefficients: a row for each sensor."""
     columns: dict[str, list[Any]] = {"sensor": [str(channel) for channel in solved.group.channels]}
     per = f"{unit(field)}/{field._unit}"
-    from cli.units import to_si
+    from cli.read.units import to_si
 
     for p, plane in enumerate(solved.planes):
         alpha = solved.alpha[i, :, p]

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from balancing import Placement, correct, drill_depth, place, place_from_stock, transfer
-from cli.digits import EPS, angle_error, angle_text, size_error, vector_error
 from cli.errors import DataError
-from cli.render import Shown
-from cli.units import degrees, from_si, phasor, to_si
+from cli.read.rounding import EPS, angle_error, angle_text, size_error, vector_error
+from cli.read.units import degrees, from_si, phasor, to_si
+from cli.show.output import Shown
 
 PI = math.pi
 

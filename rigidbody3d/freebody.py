@@ -23,8 +23,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.doubled import Doubled
 from rigidbody3d import attitude as quaternion
-from rigidbody3d.doubled import weighted_difference
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
 from rigidbody3d.inertia import principal
 
@@ -270,7 +270,10 @@ class _Motion:
         # 2E - |H|²/I3 and |H|²/I1 - 2E, as sums; and their weighted difference, whose sign tells the axis circled
         c3 = (I1 * (I3 - I1) * w1**2 + I2 * (I3 - I2) * w2**2) / I3
         c1 = (I3 * (I3 - I1) * w3**2 + I2 * (I2 - I1) * w2**2) / I1
-        apart = weighted_difference(I1, I2, I3, w1, w3) / I2
+        # on the separatrix it is all cancellation
+        apart = (
+            (Doubled(I2) - I1) * I1 * (Doubled(w1) * w1) - (Doubled(I3) - I2) * I3 * (Doubled(w3) * w3)
+        ).value / I2
         self._large = apart <= 0  # circles the axis of the largest moment
         big = np.where(self._large, d23 * c1, d12 * c3)
         small = np.where(self._large, d12 * c3, d23 * c1)

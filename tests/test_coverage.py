@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.commands.examples import names
+from cli.examples.command import names
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "docs" / "coverage.md").read_text(encoding="utf-8")

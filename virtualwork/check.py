@@ -123,7 +123,7 @@ class Check:
             return 0.0, 0.0
         if self.mechanism.inputs[0].is_slide:
             return track.start - track.length, track.start + track.length
-        return track.start, track.start + track.length
+        return track.start, track.start + (track.period or track.length)
 
     @cached_property
     def input_limits(self) -> tuple[float, float] | None:
@@ -135,7 +135,8 @@ class Check:
         limits = track.limits()
         if not limits:
             return None
-        turns = (0.0,) if slide else (-track.length, 0.0, track.length)
+        period = track.period
+        turns = (0.0,) if period is None else (-period, 0.0, period)
         every = sorted((limit.input + t, limit.side) for limit in limits for t in turns)
         above = [q for q, side in every if q > track.start and side < 0]
         below = [q for q, side in every if q < track.start and side > 0]
@@ -147,29 +148,34 @@ class Check:
 
     @cached_property
     def dead_points(self) -> tuple[float, ...]:
-        """Inputs at which the linkage locks, every end of a range of the input, rad in one turn, or m."""
-        return self._in_turn(
+        """Inputs at which the linkage locks, every end of a range of the input, rad, or m.
+
+        Angles in [0, period of the branch): where change points make a branch need two turns of the input, the
+        same angle a turn later is another pose (`virtualwork.track.Track.turns`).
+        """
+        return self._in_period(
             [limit.input for limit in self.assembly.track.limits()] if self.assembly.track.active else []
         )
 
     @cached_property
     def change_points(self) -> tuple[float, ...]:
-        """Inputs at which two branches cross, rad in one turn, or m."""
+        """Inputs at which two branches cross, rad in [0, period of the branch), or m."""
         track = self.assembly.track
         if not track.active:
             return ()
         track.cover(*self._span())
         found = [float(q) for flips in track.flips.values() for q in flips]
         found += [float(q) for march in track._marched.values() for q in march.crossings]
-        return self._in_turn(found)
+        return self._in_period(found)
 
-    def _in_turn(self, found: list[float]) -> tuple[float, ...]:
-        if self.mechanism.inputs and self.mechanism.inputs[0].is_slide:
+    def _in_period(self, found: list[float]) -> tuple[float, ...]:
+        period = self.assembly.track.period
+        if period is None:
             return tuple(sorted(found))
         unique: list[float] = []
-        for q in sorted(q % (2 * math.pi) for q in found):
-            # an input of −1e-15 is 0, not a whole turn
-            q = 0.0 if 2 * math.pi - q < 1e-9 or q < 1e-9 else q
+        for q in sorted(q % period for q in found):
+            # an input of −1e-15 is 0, not a whole period
+            q = 0.0 if period - q < 1e-9 or q < 1e-9 else q
             if all(abs(q - other) > 1e-8 for other in unique):
                 unique.append(q)
         return tuple(sorted(unique))

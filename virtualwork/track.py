@@ -10,7 +10,9 @@ points between the guess and it: nothing is marched in angle.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import factorial
+from fractions import Fraction
+from functools import cached_property
+from math import factorial, lcm
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +38,8 @@ DIP = 0.05  # a radicand below this may touch zero between two samples
 
 
 SAME = 1e-6  # change points nearer than this share of a turn are one
+TURNS = 32  # of the input, within which a branch is looked for to come back to itself
+COMPARED = 60  # poses of a turn
 
 
 @dataclass(frozen=True)
@@ -417,11 +421,60 @@ class Track:
         """Was any limit met in what was covered?"""
         return bool(self._brackets) or any(march.ends for march in self._marched.values())
 
+    # --- the branch's own scale -----------------------------------------------------------------------------------
+    @cached_property
+    def turns(self) -> int | None:
+        """How many turns of the input bring every group back to where it stood: the period of the branch.
+
+        A branch that passes an odd number of change points in a turn needs two; a fractional gear its own number.
+        None with a slide or several inputs, and where no number of turns up to `TURNS` does it.
+        """
+        if not self.active or self.assembly.mechanism.inputs[0].is_slide:
+            return None
+        self.cover(self.start, self.start + self.length)
+        if self.settled or self._period is not None or not self.plan.groups:
+            return 1
+        steps = self.assembly.needed([key for g in self.plan.groups for key in self.plan.writes(g)])
+        factors = [k for s in steps if isinstance(s, Turn) for _, k in s.angle.inputs]
+        ratios = [Fraction(k).limit_denominator(TURNS) for k in factors]
+        if any(abs(float(r) - k) > 1e-12 * abs(k) for r, k in zip(ratios, factors, strict=True)):
+            return None
+        whole = lcm(*(r.denominator for r in ratios))
+        q = self.start + self.length * (np.arange(COMPARED) + 0.5) / COMPARED
+        here = self._stands(q)
+        for n in range(whole, TURNS + 1, whole):
+            self.cover(self.start - n * self.length, self.start + self.length)
+            # beyond a limit there is nothing to compare: what is not assembled contradicts nothing
+            if not (np.abs(self._stands(q - n * self.length) - here) > SAME).any():
+                return n
+        return None
+
+    def _stands(self, q: Reals) -> NDArray[np.complex128]:
+        """Rotations and slides (over the size) of all groups at inputs q; NaN where not assembled."""
+        st = State([q], many=True)
+        with np.errstate(all="ignore"):
+            self.assembly.run(
+                self.assembly.needed([key for g in self.plan.groups for key in self.plan.writes(g)]), st
+            )
+        rows = [st.turn[b] for g in self.plan.groups for b in g.members]
+        rows += [st.slide[s] / self.assembly.mechanism.size for g in self.plan.groups for s in g.slides]
+        return np.array([np.broadcast_to(row, q.shape) for row in rows])
+
+    @property
+    def period(self) -> float | None:
+        """The input's span after which the branch repeats, rad; None where it does not, or with a slide."""
+        return None if self.turns is None else self.turns * self.length
+
+    def apart(self, q: Reals, from_: float) -> Reals:
+        """How far inputs are from one, by the nearest way round the branch."""
+        d = np.asarray(q - from_)
+        return d if self.period is None else d - self.period * np.round(d / self.period)
+
     # --- limits ---------------------------------------------------------------------------------------------------
     def limits(self) -> list[Limit]:
-        """Where the input can go no further, in what was covered, to full precision."""
+        """Where the input can go no further, over one period of the branch or what was covered, to full precision."""
         back = self.length if self.assembly.mechanism.inputs[0].is_slide or not self._repeats else 0.0
-        self.cover(self.start - back, self.start + self.length)
+        self.cover(self.start - back, self.start + (self.period or self.length))
         by_name = {g.name: g for g in self.plan.groups}
         found = [self._root(by_name[name], a, b) for name, a, b in self._brackets]
         for name, marched in self._marched.items():

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli import options
 from cli.errors import nearest, one_line
-from cli.render import Json, Output, Plot, Shown, Text, show
+from cli.read import options
+from cli.show.output import Json, Output, Plot, Shown, Text, show
 
 if TYPE_CHECKING:
     from cli.bench.measure import Measurement

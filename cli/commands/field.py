@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli import options
-from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
+from cli.read import options
+from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
 
 if TYPE_CHECKING:
     from cli.field_runs import Runs
@@ -167,7 +167,7 @@ def run(
         return
     if runs is None:
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
-    from cli.commands.balance import tolerance_of
+    from cli.balance.command import tolerance_of
     from cli.commands.place import places
 
     tolerance = tolerance_of(grade, speed, rotor_mass, permissible, None)
@@ -212,7 +212,7 @@ def run(
     shown = field.shown()
     beside: dict[Path, bytes] = {}
     if save_influence is not None:
-        from cli.render import csv_text
+        from cli.show.output import csv_text
 
         beside[save_influence] = csv_text(field.coefficients()).encode()
     if report is not None:
@@ -246,7 +246,7 @@ def _reading_error(text: str | None) -> tuple[float, float] | None:
         part = part.strip()
         if part.endswith("%"):
             try:
-                from cli.units import parse_number
+                from cli.read.units import parse_number
 
                 amplitude = parse_number(part[:-1]) / 100
             except ValueError:
@@ -276,7 +276,7 @@ def _limits(texts: list[str]) -> dict[str, tuple[float, str]]:
 
 def _in(limits: dict[str, tuple[float, str]], runs: Runs) -> dict[str, float]:
     """Return limits in SI, in the dimension of the trials."""
-    from cli.units import UNITS, to_si
+    from cli.read.units import UNITS, to_si
 
     for value, unit in limits.values():
         if unit not in UNITS[runs.per]:
@@ -291,7 +291,7 @@ def _ceiling(given: tuple[float, str], runs: Runs) -> float:
     import numpy as np
 
     from cli.field_files import convert_amplitude
-    from cli.units import amplitude_kind
+    from cli.read.units import amplitude_kind
 
     value, unit = given
     if not amplitude_kind(unit)[1]:
@@ -310,7 +310,7 @@ def _suggestion(rotor_mass: str | None, speed: str | None, radius: float | None,
     assert omega is not None
     assert radius is not None
     from balancing import trial_unbalance
-    from cli.units import from_si
+    from cli.read.units import from_si
 
     unbalance = float(trial_unbalance(mass, omega, planes))
     rule = "centrifugal force a tenth of the static load of each plane: m r ω² = 0.1 (M/planes) g"

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli import options
-from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
+from cli.read import options
+from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
 
 if TYPE_CHECKING:
     from cli.mechanism.asked import Asked

@@ -11,6 +11,7 @@ from cli.mechanism.job import ORDERS, Job
 
 if TYPE_CHECKING:
     from virtualwork.newton import AllAtOnce
+    from virtualwork.track import Track
 
 
 def check_document(job: Job) -> dict[str, Any]:
@@ -103,7 +104,7 @@ def newton_tables(job: Job) -> tuple[list[AllAtOnce], dict[str, Any]]:
 
 def newton_text(document: dict[str, Any]) -> str:
     """The table of iterates, the Jacobian at the guess, and the difference to the closed form."""
-    from cli.render import table_text
+    from cli.show.output import table_text
 
     rows = document["iterates"]
     table = table_text({key: [row[key] for row in rows] for key in rows[0]})
@@ -160,6 +161,16 @@ def _angle_text(job: Job, step: Any) -> str:
     return " + ".join(parts) or "fixed"
 
 
+def _on_branch(job: Job, track: Track, found: list[float], digits: int) -> list[float]:
+    """Inputs as they are shown, each once, deg in [0, period of the branch) or m."""
+    if job.mechanism.inputs[0].is_slide:
+        return sorted({round(v, digits) for v in found})
+    if track.turns is None:
+        return sorted({round(math.degrees(v), digits) for v in found})
+    full = 360.0 * track.turns
+    return sorted({round(math.degrees(v) % full, digits) % full for v in found})
+
+
 def limit_warnings(job: Job) -> list[str]:
     """One line for the poses that cannot be assembled, with the limit of the input that is near them; and branches."""
     lines = []
@@ -171,8 +182,7 @@ def limit_warnings(job: Job) -> list[str]:
             text = f"{len(missing)} of {motion.n} poses cannot be assembled"
             if track.active:
                 slide = job.mechanism.inputs[0].is_slide
-                limits = [v.input for v in track.limits()]
-                shown = sorted({round(v if slide else math.degrees(v) % 360.0, 12) for v in limits})
+                shown = _on_branch(job, track, [v.input for v in track.limits()], 12)
                 unit = "m" if slide else "deg"
                 if shown:
                     values = ", ".join(f"{v:.13g}" for v in shown)
@@ -196,12 +206,7 @@ def _branch_lines(job: Job, motion: Any) -> list[str]:
         inside = [c for c in changes if low - 1e-12 <= c.input <= high + 1e-12]
         if not inside:
             continue
-        at = sorted(
-            {
-                round(c.input if slide else math.degrees(c.input) % 360.0, 9) % (1e300 if slide else 360.0)
-                for c in inside
-            }
-        )
+        at = _on_branch(job, track, [c.input for c in inside], 9)
         c = inside[0]
         group = next(g for g in motion.assembly.plan.groups if g.name == c.group)
         names = [*group.angles, *(job.mechanism.guides[g].point for g in group.slides)]

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli import options
 from cli.errors import nearest
 from cli.mechanism.job import Job
+from cli.read import options
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

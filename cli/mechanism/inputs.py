@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli import options
 from cli.errors import DataError, nearest
-from cli.units import UNITS, parse_quantity, to_si
+from cli.read import options
+from cli.read.units import UNITS, parse_quantity, to_si
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -158,7 +158,7 @@ def _sweep(m: Mechanism, text: str, at: list[str] | None) -> Inputs:
 
 def _from_table(m: Mechanism, path: str) -> Inputs:
     """A CSV with a column for each input (`crank_deg`, `B_mm`), perhaps `time_s`, `crank_speed_rad_s`, ..."""
-    from cli.tables import read
+    from cli.read.tables import read
 
     numbers = {"time": "time"}
     names = {e.name: e for e in m.inputs}

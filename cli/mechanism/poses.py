@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.mechanism.job import Job
-from cli.units import degrees
+from cli.read.units import degrees
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -106,10 +106,7 @@ def marks_of(job: Job, motion: Motion) -> list[list[str]]:
                 found[i].append("change point")
     if track.has_limits:
         for limit in track.limits():
-            apart = q - limit.input
-            if not job.mechanism.inputs[0].is_slide:
-                apart = np.angle(np.exp(1j * apart))
-            for i in np.flatnonzero(np.abs(apart) <= near):
+            for i in np.flatnonzero(np.abs(track.apart(q, limit.input)) <= near):
                 found[i] += [word for word in ("limit", "dead point") if word not in found[i]]
     return found
 

@@ -15,7 +15,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from cli.render import digits_that_hold, table_text
+from cli.show.output import digits_that_hold, table_text
 
 Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 

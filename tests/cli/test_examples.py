@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.commands.examples import describe, names
+from cli.examples.command import describe, names
 
 Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.rigid_body import Answer
+    from cli.body.solve import Answer
 
 Array = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.parts import Parts, read_parts
-from cli.planes import Planes
-from cli.render import Columns, Shown
-from cli.units import degrees
+from cli.read.parts import Parts, read_parts
+from cli.read.planes import Planes
+from cli.read.units import degrees
+from cli.show.output import Columns, Shown
 from rigidbody3d import Motion, Shaft
 
 if TYPE_CHECKING:
@@ -288,7 +288,7 @@ class Answer:
 
     def errors(self) -> Columns:
         """Return bounds of the rounding errors of what is shown."""
-        from cli.body_digits import errors
+        from cli.body.columns import errors
 
         return errors(self)
 
@@ -307,7 +307,7 @@ class Answer:
 
     def figure(self) -> Any:
         """Draw the parts, the principal axes and the vectors of the motion."""
-        from cli.plots.body import draw
+        from cli.body.picture import draw
 
         return draw(self)
 

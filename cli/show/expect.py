@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from cli.errors import DataError, nearest
-from cli.tables import read
-from cli.units import parse_number
+from cli.read.tables import read
+from cli.read.units import parse_number
 
 Columns = Mapping[str, Sequence[Any]]
 

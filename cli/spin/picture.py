@@ -13,7 +13,7 @@ from rigidbody3d.attitude import rotate
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.rotation import Answer
+    from cli.spin.solve import Answer
 
 Array = NDArray[np.float64]
 LINES = (("tab:red", "-"), ("tab:blue", "--"), ("0.2", ":"))

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.errors import DataError, cell_error, nearest, quote
-from cli.units import LARGEST, UNITS, find_unit, parse_number
+from cli.read.units import LARGEST, UNITS, find_unit, parse_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -108,7 +108,7 @@ def read(
     path
         The file.
     numbers
-        Quantity -> dimension (a key of `cli.units.UNITS`) of the columns of numbers the command knows.
+        Quantity -> dimension (a key of `cli.read.units.UNITS`) of the columns of numbers the command knows.
     texts
         The columns of names; a name is text whatever it looks like. None: every column.
     cells

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError, nearest, quote
-from cli.tables import Table, read
-from cli.units import UNITS, cosine_sine, to_si
+from cli.read.tables import Table, read
+from cli.read.units import UNITS, cosine_sine, to_si
 from rigidbody3d import Body, check, compose, load_mesh, mesh, tensor
 from rigidbody3d.shapes import SHAPES
 

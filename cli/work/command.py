@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from cli import options
-from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+from cli.read import options
+from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
 
 
 def run(
@@ -40,7 +40,7 @@ def run(
     column field.
     """
     g = 0j if gravity is None else options.plane_vector("--gravity", gravity)
-    from cli import link_states as job
+    from cli.work import solve as job
 
     shown = job.balanced(job.read_states(states), g, ledger=ledger)
     show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)

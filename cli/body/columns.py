@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.parts import READ
+from cli.read.parts import READ
 
 if TYPE_CHECKING:
-    from cli.render import Columns
-    from cli.rigid_body import Answer
+    from cli.body.solve import Answer
+    from cli.show.output import Columns
 
 Real = NDArray[np.float64]
 

@@ -105,7 +105,7 @@ def show(
     """Write the files asked for and those `beside` them, print the result, end with status 1 if an expectation is not met."""
     report = None
     if expect is not None:
-        from cli.expect import compare
+        from cli.show.expect import compare
 
         report = compare(shown.columns, shown.keys, str(expect), rtol)
         checked = f"{table_text(report.columns)}\n{report.summary}"

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError, quote
-from cli.render import Shown, table_text
-from cli.tables import Table, read, spellings
-from cli.units import from_si, parse_number, to_si
+from cli.read.tables import Table, read, spellings
+from cli.read.units import from_si, parse_number, to_si
+from cli.show.output import Shown, table_text
 from virtualwork.textbook.link_states import KINDS, Balance, LinkStates, UnitLoad, balance
 
 if TYPE_CHECKING:
@@ -562,7 +562,7 @@ class Balanced:
 
     def figure(self) -> Figure:
         """The ledger of one step as bars; of several, each unknown against the step."""
-        from cli.plots.work import curves, ledger
+        from cli.work.picture import curves, ledger
 
         if len(self.states.steps) == 1:
             lines = [line for line in self.terms(0) if line[3] is not None]

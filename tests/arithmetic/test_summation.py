@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from balancing.summation import exact_sum, two_product, two_sum
+from dalembert.arithmetic.exact import exact_sum, two_product, two_sum
 
 
 def test_a_sum_and_its_error_are_exact() -> None:

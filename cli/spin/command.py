@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cli import options
-from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+from cli.read import options
+from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
 
 
 class Method(StrEnum):
@@ -58,7 +58,7 @@ def run(
     (then inertia is about the fixed point, the axis is body z and gravity acts along -z of space), or torque =
     [x, y, z] in N·m with frame = "body" or "space".
     """
-    from cli import rotation as job
+    from cli.spin import solve as job
 
     if time is not None and at:
         raise options.bad("--at", "expected --time or --at, not both")

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli import options
-from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+from cli.read import options
+from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
 
 if TYPE_CHECKING:
-    from cli.rigid_body import ShaftWanted
+    from cli.body.solve import ShaftWanted
 
 _VECTOR = "X,Y,Z"
 
@@ -75,7 +75,7 @@ def run(
     tube radius, inner_radius, length; box width, height, depth; plate width, height; sphere radius, inner_radius;
     tensor ixx iyy izz ixy ixz iyz, products as +∫xy dm; mesh file, file_unit (STL, OBJ). Thin shapes take linear_density_* or area_density_*.
     """
-    from cli import rigid_body as job
+    from cli.body import solve as job
 
     wanted = job.Wanted(
         omega=options.vector("--omega", omega, "speed"),
@@ -122,8 +122,8 @@ def _shaft(
     gravity: str | None,
     correct: list[str] | None,
 ) -> ShaftWanted | None:
-    from cli.planes import from_options
-    from cli.rigid_body import ShaftWanted
+    from cli.body.solve import ShaftWanted
+    from cli.read.planes import from_options
 
     if shaft is None:
         for flag, given in (

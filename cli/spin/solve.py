@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError, nearest
-from cli.render import Columns, Shown
-from cli.units import LARGEST
+from cli.read.units import LARGEST
+from cli.show.output import Columns, Shown
 from rigidbody3d import Body, FreeBody, FreeState, Top, TopState, Trajectory, check, integrate, principal
 from rigidbody3d import cones as cones_of
 from rigidbody3d import sleeping_threshold as threshold_of
@@ -74,7 +74,7 @@ def read_body(path: str) -> Given:
     if ("inertia" in document) == ("parts" in document):
         raise DataError(f'{file}: expected inertia = [I1, I2, I3] (or a matrix) or parts = "parts.csv"')
     if "parts" in document:
-        from cli.parts import read_parts
+        from cli.read.parts import read_parts
 
         if not isinstance(document["parts"], str):
             raise DataError(f"{file}: parts: found {document['parts']!r}, expected the name of a CSV file")
@@ -380,7 +380,7 @@ class Answer:
 
     def figure(self) -> Any:
         """Draw ω(t), the polhode and the trace of the body's axis."""
-        from cli.plots.spin import draw
+        from cli.spin.picture import draw
 
         return draw(self)
 

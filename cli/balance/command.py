@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from cli import options
-from cli.render import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+from cli.read import options
+from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
 
 
 def run(
@@ -69,7 +69,7 @@ def run(
     Angles are counter-clockwise as seen against +z.
     """
     # numpy and what stands on it are loaded only once the command line itself is in order
-    from cli import known_masses as job
+    from cli.balance import solve as job
 
     if (plane is None) == (planes is None):
         raise options.bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
@@ -83,7 +83,7 @@ def run(
         center=options.quantity("--center-z", center_z, "length"),
         tolerance=tolerance_of(grade, speed, rotor_mass, permissible, bearings),
     )
-    from cli.planes import from_options, from_table
+    from cli.read.planes import from_options, from_table
 
     chosen = from_table(planes) if planes is not None else from_options(plane or [])
     shown = job.balance(job.read_rotors(table, wanted.gravity, needs_z=chosen.several), chosen, wanted)

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from cli.errors import DataError, nearest
-from cli.render import write
+from cli.show.output import write
 
 EXAMPLES = files("cli") / "examples"
 ABOUT = "example.toml"

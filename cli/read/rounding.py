@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.units import to_si
+from cli.read.units import to_si
 
 Real = NDArray[np.float64]
 

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import GRADES, CoincidentPlanes, Correction, allocate, by_size, correct
-from cli.digits import EPS, angle_error, angle_text, size_error, vector_error
 from cli.errors import DataError, quote
-from cli.planes import Planes
-from cli.render import Shown
-from cli.tables import LARGE, Table, read
-from cli.units import degrees, from_si, phasor, to_si
+from cli.read.planes import Planes
+from cli.read.rounding import EPS, angle_error, angle_text, size_error, vector_error
+from cli.read.tables import LARGE, Table, read
+from cli.read.units import degrees, from_si, phasor, to_si
+from cli.show.output import Shown
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -440,7 +440,7 @@ class _Balanced:
 
     def figure(self) -> Any:
         """Draw the first rotors, a panel for each plane."""
-        from cli.plots.balance import draw
+        from cli.balance.picture import draw
 
         shown = range(min(len(self.rotors.names), 4))
         panels = []

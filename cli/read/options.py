@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from cli.units import SMALLEST, UNITS, parse_number, parse_quantity, to_si
+from cli.read.units import SMALLEST, UNITS, parse_number, parse_quantity, to_si
 
 STATES = 250_000  # what a gigabyte holds, integrated and shown
 PLACES = 10_000  # holes or blades on one rotor

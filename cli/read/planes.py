@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError, quote
-from cli.options import bad
-from cli.tables import read
-from cli.units import SMALLEST, parse_quantity, to_si
+from cli.read.options import bad
+from cli.read.tables import read
+from cli.read.units import SMALLEST, parse_quantity, to_si
 
 
 @dataclass(frozen=True)

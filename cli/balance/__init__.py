@@ -1,0 +1,1 @@
+"""`dalembert balance`: rotors whose eccentric masses are known."""

@@ -1,0 +1,1 @@
+"""`dalembert body`: a body put together from parts, and its motion."""

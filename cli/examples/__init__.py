@@ -1,0 +1,1 @@
+"""`dalembert examples`: the worked examples."""

@@ -1,0 +1,1 @@
+"""What a user gives, turned into SI numbers: tables, units, option values, planes, parts."""

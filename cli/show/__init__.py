@@ -1,0 +1,1 @@
+"""What a user is given: tables of columns as text, CSV and JSON, digits that hold, expectations, pictures, files."""

@@ -1,0 +1,1 @@
+"""`dalembert spin`: the rotation of a body in time."""

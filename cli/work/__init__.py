@@ -1,0 +1,1 @@
+"""`dalembert work`: the unknown load of a table of link states."""
