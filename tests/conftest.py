@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 COMMAND = Path(sys.executable).with_name("dalembert")
+# for `benchmarks`, which is not installed; last, so that what is installed is what is tested
+sys.path.append(str(Path(__file__).parents[1]))
 
 
 @pytest.fixture

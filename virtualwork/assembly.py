@@ -16,8 +16,8 @@ from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, plan
 from virtualwork.describe.errors import AssemblyError, MobilityError
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Number, cross, dot
-from virtualwork.newton import newton, write_unknowns
-from virtualwork.state import Case, State, place
+from virtualwork.formulas.newton import newton, write_unknowns
+from virtualwork.formulas.positions import Case, State, place
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -12,7 +12,7 @@ import numpy as np
 
 from virtualwork.describe.errors import AssemblyError
 from virtualwork.describe.parts import GROUND
-from virtualwork.state import State
+from virtualwork.formulas.positions import State
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

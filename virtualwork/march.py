@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.newton import newton, solve, stack, stack_rows, write_unknowns
-from virtualwork.state import Jets, State, columns
+from virtualwork.formulas.newton import newton, solve, stack, stack_rows, write_unknowns
+from virtualwork.formulas.positions import Jets, State, columns
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

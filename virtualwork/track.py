@@ -21,7 +21,7 @@ from virtualwork.assur import Group, Turn
 from virtualwork.branch.change_point import branches
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.closed_forms import Number
-from virtualwork.state import Jets, State
+from virtualwork.formulas.positions import Jets, State
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cli.read import options
-from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
+from cli.show.output import (
+    Digits,
+    Expect,
+    Json,
+    Output,
+    Plot,
+    Rtol,
+    Shown,
+    Text,
+    csv_text,
+    show,
+    suffix_among,
+)
 
 if TYPE_CHECKING:
     from cli.mechanism.asked import Asked
@@ -79,6 +95,14 @@ def run(
     ] = None,
     json: Json = False,
     output: Output = None,
+    states: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv",
+            help="Write a row for each pose and link to FILE: what `dalembert work` reads.",
+            callback=suffix_among(".csv"),
+        ),
+    ] = None,
     plot: Plot = None,
     expect: Expect = None,
     rtol: Rtol = 1e-3,
@@ -88,7 +112,8 @@ def run(
     """Solve a planar mechanism: positions, velocities, accelerations, its limits and its assemblies.
 
     FILE.toml describes ground, links, slots, sliders, gears, input and guess. Without --only the table has a row
-    for each pose and link (what `dalembert work` reads); with --only a row for each pose.
+    for each pose and link (what `dalembert work` reads); with --only or --forces a row for each pose. In a pipe
+    --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
     """
     from cli.mechanism.job import ORDERS
 
@@ -106,6 +131,26 @@ def run(
     if (flywheel is not None or counterweights is not None) and sweep is None and inputs is None:
         flag = "--flywheel" if flywheel is not None else "--counterweights"
         raise options.bad(flag, "expected a cycle too: --sweep, such as --sweep 0deg:360deg:1deg")
+    if graph is not None and plot is None:
+        raise options.bad("--graph", "expected --plot FILE too: the picture that the curves are drawn into")
+    tables = [
+        flag
+        for flag, given in (
+            ("--forces", forces),
+            ("--newton", newton),
+            ("--check", check),
+            ("--equilibrium", equilibrium),
+            ("--flywheel", flywheel is not None),
+            ("--counterweights", counterweights is not None),
+        )
+        if given
+    ]
+    as_csv = _as_csv(json=json, text=text, output=output, expect=expect)
+    if as_csv and len(tables) > 1:
+        raise options.bad(
+            tables[1],
+            f"{' and '.join(tables)} are tables of their own, and CSV holds one: ask for --json or --text",
+        )
     from cli.mechanism.asked import Asked
     from virtualwork import MechanismError
 
@@ -117,24 +162,51 @@ def run(
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not json or expect is not None or output is not None
         document = json or (output is not None and output.suffix.lower() == ".json")
-        job.check_size(json=document, table=table, forces=forces)
+        job.check_size(json=document, table=table or states is not None, forces=forces)
         shown = _shown(
             job,
             asked,
+            own=tables[0] if len(tables) == 1 and tables != ["--forces"] else None,
             table=table,
             newton=newton,
             check=check,
             explain=explain,
             graph=graph,
-            written=output is not None,
         )
-        show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)
+        beside = {} if states is None else {states: _link_states(job)}
+        show(
+            shown,
+            json=json,
+            output=output,
+            plot=plot,
+            expect=expect,
+            rtol=rtol,
+            text=text,
+            digits=digits,
+            beside=beside,
+        )
     except MechanismError as error:
         from cli.errors import DataError
 
         raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
     if not any(job.assembled(motion).any() for motion in job.motions):
         raise typer.Exit(1)
+
+
+def _as_csv(*, json: bool, text: bool, output: Path | None, expect: Path | None) -> bool:
+    """Whether the answer is written as CSV: to a file, or to a pipe."""
+    if output is not None:
+        return output.suffix.lower() == ".csv"
+    return not (json or text or expect is not None or sys.stdout.isatty())
+
+
+def _link_states(job: Job) -> bytes:
+    """The table of `--states`: every link, whatever `--only` names."""
+    from cli.mechanism import states
+
+    every = replace(job, only=None)
+    every.motions = job.motions
+    return csv_text(states.table(every)).encode()
 
 
 def _job(
@@ -164,20 +236,26 @@ def _shown(
     job: Job,
     asked: Asked,
     *,
+    own: str | None,
     table: bool,
     newton: bool,
     check: bool,
     explain: bool,
     graph: str | None,
-    written: bool,
 ) -> Shown:
-    from cli.mechanism import checking, poses, states
+    """What was asked for; `own`: the option whose table a pipe shows in place of the poses."""
+    from cli.mechanism import checking, poses, states, tables
 
     columns: dict[str, list[Any]] = {}
-    if table and asked.forces and not written:
-        columns = asked.table(job)
-    elif table:
-        columns = states.table(job) if job.only is None else poses.wide_table(job)
+
+    @cache
+    def of_poses() -> dict[str, list[Any]]:
+        if asked.forces:
+            return asked.table(job)
+        return states.table(job) if job.only is None else poses.wide_table(job)
+
+    if own is None and table:
+        columns = of_poses()
     extra: dict[str, Any] = {}
     after: list[str] = []
     if newton:
@@ -189,6 +267,14 @@ def _shown(
         after.append(checking.check_text(extra["check"]))
     of_forces = asked.document(job)
     extra |= of_forces
+    if own is not None:
+        columns = {
+            "--newton": lambda: tables.of_iterates(extra),
+            "--check": lambda: tables.of_check(extra["check"]),
+            "--equilibrium": lambda: tables.of_equilibria(extra["equilibria"], job.input_names),
+            "--flywheel": lambda: tables.of_cycle(extra["cycle"]),
+            "--counterweights": lambda: tables.of_counterweights(extra["counterweights"]),
+        }[own]()
     warnings = job.warnings + checking.limit_warnings(job) + asked.warnings(job)
 
     def document() -> dict[str, Any]:
@@ -203,7 +289,7 @@ def _shown(
 
         if not table:
             return {}
-        if asked.forces and not written:
+        if asked.forces:
             return digits.of_forces(job)
         return digits.of_states(job) if job.only is None else digits.of_poses(job)
 
@@ -218,13 +304,16 @@ def _shown(
         from cli.mechanism.graphs import quantities
 
         quantities(job, graph)  # a bad name is an error before anything is written
+    of_each_pose = ("step", "branch", "link", *job.input_columns)
     return Shown(
         document=document,
         columns=columns,
-        keys=[key for key in ("step", "branch", "link") if key in columns],
+        keys=of_each_pose if own is None else [*of_each_pose[:3], *tables.KEYS],
+        table=None if own is None else of_poses,
         notes=lambda: job.mechanism.name,
         afterword=afterword,
         figure=figure,
-        errors=errors,
+        errors=errors if own is None else dict,
+        table_errors=None if own is None else errors,
         warnings=warnings,
     )

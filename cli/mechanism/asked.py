@@ -35,7 +35,8 @@ class Asked:
             return extra
         from cli.mechanism import forces
 
-        if (self.forces or self.flywheel is not None) and self.swept and len(job.mechanism.inputs) == 1:
+        of_one = self.forces and len(job.mechanism.inputs) == 1
+        if (of_one or self.flywheel is not None) and self.swept:
             extra["cycle"] = forces.cycle(job, self.flywheel)
         if self.equilibrium:
             extra["equilibria"], said = forces.equilibria(job, self.swept)

@@ -10,7 +10,7 @@ import numpy as np
 from cli.mechanism.job import ORDERS, Job
 
 if TYPE_CHECKING:
-    from virtualwork.newton import AllAtOnce
+    from virtualwork.formulas.newton import AllAtOnce
     from virtualwork.track import Track
 
 
@@ -75,7 +75,7 @@ def check_text(document: dict[str, Any]) -> str:
 
 def newton_tables(job: Job) -> tuple[list[AllAtOnce], dict[str, Any]]:
     """Newton-Raphson from the guess at every pose; the table of the first, the largest difference of all."""
-    from virtualwork.newton import all_at_once
+    from virtualwork.formulas.newton import all_at_once
 
     assembly = job.assemblies[0]
     done = [all_at_once(assembly, tuple(row)) for row in job.inputs.values.tolist()]

@@ -99,6 +99,17 @@ class Job:
         """The guides asked for, by their point; the points themselves tell where they are."""
         return tuple(g.point for g in self.mechanism.guides if self.only is None or g.point in self.only)
 
+    @cached_property
+    def input_names(self) -> dict[str, str]:
+        """Each input and the name of its value: `input_deg`, or `input_m` of a slide."""
+        return {e.name: "input_m" if e.is_slide else "input_deg" for e in self.mechanism.inputs}
+
+    @cached_property
+    def input_columns(self) -> tuple[str, ...]:
+        """The columns of the inputs in a table."""
+        several = len(self.mechanism.inputs) > 1
+        return tuple(f"{name}_{key}" if several else key for name, key in self.input_names.items())
+
     def given(self, link: str) -> NDArray[np.float64] | None:
         """The angles asked for of a link that is driven against the ground, degrees; None for any other."""
         for j, e in enumerate(self.mechanism.inputs):

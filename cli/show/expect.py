@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,23 +25,34 @@ class Report:
     passed: bool
 
 
-def compare(columns: Columns, keys: Sequence[str], file: str, rtol: float) -> Report:
+def compare(
+    columns: Columns,
+    keys: Sequence[str],
+    file: str,
+    rtol: float,
+    other: Callable[[], Columns] | None = None,
+) -> Report:
     """Compare a result with a file of expected values, cell by cell.
 
     Rows are matched by the key columns that the file has, else by their order. A number holds where its
     relative error is at most `rtol`, an angle where it is off by at most `rtol` radians, modulo a turn; an
-    expected zero is measured against the largest value in its column. Empty cells expect nothing.
+    expected zero is measured against the largest value in its column. Empty cells expect nothing. An input is a
+    key where no `step` is given: its row is the nearest within `rtol`. `other` is the result's other table, for a
+    file with columns of that one.
     """
     expected = read(file, texts=None)
     header = list(expected.texts)
+    if other is not None and not columns.keys() >= set(header) and (table := other()).keys() >= set(header):
+        columns = table
     for name in header:
         if name not in columns:
             raise DataError(
                 f"{file}: the result has no column '{name}': expected some of "
                 f"{', '.join(columns)}{nearest(name, columns)}"
             )
-    matched = [name for name in header if name in keys]
-    rows = list(_match(columns, file, expected.texts, matched, expected.rows))
+    matched = [name for name in header if name in keys and not (is_input(name) and "step" in header)]
+    rows = list(_match(columns, file, expected.texts, matched, expected.rows, rtol))
+    named = [key for key in keys if key in columns and (key in matched or not is_input(key))]
     lines: dict[str, list[Any]] = {
         name: [] for name in ("row", "column", "value", "expected", "error", "verdict")
     }
@@ -53,7 +64,7 @@ def compare(columns: Columns, keys: Sequence[str], file: str, rtol: float) -> Re
             value = columns[name][row]
             number, error = _error(name, value, wanted, columns[name])
             holds = error <= rtol
-            label = "/".join(str(columns[key][row]) for key in keys) or str(row + 1)
+            label = "/".join(str(columns[key][row]) for key in named) or str(row + 1)
             for key, item in zip(
                 lines, (label, name, value, number, error, "ok" if holds else "WRONG"), strict=True
             ):
@@ -65,8 +76,13 @@ def compare(columns: Columns, keys: Sequence[str], file: str, rtol: float) -> Re
     return Report(lines, f"{total - wrong} of {total} values within {rtol:g}", wrong == 0)
 
 
+def is_input(name: str) -> bool:
+    """Whether a column holds a pose's input: a key that is a number."""
+    return name.endswith(("input_deg", "input_m"))
+
+
 def _match(
-    columns: Columns, file: str, expected: dict[str, list[str]], keys: list[str], rows: int
+    columns: Columns, file: str, expected: dict[str, list[str]], keys: list[str], rows: int, rtol: float
 ) -> Iterator[int]:
     """Yield for each expected row the result's row."""
     length = len(next(iter(columns.values())))
@@ -77,15 +93,35 @@ def _match(
             )
         yield from range(rows)
         return
+    names, numbers = [k for k in keys if not is_input(k)], [k for k in keys if is_input(k)]
     places: dict[tuple[str, ...], list[int]] = {}
     for row in range(length):
-        places.setdefault(tuple(str(columns[key][row]) for key in keys), []).append(row)
+        places.setdefault(tuple(str(columns[key][row]) for key in names), []).append(row)
     for index in range(rows):
-        key = tuple(expected[name][index] for name in keys)
-        if not places.get(key):
-            named = ", ".join(f"{name} {value}" for name, value in zip(keys, key, strict=True))
+        left = places.get(tuple(expected[name][index] for name in names), [])
+        for name in numbers:
+            left = _nearest(name, columns[name], left, expected[name][index], rtol)
+        if not left:
+            named = ", ".join(f"{name} {expected[name][index]}" for name in keys)
             raise DataError(f"{file}: row {index + 1}: the result has no (further) row with {named}")
-        yield places[key].pop(0)
+        yield left[0]
+        places[tuple(expected[name][index] for name in names)].remove(left[0])
+
+
+def _nearest(name: str, column: Sequence[Any], rows: list[int], wanted: str, rtol: float) -> list[int]:
+    """The rows whose number comes nearest to the one wanted, within the tolerance."""
+    try:
+        number = parse_number(wanted)
+    except ValueError:
+        return []
+    away = np.array([column[row] for row in rows], dtype=float) - number
+    if name.endswith("_deg"):  # first the same angle, and of 0° and 360° the one that is meant
+        turned = np.abs(np.radians(np.remainder(away + 180.0, 360.0) - 180.0))
+        best = turned <= min(rtol, turned.min(initial=np.inf) + 1e-12)
+    else:
+        best = np.abs(away) <= rtol * max(abs(number), np.abs(away).max(initial=0.0))
+    away = np.where(best, np.abs(away), np.inf)
+    return [row for row, d in zip(rows, away, strict=True) if d < np.inf and d == away.min()]
 
 
 def _error(name: str, value: Any, wanted: str, column: Any) -> tuple[Any, float]:

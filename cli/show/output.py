@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def _suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
+def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
+    """The callback of an option that names a file: its suffix is one of these."""
+
     def check(path: Path | None) -> Path | None:
         if path is not None and path.suffix.lower() not in suffixes:
             raise typer.BadParameter(f"'{path}' has no known suffix: expected {', '.join(suffixes)}")
@@ -36,7 +38,7 @@ Output = Annotated[
         "--output",
         metavar="FILE",
         help="Write the result to FILE (.csv or .json).",
-        callback=_suffix_among(".csv", ".json"),
+        callback=suffix_among(".csv", ".json"),
     ),
 ]
 Plot = Annotated[
@@ -45,7 +47,7 @@ Plot = Annotated[
         "--plot",
         metavar="FILE",
         help="Write a picture to FILE (.svg, .png or .pdf).",
-        callback=_suffix_among(".svg", ".png", ".pdf"),
+        callback=suffix_among(".svg", ".png", ".pdf"),
     ),
 ]
 Expect = Annotated[
@@ -87,6 +89,8 @@ class Shown:
     figure: Callable[[], Figure] | None = None
     errors: Callable[[], Columns] = dict
     """Bounds of the rounding errors of the columns of computed numbers, in their units."""
+    table_errors: Callable[[], Columns] | None = None
+    """The same of the terminal's table, where its rows are others."""
     warnings: list[str] = field(default_factory=list)
 
 
@@ -107,7 +111,7 @@ def show(
     if expect is not None:
         from cli.show.expect import compare
 
-        report = compare(shown.columns, shown.keys, str(expect), rtol)
+        report = compare(shown.columns, shown.keys, str(expect), rtol, other=shown.table)
         checked = f"{table_text(report.columns)}\n{report.summary}"
     if digits:
         shown = _with_digits_that_hold(shown)
@@ -183,13 +187,14 @@ def _plain(value: Any) -> Any:
 def _with_digits_that_hold(shown: Shown) -> Shown:
     """Cut the CSV's columns, and those of the terminal's table that bear the same names."""
     errors, table = shown.errors(), shown.table
-    unknown = sum(sum(error == float("inf") for error in column) for column in errors.values())
+    of_table = errors if shown.table_errors is None else shown.table_errors()
+    unknown = sum(sum(error == float("inf") for error in column) for column in (errors or of_table).values())
     noted = f"--digits: of {unknown} numbers no digit is known to hold; their cells are empty"
     return replace(
         shown,
         warnings=[*shown.warnings, *([noted] if unknown else [])],
         columns=digits_that_hold(shown.columns, errors),
-        table=None if table is None else lambda: digits_that_hold(table(), errors),
+        table=None if table is None else lambda: digits_that_hold(table(), of_table),
     )
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from balancing import CoincidentPlanes, by_size, correct
-from cli.bench.rotors import exact_corrections as exact
+from benchmarks.truth.rotors import exact_corrections as exact
 
 Complex = NDArray[np.complex128]
 

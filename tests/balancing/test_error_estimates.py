@@ -23,7 +23,7 @@ from balancing import (
     place_from_stock,
     trial_effect,
 )
-from cli.bench.stress import replay
+from benchmarks.stress.campaigns import replay
 
 Complex = NDArray[np.complex128]
 

@@ -10,7 +10,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from cli.bench.turning import taylor
+from benchmarks.truth.rotation import taylor
 
 F = Fraction
 

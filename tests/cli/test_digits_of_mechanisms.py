@@ -13,8 +13,8 @@ from pathlib import Path
 import mpmath as mp
 import pytest
 
-from cli.bench.exact import Exact
-from cli.bench.linkages import _coupler_point
+from benchmarks.truth.four_bar import coupler_point
+from benchmarks.truth.mechanism import Exact
 from virtualwork import Mechanism
 
 Dalembert = Callable[..., subprocess.CompletedProcess[str]]
@@ -115,7 +115,7 @@ def _motion(q: mp.mpf) -> dict[str, mp.mpf]:
     """C and the rocker, with the acceleration of the input: its part is v̇ = (dC/dq)·q̈."""
     a, b, c, d = map(mp.mpf, LENGTHS)
     speed, rate = mp.mpf("3.3"), mp.mpf("1.9")
-    pin, v, steady, _ = _coupler_point(a, b, c, d, q, 1, speed)
+    pin, v, steady, _ = coupler_point(a, b, c, d, q, 1, speed)
     acceleration = steady + v / speed * rate
     arm = pin - d
     turned, bent = v / arm / mp.mpc(0, 1), acceleration / arm
@@ -170,7 +170,7 @@ def test_states_and_their_balance(
                 at = exact.point(row["link"], center, order)
                 assert holds(row[names[0]], mp.re(at)) + holds(row[names[1]], mp.im(at)) > least // 2
     states = tmp_path / "states.csv"
-    assert dalembert("mechanism", four_bar, "--at", f"{angle}deg", "-o", states).returncode == 0
+    assert dalembert("mechanism", four_bar, "--at", f"{angle}deg", "--states", states).returncode == 0
     (found,) = table(dalembert("work", states, "--digits"))
     power = mp.mpf(0)
     with mp.workdps(50):

@@ -108,7 +108,16 @@ def test_explain_says_what_was_skipped(dalembert: Dalembert) -> None:
 
 def test_states_table(dalembert: Dalembert, tmp_path: Path) -> None:
     done = dalembert(
-        "mechanism", KLANN, "--at", "60deg", "--at", "70deg", "--order", "acceleration", "-o", "states.csv"
+        "mechanism",
+        KLANN,
+        "--at",
+        "60deg",
+        "--at",
+        "70deg",
+        "--order",
+        "acceleration",
+        "--states",
+        "states.csv",
     )
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader(io.StringIO((tmp_path / "states.csv").read_text())))

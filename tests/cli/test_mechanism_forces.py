@@ -192,7 +192,7 @@ def test_cycle_and_flywheel(dalembert: Run) -> None:
 @pytest.mark.parametrize("text", [FOUR_BAR, CYLINDER, FIVE_BAR], ids=["four-bar", "cylinder", "five-bar"])
 def test_work_reads_the_states_that_mechanism_writes(dalembert: Run, tmp_path: Path, text: str) -> None:
     (tmp_path / "m.toml").write_text(text)
-    assert dalembert("mechanism", "m.toml", "-o", "states.csv").returncode == 0
+    assert dalembert("mechanism", "m.toml", "--states", "states.csv").returncode == 0
     effort = run_json(dalembert, "m.toml", "--forces")["poses"][0]["effort"]
     done = dalembert("work", "states.csv", "--gravity", "0,-9.81", "--json")
     assert done.returncode == 0, done.stderr

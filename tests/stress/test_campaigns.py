@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cli.bench.stress import Tally, campaigns, run
+from benchmarks.stress.campaigns import Tally, campaigns, run
 
 TALLIES: dict[str, Tally] = {}
 

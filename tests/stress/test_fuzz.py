@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from cli.bench.fuzz import trial
+from benchmarks.fuzz.trial import trial
 
 
 def test_damaged_inputs_are_handled() -> None:

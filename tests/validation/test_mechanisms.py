@@ -23,7 +23,7 @@ from virtualwork import (
     sense,
 )
 from virtualwork.check import Check, grashof_class
-from virtualwork.newton import all_at_once
+from virtualwork.formulas.newton import all_at_once
 
 R = math.radians
 EXAMPLES = files("cli") / "examples"

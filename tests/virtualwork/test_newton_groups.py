@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
-from virtualwork.newton import Iterate, all_at_once, inverse_norm, newton, solve, solve_columns, stack
-from virtualwork.state import State
+from virtualwork.formulas.newton import Iterate, all_at_once, inverse_norm, newton, solve, solve_columns, stack
+from virtualwork.formulas.positions import State
 
 
 def triad() -> Mechanism:

@@ -13,22 +13,13 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from cli.bench import groups, linkages, random_linkages
-from cli.bench.exact import Exact
-from cli.bench.groups import compare
-from virtualwork import (
-    Force,
-    Friction,
-    Guess,
-    Guide,
-    Input,
-    Link,
-    Mechanism,
-    Motor,
-    Spring,
-    Torque,
-    TorsionSpring,
-)
+from benchmarks.stress import random_linkages
+from benchmarks.stress.campaigns import replay
+from benchmarks.stress.groups import compare
+from benchmarks.truth.four_bar import two_rates
+from benchmarks.truth.mechanism import Exact
+from virtualwork import Guess, Guide, Input, Link, Mechanism
+from virtualwork import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.study.cycle import Cycle
 from virtualwork.study.equilibrium import equilibria
 from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
@@ -184,8 +175,8 @@ def test_a_chain_of_a_hundred_links() -> None:
             p = base / s * mp.mpc(along, mp.sqrt(mp.mpf(length) ** 2 - along**2))
             length = 2 - length
             q = pin + p - foot
-            w3, w4 = linkages._two_rates(p, q, -v)
-            _, a4 = linkages._two_rates(p, q, -w + w3**2 * p - w4**2 * q)
+            w3, w4 = two_rates(p, q, -v)
+            _, a4 = two_rates(p, q, -w + w3**2 * p - w4**2 * q)
             rates.append((mp.arg(q), w4, a4))
             pin, v, w = foot + q, mp.mpc(0, w4) * q, mp.mpc(0, a4) * q - w4**2 * q
             ground[f"D{i}"] = foot + 0j
@@ -292,33 +283,32 @@ def test_nothing_is_loaded_for_estimates_unless_asked() -> None:
 
 
 @pytest.mark.parametrize(
-    "trial",
+    ("campaign", "seed"),
     [
         # positions within rounding of a limit: what the second order makes of them
-        (linkages._near_limit, 2321),
-        (linkages._near_limit, 3412),
+        ("near dead points", 2321),
+        ("near dead points", 3412),
         # an avoided crossing next to a change point: the weakest direction's own curvature counts
-        (linkages._near_change_point, 256),
-        (linkages._near_change_point, 204),
-        (linkages._near_change_point, 3482),
-        (linkages._near_change_point, 1856),
-        (linkages._near_change_point, 1358),
+        ("near change points", 256),
+        ("near change points", 204),
+        ("near change points", 3482),
+        ("near change points", 1856),
+        ("near change points", 1358),
         # a triad 5e-11 from its limit: rates that the Jacobian gives, where nothing can be bridged
-        (groups._near_triad, 117),
+        ("near-singular triads", 117),
         # forces so near a dead point that no digit is known: infinite, not NaN
-        (groups._forces, 34),
+        ("forces near dead points", 34),
         # a gear whose constant is a difference of larger angles
-        (groups._gears, 1255),
-        (groups._gears, 1604),
-        (groups._gears, 1768),
-        (groups._forces, 53),
+        ("geared five-bars", 1255),
+        ("geared five-bars", 1604),
+        ("geared five-bars", 1768),
+        ("forces near dead points", 53),
         # a swept e^{iθ} is a product of three factors
-        (groups._sweeps, 200051),
+        ("long sweeps", 200051),
     ],
 )
-def test_worst_cases_of_campaigns(trial: tuple) -> None:  # type: ignore[type-arg]
-    run, seed = trial
-    pairs = run(np.random.default_rng(seed))
+def test_worst_cases_of_campaigns(campaign: str, seed: int) -> None:
+    pairs = replay(campaign, seed)
     assert pairs
     assert all(error <= bound for error, bound in pairs)
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from virtualwork.newton import stack, stack_rows
+from virtualwork.formulas.newton import stack, stack_rows
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork.assur import Group
-    from virtualwork.state import Jets
+    from virtualwork.formulas.positions import Jets
 
     Reals = NDArray[np.float64]
 

@@ -30,6 +30,15 @@ class Term:
     slide: int | None = None
 
 
+# where a point lies: P[base] + Σ terms; base None is the ground's origin
+Path = tuple[str | None, tuple[Term, ...]]
+
+
+def path_reads(path: Path) -> set[str]:
+    """What a point hangs on: `angle:BODY`, `slide:GUIDE`, `point:NODE`."""
+    return _term_reads(path[1]) | _node(path[0])
+
+
 @dataclass(frozen=True)
 class Angle:
     """θ = const + Σ k·input + Σ r·θ_base. `phase`: const is such that θ takes this value at the guess."""

@@ -1,0 +1,263 @@
+"""`python -m benchmarks [speed|stress|fuzz] …`: run time against error, errors against their bounds, broken input."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from benchmarks.speed import DOMAINS
+from cli.errors import DataError, nearest, one_line
+from cli.read import options
+from cli.show.output import Json, Output, Plot, Shown, Text, show
+
+if TYPE_CHECKING:
+    from benchmarks.speed.measure import Measurement
+
+app = typer.Typer(
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Measure the program; docs/benchmarks.md holds its tables.",
+)
+
+Docs = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.md",
+        help="Write tables into FILE.md, between its marks <!-- bench:DOMAIN --> (stress: <!-- bench:stress -->) and "
+        "<!-- end -->, and pictures into the folder pictures beside it.",
+        dir_okay=False,
+    ),
+]
+
+
+@app.command()
+def speed(
+    name: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME]...", help=f"Domains: {', '.join(DOMAINS)}.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Smaller sizes.")] = False,
+    peers: Annotated[
+        bool, typer.Option("--peers", help="The same work with other packages, where they are installed.")
+    ] = False,
+    docs: Docs = None,
+    json: Json = False,
+    output: Output = None,
+    plot: Plot = None,
+    text: Text = False,
+) -> None:
+    """Measure run time against error, for each method the program offers.
+
+    Times are CPU times per item, also as multiples of a calibration loop measured in the same run (one element of
+    √(x² + y²) over 4096 doubles), so that results from different machines compare. Errors are against answers of
+    extended precision.
+    """
+    from benchmarks import page
+
+    chosen = _known(name, DOMAINS)
+    if docs is not None:
+        page.check(docs, chosen)
+    measurements = list(_measure(chosen, quick, peers))
+    if docs is not None:
+        page.write(docs, measurements)
+    columns: dict[str, list[Any]] = {
+        "domain": [m.domain for m in measurements],
+        "work": [m.work for m in measurements],
+        "method": [m.method for m in measurements],
+        "size": [m.size for m in measurements],
+        "condition": [m.condition for m in measurements],
+        "time_ns": [m.ns for m in measurements],
+        "time_units": [m.units for m in measurements],
+        "error": [m.error for m in measurements],
+        "aim_ns": [m.aim_ns for m in measurements],
+        "aim_error": [m.aim_error for m in measurements],
+        "floor": [m.floor for m in measurements],
+        "ratio": [m.ratio for m in measurements],
+        "aim_ratio": [m.aim_ratio for m in measurements],
+        "memory_bytes": [m.bytes for m in measurements],
+        "kernel_calls": [m.kernels for m in measurements],
+        "peer": ["yes" if m.peer else "no" for m in measurements],
+    }
+    show(
+        Shown(
+            document=lambda: {"measurements": _records(columns)},
+            columns=columns,
+            keys=("domain", "work", "method", "size"),
+            figure=lambda: import_module("benchmarks.speed.picture").draw(measurements),
+        ),
+        json=json,
+        output=output,
+        plot=plot,
+        text=text,
+    )
+
+
+def _records(columns: dict[str, list[Any]]) -> list[dict[str, Any]]:
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _known(names: list[str] | None, known: Iterable[str]) -> list[str]:
+    """Return the names asked for, all where there are none, once each is known."""
+    known = list(known)
+    for name in names or ():
+        if name not in known:
+            raise typer.BadParameter(f"'{name}': expected some of {', '.join(known)}{nearest(name, known)}")
+    return names or known
+
+
+def _measure(domains: list[str], quick: bool, peers: bool) -> Iterator[Measurement]:
+    from benchmarks.speed import measure as how
+
+    how.patience = 0.3 if quick else 1.0
+    for domain in domains:
+        module, line = DOMAINS[domain]
+        print(f"measuring {domain}: {line}", file=sys.stderr)
+        yield from import_module(module).measure(quick)
+        if peers:
+            from benchmarks import peers as others
+
+            yield from others.measure(domain, quick)
+
+
+@app.command()
+def stress(
+    name: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME]...", help="Campaigns, by the names of the table.")
+    ] = None,
+    given: Annotated[
+        str | None, typer.Option("--time", metavar="TIME", help="Run them for this long, such as 10min.")
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(min=0, help="The seed of the first case; without --time this one case of each.")
+    ] = 0,
+    docs: Docs = None,
+    json: Json = False,
+    output: Output = None,
+    text: Text = False,
+) -> None:
+    """Run random campaigns at singular places; status 1 if errors lie beyond the program's own estimate too often."""
+    from benchmarks import page
+    from benchmarks.stress.campaigns import Tally, campaigns, run
+
+    chosen = _known(name, campaigns())
+    seconds = options.quantity("--time", given, "time", positive=True)
+    if docs is not None:
+        page.check(docs, ["stress"])
+    tallies: list[Tally] = []
+    for campaign in chosen:
+        with typer.progressbar(length=1000, label=campaign, file=sys.stderr) as bar:
+            if seconds is None:  # one case
+                tallies.append(next(run(campaign, 0.0, seed)))
+                continue
+            share, start = seconds / len(chosen), time.monotonic()
+            for tally in run(campaign, share, seed):  # noqa: B007 the last tally is the campaign's
+                bar.update(int(1000 * min(1.0, (time.monotonic() - start) / share)) - bar.pos)
+            tallies.append(tally)
+    if docs is not None:
+        page.write_stress(docs, tallies)
+    columns: dict[str, list[Any]] = {
+        "campaign": [t.name for t in tallies],
+        "trials": [t.trials for t in tallies],
+        "answers": [len(t.ratios) for t in tallies],
+        "worst_error_over_estimate": [t.worst for t in tallies],
+        "worst_seed": [t.seed for t in tallies],
+        "share_bounded": [t.bounded for t in tallies],
+        "median_slack": [t.slack for t in tallies],
+    }
+    show(
+        Shown(
+            lambda: {"campaigns": _records(columns)},
+            columns,
+        ),
+        json=json,
+        text=text,
+        output=output,
+    )
+    if any(t.bounded < 0.999 for t in tallies):
+        raise typer.Exit(1)
+
+
+@app.command()
+def fuzz(
+    inputs: Annotated[int, typer.Argument(metavar="N", min=1, help="How many damaged inputs.")],
+    seed: Annotated[int, typer.Option(min=0, help="The seed of the first: `1 --seed S` is one again.")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+    json: Json = False,
+    output: Output = None,
+    text: Text = False,
+) -> None:
+    """Run damaged inputs through the commands; status 1 if one is not handled as it should be."""
+    from shlex import join
+
+    from benchmarks.fuzz.workers import LIMITED, Tally, run
+
+    tallies: dict[str, Tally] = {}
+    # an interrupted run shows what it has done
+    with (
+        typer.progressbar(length=inputs, label="damaged inputs", file=sys.stderr) as bar,
+        suppress(KeyboardInterrupt),
+    ):
+        for case, outcome in run(seed, inputs, workers):
+            tallies.setdefault(outcome.command, Tally(outcome.command)).add(case, outcome)
+            if outcome.fault is not None:
+                line = f"seed {case}: dalembert {join(outcome.arguments)}: {outcome.fault}"
+                print("\n" + one_line(line), file=sys.stderr)
+            bar.update(1)
+    found = [tallies[command] for command in sorted(tallies)]
+    columns: dict[str, list[Any]] = {
+        "command": [t.command for t in found],
+        "inputs": [t.inputs for t in found],
+        "results": [t.handled["result"] for t in found],
+        "data_errors": [t.handled["data error"] for t in found],
+        "usage_errors": [t.handled["usage error"] for t in found],
+        "slowest_s": [t.slowest[0] for t in found],
+        "slowest_seed": [t.slowest[1] for t in found],
+        "memory_bytes": [t.largest[0] for t in found],
+        "memory_seed": [t.largest[1] for t in found],
+        "faults": [len(t.faults) for t in found],
+    }
+    total = sum(t.inputs for t in found)
+    show(
+        Shown(
+            lambda: {
+                "first_seed": seed,
+                "inputs": total,
+                "commands": _records(columns),
+                "faults": [
+                    {"seed": case, "arguments": outcome.arguments, "fault": outcome.fault}
+                    for t in found
+                    for case, outcome in t.faults
+                ],
+            },
+            columns,
+            ("command",),
+            afterword=lambda: f"{total} inputs from seed {seed}, {sum(len(t.faults) for t in found)} faults",
+            warnings=[] if LIMITED else ["this system limits no process's memory: it was not limited"],
+        ),
+        json=json,
+        text=text,
+        output=output,
+    )
+    if any(t.faults for t in found):
+        raise typer.Exit(1)
+
+
+if __name__ == "__main__":
+    # one thread, as the tables say
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    try:
+        app(prog_name="python -m benchmarks")
+    except ModuleNotFoundError as error:
+        sys.exit(f"benchmarks: {error}: pip install '.[test]' brings what is needed")
+    except DataError as error:
+        sys.exit(f"benchmarks: {one_line(str(error))}")

@@ -1,0 +1,16 @@
+"""Run time against error, one module per domain.
+
+A domain's module has a function `measure(quick: bool)` that yields `Measurement`s. Errors are against answers of
+extended precision or rational arithmetic (`benchmarks.truth`); never against the program itself.
+"""
+
+# domain -> (module with a function `measure`, what it measures)
+DOMAINS = {
+    "mechanisms": ("benchmarks.speed.mechanisms", "mechanisms in motion, their torque and joint forces"),
+    "skipping": ("benchmarks.speed.skipping", "what is saved where less is asked for"),
+    "rotors": ("benchmarks.speed.rotors", "corrections of rotors with known masses"),
+    "field": ("benchmarks.speed.field", "corrections from measured vibration"),
+    "bodies": ("benchmarks.speed.bodies", "angular momentum, its rate and inertia forces of rigid bodies"),
+    "rotation": ("benchmarks.speed.rotation", "free rotation in closed form and integrated"),
+    "commands": ("benchmarks.speed.commands", "whole commands from start to end"),
+}

@@ -1,0 +1,161 @@
+"""`dalembert mechanism`: what was asked for is what standard output and -o show, as one table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+
+import pytest
+
+Run = Callable[..., "CompletedProcess[str]"]
+
+FOUR_BAR = """
+gravity = [0, -9.81]
+[ground]
+A = [0, 0]
+D = [0.1, 0]
+[links.crank]
+points = { A = [0, 0], B = [0.04, 0] }
+[links.coupler]
+points = { B = [0, 0], C = [0.12, 0] }
+mass = 2
+center = [0.04, 0.01]
+[links.rocker]
+points = { D = [0, 0], C = [0.08, 0] }
+[input]
+link = "crank"
+angle = 40
+speed = "30 rad/s"
+[units]
+angle = "deg"
+[guess]
+at = 40
+coupler = 20
+rocker = 57
+"""
+SWEEP = ("--sweep", "0deg:360deg:10deg")
+
+
+@pytest.fixture(autouse=True)
+def _file(tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_text(FOUR_BAR)
+
+
+def rows(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_output_holds_what_standard_output_shows(dalembert: Run, tmp_path: Path) -> None:
+    call = ("mechanism", "m.toml", *SWEEP, "--forces")
+    shown = dalembert(*call).stdout
+    assert "input_torque_N_m" in shown
+    assert dalembert(*call, "-o", "forces.csv", "--states", "states.csv").stdout == ""
+    assert (tmp_path / "forces.csv").read_text() == shown
+    # the link states beside them are those of a call without --forces
+    assert (tmp_path / "states.csv").read_text() == dalembert("mechanism", "m.toml", *SWEEP).stdout
+
+
+def test_states_beside_json(dalembert: Run, tmp_path: Path) -> None:
+    done = dalembert("mechanism", "m.toml", "--only", "C", "--json", "--states", "states.csv")
+    assert "C" in json.loads(done.stdout)["poses"][0]["points"]
+    assert "torque_N_m" in (tmp_path / "states.csv").read_text().splitlines()[0]
+
+
+def test_check_in_a_pipe(dalembert: Run) -> None:
+    check = json.loads(dalembert("mechanism", "m.toml", "--check", "--json").stdout)["check"]
+    shown = rows(dalembert("mechanism", "m.toml", "--check").stdout)
+    value = {(row["quantity"], row["of"]): row["value"] for row in shown}
+    assert value["mobility", ""] == "1"
+    (bar,) = check["four_bars"]
+    assert value["grashof", ", ".join(bar["links"])] == bar["grashof"]
+    assert float(value["least_transmission_deg", ", ".join(bar["links"])]) == bar["transmission_deg"][0]
+
+
+@pytest.mark.parametrize(
+    ("options", "key", "name"),
+    [
+        (["--equilibrium"], "equilibria", "potential_J"),
+        ([*SWEEP, "--flywheel", "0.02"], "cycle", "flywheel_inertia_kg_m2"),
+        ([*SWEEP, "--counterweights", "crank"], "counterweights", "mass_radius_kg_m"),
+        (["--newton"], "iterates", "residual_m"),
+    ],
+)
+def test_a_table_of_its_own_in_a_pipe(options: list[str], key: str, name: str, dalembert: Run) -> None:
+    document = json.loads(dalembert("mechanism", "m.toml", *options, "--json").stdout)[key]
+    listed = document["weights"] if key == "counterweights" else document
+    listed = [listed] if isinstance(listed, dict) else listed
+    shown = rows(dalembert("mechanism", "m.toml", *options).stdout)
+    assert [float(row[name]) for row in shown] == [part[name] for part in listed]
+    assert len(shown) >= 1
+
+
+@pytest.mark.parametrize(
+    "options",
+    [["--check", "--equilibrium"], ["--forces", *SWEEP, "--flywheel", "0.1"], ["--newton", "--check"]],
+)
+def test_two_tables_are_one_too_many_for_csv(options: list[str], dalembert: Run, tmp_path: Path) -> None:
+    for more in ([], ["-o", "both.csv"]):
+        done = dalembert("mechanism", "m.toml", *options, *more)
+        assert done.returncode == 2
+        assert "ask for --json or --text" in done.stderr
+        assert done.stdout == ""
+    assert not (tmp_path / "both.csv").exists()
+    assert dalembert("mechanism", "m.toml", *options, "--json").returncode == 0
+    assert dalembert("mechanism", "m.toml", *options, "--text").returncode == 0
+
+
+def test_flywheel_has_one_input(dalembert: Run, tmp_path: Path) -> None:
+    (tmp_path / "two.toml").write_text("""
+        [ground]
+        A = [0, 0]
+        [links.a]
+        points = { A = [0, 0], B = [1, 0] }
+        [links.b]
+        points = { B = [0, 0], C = [1, 0] }
+        [[input]]
+        link = "a"
+        [[input]]
+        link = "b"
+    """)
+    done = dalembert(
+        "mechanism", "two.toml", "--at", "a=0deg", "--sweep", "b=0deg:90deg:1deg", "--flywheel", "1"
+    )
+    assert done.returncode == 1
+    assert "one input" in done.stderr
+
+
+def test_expected_values_are_found_by_their_input(dalembert: Run, tmp_path: Path) -> None:
+    call = ("mechanism", "m.toml", *SWEEP, "--only", "C")
+    x = {row["input_deg"]: row["C_x_m"] for row in rows(dalembert(*call).stdout)}
+    (tmp_path / "e.csv").write_text(f"C_x_m,input_deg\n{x['90.0']},90\n{x['20.0']},20\n{x['360.0']},360\n")
+    assert dalembert(*call, "--expect", "e.csv").returncode == 0
+    (tmp_path / "e.csv").write_text(f"C_x_m,input_deg\n{x['90.0']},95\n")
+    done = dalembert(*call, "--expect", "e.csv")
+    assert done.returncode == 1
+    assert "no (further) row with input_deg 95" in done.stderr
+
+
+def test_expected_poses_beside_another_table(dalembert: Run, tmp_path: Path) -> None:
+    angle = rows(dalembert("mechanism", "m.toml").stdout)[1]["angle_deg"]
+    (tmp_path / "e.csv").write_text(f"link,angle_deg\ncoupler,{angle}\n")
+    assert dalembert("mechanism", "m.toml", "--newton", "--expect", "e.csv").returncode == 0
+    (tmp_path / "e.csv").write_text("quantity,of,value\nmobility,,1\n")
+    assert dalembert("mechanism", "m.toml", "--check", "--expect", "e.csv").returncode == 0
+    (tmp_path / "e.csv").write_text("quantity,of,value\nmobility,,2\n")
+    assert dalembert("mechanism", "m.toml", "--check", "--expect", "e.csv").returncode == 1
+
+
+def test_a_graph_needs_a_picture(dalembert: Run) -> None:
+    done = dalembert("mechanism", "m.toml", "--graph", "C.x")
+    assert done.returncode == 2
+    assert "--plot" in done.stderr
+
+
+def test_digits_beside_another_table(dalembert: Run) -> None:
+    done = dalembert("mechanism", "m.toml", "--equilibrium", "--digits")
+    assert done.stdout == dalembert("mechanism", "m.toml", "--equilibrium").stdout
+    assert dalembert("mechanism", "m.toml", "--equilibrium", "--digits", "--text").returncode == 0
