@@ -12,18 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, plan
+from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, known_by_guess, plan
 from virtualwork.describe.errors import AssemblyError, MobilityError
-from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import Number, cross, dot
-from virtualwork.formulas.newton import newton, write_unknowns
-from virtualwork.formulas.positions import Case, State, place
+from virtualwork.newton import every_solution, guessed_unknowns, newton, write_unknowns
+from virtualwork.state import Case, State, place
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from virtualwork.describe.description import Description
     from virtualwork.formulas.loads import Acting
+    from virtualwork.mechanism import Mechanism
     from virtualwork.track import Track
 
 TIE = 1e-9  # two assemblies nearer than this, relative to the mechanism's size, are one
@@ -34,25 +33,27 @@ class Assembly:
 
     Attributes
     ----------
-    mechanism : Description
+    mechanism : Mechanism
     plan : Plan
         The order of solution.
     signs : dict of group name to ±1
     starts : dict of group name to the unknowns of a Newton group at the guess's input
     number : int
         1 for the guess's assembly; others count on.
+    phases : dict of a gear's number to its constant Σ c·θ, rad
     """
 
     def __init__(
         self,
-        mechanism: Description,
+        mechanism: Mechanism,
         plan_: Plan,
         signs: Mapping[str, int],
         starts: Mapping[str, Any],
         number: int = 1,
         warnings: tuple[str, ...] = (),
+        phases: Mapping[int, float] | None = None,
     ) -> None:
-        self.mechanism, self.plan = mechanism, plan_
+        self.mechanism, self.plan, self.phases = mechanism, plan_, phases or {}
         self.signs, self.starts, self.number = dict(signs), dict(starts), number
         self.warnings = warnings
         self.cases = {g.name: Case(g, dict(plan_.directions)) for g in plan_.groups if g.kind != "Newton"}
@@ -60,7 +61,7 @@ class Assembly:
         self.acting: dict[bool, Acting] = {}  # the loads at rest and in motion, for all motions
 
     @classmethod
-    def from_guess(cls, m: Description) -> Assembly:
+    def from_guess(cls, m: Mechanism) -> Assembly:
         """The assembly that the guess chooses.
 
         Raises
@@ -80,23 +81,17 @@ class Assembly:
     @cached_property
     def merged(self) -> tuple[Plan, Group | None]:
         """All loops at once: one plan with one group of every unknown; None where there is no loop."""
-        whole = plan(self.mechanism, merged=True)
-        group = next(iter(whole.groups), None)
-        if group is not None and any(t.angle.phase is not None for t in group.ties):
-            phased = {s.body: s for s in self.plan.steps if isinstance(s, Turn)}
-            group = replace(group, ties=tuple(phased.get(t.body, t) for t in group.ties))
-        return whole, group
+        whole = plan(self.mechanism, merged=True, phases=self.phases)
+        return whole, next(iter(whole.groups), None)
 
     @cached_property
     def geared(self) -> set[str]:
-        """Bodies of which a gear of fractional ratio needs the angle itself, with its whole turns."""
-        return {
-            base
-            for step in self.plan.steps
-            if isinstance(step, Turn)
-            for base, r in step.angle.bases
-            if not float(r).is_integer()
-        }
+        """Bodies of which a gear of fractional ratio needs the angle itself, with its whole turns, at first or second hand."""
+        found: set[str] = set()
+        for step in reversed(self.plan.steps):
+            for turn in (step,) if isinstance(step, Turn) else step.ties if isinstance(step, Group) else ():
+                found |= {b for b, r in turn.angle.bases if turn.body in found or not float(r).is_integer()}
+        return found
 
     def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
         """The steps that targets hang on; worked out once for each set of targets."""
@@ -159,13 +154,14 @@ class Assembly:
 class _Chooser:
     """Reads the guess and picks each group's assembly in the order of solution."""
 
-    def __init__(self, m: Description) -> None:
+    def __init__(self, m: Mechanism) -> None:
         self.m = m
         self.plan = plan(m)
         if not m.inputs:
             raise MobilityError("[input]: missing")
         self.angles, self.points = known_by_guess(m)
         self.warnings: list[str] = []
+        self.phases: dict[int, float] = {}  # of the gears: Σ c·θ
 
     def choose(self) -> Assembly:
         st = State(list(self.m.at), many=False)
@@ -173,10 +169,13 @@ class _Chooser:
         starts: dict[str, Any] = {}
         steps: list[Step] = []
         helper = Assembly(self.m, self.plan, {}, {})
-        for step in self.plan.steps:
-            if isinstance(step, Turn) and step.angle.phase is not None:
-                step = self._phase(step, st)
+        for i, step in enumerate(self.plan.steps):
+            if isinstance(step, Turn) and step.angle.gears:
+                step = self._phased(step, st)
+            elif isinstance(step, Group) and any(tie.angle.gears for tie in step.ties):
+                step = replace(step, ties=tuple(self._phased(tie, st) for tie in step.ties))
             steps.append(step)
+            self.plan = replace(self.plan, steps=(*steps, *self.plan.steps[i + 1 :]))
             if isinstance(step, Group):
                 if step.kind == "Newton":
                     starts[step.name] = self._newton(step, st)
@@ -189,10 +188,13 @@ class _Chooser:
                 st.slide[step.guide] = st.inputs[step.input]
             else:
                 helper.turn(step, st)
-        done = replace(self.plan, steps=tuple(steps))
-        if done.blocks.redundant:
-            self._refuse_overdriven(done, st)
-        return Assembly(self.m, done, signs, starts, 1, tuple(self.warnings))
+        if self.plan.blocks.redundant:
+            self._refuse_overdriven(self.plan, st)
+        phases = {
+            i: sum(c * float(st.angle[body]) for body, c in gear.shares().items())
+            for i, gear in enumerate(self.m.gears)
+        }
+        return Assembly(self.m, self.plan, signs, starts, 1, tuple(self.warnings), phases)
 
     def _refuse_overdriven(self, done: Plan, st: State) -> None:
         """Constraints that depend on each other may leave less motion than there are inputs."""
@@ -213,11 +215,27 @@ class _Chooser:
             what = "the joints leave no motion, it is a structure" if left == 0 else f"mobility {left}"
             raise MobilityError(f"[input]: {len(self.m.inputs)} input(s) ({names}), but {what}")
 
-    def _phase(self, step: Turn, st: State) -> Turn:
-        """A gear whose phase hangs on a group: its link stands at its guess."""
-        e = st.rotate(step.angle)
-        const = float(step.angle.phase or 0.0) - float(np.angle(e))
-        return Turn(step.body, replace(step.angle, const=step.angle.const + const, phase=None))
+    def _phased(self, step: Turn, st: State) -> Turn:
+        """A turn with the constants of its gears: its link stands at its guess, where one of them is open still.
+
+        Of more of them all but the last are those of the guessed angles.
+        """
+        angle = step.angle
+        for i, p in angle.gears[:-1]:
+            self.phases.setdefault(i, self._constant(i, st))
+        for i, p in angle.gears[-1:]:
+            if i not in self.phases and all(b in st.angle for b, _ in angle.bases):
+                rest = st.affine(angle) + sum(r * st.angle[b] for b, r in angle.bases)
+                rest += sum(k * self.phases[g] for g, k in angle.gears[:-1])
+                self.phases[i] = (self.angles.get(step.body, 0.0) - rest) / p
+            self.phases.setdefault(i, self._constant(i, st))
+        const = angle.const + sum(p * self.phases[i] for i, p in angle.gears)
+        return Turn(step.body, replace(angle, const=const, gears=()))
+
+    def _constant(self, gear: int, st: State) -> float:
+        """Σ c·θ of a gear: of angles that are known, and of the guess for the others."""
+        shares = self.m.gears[gear].shares().items()
+        return sum(c * float(st.angle[b] if b in st.angle else self.angles.get(b, 0.0)) for b, c in shares)
 
     def solutions(self, group: Group, case: Case, st: State) -> list[tuple[int, State]]:
         found = []
@@ -350,7 +368,8 @@ class _Chooser:
             if body in self.angles and body in st.turn:
                 total += abs(complex(st.turn[body]) - np.exp(1j * self.angles[body])) ** 2
             base, terms = self.plan.anchors[body]
-            if base in st.point and body in st.turn:
+            placed = base in st.point and all(t.slide is None or t.slide in st.slide for t in terms)
+            if placed and body in st.turn:
                 for name, z in self.m.links[body].points.items():
                     if name in self.points:
                         here = st.point[base] + st.sum(terms) + z * st.turn[body]
@@ -412,119 +431,9 @@ class _Chooser:
         write_unknowns(group, st, x)
 
 
-def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]]:
-    """Rough link angles and point positions from the guess, the ground and the inputs, as far as they reach."""
-    angles = dict(m.guess.angles)
-    points = dict(m.ground) | dict(m.guess.points)
-    for j, e in enumerate(m.inputs):
-        if e.link is not None and e.on == GROUND:
-            angles[e.link] = m.at[j]
-    for g in m.guides:
-        if g.turned is not None and g.on == GROUND:
-            angles.setdefault(g.link, g.angle + g.turned)
-        if g.turned is not None and g.link == GROUND:
-            angles.setdefault(g.on, -(g.angle + g.turned))
-    before = -1
-    while len(angles) + len(points) > before:
-        before = len(angles) + len(points)
-        for name, link in m.links.items():
-            here = [p for p in link.points if p in points]
-            if name not in angles and len(here) >= 2:
-                ends = max(
-                    ((a, b) for a in here for b in here),
-                    key=lambda ab: abs(link.points[ab[1]] - link.points[ab[0]]),
-                )
-                local = link.points[ends[1]] - link.points[ends[0]]
-                seen = points[ends[1]] - points[ends[0]]
-                if local and seen:
-                    angles[name] = float(np.angle(seen / local))
-            if name in angles and here:
-                turn = np.exp(1j * angles[name])
-                for p, z in link.points.items():
-                    points.setdefault(p, complex(points[here[0]] + (z - link.points[here[0]]) * turn))
-    return angles, points
-
-
-def guessed_unknowns(
-    group: Group,
-    st: State,
-    angles: Mapping[str, float],
-    points: Mapping[str, complex],
-    m: Description,
-    plan_: Plan,
-) -> Any:
-    """A Newton group's unknowns from the guess, or None where an angle is not known; slides by projection."""
-    if any(b not in angles for b in group.angles):
-        return None
-    x = np.zeros((1, len(group.angles) + len(group.slides)))
-    x[0, : len(group.angles)] = [angles[b] for b in group.angles]
-    write_unknowns(group, st, x)
-    for j, g in enumerate(group.slides, len(group.angles)):
-        guide = m.guides[g]
-        through = guide.through if not isinstance(guide.through, str) else m.bodies[guide.on][guide.through]
-        on = complex(np.ravel(st.turn[guide.on])[0])
-        origin = _origin(guide.on, through, on, points, m)
-        if guide.point in points and origin is not None:
-            x[0, j] = dot(points[guide.point] - origin, plan_.directions[g] * on)
-    write_unknowns(group, st, x)
-    return x
-
-
-def _origin(
-    body: str, z: complex, turn: complex, points: Mapping[str, complex], m: Description
-) -> complex | None:
-    if body == GROUND:
-        return z
-    for name, local in m.links[body].points.items():
-        if name in points:
-            return points[name] + (z - local) * turn
-    return None
-
-
-def every_solution(group: Group, st: State, plan_: Plan, size: float) -> Any:
-    """Every assembly of a Newton group at one input, by damped Newton from many starts spread evenly.
-
-    A systematic multi-start (Kronecker sequence of the generalised golden ratio): it finds what it finds, and does
-    not prove that there is no other.
-    """
-    n = len(group.angles) + len(group.slides)
-    starts = min(4096, 128 * n)
-    g = 1.0
-    for _ in range(64):
-        g = (1 + g) ** (1 / (n + 1))
-    u = (0.5 + np.outer(np.arange(1, starts + 1), g ** -np.arange(1.0, n + 1))) % 1.0
-    x0 = np.empty((starts, n))
-    na = len(group.angles)
-    x0[:, :na] = u[:, :na] * 2 * np.pi
-    x0[:, na:] = (2 * u[:, na:] - 1) * size
-    many = State([np.full(starts, np.ravel(q)[0]) for q in st.inputs], many=True)
-    many.turn, many.point, many.slide, many.angle = (
-        dict(st.turn),
-        dict(st.point),
-        dict(st.slide),
-        dict(st.angle),
-    )
-    with np.errstate(all="ignore"):
-        x, closed = newton(group, many, plan_, x0, size)
-    x = x[closed]
-    if not len(x):
-        return x
-    x[:, :na] = (x[:, :na] + np.pi) % (2 * np.pi) - np.pi
-    keep: list[Any] = []
-    for row in x:
-        for other in keep:
-            d = row - other
-            d[:na] = np.abs(np.exp(1j * row[:na]) - np.exp(1j * other[:na]))
-            d[na:] /= size
-            if np.abs(d).max() < 1e-6:
-                break
-        else:
-            keep.append(row)
-    return np.array(keep)
-
-
-def all_assemblies(chosen: Assembly) -> tuple[Assembly, ...]:
+def all_assemblies(m: Mechanism) -> tuple[Assembly, ...]:
     """Every assembly at the guess's input: all signs of the closed forms, all solutions found for the others."""
+    chosen = m.assembly
     found = [chosen]
     for signs, starts in _combinations(chosen):
         if signs != chosen.signs or any(
@@ -532,7 +441,7 @@ def all_assemblies(chosen: Assembly) -> tuple[Assembly, ...]:
             > 1e-6
             for k in starts
         ):
-            found.append(Assembly(chosen.mechanism, chosen.plan, signs, starts, len(found) + 1))
+            found.append(Assembly(m, chosen.plan, signs, starts, len(found) + 1, phases=chosen.phases))
     return tuple(found)
 
 

@@ -12,9 +12,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from virtualwork.describe.parts import GROUND
+import numpy as np
+
+from virtualwork.mechanism import GROUND
 from virtualwork.plan.graph import Variable, decompose
 from virtualwork.plan.steps import (
     Angle,
@@ -31,10 +33,11 @@ from virtualwork.plan.steps import (
 )
 
 if TYPE_CHECKING:
-    from virtualwork.describe.description import Description
+    from virtualwork.mechanism import Mechanism
 
 # the position of a point: a known node, and what is added to it
 Chain = tuple[str | None, tuple[Term, ...]]
+Key = TypeVar("Key", int, str)
 
 __all__ = ["Angle", "Closure", "Group", "Place", "Plan", "Slide", "Step", "Term", "Turn", "direction", "plan"]
 
@@ -51,28 +54,64 @@ def direction(angle: float) -> complex:
     return complex(math.cos(angle), math.sin(angle))
 
 
-def plan(m: Description, *, merged: bool = False) -> Plan:
+def plan(m: Mechanism, *, merged: bool = False, phases: Mapping[int, float] | None = None) -> Plan:
     """The order of solution of a mechanism.
 
     Parameters
     ----------
-    m : Description
+    m : Mechanism
     merged : bool
         All loops at once in one group (the Newton-Raphson of 003) instead of group by group.
+    phases : mapping of a gear's number to its constant Σ c·θ, rad, optional
+        Where they are known already.
 
     Raises
     ------
     MobilityError
         A free degree of freedom, too many inputs.
     """
-    return _Planner(m, merged).run()
+    return _Planner(m, merged, phases or {}).run()
+
+
+def known_by_guess(m: Mechanism) -> tuple[dict[str, float], dict[str, complex]]:
+    """Rough link angles and point positions from the guess, the ground and the inputs, as far as they reach."""
+    angles = dict(m.guess.angles)
+    points = dict(m.ground) | dict(m.guess.points)
+    for j, e in enumerate(m.inputs):
+        if e.link is not None and e.on == GROUND:
+            angles[e.link] = m.at[j]
+    for g in m.guides:
+        if g.turned is not None and g.on == GROUND:
+            angles.setdefault(g.link, g.angle + g.turned)
+        if g.turned is not None and g.link == GROUND:
+            angles.setdefault(g.on, -(g.angle + g.turned))
+    before = -1
+    while len(angles) + len(points) > before:
+        before = len(angles) + len(points)
+        for name, link in m.links.items():
+            here = [p for p in link.points if p in points]
+            if name not in angles and len(here) >= 2:
+                ends = max(
+                    ((a, b) for a in here for b in here),
+                    key=lambda ab: abs(link.points[ab[1]] - link.points[ab[0]]),
+                )
+                local = link.points[ends[1]] - link.points[ends[0]]
+                seen = points[ends[1]] - points[ends[0]]
+                if local and seen:
+                    angles[name] = float(np.angle(seen / local))
+            if name in angles and here:
+                turn = np.exp(1j * angles[name])
+                for p, z in link.points.items():
+                    points.setdefault(p, complex(points[here[0]] + (z - link.points[here[0]]) * turn))
+    return angles, points
 
 
 class _Planner:
     """Walks the blocks in order and writes the steps."""
 
-    def __init__(self, m: Description, merged: bool) -> None:
-        self.m, self.merged = m, merged
+    def __init__(self, m: Mechanism, merged: bool, phases: Mapping[int, float]) -> None:
+        self.m, self.merged, self.phases = m, merged, phases
+        self.guess = known_by_guess(m)[0] if m.gears else {}
         self.steps: list[Step] = []
         self.angles: dict[str, Angle] = {GROUND: Angle()}
         self.anchors: dict[str, Chain] = {GROUND: (None, ())}
@@ -168,7 +207,7 @@ class _Planner:
                 len(bases) != 1
                 or len(tie.angle.bases) != 1
                 or bases[0][1] != 1.0
-                or tie.angle.phase is not None
+                or tie.angle.gears
             ):
                 return "Newton"
             own[tie.body] = bases[0][0]
@@ -181,44 +220,42 @@ class _Planner:
         return "PRP"
 
     # --- angles: sliders, gears and inputs are linear relations ----------------------------------------------
-    def _relations(self, fresh: list[str]) -> list[tuple[dict[str, float], dict[int, float], float | None]]:
+    def _relations(self, fresh: list[str]) -> list[tuple[dict[str, float], Angle]]:
         """Σ c·θ = Σ k·input + const, for every relation all of whose angles are known once this block is."""
-        rows: list[tuple[dict[str, float], dict[int, float], float | None]] = []
+        rows: list[tuple[dict[str, float], Angle]] = []
         seen = set(self.angles) | set(fresh)
 
-        def add(c: dict[str, float], k: dict[int, float], const: float | None) -> None:
+        def add(c: dict[str, float], right: Angle) -> None:
             if set(c) & set(fresh) and set(c) <= seen:
-                rows.append((c, k, const))
+                rows.append((c, right))
 
         for j, e in enumerate(self.m.inputs):
             if e.link is not None:
-                add({e.link: 1.0, e.on: -1.0}, {j: 1.0}, 0.0)
+                add({e.link: 1.0, e.on: -1.0}, Angle(inputs=((j, 1.0),)))
         for g in self.m.guides:
             if g.turned is not None:
-                add({g.link: 1.0, g.on: -1.0}, {}, g.angle + g.turned)
-        for gear in self.m.gears:
-            a, b = gear.links
-            add({b: 1.0, a: -gear.ratio, gear.arm: gear.ratio - 1.0}, {}, None)
+                add({g.link: 1.0, g.on: -1.0}, Angle(g.angle + g.turned))
+        for i, gear in enumerate(self.m.gears):
+            right = Angle(self.phases[i]) if i in self.phases else Angle(gears=((i, 1.0),))
+            add(gear.shares(), right)
         return rows
 
     def _eliminate(self, fresh: list[str]) -> tuple[list[str], list[Turn]]:
         """Gauss-Jordan on the linear relations: which angles stay free, and what the others are."""
-        at, guess = self.m.at, self.m.guess.angles
         rows: list[tuple[dict[str, float], Angle]] = []
-        for c, k, const in self._relations(fresh):
-            known = Angle(const or 0.0, tuple(k.items()))
+        for c, right in self._relations(fresh):
+            known = replace(right, gears=())
             for body, factor in c.items():
                 if body not in fresh:
                     known = _plus(known, self.angles[body], -factor)
             unknown = {body: factor for body, factor in c.items() if body in fresh}
-            if const is None:  # a gear: its phase is the one of the guess
-                stands = sum(factor * guess.get(body, 0.0) for body, factor in unknown.items())
-                there = known.at(at)
-                known = (
-                    replace(known, phase=stands)
-                    if there is None
-                    else _plus(known, Angle(stands - there), 1.0)
-                )
+            if right.gears:  # its constant is that of the guess, at once where no link before it has to be placed
+                there = known.at(self.m.at)
+                if there is None:
+                    known = _plus(known, right, 1.0)
+                else:
+                    stands = sum(factor * self.guess.get(body, 0.0) for body, factor in unknown.items())
+                    known = _plus(known, Angle(stands - there), 1.0)
             rows.append((unknown, known))
         solved: dict[str, tuple[dict[str, float], Angle]] = {}
         for unknown, known in rows:
@@ -250,7 +287,7 @@ class _Planner:
             angle = value
             for other, f in others.items():
                 angle = _plus(angle, Angle(bases=((other, 1.0),)), f)
-            self.angles[b] = angle if angle.phase is None else Angle(bases=((b, 1.0),))
+            self.angles[b] = Angle(bases=((b, 1.0),)) if angle.gears else angle
             turns.append(Turn(b, angle))
         return free, turns
 
@@ -406,20 +443,22 @@ class _Planner:
 
 def _plus(a: Angle, b: Angle, factor: float) -> Angle:
     """a + factor·b."""
-    inputs, bases = dict(a.inputs), dict(a.bases)
-    for j, k in b.inputs:
-        inputs[j] = inputs.get(j, 0.0) + factor * k
-    for body, r in b.bases:
-        bases[body] = bases.get(body, 0.0) + factor * r
-    phase = a.phase if a.phase is not None else b.phase
     return Angle(
         a.const + factor * b.const,
-        tuple((j, k) for j, k in inputs.items() if k != 0),
-        tuple((body, r) for body, r in bases.items() if r != 0),
-        phase,
+        _sums(a.inputs, b.inputs, factor),
+        _sums(a.bases, b.bases, factor),
+        _sums(a.gears, b.gears, factor),
     )
 
 
+def _sums(
+    own: tuple[tuple[Key, float], ...], other: tuple[tuple[Key, float], ...], factor: float
+) -> tuple[tuple[Key, float], ...]:
+    total = dict(own)
+    for key, k in other:
+        total[key] = total.get(key, 0.0) + factor * k
+    return tuple((key, k) for key, k in total.items() if k != 0)
+
+
 def _times(a: Angle, factor: float) -> Angle:
-    phase = None if a.phase is None else a.phase * factor
-    return replace(_plus(Angle(), a, factor), phase=phase)
+    return _plus(Angle(), a, factor)

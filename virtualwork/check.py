@@ -350,7 +350,7 @@ def constraint_jacobian(m: Description, st: State) -> tuple[list[str], Reals]:
             turn(label, [(g.link, 1.0), (g.on, -1.0)])
     for gear in m.gears:
         a, b = gear.links
-        turn(f"gear {a}-{b}", [(b, 1.0), (a, -gear.ratio), (gear.arm, gear.ratio - 1.0)])
+        turn(f"gear {a}-{b}", list(gear.shares().items()))
     return labels, np.array(rows) if rows else np.zeros((0, 3 * len(column)))
 
 

@@ -113,10 +113,7 @@ class Order:
             if guide.is_slider:
                 add("guide", i, {guide.link: 1.0, guide.on: -1.0})
         for i, gear in enumerate(m.gears):
-            a, b = gear.links
-            acts = {b: 1.0, a: -gear.ratio}
-            acts[gear.arm] = acts.get(gear.arm, 0.0) + gear.ratio - 1.0
-            add("gear", i, acts)
+            add("gear", i, gear.shares())
         for j, entry in enumerate(m.inputs):
             if not entry.is_slide:
                 add("input", j, {str(entry.link): 1.0, entry.on: -1.0})

@@ -42,6 +42,7 @@ class March:
         rate, det = self._rate(q, x)
         self.q, self.x, self.rate, self.det = [q], [x], [rate], [det]
         self.stopped = {1: False, -1: False}
+        self.step = {1: np.inf, -1: np.inf}  # the last one that was taken
 
     def _state(self, q: float) -> State:
         st = State([np.array([q])], many=True)
@@ -79,7 +80,7 @@ class March:
         if not np.isfinite(rate).all():
             self.stopped[side] = True
             return
-        step = h
+        step = min(h, 2 * self.step[side])
         crossed: list[tuple[float, float]] = []
         while step > FINEST * self.track.length:
             to = q + side * step
@@ -89,10 +90,12 @@ class March:
                 found, closed = newton(self.group, st, self.assembly.plan, guess[None], self.size, limit=12)
             if closed[0]:
                 new, det = self._rate(to, found[0])
-                scale = np.array([1.0] * len(self.group.angles) + [self.size] * len(self.group.slides))
+                # a slide that runs away is measured by itself
+                far = np.maximum(np.abs(x), self.size)
+                far[: len(self.group.angles)] = 1.0
                 # the cubic's own defect: what the two rates say of the step, against what it was
-                defect = np.abs((found[0] - x - side * step * 0.5 * (rate + new)) / scale).max()
-                change = np.abs((found[0] - x) / scale).max()
+                defect = np.abs((found[0] - x - side * step * 0.5 * (rate + new)) / far).max()
+                change = np.abs((found[0] - x) / far).max()
                 if np.isfinite(new).all() and defect <= 0.05 * max(change, 1e-6) and change < 0.5:
                     if np.sign(det) != np.sign(self.det[end]):
                         crossed.append((min(q, to), max(q, to)))
@@ -102,6 +105,7 @@ class March:
                     self.rate.insert(place, new)
                     self.det.insert(place, det)
                     self._crossed += crossed
+                    self.step[side] = step
                     return
             step /= 2
         self.stopped[side] = True
@@ -208,6 +212,7 @@ class March:
             many = State([q], many=True)
             for name in ("turn", "point", "slide", "angle"):
                 setattr(many, name, getattr(st, name))
+        start[~inside] = np.nan
         with np.errstate(all="ignore"):
             found, closed = newton(self.group, many, self.assembly.plan, start, self.size)
         found[~(closed & inside)] = np.nan

@@ -93,6 +93,16 @@ class Gear:
     ratio: float
     arm: str = GROUND
 
+    def shares(self) -> dict[str, float]:
+        """The share c of each body in Σ c·θ = const; the arm has none where the two links turn alike.
+
+        >>> Gear(("sun", "planet"), -0.5, "arm").shares()
+        {'planet': 1.0, 'sun': 0.5, 'arm': -1.5}
+        """
+        a, b = self.links
+        found = {b: 1.0, a: -self.ratio, self.arm: self.ratio - 1.0}
+        return {body: c for body, c in found.items() if c != 0}
+
 
 @dataclass(frozen=True)
 class Input:

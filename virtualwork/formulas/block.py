@@ -59,7 +59,7 @@ class Setting:
         """
         a, b = spring.links
         known = [self.plan.angles[body] for body in (a, b)]
-        if all(not angle.bases and angle.phase is None for angle in known):
+        if all(not angle.bases for angle in known):
             return (st.affine(known[1]) - spring.free_angle) - st.affine(known[0])
         relative = st.turn[b] * np.conj(st.turn[a]) * complex(np.exp(-1j * spring.free_angle))
         within = np.angle(relative)

@@ -140,7 +140,7 @@ class Constant(Load):
         if self.path is not None:
             return -dot(self.amount, block.position(self.path))
         known = block.setting.plan.angles[self.body]
-        if known.bases or known.phase is not None:
+        if known.bases:
             # a torque on a link whose whole turns are not known
             return np.nan
         return -self.amount * block.st.affine(known)

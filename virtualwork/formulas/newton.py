@@ -105,7 +105,8 @@ def newton(
         if table is not None:
             table.append(Iterate(k, x[0].copy(), float(norm[0])))
         # of dependent constraints rounding leaves a gap that no step makes less: it is closed, and stays as it is
-        done = done | (worse & (norm <= 1e-12 * size))
+        # and a pose that no part of the step brings nearer to closing will not close
+        done = done | worse if damped else done
         small = (norm <= 64 * EPS * size) & (big <= 1e-7)
         done = done | small | ~np.isfinite(norm)
     write_unknowns(group, st, x)

@@ -176,8 +176,8 @@ class Case:
             rail = [t for t in closure.terms if t.slide == g]
             t = rail[0]
             relative = tie.get(t.body, Angle())
-            turned = t.z * complex(np.exp(1j * relative.const)) if group.kind == "RPR" else t.z
-            self.rails.append((turned, t.body))
+            plain = group.kind == "RPR" and not relative.inputs
+            self.rails.append((t.z * complex(np.exp(1j * relative.const)) if plain else t.z, t.body))
 
     def arm(self, i: int, st: State) -> Number:
         """The arm of unknown angle i."""
@@ -190,6 +190,12 @@ class Case:
                 v = v * st.slide[t.slide]
             value = value + v
         return value
+
+    def rail(self, st: State) -> Number:
+        """The direction of a slide that turns with the unknown angle, relative to it."""
+        z, body = self.rails[0]
+        relative = self.tie.get(body, Angle())
+        return z * st.kind.exp(st.affine(relative)) if relative.inputs else z
 
     def solve(self, st: State, sign: Number, size: float) -> None:
         """Write the group's rotations and slides into the state."""
@@ -212,7 +218,7 @@ class Case:
         elif group.kind == "RPR":
             (a,), (g,) = group.angles, group.slides
             st.turn[a], st.slide[g], margin = turning_slide(
-                w, self.arm(0, st), self.rails[0][0], sign, size, st.kind
+                w, self.arm(0, st), self.rail(st), sign, size, st.kind
             )
         else:
             g, h = group.slides

@@ -60,8 +60,7 @@ def equations(m: Description) -> tuple[list[Variable], list[Equation]]:
         if g.is_slider:
             rows.append(Equation(f"slider {g.point}", turn(g.link, g.on)))
     for gear in m.gears:
-        arm = (gear.arm,) if gear.ratio != 1 else ()
-        rows.append(Equation(f"gear {gear.links[0]}-{gear.links[1]}", turn(*gear.links, *arm)))
+        rows.append(Equation(f"gear {gear.links[0]}-{gear.links[1]}", turn(*gear.shares())))
     for pin, bodies in m.pins.items():
         for name in bodies:
             if name != GROUND:

@@ -41,16 +41,19 @@ def path_reads(path: Path) -> set[str]:
 
 @dataclass(frozen=True)
 class Angle:
-    """θ = const + Σ k·input + Σ r·θ_base. `phase`: const is such that θ takes this value at the guess."""
+    """θ = const + Σ k·input + Σ r·θ_base + Σ p·K_gear.
+
+    K is the constant of a gear, K = Σ c·θ of its links: the guess gives it once the links before it are placed.
+    """
 
     const: float = 0.0
     inputs: tuple[tuple[int, float], ...] = ()
     bases: tuple[tuple[str, float], ...] = ()
-    phase: float | None = None
+    gears: tuple[tuple[int, float], ...] = ()
 
     def at(self, inputs: tuple[float, ...]) -> float | None:
         """The angle at given inputs, or None where it hangs on other angles."""
-        if self.bases or self.phase is not None:
+        if self.bases or self.gears:
             return None
         return self.const + sum(k * inputs[j] for j, k in self.inputs)
 
