@@ -3,7 +3,12 @@
 from virtualwork.describe.errors import AssemblyError, DescriptionError, MechanismError, MobilityError
 from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link
-from virtualwork.mechanism import Mechanism
+from virtualwork.formulas.effort import ledger
+from virtualwork.mechanism import Mechanism, equilibria
+from virtualwork.study import counterweights
+from virtualwork.study.check import Check, grashof_class
+from virtualwork.study.cycle import Cycle
+from virtualwork.study.equilibrium import Equilibria, Equilibrium
 from virtualwork.textbook.combinations import (
     block_on_bar,
     crank_rod_piston,
@@ -13,11 +18,16 @@ from virtualwork.textbook.combinations import (
     second_point,
     sense,
 )
+from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
 
 __all__ = [
     "GROUND",
     "AssemblyError",
+    "Check",
+    "Cycle",
     "DescriptionError",
+    "Equilibria",
+    "Equilibrium",
     "Force",
     "Friction",
     "Gear",
@@ -25,6 +35,7 @@ __all__ = [
     "Guide",
     "Input",
     "Link",
+    "LinkStates",
     "Mechanism",
     "MechanismError",
     "MobilityError",
@@ -32,8 +43,14 @@ __all__ = [
     "Spring",
     "Torque",
     "TorsionSpring",
+    "UnitLoad",
+    "balance",
     "block_on_bar",
+    "counterweights",
     "crank_rod_piston",
+    "equilibria",
+    "grashof_class",
+    "ledger",
     "on_incline",
     "on_moving_ramp",
     "rotation",

@@ -7,10 +7,14 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from virtualwork.assembly import Assembly, all_assemblies
+from virtualwork.branch.assembly import Assembly, all_assemblies
 from virtualwork.describe.description import Description
 from virtualwork.describe.reader import read, read_text
 from virtualwork.motion import Motion
+from virtualwork.study.check import Check
+from virtualwork.study.equilibrium import SAMPLES, Equilibria
+from virtualwork.study.equilibrium import equilibria as search
+from virtualwork.study.newton_table import AllAtOnce, all_at_once
 
 
 class Mechanism(Description):
@@ -107,6 +111,39 @@ class Mechanism(Description):
             return Motion(self.assembly)
         return Motion(self.assembly, angle, speed, acceleration, jerk)
 
+    @cached_property
+    def check(self) -> Check:
+        """What kind of mechanism this is: mobility, redundant constraints, Grashof classes, limits, dead points."""
+        return Check(self.assembly)
+
+    def equilibria(self, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:
+        """Every position in which the mechanism rests under its loads without effort, each stable or not.
+
+        Parameters
+        ----------
+        spans : array (k, 2), optional
+            The range of each input, rad or m. Default: a whole turn; for a slide, two sizes of the mechanism either way.
+        samples : int
+            How finely the range of one input is looked through.
+
+        Examples
+        --------
+        >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="bob"),
+        ...                      gravity=-9.81j)
+        >>> pendulum.equilibria()
+        Equilibria(1.5708 unstable, 4.71239 stable)
+        """
+        return search(self.assembly, spans, samples)
+
+    def newton(self, *inputs: float, limit: int = 50) -> AllAtOnce:
+        """All loops at once by Newton-Raphson from the guess, with the table of iterates."""
+        return all_at_once(self.assembly, inputs or self.at, limit)
+
     def assemblies(self) -> tuple[Assembly, ...]:
         """Every assembly at the input where the guess is meant, the guess's own first."""
         return all_assemblies(self.assembly)
+
+
+def equilibria(mechanism: Mechanism, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:
+    """Every position in which a mechanism rests under its loads without effort; see `Mechanism.equilibria`."""
+    return mechanism.equilibria(spans, samples)

@@ -11,6 +11,7 @@ array([2., 2., 2.])
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -19,15 +20,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.bounds.forces import ForceErrors
 from virtualwork.bounds.motion import MotionErrors
-from virtualwork.assembly import Assembly
-from virtualwork.describe.errors import DescriptionError
+from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
+from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.parts import Point, as_point
 from virtualwork.describe.record import same
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.plan.steps import Step
+from virtualwork.study.counterweights import least_squares
 from virtualwork.study.cycle import Cycle
 
 if TYPE_CHECKING:
@@ -89,7 +91,7 @@ class PointMotion:
         >>> bool(abs(point.position[0, 1] - np.sqrt(0.75)) <= point.error_estimate()[0] < 1e-15)
         True
         """
-        return self.motion.errors.point(self.body, self.place, self.node, order)
+        return self.motion.rounding.point(self.body, self.place, self.node, order)
 
     def coefficient(self, j: int = 0) -> Complexes:
         """The velocity coefficient dP/dq_j as x + iy, (n,): the point's virtual displacement for a unit of input j."""
@@ -138,7 +140,7 @@ class LinkMotion:
 
         The dimensions and the input are taken as exact. See `virtualwork.bounds`.
         """
-        return self.motion.errors.angle(self.body, order)
+        return self.motion.rounding.angle(self.body, order)
 
     def coefficient(self, j: int = 0) -> Reals:
         """The velocity coefficient dθ/dq_j, (n,): the link's virtual rotation for a unit of input j."""
@@ -179,7 +181,7 @@ class SlideMotion:
 
         The dimensions and the input are taken as exact. See `virtualwork.bounds`.
         """
-        return self.motion.errors.slide(self.guide, order)
+        return self.motion.rounding.slide(self.guide, order)
 
 
 class Forces(Dynamics):
@@ -234,6 +236,7 @@ class Motion:
     ) -> None:
         self.assembly = assembly
         self.poses = Poses(assembly, angle, speed, acceleration, jerk)
+        self._units: dict[int, Motion] = {}
 
     def __repr__(self) -> str:
         m = self.mechanism
@@ -334,7 +337,7 @@ class Motion:
         raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
 
     @cached_property
-    def errors(self) -> MotionErrors:
+    def rounding(self) -> MotionErrors:
         """Bounds of the rounding errors of this motion, each formed when first asked for."""
         return MotionErrors(self.poses)
 
@@ -365,10 +368,25 @@ class Motion:
         """
         return self.dynamics.reaction(joint, on)
 
+    def unit(self, j: int = 0) -> Motion:
+        """The motion through the same poses at a unit speed of input j alone: its velocities are virtual displacements."""
+        if j not in self._units:
+            k = self.inputs.shape[1]
+            rates: list[list[Number]] = [[float(i == j) for i in range(k)], [0.0] * k, [0.0] * k]
+            self._units[j] = _again(self.assembly, self.inputs, rates, self.input_error)
+        return self._units[j]
+
     @property
     def cycle(self) -> Cycle:
         """The sweep as a cycle of work: mean and peak effort, energy balance, flywheel."""
         return Cycle(self)
+
+    def counterweights(self, links: Sequence[str]) -> tuple[dict[str, complex], Complexes, Complexes]:
+        """The counterweights on links with a fixed pivot that leave the least RMS shaking force.
+
+        See `virtualwork.counterweights.least_squares`.
+        """
+        return least_squares(self, links)
 
     # --- as a table -------------------------------------------------------------------------------------------------
     def to_frame(self) -> DataFrame:
@@ -386,7 +404,9 @@ class Motion:
         from pandas import DataFrame
 
         m = self.mechanism
-        units = ("m", "m_s", "m_s2") if any(np.any(rate) for of in self.poses.rates for rate in of) else ("m",)
+        units = (
+            ("m", "m_s", "m_s2") if any(np.any(rate) for of in self.poses.rates for rate in of) else ("m",)
+        )
         table: dict[str, Any] = {
             f"{e.name}_{'m' if e.is_slide else 'rad'}": self.inputs[:, j] for j, e in enumerate(m.inputs)
         }
@@ -408,9 +428,7 @@ class Motion:
         return str(self.to_frame().to_html(max_rows=20))
 
 
-def _again(
-    assembly: Assembly, inputs: Reals, rates: list[list[Number]], input_error: ArrayLike
-) -> Motion:
+def _again(assembly: Assembly, inputs: Reals, rates: list[list[Number]], input_error: ArrayLike) -> Motion:
     """Make a motion again, as pickles and copies do; what it had solved is solved anew when asked for."""
     motion = Motion(assembly, inputs)
     motion.poses.rates, motion.input_error = rates, input_error

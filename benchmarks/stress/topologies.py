@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork import Guess, Input, Link, Mechanism
-from virtualwork.mechanism import GROUND, Gear, Guide
+from virtualwork import GROUND, Gear, Guess, Guide, Input, Link, Mechanism
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +23,9 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
     Generator = np.random.Generator
 
-REGULAR = 1e-5  # least singular value over the largest from which a pose is taken as determined by its constraints
+REGULAR = (
+    1e-5  # least singular value over the largest from which a pose is taken as determined by its constraints
+)
 LINKS = (2, 6)
 REGULAR_SHARE = 0.85  # of the mechanisms
 
@@ -46,7 +47,11 @@ class Topology:
     def unknowns(self) -> Reals:
         """The pose as x, y, θ of every link in order, (3·links,)."""
         return np.array(
-            [v for b in self.mechanism.links for v in (self.origins[b].real, self.origins[b].imag, self.angles[b])]
+            [
+                v
+                for b in self.mechanism.links
+                for v in (self.origins[b].real, self.origins[b].imag, self.angles[b])
+            ]
         )
 
 

@@ -10,13 +10,13 @@ import numpy as np
 from cli.mechanism.job import ORDERS, Job
 
 if TYPE_CHECKING:
-    from virtualwork.formulas.newton import AllAtOnce
-    from virtualwork.track import Track
+    from virtualwork.branch.track import Track
+    from virtualwork.study.newton_table import AllAtOnce
 
 
 def check_document(job: Job) -> dict[str, Any]:
     """The character of the mechanism."""
-    from virtualwork.check import Check
+    from virtualwork.study.check import Check
 
     check = Check(job.mechanism.assembly)
     slide = bool(job.mechanism.inputs) and job.mechanism.inputs[0].is_slide
@@ -75,7 +75,7 @@ def check_text(document: dict[str, Any]) -> str:
 
 def newton_tables(job: Job) -> tuple[list[AllAtOnce], dict[str, Any]]:
     """Newton-Raphson from the guess at every pose; the table of the first, the largest difference of all."""
-    from virtualwork.formulas.newton import all_at_once
+    from virtualwork.study.newton_table import all_at_once
 
     assembly = job.assemblies[0]
     done = [all_at_once(assembly, tuple(row)) for row in job.inputs.values.tolist()]
@@ -122,7 +122,7 @@ def newton_text(document: dict[str, Any]) -> str:
 
 def explain_text(job: Job) -> str:
     """The order of solution, and for this request what was solved and what was skipped."""
-    from virtualwork.assur import Group, Place, Slide, Turn
+    from virtualwork.plan.steps import Group, Place, Slide, Turn
 
     motion = job.motions[0]
     plan = motion.assembly.plan

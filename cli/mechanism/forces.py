@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.mechanism.job import Job
-    from virtualwork.formulas.reactions import Joint
     from virtualwork.motion import Motion
+    from virtualwork.plan.joints import Joint
 
 Column = list[Any]
 GROUND = "ground"
@@ -132,7 +132,7 @@ def warnings(job: Job) -> list[str]:
         ):
             bad = there & ~np.isfinite(values).all(axis=1) & ~d.locked
             found += _listed(job, bad, what)
-        if d.scene.rubs:
+        if d.scene.friction:
             found += _listed(
                 job, there & d.locked, "friction locks the mechanism: no reaction balances its own friction"
             )
@@ -233,7 +233,7 @@ def _split_unit(key: str) -> tuple[str, str]:
 
 def equilibria(job: Job, swept: bool) -> tuple[list[dict[str, Any]], list[str]]:
     """The positions where the loads balance without effort, and what to say of them."""
-    from virtualwork.study.equilibrium import equilibria as search
+    from virtualwork import equilibria as search
 
     m = job.mechanism
     spans = None
@@ -339,6 +339,6 @@ def explain_text(job: Job) -> str:
     lines.append(
         f"  formed for the reactions: {', '.join(sorted(motion.dynamics.reactions.formed)) or 'nothing'}"
     )
-    if motion.dynamics.scene.rubs:
+    if motion.dynamics.scene.friction:
         lines.append(f"  friction: {motion.dynamics.friction_iterations} iterations")
     return "\n".join(lines)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork import Mechanism
-    from virtualwork.assembly import Assembly
+    from virtualwork.branch.assembly import Assembly
     from virtualwork.motion import Motion
 
 ORDERS = ("position", "velocity", "acceleration", "jerk")
@@ -153,5 +153,5 @@ class Job:
         for name in self.points:
             whole &= np.isfinite(motion.point(name).complex(0))
         for name in self.links:
-            whole &= np.isfinite(motion.angle(name))
+            whole &= np.isfinite(motion.link(name).angle)
         return whole

@@ -10,8 +10,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque, TorsionSpring
-from virtualwork.study.equilibrium import equilibria
+from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque, TorsionSpring, equilibria
 
 G = 9.81
 

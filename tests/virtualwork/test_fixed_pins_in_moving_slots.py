@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from virtualwork import Force, Friction, Guess, Guide, Input, Link, Mechanism
-from virtualwork.check import Check
 from virtualwork.describe.reader import loads
+from virtualwork.study.check import Check
 
 TURN = np.radians(np.arange(0.0, 360.0, 7.0))
 GROUND = {"O": (0, 0), "P": (0.3, 0.05)}

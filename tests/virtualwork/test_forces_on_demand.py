@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Guess, Input, Link, Mechanism, Motor
-from virtualwork.formulas.scene import Block
+from virtualwork.formulas.block import Block
 
 SWEEP = np.linspace(0, 2 * np.pi, 361)
 

@@ -38,7 +38,7 @@ from virtualwork.formulas.loads import (
 )
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.formulas.statics import Statics
-from virtualwork.joints import Joint
+from virtualwork.plan.joints import Joint
 
 
 class ForceErrors:
@@ -283,7 +283,7 @@ class ForceErrors:
                 lever = abs(m.links[g.link].points[g.point] - center[g.link])
                 put(g.link, bent, lever * (bent + force * turned[g.link]))
             if g.on != GROUND:
-                                slide = poses.slide_derivative(joint.guide, 0)
+                slide = poses.slide_derivative(joint.guide, 0)
                 reach = abs(m.through(g) - center[g.on]) + np.abs(slide)
                 put(g.on, bent, 2 * reach * bent + force * r.slide(joint.guide))
         return out

@@ -242,13 +242,15 @@ class MotionErrors:
         """The size of what the k-th derivative of each loop leaves, (n, 2·loops): as computed, and its rounding."""
         out = np.empty((n, 2 * len(self.loops)))
         for i, (terms, nodes) in enumerate(self.loops):
-            left = rates.vector(None, terms, k)
+            left = rates.vector((None, terms), k)
             noise = self._noise(rates, rows, terms, nodes, k)
             out[:, 2 * i] = np.abs(np.real(0.0 if left is None else left)) + noise
             out[:, 2 * i + 1] = np.abs(np.imag(0.0 if left is None else left)) + noise
         return out
 
-    def _noise(self, rates: Rates, rows: slice, terms: tuple[Term, ...], nodes: tuple[str, ...], k: int) -> Any:
+    def _noise(
+        self, rates: Rates, rows: slice, terms: tuple[Term, ...], nodes: tuple[str, ...], k: int
+    ) -> Any:
         """The rounding of a sum of terms, and of the points on the way."""
         sizes = Sizes(rates)
         noise: Any = 0.0

@@ -55,13 +55,13 @@ class Sizes:
 
 def value_of(rates: Rates, t: Term, k: int) -> Any:
     """The k-th derivative of a term."""
-    value = rates.vector(None, (t,), k)
+    value = rates.vector((None, (t,)), k)
     return 0.0 if value is None else value
 
 
 def sum_of(rates: Rates, terms: tuple[Term, ...], k: int) -> Any:
     """The k-th derivative of a sum of terms."""
-    value = rates.vector(None, terms, k)
+    value = rates.vector((None, terms), k)
     return 0.0 if value is None else value
 
 

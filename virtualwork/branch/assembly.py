@@ -1,67 +1,33 @@
-"""An assembly of a mechanism: the order of solution, and on which branch each group closes.
+"""An assembly of a mechanism: on which branch each group closes, wherever its input goes.
 
 The guess picks each group's sign once. What a pose at another input looks like follows from the branch alone (no
-marching): the sign of each closed form, turned over at each change point on the way (`virtualwork.track`).
+marching): the sign of each closed form, turned over at each change point on the way (`virtualwork.branch.track`).
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, known_by_guess, plan
-from virtualwork.describe.errors import AssemblyError, MobilityError
-from virtualwork.formulas.closed_forms import Number, cross, dot
-from virtualwork.newton import every_solution, guessed_unknowns, newton, write_unknowns
-from virtualwork.state import Case, State, place
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from virtualwork.formulas.loads import Acting
-    from virtualwork.mechanism import Mechanism
-    from virtualwork.track import Track
-
-TIE = 1e-9  # two assemblies nearer than this, relative to the mechanism's size, are one
+from virtualwork.branch.choice import Choice
+from virtualwork.branch.guess import choose
+from virtualwork.branch.solutions import every_solution
+from virtualwork.branch.track import Track
+from virtualwork.describe.description import Description
+from virtualwork.formulas.newton import write_unknowns
+from virtualwork.formulas.positions import State
+from virtualwork.formulas.rates import Passage
+from virtualwork.plan.steps import Group, Step
 
 
-class Assembly:
-    """A mechanism put together in one way.
-
-    Attributes
-    ----------
-    mechanism : Mechanism
-    plan : Plan
-        The order of solution.
-    signs : dict of group name to ±1
-    starts : dict of group name to the unknowns of a Newton group at the guess's input
-    number : int
-        1 for the guess's assembly; others count on.
-    phases : dict of a gear's number to its constant Σ c·θ, rad
-    """
-
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        plan_: Plan,
-        signs: Mapping[str, int],
-        starts: Mapping[str, Any],
-        number: int = 1,
-        warnings: tuple[str, ...] = (),
-        phases: Mapping[int, float] | None = None,
-    ) -> None:
-        self.mechanism, self.plan, self.phases = mechanism, plan_, phases or {}
-        self.signs, self.starts, self.number = dict(signs), dict(starts), number
-        self.warnings = warnings
-        self.cases = {g.name: Case(g, dict(plan_.directions)) for g in plan_.groups if g.kind != "Newton"}
-        self._needed: dict[frozenset[str], tuple[Step, ...]] = {}
-        self.acting: dict[bool, Acting] = {}  # the loads at rest and in motion, for all motions
+class Assembly(Choice):
+    """A mechanism put together in one way, ready to move."""
 
     @classmethod
-    def from_guess(cls, m: Mechanism) -> Assembly:
+    def from_guess(cls, m: Description) -> Assembly:
         """The assembly that the guess chooses.
 
         Raises
@@ -69,371 +35,46 @@ class Assembly:
         AssemblyError
             Where the guess is missing and there is more than one: the choices are listed.
         """
-        return _Chooser(m).choose()
+        return choose(m, cls)
+
+    @cached_property
+    def prepared(self) -> dict[bool, Any]:
+        """What acts at rest (False) and in motion (True), made once for all motions."""
+        return {}
 
     @cached_property
     def track(self) -> Track:
-        """Change points and limits along the input, found when first needed."""
-        from virtualwork.track import Track
-
+        """Change points and limits along the input."""
         return Track(self)
 
-    @cached_property
-    def merged(self) -> tuple[Plan, Group | None]:
-        """All loops at once: one plan with one group of every unknown; None where there is no loop."""
-        whole = plan(self.mechanism, merged=True, phases=self.phases)
-        return whole, next(iter(whole.groups), None)
+    @property
+    def passage(self) -> Passage | None:
+        """How derivatives go through change points; None with several inputs."""
+        return self.track if self.track.active else None
 
-    @cached_property
-    def geared(self) -> set[str]:
-        """Bodies of which a gear of fractional ratio needs the angle itself, with its whole turns, at first or second hand."""
-        found: set[str] = set()
-        for step in reversed(self.plan.steps):
-            for turn in (step,) if isinstance(step, Turn) else step.ties if isinstance(step, Group) else ():
-                found |= {b for b, r in turn.angle.bases if turn.body in found or not float(r).is_integer()}
-        return found
+    def cover(self, low: float, high: float) -> None:
+        """Look for change points and limits over the inputs from low to high."""
+        self.track.cover(low, high)
 
-    def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
-        """The steps that targets hang on; worked out once for each set of targets."""
-        key = frozenset(targets)
-        if key not in self._needed:
-            self._needed[key] = self.plan.needed(key)
-        return self._needed[key]
-
-    def run(self, steps: Iterable[Step], st: State, tracked: bool = True) -> None:
+    def run(self, steps: Iterable[Step], st: State) -> None:
         """Work out positions, step by step."""
-        for step in steps:
-            if isinstance(step, Place):
-                place(step, st)
-            elif isinstance(step, Group):
-                self.close(step, st, tracked)
-            elif isinstance(step, Turn):
-                self.turn(step, st)
-            else:
-                st.slide[step.guide] = st.inputs[step.input]
+        self.track.run(steps, st)
 
-    def turn(self, step: Turn, st: State) -> None:
-        """A body's rotation; its angle too, where a gear's ratio will need it."""
-        st.turn[step.body] = st.rotate(step.angle)
-        angle = st.affine(step.angle)
-        for base, r in step.angle.bases:
-            if base not in st.angle:
-                return
-            angle = angle + r * st.angle[base]
-        st.angle[step.body] = angle
-
-    def close(self, group: Group, st: State, tracked: bool = True) -> None:
-        """Close the loops of one group."""
-        if group.kind == "Newton":
-            self.track.close_newton(group, st)
-            return
-        case = self.cases[group.name]
-        if not tracked or not self.track.active:
-            case.solve(st, self.signs[group.name], self.mechanism.size)
-        else:
-            case.solve(st, self.track.sign(group, st.inputs[0]), self.mechanism.size)
-            self.track.mend(group, st)
-        for body in self.geared.intersection(group.members):
-            st.angle[body] = self.track.unwound(body, st.inputs[0], np.angle(st.turn[body]), tracked)
-
-    def state(
-        self, inputs: tuple[float, ...], targets: Iterable[str] | None = None, tracked: bool = True
-    ) -> State:
+    def state(self, inputs: tuple[float, ...], targets: Iterable[str] | None = None) -> State:
         """Positions of one pose, as Python numbers."""
-        st = State(list(inputs), many=False)
+        st = State(list(inputs))
         steps = self.plan.steps if targets is None else self.needed(targets)
         try:
-            self.run(steps, st, tracked)
+            self.run(steps, st)
         except ZeroDivisionError:
             st = State([np.array([q]) for q in inputs], many=True)
             with np.errstate(all="ignore"):
-                self.run(steps, st, tracked)
+                self.run(steps, st)
         return st
 
 
-class _Chooser:
-    """Reads the guess and picks each group's assembly in the order of solution."""
-
-    def __init__(self, m: Mechanism) -> None:
-        self.m = m
-        self.plan = plan(m)
-        if not m.inputs:
-            raise MobilityError("[input]: missing")
-        self.angles, self.points = known_by_guess(m)
-        self.warnings: list[str] = []
-        self.phases: dict[int, float] = {}  # of the gears: Σ c·θ
-
-    def choose(self) -> Assembly:
-        st = State(list(self.m.at), many=False)
-        signs: dict[str, int] = {}
-        starts: dict[str, Any] = {}
-        steps: list[Step] = []
-        helper = Assembly(self.m, self.plan, {}, {})
-        for i, step in enumerate(self.plan.steps):
-            if isinstance(step, Turn) and step.angle.gears:
-                step = self._phased(step, st)
-            elif isinstance(step, Group) and any(tie.angle.gears for tie in step.ties):
-                step = replace(step, ties=tuple(self._phased(tie, st) for tie in step.ties))
-            steps.append(step)
-            self.plan = replace(self.plan, steps=(*steps, *self.plan.steps[i + 1 :]))
-            if isinstance(step, Group):
-                if step.kind == "Newton":
-                    starts[step.name] = self._newton(step, st)
-                else:
-                    signs[step.name] = self._sign(step, helper.cases[step.name], st, signs)
-                    st.angle.update({b: float(np.angle(st.turn[b])) for b in step.members})
-            elif isinstance(step, Place):
-                place(step, st)
-            elif isinstance(step, Slide):
-                st.slide[step.guide] = st.inputs[step.input]
-            else:
-                helper.turn(step, st)
-        if self.plan.blocks.redundant:
-            self._refuse_overdriven(self.plan, st)
-        phases = {
-            i: sum(c * float(st.angle[body]) for body, c in gear.shares().items())
-            for i, gear in enumerate(self.m.gears)
-        }
-        return Assembly(self.m, self.plan, signs, starts, 1, tuple(self.warnings), phases)
-
-    def _refuse_overdriven(self, done: Plan, st: State) -> None:
-        """Constraints that depend on each other may leave less motion than there are inputs."""
-        from virtualwork.check import constraint_jacobian
-
-        _, jacobian = constraint_jacobian(self.m, st)
-        try:
-            s = np.linalg.svd(jacobian, compute_uv=False)
-        except np.linalg.LinAlgError:
-            raise AssemblyError(
-                "the lengths of the links differ too much to tell the mechanism's mobility"
-            ) from None
-        left = 3 * len(self.m.links) - int((s > 1e-9 * s[0]).sum())
-        counted = done.blocks.mobility
-        if left < len(self.m.inputs) or 1 <= counted < len(self.m.inputs):
-            left = min(left, counted) if counted >= 1 else left
-            names = ", ".join(e.name for e in self.m.inputs)
-            what = "the joints leave no motion, it is a structure" if left == 0 else f"mobility {left}"
-            raise MobilityError(f"[input]: {len(self.m.inputs)} input(s) ({names}), but {what}")
-
-    def _phased(self, step: Turn, st: State) -> Turn:
-        """A turn with the constants of its gears: its link stands at its guess, where one of them is open still.
-
-        Of more of them all but the last are those of the guessed angles.
-        """
-        angle = step.angle
-        for i, p in angle.gears[:-1]:
-            self.phases.setdefault(i, self._constant(i, st))
-        for i, p in angle.gears[-1:]:
-            if i not in self.phases and all(b in st.angle for b, _ in angle.bases):
-                rest = st.affine(angle) + sum(r * st.angle[b] for b, r in angle.bases)
-                rest += sum(k * self.phases[g] for g, k in angle.gears[:-1])
-                self.phases[i] = (self.angles.get(step.body, 0.0) - rest) / p
-            self.phases.setdefault(i, self._constant(i, st))
-        const = angle.const + sum(p * self.phases[i] for i, p in angle.gears)
-        return Turn(step.body, replace(angle, const=const, gears=()))
-
-    def _constant(self, gear: int, st: State) -> float:
-        """Σ c·θ of a gear: of angles that are known, and of the guess for the others."""
-        shares = self.m.gears[gear].shares().items()
-        return sum(c * float(st.angle[b] if b in st.angle else self.angles.get(b, 0.0)) for b, c in shares)
-
-    def solutions(self, group: Group, case: Case, st: State) -> list[tuple[int, State]]:
-        found = []
-        for sign in (1, -1):
-            trial = State(list(st.inputs), many=False)
-            trial.turn, trial.point, trial.slide = dict(st.turn), dict(st.point), dict(st.slide)
-            trial.angle = dict(st.angle)
-            try:
-                case.solve(trial, sign, self.m.size)
-            except ZeroDivisionError:
-                continue
-            if all(_finite(trial.turn[b]) for b in group.members) and all(
-                _finite(trial.slide[g]) for g in group.slides
-            ):
-                found.append((sign, trial))
-        return found
-
-    def _meeting(self, group: Group) -> str:
-        return (
-            f"[guess] at: {group.name} stands at a change point or a limit there, where its two assemblies "
-            "meet; taken is the one whose links stand still or turn with the input; another `at` chooses the other"
-        )
-
-    def _near(self, group: Group, case: Case, st: State, signs: Mapping[str, int], sign: int) -> None:
-        """Put the group into the state as it stands just beyond a point where its closed form has no direction."""
-        beside = State(
-            [q + 1e-7 * (self.m.size if self.m.inputs[0].is_slide else 1.0) for q in self.m.at], many=False
-        )
-        before = Assembly(self.m, self.plan, signs, {})
-        before.run([s for s in self.plan.needed(self.plan.writes(group)) if s is not group], beside, False)
-        case.solve(beside, sign, self.m.size)
-        st.turn.update({b: beside.turn[b] for b in group.members})
-        st.slide.update({g: beside.slide[g] for g in group.slides})
-
-    def _ahead(
-        self, group: Group, case: Case, signs: Mapping[str, int], here: State | None = None
-    ) -> list[float] | None:
-        """How far the group's two assemblies go a little beyond the guess.
-
-        Each link's least distance to standing still or to turning with the input, so that a parallelogram is
-        preferred to its antiparallel twin; where the pose itself is not determined, the distance to the guess.
-        """
-        if len(self.m.inputs) != 1:
-            return None
-        step = 0.02 * (self.m.size if self.m.inputs[0].is_slide else 1.0)
-        before = Assembly(self.m, self.plan, signs, {})
-        for side in (1, -1):
-            st = State([self.m.at[0] + side * step], many=False)
-            try:
-                before.run(
-                    [s for s in self.plan.needed(self.plan.writes(group)) if s is not group], st, False
-                )
-            except (KeyError, ZeroDivisionError):
-                return None
-            found = self.solutions(group, case, st)
-            if len(found) == 2:
-                # seen from before the point, the Jacobian has the other sign on the same branch
-                distances = [self._distance(group, trial) for _, trial in found]
-                if here is not None and group.members:
-                    turned = complex(np.exp(1j * side * step))
-                    distances = [
-                        sum(
-                            min(abs(e - trial.turn[b]), abs(e * turned - trial.turn[b]))
-                            for b in group.members
-                            for e in [here.turn[b]]
-                        )
-                        for _, trial in found
-                    ]
-                return distances if side > 0 else distances[::-1]
-        return None
-
-    def _sign(self, group: Group, case: Case, st: State, signs: Mapping[str, int]) -> int:
-        if group.kind == "PRP":
-            try:
-                case.solve(st, 1, self.m.size)
-            except ZeroDivisionError:
-                raise AssemblyError(
-                    f"{group.name}: its two guides are parallel, so that its position is not determined; expected "
-                    "guides of different directions (`angle`)"
-                ) from None
-            return 1
-        found = self.solutions(group, case, st)
-        if not found:
-            ahead = self._ahead(group, case, signs)
-            if ahead is not None and self._informed(group):
-                self.warnings.append(self._meeting(group))
-                sign = (1, -1)[int(np.argmin(ahead))]
-                self._near(group, case, st, signs, sign)
-                return sign
-            st.turn.update({b: complex(np.nan, np.nan) for b in group.members})
-            st.slide.update(dict.fromkeys(group.slides, np.nan))
-            return self._sign_of_guess(group, case, st)
-        distances = [self._distance(group, trial) for _, trial in found]
-        # a guess to full precision tells apart even assemblies that all but meet; distances are squares
-        told = min(distances) < 1e-3 * max(distances) and max(distances) > 1e-28
-        if len(found) == 2 and abs(found[0][1].margin[group.name]) < 1e-14 and not told:
-            ahead = self._ahead(group, case, signs, found[0][1])
-            if ahead is not None:
-                distances = ahead
-            self.warnings.append(self._meeting(group))
-        elif len(found) == 2 and not self._informed(group):
-            raise AssemblyError(self._choices(group, [t for _, t in found]))
-        best = int(np.argmin(distances))
-        sign, chosen = found[best]
-        for name in ("turn", "point", "slide", "angle"):
-            getattr(st, name).update(getattr(chosen, name))
-        return sign
-
-    def _informed(self, group: Group) -> bool:
-        """Does the guess say anything about the links of this group?"""
-        given = self.m.guess
-        return any(b in given.angles for b in group.links) or any(
-            p in given.points for b in group.links for p in self.m.links[b].points
-        )
-
-    def _choices(self, group: Group, states: list[State]) -> str:
-        texts = []
-        for st in states:
-            parts = [f"{b} = {np.degrees(np.angle(st.turn[b])):.4g} deg" for b in group.members]
-            parts += [f"{self.m.guides[g].point} at {st.slide[g]:.4g} m" for g in group.slides]
-            texts.append(", ".join(parts))
-        return f"[guess]: {group.name} can be assembled in {len(texts)} ways; choose one: " + "; or ".join(
-            texts
-        )
-
-    def _distance(self, group: Group, st: State) -> float:
-        """How far an assembly is from the guess: chords of the unit circle, and points relative to the size."""
-        total = 0.0
-        for body in group.links:
-            if body in self.angles and body in st.turn:
-                total += abs(complex(st.turn[body]) - np.exp(1j * self.angles[body])) ** 2
-            base, terms = self.plan.anchors[body]
-            placed = base in st.point and all(t.slide is None or t.slide in st.slide for t in terms)
-            if placed and body in st.turn:
-                for name, z in self.m.links[body].points.items():
-                    if name in self.points:
-                        here = st.point[base] + st.sum(terms) + z * st.turn[body]
-                        total += abs(here - self.points[name]) ** 2 / self.m.size**2
-        return total
-
-    def _sign_of_guess(self, group: Group, case: Case, st: State) -> int:
-        """Not assembled at the guess: the sign that the guessed angles would have."""
-        self.warnings.append(
-            f"[guess] at: {group.name} cannot be assembled there; its branch is that of the guessed angles"
-        )
-        e = [np.exp(1j * self.angles[b]) if b in self.angles else None for b in group.angles]
-        try:
-            if group.kind == "RRR" and e[0] is not None and e[1] is not None:
-                return 1 if cross(case.arm(0, st) * e[0], case.arm(1, st) * e[1]) >= 0 else -1
-            if group.kind == "RRP" and e[0] is not None:
-                z, body = case.rails[0]
-                return 1 if dot(case.arm(0, st) * e[0], z * st.turn[body]) >= 0 else -1
-        except (KeyError, TypeError):
-            pass
-        return 1
-
-    # --- groups with no closed form ------------------------------------------------------------------------
-    def _newton(self, group: Group, st: State) -> Any:
-        many = State([np.array([q]) for q in st.inputs], many=True)
-        many.turn, many.point, many.slide = dict(st.turn), dict(st.point), dict(st.slide)
-        many.angle = dict(st.angle)
-        start = guessed_unknowns(group, many, self.angles, self.points, self.m, self.plan)
-        if start is not None:
-            x, closed = newton(group, many, self.plan, start, self.m.size)
-            if closed[0]:
-                self._take(group, st, x)
-                return x[0]
-        found = every_solution(group, many, self.plan, self.m.size)
-        if len(found) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
-            raise MobilityError(
-                f"{group.name}: more constraints than unknowns, and they contradict each other: a structure, or lengths "
-                f"that do not fit (look at {', '.join(self.plan.blocks.redundant)})"
-            )
-        if len(found) == 0:
-            raise AssemblyError(
-                f"[guess] at: {group.name} cannot be assembled there (Newton-Raphson from many starts finds no "
-                "closed loop); give an `at` where it can, or check the lengths"
-            )
-        states = []
-        for x in found:
-            trial = State(list(st.inputs), many=False)
-            trial.turn, trial.point, trial.slide = dict(st.turn), dict(st.point), dict(st.slide)
-            trial.angle = dict(st.angle)
-            write_unknowns(group, trial, x[None])
-            states.append(trial)
-        if len(found) > 1 and not self._informed(group):
-            raise AssemblyError(self._choices(group, states))
-        best = int(np.argmin([self._distance(group, trial) for trial in states]))
-        self._take(group, st, found[best][None])
-        return found[best]
-
-    def _take(self, group: Group, st: State, x: Any) -> None:
-        write_unknowns(group, st, x)
-
-
-def all_assemblies(m: Mechanism) -> tuple[Assembly, ...]:
+def all_assemblies(chosen: Assembly) -> tuple[Assembly, ...]:
     """Every assembly at the guess's input: all signs of the closed forms, all solutions found for the others."""
-    chosen = m.assembly
     found = [chosen]
     for signs, starts in _combinations(chosen):
         if signs != chosen.signs or any(
@@ -441,28 +82,30 @@ def all_assemblies(m: Mechanism) -> tuple[Assembly, ...]:
             > 1e-6
             for k in starts
         ):
-            found.append(Assembly(m, chosen.plan, signs, starts, len(found) + 1, phases=chosen.phases))
+            found.append(
+                Assembly(chosen.mechanism, chosen.plan, signs, starts, len(found) + 1, phases=chosen.phases)
+            )
     return tuple(found)
 
 
 def _combinations(chosen: Assembly) -> list[tuple[dict[str, int], dict[str, Any]]]:
     """Walk the steps at the guess's input and fork wherever a group closes in more than one way."""
     m = chosen.mechanism
-    fronts: list[tuple[State, dict[str, int], dict[str, Any]]] = [(State(list(m.at), many=False), {}, {})]
+    fronts: list[tuple[State, dict[str, int], dict[str, Any]]] = [(State(list(m.at)), {}, {})]
     for step in chosen.plan.steps:
         after: list[tuple[State, dict[str, int], dict[str, Any]]] = []
         for st, signs, starts in fronts:
             if not isinstance(step, Group):
-                chosen.run([step], st, tracked=False)
+                chosen.run_untracked([step], st)
                 after.append((st, signs, starts))
             elif step.kind == "Newton":
-                for x in every_solution(step, st, chosen.plan, m.size):
-                    trial = _copy(st)
+                for x in every_solution(step, st, m.size):
+                    trial = st.copy()
                     write_unknowns(step, trial, x[None])
                     after.append((trial, signs, starts | {step.name: x}))
             else:
                 for sign in (1,) if step.kind == "PRP" else (1, -1):
-                    trial = _copy(st)
+                    trial = st.copy()
                     try:
                         chosen.cases[step.name].solve(trial, sign, m.size)
                     except ZeroDivisionError:
@@ -471,14 +114,3 @@ def _combinations(chosen: Assembly) -> list[tuple[dict[str, int], dict[str, Any]
                         after.append((trial, signs | {step.name: sign}, starts))
         fronts = after
     return [(signs, starts) for _, signs, starts in fronts]
-
-
-def _copy(st: State) -> State:
-    trial = State(list(st.inputs), st.many)
-    for name in ("turn", "point", "slide", "angle", "margin"):
-        setattr(trial, name, dict(getattr(st, name)))
-    return trial
-
-
-def _finite(value: Number) -> bool:
-    return bool(np.isfinite(value))

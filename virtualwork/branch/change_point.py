@@ -1,4 +1,4 @@
-"""The tangent through a change point, and every higher derivative there.
+"""A change point: the tangents through it, and every higher derivative there.
 
 Where the Jacobian Φ of a group vanishes while its loops still close on both sides, two branches cross. With the left
 null vector n of Φ, the n-component of the k-th derivative of the loops holds no k-th derivative of the unknowns:
@@ -8,37 +8,61 @@ branches; at k > 2 it is linear in the free (k−1)-th rate. So the branch goes 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import factorial
+from typing import Any
 
 import numpy as np
 
-from virtualwork.formulas.newton import stack, stack_rows
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from virtualwork.assur import Group
-    from virtualwork.formulas.positions import Jets
-
-    Reals = NDArray[np.float64]
+from virtualwork.formulas.linear import stack, stack_rows
+from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.formulas.rates import Rates
+from virtualwork.plan.steps import Group
 
 
-def branches(group: Group, jets: Callable[[], Jets], order: int) -> list[list[Reals]]:
+@dataclass(frozen=True)
+class ChangePoint:
+    """Where a group's two branches cross: the input, the unknowns there, and their derivatives.
+
+    `turn` and `slide` are the unknowns at the point; `rates[k−1]` their k-th derivatives along the branch taken.
+    """
+
+    group: str
+    input: float
+    turn: tuple[complex, ...]
+    slide: tuple[float, ...]
+    rates: Any
+    reach: float
+    # first rates of the branch not taken
+    other: Any = None
+
+    def unknown(self, delta: Number, order: int) -> Any:
+        """The unknowns' derivatives of one order at a distance from the point (order 0: their change)."""
+        n = len(self.rates)
+        total = np.zeros((*np.shape(delta), len(self.rates[0])))
+        for j in range(n - order, -1, -1):
+            k = order + j
+            if k == 0:
+                continue
+            total = total + np.multiply.outer(delta**j, self.rates[k - 1]) / factorial(j)
+        return total
+
+
+def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[Reals]]:
     """The derivatives [x′, x″, ... x⁽ᵒʳᵈᵉʳ⁾] of a group's unknowns on each branch through a change point.
 
     Parameters
     ----------
-    jets : callable
-        Gives fresh `Jets` at the change point, with everything the group hangs on known to order + 1.
+    start : callable
+        Gives fresh `Rates` at the change point, with everything the group hangs on known to order + 1.
 
     Returns
     -------
     list of branches
         Two where two tangents cross; one where both fall together; none where the tangent is not determined.
     """
-    d = jets()
+    d = start()
     jacobian = stack(d.columns(group), 1)[0]
     if not np.isfinite(jacobian).all():
         return []  # what the group hangs on is not assembled here
@@ -50,13 +74,13 @@ def branches(group: Group, jets: Callable[[], Jets], order: int) -> list[list[Re
         """The solution of Φ·x = −right without a component along the null vector."""
         return np.asarray(vt[:span].T @ ((u[:, :span].T @ -right) / s[:span]))
 
-    def gap(d: Jets, k: int) -> Reals:
+    def gap(d: Rates, k: int) -> Reals:
         return np.asarray(stack_rows(d.right_side(group, k), 1)[0])
 
     base = particular(gap(d, 1))
 
     def second(rate: float) -> float:
-        trial = jets()
+        trial = start()
         trial.right_side(group, 1)
         trial.write(group, 1, list(base + rate * null))
         return float(left @ gap(trial, 2))
@@ -65,7 +89,7 @@ def branches(group: Group, jets: Callable[[], Jets], order: int) -> list[list[Re
     a, b = (plus + minus) / 2 - c, (plus - minus) / 2
     found = []
     for rate in _roots(a, b, c):
-        trial = jets()
+        trial = start()
         trial.right_side(group, 1)
         series = [base + rate * null]
         trial.write(group, 1, list(series[0]))

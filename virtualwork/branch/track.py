@@ -9,64 +9,38 @@ points between the guess and it: nothing is marched in angle.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from math import factorial, lcm
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from virtualwork.assur import Group, Turn
-from virtualwork.branch.change_point import branches
+from virtualwork.branch.change_point import ChangePoint, branches
+from virtualwork.branch.choice import Choice
+from virtualwork.branch.continuation import Continuation, along_lines
 from virtualwork.describe.errors import MechanismError
-from virtualwork.formulas.closed_forms import Number
-from virtualwork.formulas.positions import Jets, State
+from virtualwork.formulas.numbers import EPS, Complexes, Number, Reals
+from virtualwork.formulas.positions import State, run
+from virtualwork.formulas.rates import Rates
+from virtualwork.plan.steps import Group, Step, Turn
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from virtualwork.assembly import Assembly
-
-    Reals = NDArray[np.float64]
-
-EPS = float(np.finfo(float).eps)
-SAMPLES = 720  # of one turn, or of one mechanism's size of slide
-ORDER = 12  # of the series through a change point
-REACH = 0.03  # of its radius of convergence, within which it replaces the closed form
-DIP = 0.05  # a radicand below this may touch zero between two samples
-
-
-SAME = 1e-6  # change points nearer than this share of a turn are one
-TURNS = 32  # of the input, within which a branch is looked for to come back to itself
-COMPARED = 60  # poses of a turn
-
-
-@dataclass(frozen=True)
-class ChangePoint:
-    """Where a group's two branches cross: the input, the unknowns there, and their derivatives.
-
-    `turn` and `slide` are the unknowns at the point; `rates[k−1]` their k-th derivatives along the branch taken.
-    """
-
-    group: str
-    input: float
-    turn: tuple[complex, ...]
-    slide: tuple[float, ...]
-    rates: Any
-    reach: float
-    other: Any = None  # first rates of the branch not taken
-
-    def unknown(self, delta: Number, order: int) -> Any:
-        """The unknowns' derivatives of one order at a distance from the point (order 0: their change)."""
-        n = len(self.rates)
-        total = np.zeros((*np.shape(delta), len(self.rates[0])))
-        for j in range(n - order, -1, -1):
-            k = order + j
-            if k == 0:
-                continue
-            total = total + np.multiply.outer(delta**j, self.rates[k - 1]) / factorial(j)
-        return total
+# of one turn, or of one mechanism's size of slide
+SAMPLES = 720
+# of the series through a change point
+ORDER = 12
+# share of the series' radius of convergence, within which it replaces the closed form
+REACH = 0.03
+# a radicand below this may touch zero between two samples
+DIP = 0.05
+# change points nearer than this share of a turn are one
+SAME = 1e-6
+# turns of the input within which a branch is looked for to come back to itself
+TURNS = 32
+# poses of a turn that are compared for it
+COMPARED = 60
 
 
 @dataclass(frozen=True)
@@ -81,7 +55,7 @@ class Limit:
 class Track:
     """What happens to an assembly along its one input."""
 
-    def __init__(self, assembly: Assembly) -> None:
+    def __init__(self, assembly: Choice) -> None:
         self.assembly = assembly
         m = assembly.mechanism
         self.plan = assembly.plan
@@ -93,8 +67,8 @@ class Track:
         self.flips: dict[str, Reals] = {}
         self.changes: dict[str, list[ChangePoint]] = {}
         self._brackets: list[tuple[str, float, float]] = []
-        self._marched: dict[str, Any] = {}
-        self._wound: dict[str, tuple[Reals, Reals]] = {}
+        self._marched: dict[str, Continuation] = {}
+        self._followed: dict[str, tuple[Reals, Reals]] = {}
         # one turn says it all where every turn of a body is a whole number of turns of the input
         whole = all(
             float(k).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, k in s.angle.inputs
@@ -103,11 +77,30 @@ class Track:
         )
         self.whole = whole and not slide
         self._repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
-        self.settled = False  # no change point anywhere, however far the input turns
+        # no change point anywhere, however far the input turns
+        self.settled = False
         # where one turn begins, and what it has
         self._period: tuple[float, dict[str, list[ChangePoint]]] | None = None
 
     # --- what poses ask ---------------------------------------------------------------------------------------
+    def run(self, steps: Iterable[Step], st: State) -> None:
+        """Work out positions, step by step, each group on its branch."""
+        run(steps, st, self.close)
+
+    def close(self, group: Group, st: State) -> None:
+        """Close the loops of one group."""
+        if group.kind == "Newton":
+            self._close_newton(group, st)
+            return
+        case = self.assembly.cases[group.name]
+        if group.name in self.flips:
+            case.solve(st, self.sign(group, st.inputs[0]), self.assembly.mechanism.size)
+            self.mend(group, st)
+        else:
+            case.solve(st, self.assembly.signs[group.name], self.assembly.mechanism.size)
+        for body in self.assembly.geared.intersection(group.members):
+            st.angle[body] = self.unwound(body, st.inputs[0], np.angle(st.turn[body]))
+
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""
         if self.settled or not self.active:
@@ -211,19 +204,19 @@ class Track:
                     x[j][i] = rate[j]
         return x
 
-    def unwound(self, body: str, q: Number, angle: Number, tracked: bool = True) -> Number:
+    def unwound(self, body: str, q: Number, angle: Number) -> Number:
         """An angle with its whole turns, counted from the guess."""
-        if not tracked or not self.active or body not in self._wound:
+        if not self.active or body not in self._followed:
             return angle
-        nodes, turns = self._wound[body]
+        nodes, turns = self._followed[body]
         good = np.isfinite(turns)
         near = np.interp(q, nodes[good], turns[good])
         whole = angle + 2 * np.pi * np.round((near - angle) / (2 * np.pi))
         return whole if np.ndim(q) else float(whole)
 
-    def _wind(self, body: str, q: Reals, angle: Reals) -> None:
+    def _follow(self, body: str, q: Reals, angle: Reals) -> None:
         """Add samples of an angle and count its turns from the guess."""
-        nodes, angles = self._wound.get(body, (np.empty(0), np.empty(0)))
+        nodes, angles = self._followed.get(body, (np.empty(0), np.empty(0)))
         nodes, first = np.unique(np.append(nodes, q), return_index=True)
         angles = np.append(angles, np.broadcast_to(angle, q.shape))[first]
         good = np.isfinite(angles)
@@ -231,9 +224,9 @@ class Track:
             angles[good] = np.unwrap(angles[good])
             here = np.interp(self.start, nodes[good], angles[good])
             angles = angles - 2 * np.pi * np.round(here / (2 * np.pi))
-            self._wound[body] = nodes, angles
+            self._followed[body] = nodes, angles
 
-    def _near(self, group: Group, q: Number):  # type: ignore[no-untyped-def]
+    def _near(self, group: Group, q: Number) -> Iterator[tuple[ChangePoint, Any, Number]]:
         for change in self.changes.get(group.name, ()):
             if np.ndim(q) == 0:
                 if abs(q - change.input) < change.reach:
@@ -248,7 +241,7 @@ class Track:
         """The group's radicand at inputs q, on the branch known so far."""
         st = State([q], many=True)
         with np.errstate(all="ignore"):
-            self.assembly.run(self.assembly.needed(self.plan.writes(group)), st)
+            self.run(self.assembly.needed(self.plan.writes(group)), st)
         return np.broadcast_to(st.margin[group.name], q.shape).astype(float)
 
     def _scan(self, a: float, b: float) -> None:
@@ -257,20 +250,20 @@ class Track:
         st = State([q], many=True)
         for s in self.plan.steps:
             if isinstance(s, Group) and s.kind != "Newton":
-                self.assembly.close(s, st)
+                self.close(s, st)
                 if s.kind == "PRP":
                     continue
                 m = np.broadcast_to(st.margin[s.name], q.shape)
                 if self._look(s, q, m, a, b):
-                    self.assembly.close(s, st)
+                    self.close(s, st)
                 for body in self.assembly.geared.intersection(s.members):
-                    self._wind(body, q, np.angle(st.turn[body]))
+                    self._follow(body, q, np.angle(st.turn[body]))
                     st.angle[body] = self.unwound(body, q, np.angle(st.turn[body]))
             elif isinstance(s, Group):
-                self._march(s, a, b)
-                self.assembly.close(s, st)
+                self._continued(s).extend(a, b)
+                self.close(s, st)
             else:
-                self.assembly.run([s], st)
+                self.run([s], st)
 
     def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
         """Find where the radicand crosses or touches zero; say whether a change point was found."""
@@ -352,7 +345,7 @@ class Track:
         """The series that the closed form follows within a span around a change point, and how far they are apart."""
         nodes = span * np.cos(np.pi * (np.arange(12) + 0.5) / 12) * self.length / (2 * np.pi)
         st = State([q0 + nodes], many=True)
-        self.assembly.run(self.assembly.needed(self.plan.writes(group)), st)
+        self.run(self.assembly.needed(self.plan.writes(group)), st)
         weights = _at_centre(nodes)
         turn, slide = [], []
         for body in group.angles:
@@ -360,25 +353,24 @@ class Track:
             turn.append(e / abs(e))
         for g in group.slides:
             slide.append(float(np.sum(weights * st.slide[g])))
-        before = [s for s in self.assembly.needed(self.plan.writes(group)) if s is not group]
+        before = self.assembly.before(group)
 
-        def jets() -> Jets:
-            at = State([q0], many=False)
-            self.assembly.run(before, at)
+        def start() -> Rates:
+            at = State([q0])
+            self.run(before, at)
             for j, body in enumerate(group.angles):
                 at.turn[body] = turn[j]
             for j, g in enumerate(group.slides):
                 at.slide[g] = slide[j]
             for tie in group.ties:
                 at.turn[tie.body] = at.rotate(tie.angle)
-            d = Jets(self.plan, at, [[1.0]], self)
+            d = Rates(self.plan, at, [[1.0]], self)
             for k in range(1, ORDER + 2):
-                for s in before:
-                    d.step(s, k)
+                d.advance(before, k)
             return d
 
         try:
-            found = branches(group, jets, ORDER)
+            found = branches(group, start, ORDER)
         except ZeroDivisionError:  # a group that this one hangs on has no direction here
             found = []
         best, nearest = None, np.inf
@@ -449,13 +441,11 @@ class Track:
                 return n
         return None
 
-    def _stands(self, q: Reals) -> NDArray[np.complex128]:
+    def _stands(self, q: Reals) -> Complexes:
         """Rotations and slides (over the size) of all groups at inputs q; NaN where not assembled."""
         st = State([q], many=True)
         with np.errstate(all="ignore"):
-            self.assembly.run(
-                self.assembly.needed([key for g in self.plan.groups for key in self.plan.writes(g)]), st
-            )
+            self.run(self.assembly.needed([key for g in self.plan.groups for key in self.plan.writes(g)]), st)
         rows = [st.turn[b] for g in self.plan.groups for b in g.members]
         rows += [st.slide[s] / self.assembly.mechanism.size for g in self.plan.groups for s in g.slides]
         return np.array([np.broadcast_to(row, q.shape) for row in rows])
@@ -505,24 +495,24 @@ class Track:
             b, fb = q, f
         return Limit(group.name, a if abs(fa) < abs(fb) else b, side)
 
+    @property
+    def crossings(self) -> list[float]:
+        """Inputs at which two branches cross, in what was covered: of closed forms, and met on the way of the others."""
+        found = [float(q) for flips in self.flips.values() for q in flips]
+        return found + [float(q) for marched in self._marched.values() for q in marched.crossings]
+
     # --- groups with no closed form ------------------------------------------------------------------------------
-    def _march(self, group: Group, a: float, b: float) -> None:
-        from virtualwork.march import March
-
+    def _continued(self, group: Group) -> Continuation:
         if group.name not in self._marched:
-            self._marched[group.name] = March(self, group)
-        self._marched[group.name].extend(a, b)
+            self._marched[group.name] = Continuation(self, group)
+        return self._marched[group.name]
 
-    def close_newton(self, group: Group, st: State) -> None:
-        """Close a Newton group at the state's poses, from the marched branch."""
-        from virtualwork.march import March, march_along
-
-        if not self.active:
-            march_along(self.assembly, group, st)
-            return
-        if group.name not in self._marched:
-            self._marched[group.name] = March(self, group)
-        self._marched[group.name].close(st)
+    def _close_newton(self, group: Group, st: State) -> None:
+        """Close a Newton group at the state's poses, from its continued branch."""
+        if self.active:
+            self._continued(group).close(st)
+        else:
+            along_lines(self, group, st)
 
 
 def _at_centre(nodes: Reals) -> Reals:

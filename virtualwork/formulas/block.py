@@ -107,7 +107,9 @@ class Block:
     A derivative that is identically zero is None.
     """
 
-    def __init__(self, setting: Setting, rows: slice, st: State, along: Rates | None, by: list[Rates]) -> None:
+    def __init__(
+        self, setting: Setting, rows: slice, st: State, along: Rates | None, by: list[Rates]
+    ) -> None:
         self.setting, self.rows, self.st, self.along, self.by = setting, rows, st, along, by
         self.one = len(by) == 1
         self.rates = setting.rates(rows, st.many) if self.one else (None, None)
@@ -149,7 +151,7 @@ class Block:
 
     def coefficient(self, path: Path, j: int) -> Number:
         """∂P/∂q_j, complex."""
-        return self.by[j].vector(*path, 1)
+        return self.by[j].vector(path, 1)
 
     def turning(self, body: str, j: int) -> Number:
         """∂θ/∂q_j."""
@@ -157,7 +159,7 @@ class Block:
 
     def velocity(self, path: Path) -> Number:
         """Ṗ, complex."""
-        return self._first(lambda rates: rates.vector(*path, 1))
+        return self._first(lambda rates: rates.vector(path, 1))
 
     def omega(self, body: str) -> Number:
         """ω."""
@@ -169,7 +171,7 @@ class Block:
 
     def acceleration(self, path: Path, factor: float = 1.0) -> Number:
         """P̈ = K q̈ + L q̇², complex, times a factor."""
-        own, value = self.second(lambda rates, k: rates.vector(*path, k))
+        own, value = self.second(lambda rates, k: rates.vector(path, k))
         return None if value is None else value * (own * factor)
 
     def alpha(self, body: str, factor: float = 1.0) -> Number:

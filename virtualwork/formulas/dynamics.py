@@ -20,7 +20,7 @@ from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.reactions import Reactions
 from virtualwork.formulas.scene import Scene
 from virtualwork.formulas.statics import Statics
-from virtualwork.joints import Joint
+from virtualwork.plan.joints import Joint
 
 
 class Dynamics:
@@ -228,9 +228,7 @@ class Dynamics:
         loads = [load for load in [*self.scene.loads, *self.scene.friction] if load.body == link]
         for block in self.scene.blocks([f"angle:{link}"]):
             for load in loads:
-                value = (
-                    None if load.kind in OWN else block.formed(load)
-                )
+                value = None if load.kind in OWN else block.formed(load)
                 if value is None:
                     continue
                 if load.path is None:

@@ -122,11 +122,7 @@ def ledger(scene: Scene, j: int = 0) -> tuple[dict[str, Reals], list[str], list[
         for load in scene.case.everything:
             value = load.power(block, j)
             if value is None:
-                if (
-                    load.displacement(block, j) is None
-                    and load.name not in workless
-                    and load.carries
-                ):
+                if load.displacement(block, j) is None and load.name not in workless and load.carries:
                     workless.append(load.name)
                 continue
             known = works.setdefault(load.name, np.zeros(scene.poses.n))

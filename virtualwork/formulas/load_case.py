@@ -5,7 +5,7 @@ A load that is zero for the whole case (no mass, no speed, no stiffness) is not 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from virtualwork.describe.description import Description
@@ -24,7 +24,7 @@ from virtualwork.formulas.loads import (
     TorsionEnd,
 )
 from virtualwork.formulas.quantities import Combination, Quantities
-from virtualwork.joints import Joint, joints
+from virtualwork.plan.joints import Joint, joints
 from virtualwork.plan.steps import Path, Place, Plan, Term, combined
 
 
@@ -97,9 +97,12 @@ class LoadCase:
                 found.append(InertiaTorque("inertia torque", body, None, r.center, r.inertia))
         found += [self._force(force) for force in m.forces if force.history or force.force]
         found += [Constant("applied torque", t.link, None, 0j, t.torque) for t in m.torques if t.torque]
-        for spring in (*m.springs, *m.torsion_springs):
+        for spring in m.springs:
             if spring.stiffness or (spring.damping and self.moves):
-                found += self._spring(spring) if isinstance(spring, Spring) else self._torsion(spring)
+                found += self._spring(spring)
+        for torsion in m.torsion_springs:
+            if torsion.stiffness or (torsion.damping and self.moves):
+                found += self._torsion(torsion)
         return found
 
     def _force(self, force: Force) -> Load:
@@ -113,16 +116,17 @@ class LoadCase:
         found: list[Load] = []
         for k, (body, z) in enumerate(spring.between):
             if body != GROUND:
-                pair = {"carries": not found, "mate": found[0] if found else None}
-                found.append(SpringEnd("spring", body, ends[k], z, spring=spring, other=ends[1 - k], **pair))
+                end = SpringEnd("spring", body, ends[k], z, spring=spring, other=ends[1 - k])
+                found.append(_beside(end, found))
         return found
 
     def _torsion(self, spring: TorsionSpring) -> list[Load]:
         found: list[Load] = []
         for body, sign in zip(spring.links, (1.0, -1.0), strict=True):
             if body != GROUND:
-                pair = {"carries": not found, "mate": found[0] if found else None}
-                found.append(TorsionEnd("torsion spring", body, None, sign=sign, spring=spring, **pair))
+                found.append(
+                    _beside(TorsionEnd("torsion spring", body, None, sign=sign, spring=spring), found)
+                )
         return found
 
     @cached_property
@@ -221,3 +225,8 @@ class LoadCase:
             if body != entry.on:
                 found += [(body, j, -1.0), (entry.on, j, 1.0)]
         return [entry for entry in found if entry[0] != GROUND]
+
+
+def _beside(load: Load, before: list[Load]) -> Load:
+    """One side of a pair, after the other if that is there: the first carries the work of both."""
+    return replace(load, carries=False, mate=before[0]) if before else load

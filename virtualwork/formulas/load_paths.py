@@ -32,7 +32,7 @@ from virtualwork.formulas.linear import stack
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.numbers import PARALLEL, Number
 from virtualwork.formulas.quantities import Combination, Quantity, Transmitted, in_order
-from virtualwork.joints import Order, Side
+from virtualwork.plan.joint_forces import Order, Side
 from virtualwork.plan.steps import Group, Place, Term, Turn
 
 # lever (None: the point itself), sign, source of the force
@@ -128,7 +128,9 @@ class LoadPaths:
             total = Combination()
             for _, sign, source in self._hung.get(f"point:{node}", ()):
                 total.add(self._source(source, free), sign)
-            self._known[key] = Combination({self.quantities(Transmitted, total): 1.0}) if len(total) > LONG else total
+            self._known[key] = (
+                Combination({self.quantities(Transmitted, total): 1.0}) if len(total) > LONG else total
+            )
         return self._known[key]
 
     def own(self, key: str, without: Group | None = None, *, free: bool = False) -> Combination:
@@ -193,7 +195,10 @@ class LoadPaths:
         return total
 
     def moment(
-        self, body: str, about: complex, sides: Iterable[tuple[complex, int | None, complex, Combination]] = ()
+        self,
+        body: str,
+        about: complex,
+        sides: Iterable[tuple[complex, int | None, complex, Combination]] = (),
     ) -> Combination:
         """The moment on a body about a point of its own, of its loads and of further forces at its points.
 

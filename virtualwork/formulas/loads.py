@@ -106,8 +106,8 @@ class Load:
         value = block.formed(self)
         if value is None or self.path is None:
             return None if value is None else times(_angle(rates, self.body, 2), value)
-        total = times_dot(value, rates.vector(*self.path, 2))
-        first = rates.vector(*self.path, 1)
+        total = times_dot(value, rates.vector(self.path, 2))
+        first = rates.vector(self.path, 1)
         return total if first is None else plus(total, times_dot(self.turned(block, rates), first))
 
     def turned(self, block: Block, rates: Rates) -> Number:
@@ -285,10 +285,10 @@ class SpringEnd(Load):
 
     def second(self, block: Block, rates: Rates) -> Number:
         """−k[(1 − l₀/l)(d′·d′ + d·d″) + l₀(d·d′)²/l³]."""
-        s, d1 = self.spring, self._between(lambda path: rates.vector(*path, 1))
+        s, d1 = self.spring, self._between(lambda path: rates.vector(path, 1))
         if not self.carries or not s.stiffness or d1 is None:
             return None
-        d, d2 = self._between(block.position), self._between(lambda path: rates.vector(*path, 2))
+        d, d2 = self._between(block.position), self._between(lambda path: rates.vector(path, 2))
         share: Number = 1.0
         bend: Number = 0.0
         if s.free_length:

@@ -26,9 +26,17 @@ from virtualwork.plan.steps import Group, Path, Plan, Step, Term, path_reads
 class Branch(Protocol):
     """One assembly of a mechanism, as its poses need it: what to solve, and which way every loop closes."""
 
-    mechanism: Description
-    plan: Plan
-    prepared: dict[bool, Any]
+    @property
+    def mechanism(self) -> Description:
+        """What moves."""
+
+    @property
+    def plan(self) -> Plan:
+        """The order of solution."""
+
+    @property
+    def prepared(self) -> dict[bool, Any]:
+        """What acts at rest (False) and in motion (True), made once for all poses."""
 
     @property
     def merged(self) -> tuple[Plan, Group | None]:
@@ -266,9 +274,7 @@ class Poses:
                 return times(get(i, 1), v)
             if order == 2:
                 return plus(times(get(i, 2), times(v, v)), times(get(i, 1), a))
-            third = plus(
-                times(get(i, 3), times(times(v, v), v)), times(get(i, 2), times(times(3.0, v), a))
-            )
+            third = plus(times(get(i, 3), times(times(v, v), v)), times(get(i, 2), times(times(3.0, v), a)))
             return plus(third, times(get(i, 1), j))
 
         return self.over(form, kind)
@@ -310,7 +316,7 @@ class Poses:
         rates = self.solve(keys, order)
         if order == 0:
             return self.over(lambda i, st: st.at(path), complex)  # type: ignore[no-any-return]
-        return self.in_time(order, lambda i, k: rates[i].vector(*path, k), complex)  # type: ignore[no-any-return]
+        return self.in_time(order, lambda i, k: rates[i].vector(path, k), complex)  # type: ignore[no-any-return]
 
     def point_coefficient(
         self, body: str, z: complex, j: int = 0, node: str | None = None, order: int = 1
@@ -318,7 +324,7 @@ class Poses:
         """dP/dq_j of any point of a body, x + iy, (n,); order 2: d²P/dq_j²."""
         keys, path = self._path(body, z, node)
         rates = self.solve(keys, order, self._which(j))
-        return self.over(lambda i, st: rates[i].vector(*path, order), complex)  # type: ignore[no-any-return]
+        return self.over(lambda i, st: rates[i].vector(path, order), complex)  # type: ignore[no-any-return]
 
     def slide_derivative(self, guide: int, order: int) -> Reals:
         """A slide or its time derivative, (n,)."""

@@ -105,7 +105,7 @@ class SecondRate(Quantity):
         return (
             rates.turn(self.name, k)
             if self.slide is None
-            else rates.vector(None, (Term(1.0, self.name, self.slide),), k)
+            else rates.vector((None, (Term(1.0, self.name, self.slide),)), k)
         )
 
     def form(self, block: Block) -> tuple[float, Number]:

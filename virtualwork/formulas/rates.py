@@ -18,7 +18,7 @@ from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.linear import singular_poses, solve_columns
 from virtualwork.formulas.numbers import Number, cross, plus, times
 from virtualwork.formulas.positions import State, columns
-from virtualwork.plan.steps import Angle, Group, Place, Plan, Step, Term, Turn
+from virtualwork.plan.steps import Angle, Group, Path, Place, Plan, Step, Term, Turn
 
 
 class Passage(Protocol):
@@ -46,7 +46,9 @@ class Rates:
     A derivative that is identically zero is None, and costs nothing.
     """
 
-    def __init__(self, plan: Plan, st: State, rates: list[list[Number]], passage: Passage | None = None) -> None:
+    def __init__(
+        self, plan: Plan, st: State, rates: list[list[Number]], passage: Passage | None = None
+    ) -> None:
         self.plan, self.st, self.rates, self.passage = plan, st, rates, passage
         self.angle: dict[str, list[Number]] = {GROUND: []}
         self.point: dict[str | None, list[Number]] = {None: []}
@@ -87,8 +89,9 @@ class Rates:
             self._turn[body, k] = self.turn_partial(body, k, self.angle[body][k - 1])
         return self._turn[body, k]
 
-    def vector(self, base: str | None, terms: tuple[Term, ...], k: int) -> Number:
-        """The k-th derivative of P[base] + Σ terms."""
+    def vector(self, path: Path, k: int) -> Number:
+        """The k-th derivative of a point, P[base] + Σ terms."""
+        base, terms = path
         v: Number = None if base is None else self.point[base][k - 1]
         for t in terms:
             v = plus(v, self._term(t, k))
@@ -102,7 +105,7 @@ class Rates:
         """Carry steps on to derivatives of order k; the lower orders are known."""
         for step in steps:
             if isinstance(step, Place):
-                _put(self.point, step.node, k, self.vector(step.base, step.terms, k))
+                _put(self.point, step.node, k, self.vector((step.base, step.terms), k))
             elif isinstance(step, Group):
                 self._group(step, k)
             elif isinstance(step, Turn):

@@ -9,13 +9,16 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort
-from virtualwork.formulas.numbers import Number, dot, plus
+from virtualwork.formulas.numbers import Number, dot, minus, plus
 from virtualwork.formulas.positions import BLOCK
 from virtualwork.formulas.scene import Scene
-from virtualwork.joints import Joint, Side
+from virtualwork.plan.joint_forces import Side
+from virtualwork.plan.joints import Joint
 from virtualwork.plan.steps import path_reads
 
 
@@ -27,7 +30,7 @@ class Reactions:
         self.paths = scene.paths
         self.order = self.paths.order
         self.plan = scene.plan
-        self.mechanism: Description = scene.mechanism
+        self.mechanism = scene.mechanism
         self.joints, self.by_key = self.order.joints, self.order.by_key
 
     @property
@@ -118,7 +121,11 @@ class Reactions:
     def joint_force(self, block: Block, joint: Joint, body: str) -> Number:
         """The force of a joint on a body over a block, without the force of an input that drives it."""
         value = plus(self.on_side(block, (joint.key, body)), self.rubbed(block, joint, body))
-        if joint.guide is not None and value is not None and self.mechanism.driver_of(joint.guide) is not None:
+        if (
+            joint.guide is not None
+            and value is not None
+            and self.mechanism.driver_of(joint.guide) is not None
+        ):
             rail = self.rail(block, joint.guide)
             value = value - dot(value, rail) * rail
         return value
@@ -130,7 +137,7 @@ class Reactions:
             if load.path is None or load.joint != joint.key:
                 continue
             if body == GROUND:  # no load stands there: it feels the reverse of the other body's
-                total = plus(total, times(load.form(block), -1.0))
+                total = minus(total, load.form(block))
             elif load.body == body:
                 total = plus(total, load.form(block))
         return total

@@ -44,7 +44,7 @@ class Scene:
         if self.moves not in known:
             known[self.moves] = LoadPaths(LoadCase(self.mechanism, self.plan, self.moves))
         self.paths: LoadPaths = known[self.moves]
-        self.case = self.paths.case
+        self.case: LoadCase = self.paths.case
         self._blocks: dict[tuple[str, ...], list[Block]] = {}
 
     @property

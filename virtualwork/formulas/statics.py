@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.numbers import Reals, cross
 from virtualwork.formulas.reactions import Reactions
-from virtualwork.joints import Joint
+from virtualwork.plan.joints import Joint
 
 # ("fx" or "fy", joint, body), ("normal", joint, ""), ("moment", joint, ""), ("gear", number, ""), ...
 Column = tuple[str, str, str]

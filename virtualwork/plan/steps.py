@@ -18,7 +18,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from virtualwork.describe.parts import GROUND
-from virtualwork.plan.graph import Blocks
+
+# ("angle", link), ("x", link), ("y", link), ("px", pin), ("py", pin), ("slide", guide)
+Variable = tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -122,6 +124,16 @@ class Group:
 
 
 Step = Turn | Slide | Place | Group
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """The irreducible blocks of coordinates in their order of solution, and the redundant equations."""
+
+    order: tuple[tuple[Variable, ...], ...]
+    redundant: tuple[str, ...]
+    # Grübler's: coordinates less equations of joints
+    mobility: int
 
 
 @dataclass(frozen=True)

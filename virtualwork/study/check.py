@@ -6,24 +6,20 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe.description import Description
 from virtualwork.describe.errors import AssemblyError
 from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.constraints import constraint_jacobian
+from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.positions import State
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from virtualwork.assembly import Assembly
-    from virtualwork.describe.description import Description
-    from virtualwork.motion import Motion
-
-    Reals = NDArray[np.float64]
-
-EQUAL = 1e-12  # two sums of lengths nearer than this, relative, are equal
+# two sums of lengths nearer than this, relative, are equal
+EQUAL = 1e-12
 
 
 @dataclass(frozen=True)
@@ -41,6 +37,7 @@ class FourBar:
     transmission: tuple[float, float]
 
 
+@dataclass(frozen=True)
 class Check:
     """A mechanism's character; every part is worked out when first read.
 
@@ -58,8 +55,11 @@ class Check:
     ('triple-rocker', [46.567463, 313.432537])
     """
 
-    def __init__(self, assembly: Assembly) -> None:
-        self.assembly = assembly
+    assembly: Assembly
+
+    def __repr__(self) -> str:
+        four_bars = ", ".join(f"{'-'.join(f.links)}: {f.grashof}" for f in self.four_bars) or "no four-bar"
+        return f"Check({self.mechanism.name!r}: mobility {self.mobility}, {four_bars})"
 
     @property
     def mechanism(self) -> Description:
@@ -108,8 +108,7 @@ class Check:
         best, chosen = np.inf, None
         for q in qs:
             inputs = (q, *m.at[1:])
-            motion = _motion(self.assembly, inputs)
-            condition = float(motion.condition[0])
+            condition = float(Poses(self.assembly, np.array([inputs])).condition[0])
             if condition < best:
                 best, chosen = condition, inputs
         if chosen is None:
@@ -151,7 +150,7 @@ class Check:
         """Inputs at which the linkage locks, every end of a range of the input, rad, or m.
 
         Angles in [0, period of the branch): where change points make a branch need two turns of the input, the
-        same angle a turn later is another pose (`virtualwork.track.Track.turns`).
+        same angle a turn later is another pose (`virtualwork.branch.track.Track.turns`).
         """
         return self._in_period(
             [limit.input for limit in self.assembly.track.limits()] if self.assembly.track.active else []
@@ -164,9 +163,7 @@ class Check:
         if not track.active:
             return ()
         track.cover(*self._span())
-        found = [float(q) for flips in track.flips.values() for q in flips]
-        found += [float(q) for march in track._marched.values() for q in march.crossings]
-        return self._in_period(found)
+        return self._in_period(track.crossings)
 
     def _in_period(self, found: list[float]) -> tuple[float, ...]:
         period = self.assembly.track.period
@@ -232,17 +229,15 @@ class Check:
         return FourBar(links, lengths, grashof_class(*lengths), (angles[0], angles[-1]))
 
     @cached_property
-    def _sampled(self) -> Motion:
-        """The motion over the whole span, for every four-bar the same."""
-        from virtualwork.motion import Motion
-
+    def _sampled(self) -> Poses:
+        """Poses over the whole span, for every four-bar the same."""
         low, high = self._span()
         q = np.linspace(low, high, 1441)
-        return Motion(self.assembly, q if self.assembly.track.active else np.array([self.mechanism.at]))
+        return Poses(self.assembly, q if self.assembly.track.active else np.array([self.mechanism.at]))
 
     def _seen(self, bodies: tuple[str, ...], corners: list[str]) -> list[float]:
         """The transmission angle over the motion, sampled, for chains that are not driven at their own crank."""
-        b, c, d = (self._sampled.point(p).complex(0) for p in corners[1:])
+        b, c, d = (self._sampled.point_derivative(GROUND, 0j, 0, p) for p in corners[1:])
         mu = np.abs(np.angle((b - c) * np.conj(d - c)))
         mu = mu[np.isfinite(mu)]
         return [float(mu.min()), float(mu.max())] if len(mu) else [math.nan, math.nan]
@@ -291,70 +286,3 @@ def _cycles(order: list[str], pins: dict[frozenset[str], list[str]]) -> list[tup
                     ):
                         found.append((a, b, c, d))
     return found
-
-
-def constraint_jacobian(m: Description, st: State) -> tuple[list[str], Reals]:
-    """The Jacobian of every joint's constraints in the coordinates (θ, x, y) of each link, lengths over the size.
-
-    Returns
-    -------
-    labels : list of str
-        The joint of each row.
-    jacobian : array (constraints, 3·links)
-    """
-    column = {link: 3 * i for i, link in enumerate(m.links)}
-    size = m.size
-    labels: list[str] = []
-    rows: list[Reals] = []
-
-    def vector(body: str, z: complex) -> tuple[complex, complex, complex]:
-        """Derivatives of a point of a body along its θ, x, y."""
-        return 1j * z * complex(np.ravel(st.turn[body])[0]) / size, 1.0, 1j
-
-    def add(label: str, parts: list[tuple[str, complex, float]], normal: complex | None = None) -> None:
-        """Σ sign·point = 0, in x and y, or along a normal only."""
-        both = [1.0 + 0j, 1j] if normal is None else [normal]
-        for n in both:
-            row = np.zeros(3 * len(column))
-            for body, z, sign in parts:
-                if body != GROUND:
-                    for k, v in enumerate(vector(body, z)):
-                        row[column[body] + k] += sign * (v.real * n.real + v.imag * n.imag)
-            labels.append(label)
-            rows.append(row)
-
-    def turn(label: str, parts: list[tuple[str, float]]) -> None:
-        row = np.zeros(3 * len(column))
-        for body, factor in parts:
-            if body != GROUND:
-                row[column[body]] += factor
-        labels.append(label)
-        rows.append(row)
-
-    for pin, bodies in m.pins.items():
-        first = bodies[0]
-        for other in bodies[1:]:
-            add(f"pin {pin}", [(first, m.bodies[first][pin], 1.0), (other, m.bodies[other][pin], -1.0)])
-    for i, g in enumerate(m.guides):
-        label = f"{'slider' if g.is_slider else 'slot'} {g.point}"
-        through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
-        d = complex(math.cos(g.angle), math.sin(g.angle))
-        on = complex(np.ravel(st.turn[g.on])[0])
-        slide = float(np.ravel(st.slide[i])[0])
-        add(
-            label,
-            [(g.link, m.bodies[g.link][g.point], 1.0), (g.on, through + slide * d, -1.0)],
-            1j * d * on,
-        )
-        if g.is_slider:
-            turn(label, [(g.link, 1.0), (g.on, -1.0)])
-    for gear in m.gears:
-        a, b = gear.links
-        turn(f"gear {a}-{b}", list(gear.shares().items()))
-    return labels, np.array(rows) if rows else np.zeros((0, 3 * len(column)))
-
-
-def _motion(assembly: Assembly, inputs: tuple[float, ...]) -> Any:
-    from virtualwork.motion import Motion
-
-    return Motion(assembly, np.array([inputs]))

@@ -80,6 +80,12 @@ class Equilibria:
     region: bool = False
     loaded: bool = True
 
+    def __repr__(self) -> str:
+        if self.everywhere or self.region:
+            return f"Equilibria({'everywhere' if self.everywhere else 'a region'})"
+        words = {True: "stable", False: "unstable", None: "undecided"}
+        return f"Equilibria({', '.join(f'{e.inputs[0]:g} {words[e.stable]}' for e in self.found) or 'none'})"
+
 
 class Rest:
     """Generalized forces, their derivative and the potential of a mechanism at rest at given inputs (n, k)."""

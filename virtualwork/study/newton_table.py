@@ -6,18 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from virtualwork.assembly import Assembly, guessed_unknowns, known_by_guess
+from virtualwork.branch.assembly import Assembly
+from virtualwork.branch.solutions import guessed_unknowns
 from virtualwork.describe.errors import AssemblyError
 from virtualwork.formulas.linear import stack
 from virtualwork.formulas.newton import Iterate, newton, write_unknowns
 from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.positions import State, columns, turn
-from virtualwork.plan.steps import Turn
+from virtualwork.formulas.positions import State, columns
+from virtualwork.plan.guessed import known_by_guess
 
 
 @dataclass(frozen=True)
 class AllAtOnce:
-    """Newton-Raphson on all loops of a mechanism together, as 003 does it.
+    """Newton-Raphson on all loops of a mechanism together, as Nicoletti, lecture 7, does it.
 
     Attributes
     ----------
@@ -44,15 +45,13 @@ class AllAtOnce:
 def all_at_once(assembly: Assembly, inputs: tuple[float, ...], limit: int = 50) -> AllAtOnce:
     """Solve all loops of a mechanism at once by Newton-Raphson from its guess, undamped, with the table of iterates.
 
-    x_{k+1} = x_k − Φ(x_k)⁻¹·f(x_k) (003).
+    x_{k+1} = x_k − Φ(x_k)⁻¹·f(x_k) (Nicoletti, lecture 7).
 
     Raises
     ------
     AssemblyError
         Where the guess does not give every unknown angle.
     """
-    from virtualwork.assembly import guessed_unknowns, known_by_guess
-    from virtualwork.assur import Turn
 
     m = assembly.mechanism
     merged, group = assembly.merged
@@ -62,23 +61,20 @@ def all_at_once(assembly: Assembly, inputs: tuple[float, ...], limit: int = 50) 
     for step in merged.steps:
         if step is group:
             break
-        if isinstance(step, Turn):
-            assembly.turn(step, st)
-        else:
-            assembly.run([step], st)
+        assembly.run([step], st)
     angles, points = known_by_guess(m)
     for body in group.angles:
         if body not in angles:
             raise AssemblyError(
                 f"[guess]: newton starts from the guess, and the angle of '{body}' is missing there"
             )
-    start = guessed_unknowns(group, st, angles, points, m, merged)
+    start = guessed_unknowns(group, st, angles, points, m, merged.directions)
     assert start is not None
     write_unknowns(group, st, start)
-    jacobian = stack(columns(group, st, merged), 1)[0]
+    jacobian = stack(columns(group, st), 1)[0]
     table: list[Iterate] = []
     with np.errstate(all="ignore"):
-        x, closed = newton(group, st, merged, start, m.size, limit, table, damped=False)
+        x, closed = newton(group, st, start, m.size, limit, table, damped=False)
         exact = assembly.state(inputs)
         # numpy's maximum keeps a NaN: where one link is not assembled there is nothing to compare with
         away = [
