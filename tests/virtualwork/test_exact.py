@@ -19,10 +19,10 @@ def errors(m, q, exact, order):
     worst, largest = 0.0, 1.0
     for name, values in reference.items():
         if isinstance(name, str):
-            found = motion.angle(name) if order == 0 else motion.angle_derivative(name, order)
+            found = motion.poses.angle(name) if order == 0 else motion.poses.angle_derivative(name, order)
             scale = 1.0
         else:
-            found, scale = motion.slide_derivative(name, order), m.size
+            found, scale = motion.poses.slide_derivative(name, order), m.size
         difference = mp.mpf(float(found[0])) - values[order]
         if order == 0 and isinstance(name, str):
             difference = math.remainder(float(difference), 2 * math.pi)

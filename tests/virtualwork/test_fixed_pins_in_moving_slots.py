@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from virtualwork import Force, Friction, Guess, Guide, Input, Link, Mechanism
-from virtualwork.describe.reader import loads
 from virtualwork.study.check import Check
 
 TURN = np.radians(np.arange(0.0, 360.0, 7.0))
@@ -119,9 +118,9 @@ def test_a_file_names_the_ground_as_the_link_of_a_slot():
     on = "rod"
     through = "A"
     """
-    m = loads(text, "file")
+    m = Mechanism.from_toml_text(text, "file")
     assert m.guides[0].link == "ground"
-    assert loads(text.replace('link = "ground"\n', ""), "file").guides == m.guides
+    assert Mechanism.from_toml_text(text.replace('link = "ground"\n', ""), "file").guides == m.guides
     assert math.hypot(0.3 - 0.05, 0.1 * math.sin(math.pi / 3)) == pytest.approx(
         m.motion().slide("P").position[0]
     )

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.record import Record
+from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import Case, State, run
+from virtualwork.formulas.rates import Passage
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, Turn
 
@@ -83,3 +85,16 @@ class Choice(Record):
         self.cases[group.name].solve(st, self.signs[group.name], self.mechanism.size)
         for body in self.geared.intersection(group.members):
             st.angle[body] = np.angle(st.turn[body])
+
+
+class Along(Passage, Protocol):
+    """The way of the one input, as change points and continuations need it."""
+
+    assembly: Choice
+    start: float
+    length: float
+    whole: bool
+    flips: dict[str, Reals]
+
+    def run(self, steps: Iterable[Step], st: State) -> None:
+        """Work out positions, each group on its branch."""

@@ -6,36 +6,22 @@ corrected by Newton-Raphson on all poses together, so that no error accumulates.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from virtualwork.branch.choice import Choice
+from virtualwork.branch.choice import Along
 from virtualwork.formulas.linear import solve, stack, stack_rows
 from virtualwork.formulas.newton import newton, write_unknowns
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import State, columns
-from virtualwork.formulas.rates import Passage, Rates
-from virtualwork.plan.steps import Group, Step
+from virtualwork.formulas.rates import Rates
+from virtualwork.plan.steps import Group
 
 # of one turn
 NODES = 120
 # of one turn: a step this short has met a limit
 FINEST = 1e-7
-
-
-class Along(Passage, Protocol):
-    """The way of the input, as a continuation needs it."""
-
-    assembly: Choice
-    start: float
-    length: float
-    whole: bool
-    flips: dict[str, Reals]
-
-    def run(self, steps: Iterable[Step], st: State) -> None:
-        """Work out positions, each group on its branch."""
 
 
 class Continuation:

@@ -18,7 +18,7 @@ from virtualwork.formulas.numbers import cross, dot
 from virtualwork.formulas.positions import Case, State
 from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Plan, Step, Turn
+from virtualwork.plan.steps import Group, Plan, Turn
 
 C = TypeVar("C", bound=Choice)
 
@@ -51,15 +51,15 @@ class _Chooser:
         st = State(list(self.m.at))
         signs: dict[str, int] = {}
         starts: dict[str, Any] = {}
-        steps: list[Step] = []
         helper = Choice(self.m, self.plan)
         for i, step in enumerate(self.plan.steps):
+            open_ = step
             if isinstance(step, Turn) and step.angle.gears:
                 step = self._phased(step, st)
             elif isinstance(step, Group) and any(tie.angle.gears for tie in step.ties):
                 step = replace(step, ties=tuple(self._phased(tie, st) for tie in step.ties))
-            steps.append(step)
-            self.plan = replace(self.plan, steps=(*steps, *self.plan.steps[i + 1 :]))
+            if step is not open_:
+                self.plan = replace(self.plan, steps=(*self.plan.steps[:i], step, *self.plan.steps[i + 1 :]))
             if isinstance(step, Group):
                 if step.kind == "Newton":
                     starts[step.name] = self._newton(step, st)

@@ -13,26 +13,21 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from math import factorial, lcm
+from math import lcm
 from typing import Any
 
 import numpy as np
 
-from virtualwork.branch.change_point import ChangePoint, branches
+from virtualwork.branch.change_point import ChangePoint, through
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.continuation import Continuation, along_lines
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.numbers import EPS, Complexes, Number, Reals
 from virtualwork.formulas.positions import State, run
-from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Group, Step, Turn
 
 # of one turn, or of one mechanism's size of slide
 SAMPLES = 720
-# of the series through a change point
-ORDER = 12
-# share of the series' radius of convergence, within which it replaces the closed form
-REACH = 0.03
 # a radicand below this may touch zero between two samples
 DIP = 0.05
 # change points nearer than this share of a turn are one
@@ -296,7 +291,7 @@ class Track:
                     fresh.append(where)
         # the branch through each one can be told only once all of them are known
         for where in fresh:
-            self.changes.setdefault(group.name, []).append(self._through(group, where))
+            self.changes.setdefault(group.name, []).append(through(self, group, where))
         return bool(fresh)
 
     def _bottom(self, group: Group, a: float, b: float) -> tuple[float, float, float] | None:
@@ -328,85 +323,6 @@ class Track:
     def _radii(self, group: Group) -> float:
         arms = [abs(a) for a in self.assembly.cases[group.name].arms if a]
         return min(arms, default=self.assembly.mechanism.size)
-
-    def _through(self, group: Group, q0: float) -> ChangePoint:
-        """The exact branch through a change point.
-
-        Where the links are nearly equal one of the branches turns many times faster than the input: the closed form
-        is then compared with the series closer to the point, until one of the series is the branch.
-        """
-        for span in (0.02, 0.0025, 3e-4, 4e-5):
-            change, miss = self._branch(group, q0, span)
-            if miss < 1e-6:
-                break
-        return change
-
-    def _branch(self, group: Group, q0: float, span: float) -> tuple[ChangePoint, float]:
-        """The series that the closed form follows within a span around a change point, and how far they are apart."""
-        nodes = span * np.cos(np.pi * (np.arange(12) + 0.5) / 12) * self.length / (2 * np.pi)
-        st = State([q0 + nodes], many=True)
-        self.run(self.assembly.needed(self.plan.writes(group)), st)
-        weights = _at_centre(nodes)
-        turn, slide = [], []
-        for body in group.angles:
-            e = complex(np.sum(weights * st.turn[body]))
-            turn.append(e / abs(e))
-        for g in group.slides:
-            slide.append(float(np.sum(weights * st.slide[g])))
-        before = self.assembly.before(group)
-
-        def start() -> Rates:
-            at = State([q0])
-            self.run(before, at)
-            for j, body in enumerate(group.angles):
-                at.turn[body] = turn[j]
-            for j, g in enumerate(group.slides):
-                at.slide[g] = slide[j]
-            for tie in group.ties:
-                at.turn[tie.body] = at.rotate(tie.angle)
-            d = Rates(self.plan, at, [[1.0]], self)
-            for k in range(1, ORDER + 2):
-                d.advance(before, k)
-            return d
-
-        try:
-            found = branches(group, start, ORDER)
-        except ZeroDivisionError:  # a group that this one hangs on has no direction here
-            found = []
-        best, nearest = None, np.inf
-        probe = int(np.argmax(nodes))
-        for rates in found:
-            change = ChangePoint(group.name, q0, tuple(turn), tuple(slide), np.array(rates), 0.0)
-            move = change.unknown(nodes[probe], 0)
-            miss = (
-                sum(
-                    abs(turn[j] * np.exp(1j * move[j]) - st.turn[body][probe])
-                    for j, body in enumerate(group.angles)
-                )
-                + sum(
-                    abs(slide[j] + move[len(turn) + j] - st.slide[g][probe])
-                    for j, g in enumerate(group.slides)
-                )
-                / self.assembly.mechanism.size
-            )
-            if miss < nearest:
-                best, nearest = rates, miss
-        if best is None or not np.isfinite(best).all():
-            unknown = np.full((ORDER, len(turn) + len(slide)), np.nan)
-            return ChangePoint(group.name, q0, tuple(turn), tuple(slide), unknown, 0.0), np.inf
-        scale = np.array([1.0] * len(turn) + [self.assembly.mechanism.size] * len(slide))
-        terms = [float(np.abs(r / scale).max()) / factorial(k) for k, r in enumerate(best, 1)]
-        radius = (
-            min(t ** (-1 / k) for k, t in enumerate(terms, 1) if t > 0 and k >= 3)
-            if max(terms[2:]) > 0
-            else 1.0
-        )
-        reach = REACH * min(radius, 1.0 if self.length > 6 else self.length)
-        others = [rates[0] for rates in found if rates is not best]
-        change = ChangePoint(
-            group.name, q0, tuple(turn), tuple(slide), np.array(best), reach, others[0] if others else None
-        )
-        return change, float(nearest)
 
     @property
     def has_limits(self) -> bool:
@@ -513,13 +429,6 @@ class Track:
             self._continued(group).close(st)
         else:
             along_lines(self, group, st)
-
-
-def _at_centre(nodes: Reals) -> Reals:
-    """Weights of polynomial interpolation from the nodes to 0 (barycentric, second form)."""
-    w = np.array([1 / np.prod(x - np.delete(nodes, i)) for i, x in enumerate(nodes)])
-    w = w / -nodes
-    return np.asarray(w / w.sum())
 
 
 def _put(store: dict[Any, Any], key: Any, near: Any, value: Any) -> None:

@@ -75,6 +75,7 @@ class _Planner:
     def __init__(self, m: Description, merged: bool, phases: Mapping[int, float]) -> None:
         self.m, self.merged, self.phases = m, merged, phases
         self.guess = known_by_guess(m)[0] if m.gears else {}
+        self.relations = list(relations(m))
         self.steps: list[Step] = []
         self.angles: dict[str, Angle] = {GROUND: Angle()}
         self.anchors: dict[str, Path] = {GROUND: (None, ())}
@@ -173,11 +174,11 @@ class _Planner:
     # --- angles: sliders, gears and inputs are linear relations ----------------------------------------------
     def _relations(self, fresh: list[str]) -> list[tuple[Mapping[str, float], Angle]]:
         """Σ c·θ = const + Σ k·input, for every relation all of whose angles are known once this block is."""
-        seen = set(self.angles) | set(fresh)
+        new = set(fresh)
         found = []
-        for relation in relations(self.m):
-            bodies = set(relation.shares)
-            if bodies & set(fresh) and bodies <= seen:
+        for relation in self.relations:
+            bodies = relation.shares.keys()
+            if bodies & new and all(body in new or body in self.angles for body in bodies):
                 right = relation.right
                 if relation.gear is not None:
                     known = self.phases.get(relation.gear)
