@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from balancing.amplitudes import AmplitudeFit, influence_from_amplitudes
+    from balancing.balance import Balance, initial_unbalance, least_squares, minimax
     from balancing.confidence import Readings, spread
     from balancing.correction import CoincidentPlanes, Correction, Unbalances, correct
     from balancing.dependence import (
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
         plane_significance,
         unseen,
     )
-    from balancing.influence import Balance, Infeasible, influence_coefficients, least_squares
-    from balancing.least_maximum import minimax
+    from balancing.influence import influence_coefficients
+    from balancing.limited import Infeasible
     from balancing.placement import Placement, drill_depth, place, place_from_stock, transfer
     from balancing.rotor import by_size
     from balancing.rounding import influence_error
@@ -38,11 +39,12 @@ if TYPE_CHECKING:
 # A rotor with known masses needs none of what vibration needs: each module is loaded when a name of it is asked for.
 _HOMES = {
     "balancing.amplitudes": "AmplitudeFit influence_from_amplitudes",
+    "balancing.balance": "Balance initial_unbalance least_squares minimax",
     "balancing.confidence": "Readings spread",
     "balancing.correction": "CoincidentPlanes Correction Unbalances correct",
     "balancing.dependence": "DependentPlanes DependentTrials condition_number plane_significance unseen",
-    "balancing.influence": "Balance Infeasible influence_coefficients least_squares",
-    "balancing.least_maximum": "minimax",
+    "balancing.influence": "influence_coefficients",
+    "balancing.limited": "Infeasible",
     "balancing.placement": "Placement drill_depth place place_from_stock transfer",
     "balancing.rotor": "by_size",
     "balancing.rounding": "influence_error",
@@ -89,6 +91,7 @@ __all__ = [
     "influence_coefficients",
     "influence_error",
     "influence_from_amplitudes",
+    "initial_unbalance",
     "least_squares",
     "minimax",
     "permissible_unbalance",

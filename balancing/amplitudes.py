@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import EPS
+from dalembert.arithmetic.exact import EPS
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

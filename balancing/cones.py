@@ -8,15 +8,12 @@ finished by Newton's method on the active constraints. The rows are expected to 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-EPS = float(np.finfo(float).eps)
 
 
 @dataclass
@@ -259,5 +256,4 @@ def _consistent(system: Real, rhs: Real, largest: float) -> Real:
             return u
     except np.linalg.LinAlgError:
         pass
-    found: tuple[Any, ...] = np.linalg.lstsq(system, rhs, rcond=1e-11)
-    return np.asarray(found[0])
+    return np.asarray(np.linalg.lstsq(system, rhs, rcond=1e-11)[0])

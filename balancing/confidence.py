@@ -9,8 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.balance import least_squares
 from balancing.dependence import adjoint
-from balancing.influence import influence_coefficients, least_squares
+from balancing.influence import influence_coefficients
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -21,7 +22,8 @@ class Readings:
     """The readings from which corrections were found, and their errors; one rotor.
 
     The errors are standard deviations: of the amplitude, relative to it, and of the phase in rad; those of
-    different readings are independent.
+    different readings are independent. Errors of repeated readings are seen in their scatter (a type A evaluation,
+    JCGM 100:2008, 4.2), whose mean is the better for it; the stated ones (type B, 4.3) are not averaged away.
     """
 
     initial: Complex
@@ -36,6 +38,27 @@ class Readings:
     """The given coefficients (s, p), where there are no trials."""
     runout: Complex | None = None
     """(s,), subtracted from every reading."""
+    scatter: Real | None = None
+    """Standard deviation of each component of each run's mean reading as repeats of readings show it, (1 + r, s), in
+    units of the readings: it takes the place of the stated errors where it is larger."""
+    degrees_of_freedom: int = 0
+    """Of `scatter`, complex: the repeated readings less their means."""
+
+    @cached_property
+    def _errors(self) -> tuple[Complex, Complex, Real, Real]:
+        """Direction and share of the error along a reading and across it: (1 + r, s) each."""
+        v = self._all
+        if self.scatter is None:
+            return v, v, np.full(v.shape, self.amplitude_error), np.full(v.shape, self.phase_error)
+        size = np.abs(v)
+        unit = np.where(size > 0, v / np.where(size > 0, size, 1.0), 1.0)
+        along, across = (self.scatter > error * size for error in (self.amplitude_error, self.phase_error))
+        return (
+            np.where(along, unit, v),
+            np.where(across, unit, v),
+            np.where(along, self.scatter, self.amplitude_error),
+            np.where(across, self.scatter, self.phase_error),
+        )
 
     @cached_property
     def _all(self) -> Complex:
@@ -72,16 +95,29 @@ class Readings:
         At fixed corrections the residual is linear in the readings: no further approximation is made.
         """
         share = self._share(corrections)
-        error = self._draw(n, seed) - self._all
+        error = self._draw(n, seed, student=True) - self._all
         expected = self.vibration + self.coefficients @ corrections
         return np.asarray(expected + np.tensordot(error, share, axes=([1], [0])))
 
-    def _draw(self, n: int, seed: int) -> Complex:
-        """Draw readings, (n, 1 + r, s)."""
-        normal = np.random.default_rng(seed).standard_normal((2, n, *self._all.shape))
-        return np.asarray(
-            self._all * (1 + self.amplitude_error * normal[0]) * np.exp(1j * self.phase_error * normal[1])
-        )
+    def _draw(self, n: int, seed: int, *, student: bool = False) -> Complex:
+        """Draw readings, (n, 1 + r, s); errors known from repeats with Student's distribution where asked for."""
+        rng = np.random.default_rng(seed)
+        normal = rng.standard_normal((2, n, *self._all.shape))
+        if self.scatter is None:
+            return np.asarray(
+                self._all * (1 + self.amplitude_error * normal[0]) * np.exp(1j * self.phase_error * normal[1])
+            )
+        along, across, of_size, of_phase = self._errors
+        stated = self.scatter <= self.phase_error * np.abs(self._all)
+        if student:
+            # each complex degree of freedom is two real ones; the scatter is one estimate for all readings
+            real = 2 * self.degrees_of_freedom
+            wider = np.sqrt(real / rng.chisquare(real, n))[:, None, None]
+            normal[0] *= np.where(self.scatter > self.amplitude_error * np.abs(self._all), wider, 1.0)
+            normal[1] *= np.where(stated, 1.0, wider)
+        turn = np.where(stated, of_phase, 0.0)
+        aside = 1j * across * np.where(stated, 0.0, of_phase) * normal[1]
+        return np.asarray((self._all + along * of_size * normal[0]) * np.exp(1j * turn * normal[1]) + aside)
 
     def correction_samples(
         self, weights: ArrayLike | None = None, ridge: float = 0.0, n: int = 4000, seed: int = 0
@@ -162,13 +198,13 @@ class Readings:
             antilinear[:, 1:], antilinear[:, 0] = by_run, -by_run.sum(axis=1)
             linear[:, 1:] += forward
             linear[:, 0] -= forward.sum(axis=1)
-        v = self._all
+        e_along, e_across, of_size, of_phase = self._errors
         size = np.where(np.abs(w) > 0, np.abs(w), 1.0)
         back = np.where(np.abs(w) > 0, w.conj() / size, 1.0)[
             :, None, None
         ]  # turns each correction onto the real axis
-        radial = back * (linear * v + antilinear * v.conj()) * self.amplitude_error
-        across = back * 1j * (linear * v - antilinear * v.conj()) * self.phase_error
+        radial = back * (linear * e_along + antilinear * e_along.conj()) * of_size
+        across = back * 1j * (linear * e_across - antilinear * e_across.conj()) * of_phase
         parts = np.stack([np.stack([x.real, x.imag]) for x in (radial, across)])  # (2, 2, p, 1 + r, s)
         return np.asarray(np.einsum("eaprs,ebprs->pab", parts, parts))
 

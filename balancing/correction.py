@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.rotor import BLOCK
-from dalembert.arithmetic.exact import exact_sum, two_product, two_sum
+from dalembert.arithmetic.exact import UNIT, exact_sum, two_product, two_sum
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -174,23 +174,22 @@ class Correction:
         Sums are known to some 30 digits of their terms and rounded once; each product, sum and quotient once more; a
         sum over planes that cancels keeps the error of its terms.
         """
-        u = np.finfo(float).eps / 2
         if quantity in ("static", "couple"):
             if quantity == "static":
-                return np.asarray(2 * u * np.abs(self.static) + self._hidden)
+                return np.asarray(2 * UNIT * np.abs(self.static) + self._hidden)
             about = self.planes[..., 0] if at is None else np.asarray(at, dtype=float)
             return np.asarray(
-                2 * u * np.abs(self.couple(about)) + self._hidden_about(about[..., None])[..., 0]
+                2 * UNIT * np.abs(self.couple(about)) + self._hidden_about(about[..., None])[..., 0]
             )
         if quantity in ("residual_static", "residual_couple"):
             added = np.abs(self.unbalance)
-            terms = self._hidden + 4 * u * u * self.planes.shape[-1] * added.sum(axis=-1)
+            terms = self._hidden + 4 * UNIT * UNIT * self.planes.shape[-1] * added.sum(axis=-1)
             if quantity == "residual_static":
-                return np.asarray(2 * u * np.abs(self.residual.static) + terms)
+                return np.asarray(2 * UNIT * np.abs(self.residual.static) + terms)
             lever = np.abs(self.planes - self.planes[..., :1])
-            terms = 8 * u * u * self.planes.shape[-1] * (lever * added).sum(axis=-1)
+            terms = 8 * UNIT * UNIT * self.planes.shape[-1] * (lever * added).sum(axis=-1)
             terms = terms + self._hidden_about(self.planes[..., :1])[..., 0]
-            return np.asarray(2 * u * np.abs(self.residual.couple) + terms)
+            return np.asarray(2 * UNIT * np.abs(self.residual.couple) + terms)
         size = np.abs(self.unbalance)
         bound = self._unbalance_error
         if quantity == "unbalance":
@@ -199,39 +198,36 @@ class Correction:
             if at is None:
                 raise ValueError("mass: expected at, the radius")
             radius = np.asarray(at, dtype=float)
-            return np.asarray((bound + 4 * u * size) / radius)
+            return np.asarray((bound + 4 * UNIT * size) / radius)
         if quantity == "angle":
             known = bound < size
             turn = np.arcsin(np.where(known, bound / np.where(known, size, 1.0), 0.0))
-            return np.where(known, turn + 8 * u * np.pi, np.where((size > 0) | (bound > 0), np.pi, 0.0))
+            return np.where(known, turn + 8 * UNIT * np.pi, np.where((size > 0) | (bound > 0), np.pi, 0.0))
         raise ValueError(
             f"'{quantity}': expected unbalance, static, couple, mass, angle, residual_static or residual_couple"
         )
 
     @property
     def _unbalance_error(self) -> Real:
-        u = np.finfo(float).eps / 2
         if self.planes.shape[-1] == 1:
-            return np.asarray(2 * u * np.abs(self.unbalance) + self._hidden[..., None])
+            return np.asarray(2 * UNIT * np.abs(self.unbalance) + self._hidden[..., None])
         apart, square = self._distances
         moments = np.abs(_complex(self._about(self.planes)[0]))
         terms = np.einsum("...pq,...q->...p", np.abs(apart), moments) / square[..., None]
         hidden = (
             np.einsum("...pq,...q->...p", np.abs(apart), self._hidden_about(self.planes)) / square[..., None]
         )
-        return np.asarray((self.planes.shape[-1] + 6) * u * terms + hidden)
+        return np.asarray((self.planes.shape[-1] + 6) * UNIT * terms + hidden)
 
     @cached_property
     def _hidden(self) -> Real:
         """What a sum of pairs can hide: some 30 digits below its terms."""
-        u = np.finfo(float).eps / 2
-        return np.asarray(4 * u * u * self.moment.shape[-1] * np.abs(self.moment).sum(axis=-1))
+        return np.asarray(4 * UNIT * UNIT * self.moment.shape[-1] * np.abs(self.moment).sum(axis=-1))
 
     def _hidden_about(self, z: Real) -> Real:
-        u = np.finfo(float).eps / 2
         arms = np.abs(self.z)[..., None, :] + np.abs(z)[..., None]
         size = np.abs(self.moment)[..., None, :]
-        return np.asarray(8 * u * u * self.moment.shape[-1] * (arms * size).sum(axis=-1))
+        return np.asarray(8 * UNIT * UNIT * self.moment.shape[-1] * (arms * size).sum(axis=-1))
 
     def mass(self, radius: ArrayLike) -> Real:
         """Return the masses to add at the radius (m) of each plane, (..., p), kg."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.exact import EPS
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-EPS = float(np.finfo(float).eps)
 
 
 class DependentPlanes(ValueError):

@@ -14,17 +14,13 @@ is not unique, or not a smooth function of the data. The reason is said.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from balancing.cones import real_rows
 from balancing.dependence import adjoint, columns_scaled, roundings
-from balancing.rounding import Bounds
-
-if TYPE_CHECKING:
-    from balancing.influence import Balance
+from balancing.rounding import Bounds, Case
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -53,45 +49,38 @@ class _Rows:
 
 
 def optimum_bounds(
-    fix: Balance, influence_error: Real | None, initial_error: Real | None
+    case: Case, minimax: bool, max_mass: Real | None, max_residual: Real | None
 ) -> tuple[Bounds, str]:
     """Bound the errors of the corrections and of the residual; inf with the reason where they are not bounded."""
-    sensors, planes = fix.influence.shape
+    sensors, planes = case.influence.shape
     try:
-        found = _Optimum(fix, _rows(fix, influence_error, initial_error))
+        found = _Optimum(case.corrections, minimax, _rows(case, minimax, max_mass, max_residual))
     except _NotBounded as reason:
         nothing = Bounds(np.full(planes, np.inf), np.full(sensors, np.inf))
         return nothing, str(reason)
-    c = roundings(planes)
-    size = np.abs(fix.corrections)
-    own = c * (np.abs(fix.initial) + np.abs(fix.influence) @ size)
-    if influence_error is not None:
-        own = own + influence_error @ size
-    if initial_error is not None:
-        own = own + initial_error
-    return Bounds(found.bound(np.eye(planes, dtype=complex)), found.bound(fix.influence) + own), ""
+    residual = found.bound(case.influence) + case.evaluation_error
+    return Bounds(found.bound(np.eye(planes, dtype=complex)), residual), ""
 
 
 class _NotBounded(Exception):
     """Why there is no bound."""
 
 
-def _rows(fix: Balance, influence_error: Real | None, initial_error: Real | None) -> _Rows:
-    alpha, v = fix.influence, fix.initial
+def _rows(case: Case, minimax: bool, max_mass: Real | None, max_residual: Real | None) -> _Rows:
+    alpha, v, w = case.influence, case.initial, case.corrections
     sensors, planes = alpha.shape
     c = roundings(planes)
-    da = c * np.abs(alpha) + (0.0 if influence_error is None else influence_error)
-    db = c * np.abs(v) + (0.0 if initial_error is None else initial_error)
-    limit = np.broadcast_to(np.inf if fix.max_mass is None else fix.max_mass, (planes,))
+    da, db = case.data_errors
+    limit = np.broadcast_to(np.inf if max_mass is None else max_mass, (planes,))
     limited = np.flatnonzero(np.isfinite(limit))
     caps = np.zeros((len(limited), planes), dtype=complex)
     caps[np.arange(len(limited)), limited] = 1 / limit[limited]
-    weight = np.ones(sensors) if fix.weights is None else fix.weights
-    if fix.bound is not None:  # minimax: readings that no plane moves are no part of it
+    weight = np.ones(sensors) if case.weights is None else case.weights
+    if minimax:  # readings that no plane moves are no part of it
         e, at, de, dat = (x * (weight if x.ndim == 1 else weight[:, None]) for x in (alpha, v, da, db))
         moved = np.abs(e).max(axis=1) > 0
         e, at, de, dat = e[moved], at[moved], de[moved], dat[moved]
-        unit = float(np.abs(at + e @ fix.corrections).max())
+        unit = float(np.abs(at + e @ w).max())
         h, f = np.zeros(len(at)), np.ones(len(at))
         square, of = np.zeros((0, planes), dtype=complex), np.zeros(0, dtype=complex)
         none = np.zeros((0, planes)), np.zeros(0)
@@ -100,10 +89,10 @@ def _rows(fix: Balance, influence_error: Real | None, initial_error: Real | None
     else:
         root = np.sqrt(weight)
         square, of = alpha * root[:, None], v * root
-        unit = float(np.abs(of + square @ fix.corrections).max()) or 1.0
+        unit = float(np.abs(of + square @ w).max()) or 1.0
         square, of = square / unit, of / unit
         square_error = da * root[:, None] / unit, db * root / unit
-        ceiling = np.broadcast_to(np.inf if fix.max_residual is None else fix.max_residual, (sensors,))
+        ceiling = np.broadcast_to(np.inf if max_residual is None else max_residual, (sensors,))
         capped = np.isfinite(ceiling)
         e, at, de, dat = ((x[capped].T / ceiling[capped]).T for x in (alpha, v, da, db))
         h, f = np.ones(len(at)), np.zeros(len(at))
@@ -123,9 +112,7 @@ def _rows(fix: Balance, influence_error: Real | None, initial_error: Real | None
 class _Optimum:
     """The conditions at the corrections as given out, and the inverse of their Jacobian."""
 
-    def __init__(self, fix: Balance, rows: _Rows) -> None:
-        w = fix.corrections
-        with_t = fix.bound is not None
+    def __init__(self, w: Complex, with_t: bool, rows: _Rows) -> None:
         planes = len(w)
         value = rows.offset + rows.e @ w
         size = np.abs(value)
@@ -163,21 +150,21 @@ class _Optimum:
         if with_t:
             slope[-1] = 1.0
         mu = np.linalg.lstsq(self.gradient.T, -slope, rcond=1e-13)[0]
-        # of least squares the squares' own pull is what the limits hold against
-        strength = mu * np.linalg.norm(self.gradient, axis=1)
-        if not strength.min() > WEAK * max(float(strength.max()), float(np.linalg.norm(left))):
-            raise _NotBounded("a limit or a reading is only just active: a little more, and it would not be")
         hessian = self.across.T @ ((mu / self.size)[:, None] * self.across)
         squares = np.concatenate(real_rows(rows.square @ undo))
         hessian[: 2 * planes, : 2 * planes] += squares.T @ squares
         # multipliers in units of their size: the condition number is then one without units
-        unit = float(max(np.abs(hessian).max(), mu.max()))
+        unit = float(max(np.abs(hessian).max(), np.abs(mu).max()))
         system = np.zeros((n + m, n + m))
         system[:n, :n], system[n:, :n], system[:n, n:] = hessian / unit, self.gradient, self.gradient.T
         if not np.linalg.cond(system) < SINGULAR:
             raise _NotBounded(
                 "the optimum is not unique, or the next thing to it: other corrections leave as much"
             )
+        # of least squares the squares' own pull is what the limits hold against
+        strength = mu * np.linalg.norm(self.gradient, axis=1)
+        if not strength.min() > WEAK * max(float(strength.max()), float(np.linalg.norm(left))):
+            raise _NotBounded("a limit or a reading is only just active: a little more, and it would not be")
         inverse = np.linalg.inv(system)
         inverse[:, :n] /= unit
         inverse[n:, :] *= unit

@@ -13,18 +13,17 @@ is solved with AᴴA. Corrections under limits, and those of the minimax problem
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import EPS, adjoint, columns_scaled, roundings
-
-if TYPE_CHECKING:
-    from balancing.influence import Balance
+from balancing.dependence import adjoint, columns_scaled, roundings
+from balancing.influence import influence_coefficients
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Kind = TypeVar("Kind", np.float64, np.complex128)
 
 
 class Bounds(NamedTuple):
@@ -94,8 +93,6 @@ def influence_error(
     >>> float(influence_error([1.0], [[1.0 + 2**-40]], [[1.0]], reading_error=([1e-16], [[1e-16]]))[0, 0].round(17))
     2e-16
     """
-    from balancing.influence import influence_coefficients
-
     v0, v = np.asarray(initial, dtype=complex), np.asarray(trials, dtype=complex)
     t = np.asarray(trial_masses, dtype=complex)
     alpha = influence_coefficients(v0, v, t)
@@ -111,29 +108,50 @@ def influence_error(
     return perturbed(each, -change, alpha, left, of_masses[..., None, :, :], off).solution
 
 
-def balance_bounds(fix: Balance, influence_error: Real | None, initial_error: Real | None) -> Bounds:
+class Case(NamedTuple):
+    """A problem with corrections as found, and bounds of the errors of its data; None: weights of one, exact data."""
+
+    influence: Complex
+    initial: Complex
+    corrections: Complex
+    weights: Real | None
+    influence_error: Real | None
+    initial_error: Real | None
+
+    @property
+    def data_errors(self) -> tuple[Real, Real]:
+        """Bounds of the errors of coefficients and vibration, the rounding of the products with them included."""
+        c = roundings(self.influence.shape[-1])
+        of_influence = 0.0 if self.influence_error is None else self.influence_error
+        of_initial = 0.0 if self.initial_error is None else self.initial_error
+        return c * np.abs(self.influence) + of_influence, c * np.abs(self.initial) + of_initial
+
+    @property
+    def evaluation_error(self) -> Real:
+        """By how much V + α w at these very corrections can be wrong, (..., s)."""
+        size = np.abs(self.corrections)
+        terms = np.abs(self.initial) + np.matvec(np.abs(self.influence), size)
+        own = roundings(self.influence.shape[-1]) * terms
+        if self.influence_error is not None:
+            own = own + np.matvec(self.influence_error, size)
+        return np.asarray(own if self.initial_error is None else own + self.initial_error)
+
+
+def least_squares_bounds(case: Case, residual: Complex, ridge: float) -> Bounds:
     """Bound the errors of the corrections of a least-squares problem without limits, and of its residual."""
-    alpha, v, w = fix.influence, fix.initial, fix.corrections
-    sensors, planes = alpha.shape[-2:]
-    c = roundings(planes)
-    da = c * np.abs(alpha) + (0.0 if influence_error is None else influence_error)
-    db = c * np.abs(v) + (0.0 if initial_error is None else initial_error)
-    root = np.ones(v.shape) if fix.weights is None else np.sqrt(fix.weights)
-    a, b, r = alpha * root[..., None], v * root, fix.residual * root
+    alpha, v, w = case.influence, case.initial, case.corrections
+    da, db = case.data_errors
+    root = np.ones(v.shape) if case.weights is None else np.sqrt(case.weights)
+    a, b, r = alpha * root[..., None], v * root, residual * root
     da, db = da * root[..., None], db * root
-    if fix.ridge:
-        a, b, r, da, db = _damped(fix.ridge, a, b, r, da, db, w)
+    if ridge:
+        a, b, r, da, db = _damped(ridge, a, b, r, da, db, w)
     bounds = perturbed(a, b, w, r, da, db)
     safe = np.where(root > 0, root, 1.0)
     # a reading without weight takes no part: its residual follows the corrections
     follows = np.matvec(np.abs(alpha), bounds.solution)
-    own = c * (np.abs(v) + np.matvec(np.abs(alpha), np.abs(w)))
-    if influence_error is not None:
-        own = own + np.matvec(influence_error, np.abs(w))
-    if initial_error is not None:
-        own = own + initial_error
-    left = np.where(root > 0, np.minimum(bounds.residual[..., :sensors] / safe, follows), follows)
-    return Bounds(bounds.solution, left + own)
+    left = np.where(root > 0, np.minimum(bounds.residual[..., : v.shape[-1]] / safe, follows), follows)
+    return Bounds(bounds.solution, left + case.evaluation_error)
 
 
 def _damped(
@@ -147,7 +165,7 @@ def _damped(
     lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1])
     zeros = np.zeros((*lead, a.shape[-1]))
 
-    def joined(one: NDArray[Any], other: NDArray[Any], axis: int) -> NDArray[Any]:
+    def joined(one: NDArray[Kind], other: NDArray[Kind], axis: int) -> NDArray[Kind]:
         axes = -axis
         shape = lead + one.shape[-axes:], lead + other.shape[-axes:]
         return np.concatenate([np.broadcast_to(one, shape[0]), np.broadcast_to(other, shape[1])], axis=axis)
@@ -159,29 +177,3 @@ def _damped(
         joined(da, of_norms, -2),
         joined(db, zeros, -1),
     )
-
-
-def unlimited(fix: Balance) -> bool:
-    """Tell whether corrections are those of least squares: without limits, or where none holds them."""
-    if fix.bound is not None:
-        # a rotor that minimax balances to nothing is balanced by least squares
-        noise = np.abs(fix.influence) @ np.abs(fix.corrections) + np.abs(fix.initial)
-        if fix.bound > 0 or float(fix.residual_max) > 64 * EPS * float(noise.max()):
-            return False
-        return fix.max_mass is None or bool((np.abs(fix.corrections) < fix.max_mass * (1 - 1e-9)).all())
-    if fix.max_mass is not None and not (np.abs(fix.corrections) < fix.max_mass * (1 - 1e-9)).all():
-        return False
-    return fix.max_residual is None or bool((np.abs(fix.residual) < fix.max_residual * (1 - 1e-9)).all())
-
-
-def gap_bound(fix: Balance, influence_error: Real | None, initial_error: Real | None) -> Real:
-    """Bound the error of `residual_max` of a minimax problem by its distance from the dual bound."""
-    assert fix.bound is not None
-    size = np.abs(fix.corrections)
-    terms = np.abs(fix.initial) + np.abs(fix.influence) @ size
-    wrong = roundings(fix.influence.shape[-1]) * terms
-    if influence_error is not None:
-        wrong = wrong + influence_error @ size
-    if initial_error is not None:
-        wrong = wrong + initial_error
-    return np.asarray(max(float(fix.residual_max) - fix.bound, 0.0) + wrong.max())

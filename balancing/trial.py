@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.exact import EPS
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 STANDARD_GRAVITY = 9.80665
-
-EPS = float(np.finfo(float).eps)
 
 
 def trial_unbalance(

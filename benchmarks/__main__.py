@@ -16,7 +16,7 @@ import typer
 from benchmarks.speed import DOMAINS
 from cli.errors import DataError, nearest, one_line
 from cli.read import options
-from cli.show.output import Json, Output, Plot, Shown, Text, show
+from cli.show.shown import Json, Output, Plot, Shown, Text, show
 
 if TYPE_CHECKING:
     from benchmarks.speed.measure import Measurement

@@ -11,6 +11,7 @@ from typing import Any
 import typer
 
 from cli.errors import DataError, one_line
+from cli.read.files import forget
 
 # name -> (module with a function `run`, the line shown by `dalembert --help`)
 COMMANDS = {
@@ -71,6 +72,7 @@ def main(front: Callable[[str | None], Callable[..., Any]] = build) -> None:
     """
     # Small matrices only: a pool of BLAS threads costs more to start than it gives. The user's word goes first.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    forget()
     called = next((word for word in sys.argv[1:] if not word.startswith("-")), None)
     try:
         front(called)(prog_name="dalembert")

@@ -30,7 +30,7 @@ def errors(field: Field, warnings: list[str]) -> dict[str, Any]:
         f"{per}_{unit}": from_si(size_error(flat, bound), per, unit),
         "angle_deg": angle_error(flat, bound, degrees(flat)),
     }
-    if field.wanted.reading_error is not None:
+    if field.uncertain:
         share = field.rows([_share(field, solved, b) for solved, b in zip(field.solved, bounds, strict=True)])
         for name in (f"{per}_uncertainty_{unit}", "angle_uncertainty_deg"):
             out[name] = share * np.nan_to_num(np.asarray(field.columns[name], dtype=float))
@@ -106,6 +106,10 @@ def _share(field: Field, solved: Solved, bound: Real) -> Real:
     share = condition_number(solved.alpha, solved.group.weights) * relative
     if field.stored is None:
         share = share + 8 * EPS * condition_number(solved.group.on)
+    # the scatter of repeats is a difference of readings
+    sd = solved.group.reading_sd
+    of_scatter = EPS * 8 * np.abs(solved.group.initial).max(axis=1) / np.where(sd > 0, sd, 1.0)
+    share = share + np.where(sd > 0, of_scatter, 0.0)
     size = np.abs(solved.corrections)
     own = np.where(size > 0, bound / np.where(size > 0, size, 1.0), 0.0)
     return np.asarray(4 * share[:, None] + own)

@@ -21,8 +21,8 @@ def convert_amplitude(value: Real, unit: str, wanted: str, what: str) -> Real:
     """Convert amplitudes between units of one kind and tag; DataError where they are different quantities."""
     if amplitude_kind(unit) != amplitude_kind(wanted):
         raise DataError(
-            f"{what} is in {unit}, the runs in {wanted}: displacement, velocity, acceleration, peak (_pk), peak to peak "
-            "(_pp) and r.m.s. (_rms) do not mix"
+            f"{what} is in {unit}, the runs in {wanted}: displacement, velocity, acceleration, voltage, counts, peak "
+            "(_pk), peak to peak (_pp) and r.m.s. (_rms) do not mix"
         )
     if unit == wanted:
         return value

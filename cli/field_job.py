@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cli.field_solve import UNKNOWN_ANGLE, Solved, Solver, Wanted
 from cli.read.units import degrees, from_si, to_si
-from cli.show.output import Shown
+from cli.show.shown import Shown
 
 Real = NDArray[np.float64]
 
@@ -48,6 +48,11 @@ class Field(Solver):
         from cli.plots.field import draw
 
         return draw(self, range(min(len(self.runs.rotors), 3)))
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether reading errors are known, stated or from repeats."""
+        return any(solved.covariance is not None for solved in self.solved)
 
     def uncertainty(self, solved: Solved) -> tuple[Real, Real] | None:
         """Return the standard deviations of size (SI) and angle (degrees; NaN where it is not known), (g, p) each."""
@@ -95,10 +100,12 @@ class Field(Solver):
             f"{self.runs.per}_{self.runs.mass_unit}": self._amount(np.abs(flat)),
             "angle_deg": degrees(flat),
         }
-        if self.wanted.reading_error is not None:
-            pairs = [self.uncertainty(solved) for solved in self.solved]
-            along = self.rows([pair[0] for pair in pairs if pair is not None])
-            angle = self.rows([pair[1] for pair in pairs if pair is not None])
+        if self.uncertain:
+            pairs = [
+                self.uncertainty(solved) or (np.full(solved.corrections.shape, np.nan),) * 2
+                for solved in self.solved
+            ]
+            along, angle = (self.rows([pair[k] for pair in pairs]) for k in (0, 1))
             columns[f"{self.runs.per}_uncertainty_{self.runs.mass_unit}"] = self._amount(along)
             columns["angle_uncertainty_deg"] = angle
         return columns
@@ -162,6 +169,12 @@ class Field(Solver):
                 document["residual_bound"] = float(solved.bound[i])
             if solved.residual_95 is not None:
                 document["residual_max_95"] = float(solved.residual_95[i])
+            if group.repeats:
+                document["repeats"] = {
+                    "readings": int(group.counts[group.counts > 1].sum()),
+                    "degrees_of_freedom": group.repeats,
+                    "reading_sd": float(group.reading_sd[i]),
+                }
             if solved.fits:
                 document["misfit"] = [
                     {"sensor": channel.sensor, "amplitude": float(misfit)}
@@ -182,8 +195,8 @@ class Field(Solver):
                         {
                             "plane": plane,
                             "permissible_kg_m": share,
-                            "initial_kg_m": before,
-                            "within": before <= share,
+                            "initial_kg_m": _number(before),
+                            "within": before <= share if np.isfinite(before) else None,
                         }
                         for plane, share, before in self._verdict(solved, i)
                     ],

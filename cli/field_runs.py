@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.balance.solve import number_names
 from cli.errors import DataError, quote
-from cli.read.tables import Cells, Table, read
-from cli.read.units import SMALLEST, UNITS, parse_number, phasor, to_si
+from cli.read.tables import Cells, Table, number_names, read
+from cli.read.units import SMALLEST, UNITS, phasor, to_si
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Rows = NDArray[np.intp]
 
 YES = ("yes", "y", "true", "1", "kept", "on")
+SHOWN = 5  # of so many contradictions the figures are shown
 NEAR_SPEED = 0.05  # among several speeds one is recognised within this share
 NO = ("no", "n", "false", "0", "", "removed", "off")
 
@@ -66,8 +67,45 @@ class Group:
     base: list[int]
     """For each trial run the run it is compared with: -1 is the initial run."""
     weights: Real | None
+    counts: Rows
+    """How often each sensor was read in the initial and in each trial run, (1 + r, s)."""
+    scatter: Real
+    """Σ|reading - mean|² of the repeats, (g, 1 + r, s)."""
     errors: Callable[[], tuple[Real, Real, Real]]
     """Bounds of the errors of `initial`, `runs` and `on` against the decimals of the table; worked out when asked for."""
+
+    @property
+    def repeats(self) -> int:
+        """Complex degrees of freedom of the repeats: readings less means."""
+        return int((self.counts - 1).sum())
+
+    @cached_property
+    def reading_sd(self) -> Real:
+        """Standard deviation of one reading as the repeats show it, √(Σ|reading - mean|²/degrees of freedom), (g,)."""
+        sd = np.sqrt(self.scatter.sum(axis=(1, 2)) / max(self.repeats, 1))
+        # what lies in the rounding of the mean is agreement
+        largest = np.maximum(
+            np.abs(self.initial).max(axis=1), np.abs(self.runs).max(axis=(1, 2), initial=0.0)
+        )
+        return np.where(sd > 1e-14 * largest, sd, 0.0)
+
+    @cached_property
+    def contradictory(self) -> NDArray[np.bool_]:
+        """Where repeats lie as far apart as a trial mass should move the vibration, 30 % of it, (g, 1 + r, s)."""
+        means = np.concatenate([self.initial[:, None], self.runs], axis=1)
+        spread = self.scatter / self.counts
+        largest = np.sqrt((np.square(np.abs(means)) + spread).max(axis=1, keepdims=True))
+        return np.asarray(np.sqrt(spread) > 0.15 * largest)
+
+    @cached_property
+    def mean_error(self) -> Real:
+        """Standard deviation of each component of each mean as the repeats show it, (g, 1 + r, s).
+
+        One estimate serves all readings; where repeats contradict each other their own holds if it is larger.
+        """
+        pooled = np.square(self.reading_sd)[:, None, None]
+        own = np.where(self.contradictory, self.scatter / np.maximum(self.counts - 1, 1), 0.0)
+        return np.asarray(np.sqrt(np.maximum(pooled, own) / (2 * self.counts)))
 
 
 @dataclass
@@ -289,7 +327,13 @@ class _Reader:
             of_initial = np.stack([of_rows[:, members].mean(axis=1) for members in places], axis=1)
             return of_initial, of_runs, self._mass_error(rows, trials, on.shape)
 
-        return Group(
+        scatter = np.zeros((len(rotors), 1 + len(trials), len(channels)))
+        for j, cells in enumerate((places, *matches)):
+            means = vibration if j == 0 else runs[:, j - 1]
+            for s, members in enumerate(cells):
+                apart_by = np.abs(self.vibration[rows[:, members]] - means[:, s, None])
+                scatter[:, j, s] = np.square(apart_by).sum(axis=1)
+        group = Group(
             rotors,
             channels,
             planes,
@@ -301,8 +345,35 @@ class _Reader:
             standing_masses,
             base,
             weights,
+            np.array([[len(members) for members in cells] for cells in (places, *matches)]),
+            scatter,
             errors,
         )
+        self._contradictions(group, rows, (places, *matches))
+        return group
+
+    def _contradictions(self, group: Group, rows: Rows, cells: Sequence[list[list[int]]]) -> None:
+        """Say which repeats contradict each other, with their figures."""
+        found = np.argwhere(group.contradictory & (group.counts > 1))
+        size, phase = self.table.numbers["amplitude"], self.table.numbers.get("phase")
+        for i, j, s in found[:SHOWN].tolist():
+            members = rows[i, cells[j][s]].tolist()
+            figures = [f"{size.values[row]:g} {size.unit}" for row in members]
+            if phase is not None:
+                angle = "°" if phase.unit == "deg" else " rad"
+                figures = [
+                    f"{figure} at {phase.values[row]:g}{angle}"
+                    for figure, row in zip(figures, members, strict=True)
+                ]
+            more = f" and {len(figures) - SHOWN} more" if len(figures) > SHOWN else ""
+            mean = group.initial[i, s] if j == 0 else group.runs[i, j - 1, s]
+            self._warn(
+                f"{self._of(group.rotors[i:])}run {self.run[members[0]]}: sensor {group.channels[s]} was read {len(members)} "
+                f"times, and the readings contradict each other: {', '.join(figures[:SHOWN])}{more}; their mean "
+                f"has the size {abs(mean):.4g}: read again, or leave out what is wrong"
+            )
+        if len(found) > SHOWN:
+            self._warn(f"… and {len(found) - SHOWN} further readings that contradict each other")
 
     def _vibration_error(self, rows: Rows) -> Real:
         """Bound the errors of readings and of their share in a mean, (g, n)."""
@@ -414,9 +485,10 @@ class _Reader:
             try:
                 if len(parts) != names:
                     raise ValueError
-                values[i] = parse_number(parts[place])
+                values[i] = cells.number(parts[place])
             except ValueError:
                 many = f", {names} joined by ';' as in trial_plane" if names > 1 else ""
+                many += ", with a decimal comma as elsewhere in the file" if cells.decimal_comma else ""
                 raise self.fail(row, cells.header, text, expected + many) from None
         return values
 

@@ -19,6 +19,7 @@ from balancing import (
     condition_number,
     influence_coefficients,
     influence_from_amplitudes,
+    initial_unbalance,
     least_squares,
     minimax,
     place,
@@ -38,6 +39,7 @@ Complex = NDArray[np.complex128]
 
 NEARLY = 0.1  # a plane whose effect others bring about but for this share is said to be nearly dependent
 SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
+MANY = 200  # rotors whose uncertainties are worked out unasked
 SHOWN = 5  # of so many rotors the same is said, of the others together
 UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
 
@@ -84,6 +86,8 @@ class Solved:
     covariance: Real | None = None
     residual_95: Real | None = None
     fits: list[AmplitudeFit] = field(default_factory=list)
+    unbalance: Complex | None = None
+    """(g, p): the rotor's own in its initial state; NaN where the readings do not determine it."""
 
     @property
     def total(self) -> Complex:
@@ -151,9 +155,21 @@ class Solver:
         solved = Solved(
             group, planes, alpha, initial, corrections, standing, residual, condition, bounds, fits=fits
         )
-        if wanted.reading_error is not None:
-            self._confidence(solved, runout)
+        if wanted.tolerance is not None:
+            solved.unbalance = initial_unbalance(alpha, initial, group.weights, singular=SINGULAR)
+        limited = bool(wanted.objective == "minimax" or wanted.max_mass or wanted.max_residual is not None)
+        if wanted.reading_error is not None or self._repeats_tell(group, limited):
+            self._confidence(solved, runout, limited)
         return solved
+
+    def _repeats_tell(self, group: Group, limited: bool) -> bool:
+        """Whether the scatter of repeats is to give uncertainties that nobody asked for."""
+        if self.wanted.four_run or not group.reading_sd.any():
+            return False
+        if len(group.rotors) <= (SHOWN if limited else MANY):
+            return True
+        self.warn("uncertainties of so many rotors are worked out with --reading-error alone")
+        return False
 
     def limits(self, planes: list[str]) -> Real | None:
         given = self.wanted.max_mass
@@ -279,13 +295,11 @@ class Solver:
                     self.warn(text)
         return fits
 
-    def _confidence(self, solved: Solved, runout: Complex) -> None:
+    def _confidence(self, solved: Solved, runout: Complex, limited: bool) -> None:
         """Propagate the reading errors, rotor by rotor."""
-        assert self.wanted.reading_error is not None
-        relative, angle = self.wanted.reading_error
+        relative, angle = self.wanted.reading_error or (0.0, 0.0)
         group, wanted = solved.group, self.wanted
         covariances, residuals = [], []
-        limited = wanted.objective == "minimax" or wanted.max_mass or wanted.max_residual is not None
         draws = wanted.monte_carlo or 4000
         for i in range(len(group.rotors)):
             readings = Readings(
@@ -296,6 +310,8 @@ class Solver:
                 trial_masses=None if self.stored is not None else group.on[i],
                 influence=solved.alpha[i],
                 runout=runout,
+                scatter=group.mean_error[i] if group.reading_sd[i] else None,
+                degrees_of_freedom=group.repeats,
             )
             w = None if group.weights is None else group.weights[i]
             total = solved.total[i]
@@ -405,10 +421,19 @@ class Solver:
                         f"{self._amount(abs(other)):.6g} {self._unit} at {float(degrees(other)):.2f}°: a further trial run at "
                         "another angle decides"
                     )
-        if self.wanted.tolerance is not None:
-            _, whole = self.wanted.tolerance
-            size = np.abs(solved.total) * (1.0 if self.runs.per == "unbalance" else self.wanted.radius or 1.0)
-            good = np.flatnonzero((size <= whole / len(planes)).all(axis=1))
+        if self.wanted.tolerance is not None and solved.unbalance is not None:
+            unknown = np.isnan(solved.unbalance)
+            lost = np.flatnonzero(unknown.any(axis=1))
+            for i in lost[:SHOWN]:
+                told = [planes[p] for p in np.flatnonzero(unknown[i])]
+                self.warn(
+                    f"{self.of(group, int(i))}the initial unbalance is not determined in plane{'s' * (len(told) > 1)} "
+                    f"{' and '.join(told)}: {_why(group, planes, told)}; whether it is within the tolerance is not known"
+                )
+            self._more(len(lost), "the initial unbalance is not determined in every plane")
+            # from here on means with the trial masses that were left on the rotor
+            size = self._in_kg_m(solved.unbalance + solved.standing)
+            good = np.flatnonzero((size <= self.wanted.tolerance[1] / len(planes)).all(axis=1))
             for i in good[:SHOWN]:
                 self.warn(
                     f"{self.of(group, int(i))}already within the permissible residual unbalance in every plane: stop, no "
@@ -439,11 +464,17 @@ class Solver:
             self._more(int(little.sum()), f"run {trial.run} changed the vibration by less than 30 % and 30°")
 
     def _verdict(self, solved: Solved, i: int) -> list[tuple[str, float, float]]:
-        """For each plane: name, permissible and initial unbalance, kg·m."""
+        """For each plane: name, permissible and initial unbalance, kg·m; NaN where the readings do not determine it."""
         assert self.wanted.tolerance is not None
+        assert solved.unbalance is not None
         share = self.wanted.tolerance[1] / len(solved.planes)
-        size = np.abs(solved.total[i]) * (1.0 if self.runs.per == "unbalance" else self.wanted.radius or 1.0)
+        size = self._in_kg_m(solved.unbalance[i])
         return [(plane, share, float(u)) for plane, u in zip(solved.planes, size, strict=True)]
+
+    def _in_kg_m(self, corrections: Complex) -> Real:
+        """Return the unbalances of masses at the trial radius, or of unbalances as they are."""
+        arm = 1.0 if self.runs.per == "unbalance" else self.wanted.radius or 1.0
+        return np.asarray(np.abs(corrections) * arm)
 
     @property
     def _unit(self) -> str:
@@ -464,3 +495,10 @@ class Solver:
             for k, mass in enumerate(placed.masses)
             if mass > 0
         ]
+
+
+def _why(group: Group, planes: list[str], told: list[str]) -> str:
+    """Why the readings do not determine the unbalance in the planes `told`."""
+    if len(group.channels) < len(planes):
+        return f"{len(group.channels)} readings for {len(planes)} planes"
+    return "no reading responds to it" if len(told) == 1 else "the readings cannot tell them apart"

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.read.rounding import angle_text
 from cli.read.units import degrees, from_si
-from cli.show.output import table_text
+from cli.show.text import angle_text, table_text
 
 if TYPE_CHECKING:
     from cli.field_job import Field, Solved
@@ -140,12 +139,22 @@ def summary(field: Field, solved: Solved, i: int) -> list[str]:
         lines.append(
             f"smallest possible largest residual, by the dual problem: {solved.bound[i]:.10g} {unit(field)}"
         )
-    if solved.residual_95 is not None:
-        assert field.wanted.reading_error is not None
-        relative, angle = field.wanted.reading_error
+    if solved.group.repeats:
         lines.append(
-            f"with reading errors of {100 * relative:.3g} % and {np.degrees(angle):.3g}° (one standard deviation) the largest residual "
-            f"stays below {solved.residual_95[i]:.4g} {unit(field)} in 95 % of cases"
+            f"repeated readings scatter by {solved.group.reading_sd[i]:.4g} {unit(field)} (standard deviation of one reading as a "
+            f"vector, {solved.group.repeats} complex degree{'s' * (solved.group.repeats > 1)} of freedom)"
+        )
+    if solved.residual_95 is not None:
+        known = []
+        if field.wanted.reading_error is not None:
+            relative, angle = field.wanted.reading_error
+            known.append(f"of {100 * relative:.3g} % and {np.degrees(angle):.3g}°")
+        if solved.group.reading_sd[i]:
+            known.append(
+                f"{'or ' if known else ''}as the repeats scatter{' where that is more' if known else ''}"
+            )
+        lines.append(
+            f"with reading errors {' '.join(known)} (one standard deviation) the largest residual stays below {solved.residual_95[i]:.4g} {unit(field)} in 95 % of cases"
         )
     if np.isfinite(solved.condition[i]):
         lines.append(f"condition number of the scaled coefficients: {solved.condition[i]:.4g}")
@@ -165,9 +174,13 @@ def verdict(field: Field, solved: Solved, i: int) -> list[str]:
         f"tolerance{' ' + grade if grade else ''}: U_per = {from_si(whole, 'unbalance', 'g_mm'):.6g} g·mm, shared equally"
     ]
     for plane, share, before in field._verdict(solved, i):
+        initial = (
+            "not determined"
+            if np.isnan(before)
+            else f"{from_si(before, 'unbalance', 'g_mm'):.6g} g·mm ({'within' if before <= share else 'beyond'})"
+        )
         lines.append(
-            f"  plane {plane}: permissible {from_si(share, 'unbalance', 'g_mm'):.6g}, initial "
-            f"{from_si(before, 'unbalance', 'g_mm'):.6g} g·mm ({'within' if before <= share else 'beyond'})"
+            f"  plane {plane}: permissible {from_si(share, 'unbalance', 'g_mm'):.6g}, initial {initial}"
         )
     return lines
 

@@ -11,9 +11,10 @@ import numpy as np
 
 from balancing import Placement, correct, drill_depth, place, place_from_stock, transfer
 from cli.errors import DataError
-from cli.read.rounding import EPS, angle_error, angle_text, size_error, vector_error
+from cli.read.rounding import EPS, angle_error, size_error, vector_error
 from cli.read.units import degrees, from_si, phasor, to_si
-from cli.show.output import Shown
+from cli.show.shown import Shown
+from cli.show.text import angle_text
 
 PI = math.pi
 
@@ -192,14 +193,14 @@ class _Placed:
         unit = self.wanted.unit
         columns: dict[str, Any] = {}
         if self.wanted.planes is not None:
-            columns["z_mm"] = [float(from_si(share.z, "length", "mm")) for share, _ in self.used]
+            columns["z_mm"] = [from_si(share.z or 0.0, "length", "mm") for share, _ in self.used]
         columns |= {
             "position": [str(i + 1) for _, i in self.used],
             "angle_deg": self.angle,
             f"mass_{unit}": [float(from_si(mass, "mass", unit)) for mass in self.mass],
         }
         if self.wanted.drill is not None:
-            columns["drill_depth_mm"] = [float(from_si(depth, "length", "mm")) for depth in self.depth]
+            columns["drill_depth_mm"] = [from_si(depth or 0.0, "length", "mm") for depth in self.depth]
             columns["holes"] = self.holes
         return Shown(
             document=self.document,

@@ -5,9 +5,10 @@ to space. Products of inertia are +∫ x y dm, and a tensor carries them with th
 """
 
 from rigidbody3d.attitude import from_scipy, to_scipy
+from rigidbody3d.body import Body, compose
 from rigidbody3d.freebody import FreeBody, FreeState
 from rigidbody3d.gyroscope import cones, gyroscopic_couple, sleeping_threshold, steady_precession
-from rigidbody3d.inertia import Body, check, compose, principal, products, shift, tensor
+from rigidbody3d.inertia import check, principal, products, shift, tensor
 from rigidbody3d.momentum import Motion, Wrench, strike
 from rigidbody3d.shaft import Shaft
 from rigidbody3d.shapes import SHAPES, inertia_of, load_mesh, measure_of, mesh

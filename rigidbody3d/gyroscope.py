@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rigidbody3d import rounding
+
 Array = NDArray[np.float64]
 
 
@@ -40,8 +42,6 @@ class Steady(_Rates):
 
         Where the two nearly coincide, at the least spin that allows them, the square root leaves half the digits.
         """
-        from rigidbody3d import rounding
-
         slow, fast = rounding.steady(*self.given)
         return slow.error, fast.error
 
@@ -122,8 +122,6 @@ class Cones(_Cones):
 
     def error_estimate(self) -> tuple[Array, ...]:
         """Return bounds of the rounding errors of the four, (...): small beside each, since nothing here cancels."""
-        from rigidbody3d import rounding
-
         return tuple(x.error for x in rounding.cones(*self.given))
 
 

@@ -13,13 +13,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-if TYPE_CHECKING:
-    from rigidbody3d.rounding import BodyError
+from dalembert.arithmetic.bounded import read
+from rigidbody3d import rounding
+from rigidbody3d.inertia import shift
+from rigidbody3d.rounding import BodyError
 
 Array = NDArray[np.float64]
 
@@ -222,9 +224,18 @@ class Motion:
         >>> bool((disk.error_estimate("rate") < 1e-12).all())
         True
         """
-        from rigidbody3d import rounding
-
-        return rounding.motion(self, of, point, body, given)
+        frame, pivot = (None if x is None else read(x, given) for x in (self.frame_omega, self.pivot))
+        return rounding.motion(
+            of,
+            rounding.numbers(self.mass, self.center, self.inertia, body),
+            read(self.omega, given),
+            read(self.alpha, given),
+            frame,
+            read(self.velocity, given),
+            read(self.acceleration, given),
+            pivot,
+            read(np.nan if point is None else point, given),
+        )
 
     @classmethod
     def about_fixed_point(
@@ -360,8 +371,6 @@ def strike(
         spin = np.asarray(np.linalg.solve(I, np.cross(r, J)[..., None])[..., 0])
         move = np.asarray(J / m[..., None])
         return Blow(move, spin, np.zeros_like(move))
-    from rigidbody3d.inertia import shift
-
     p = np.asarray(pin, dtype=float)
     at_pin = I + shift(m, p)
     moment = np.cross(r - p, J)

@@ -17,7 +17,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigidbody3d.inertia import Body
+from dalembert.arithmetic.bounded import read
+from rigidbody3d import rounding
+from rigidbody3d.body import Body
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -160,9 +162,10 @@ class Shaft:
         >>> bool((Shaft(rotor, (0.0, 2.0), 100.0).error_estimate("dynamic") < 1e-13).all())
         True
         """
-        from rigidbody3d import rounding
-
-        return rounding.shaft(self, of, given)
+        bearings, speed, speed_rate, gravity = (
+            read(x, given) for x in (self.bearings, self.speed, self.speed_rate, self.gravity)
+        )
+        return rounding.shaft(of, self.body.numbers(), bearings, speed, speed_rate, gravity)
 
     def with_masses(self, unbalance: ArrayLike, z: ArrayLike) -> Array:
         """Return the dynamic forces with further unbalances (..., k) at z (k,) on the shaft, (..., 2, 2), N.

@@ -17,23 +17,24 @@ differences: they are worked out once per top with 200 digits.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.exact import EPS
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
+from rigidbody3d.rounding_in_time import FEW, STATE, apart, require
+from rigidbody3d.states import in_blocks
 from rigidbody3d.top_roots import constants
 
 Array = NDArray[np.float64]
 
-BLOCK = 8192
-
-
-LIGHTEST = 1e60  # I ω² over m g l: what it takes from the 200 digits of the roots
+LIGHTEST = 1e60
+"""I ω² over m g l: what it takes from the 200 digits of the roots."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,8 @@ class Top:
     mgl: ArrayLike
     omega: ArrayLike
     attitude: ArrayLike = (1.0, 0.0, 0.0, 0.0)
+    _lead: tuple[int, ...] = field(init=False, repr=False, compare=False)
+    _rotation: TopRotation = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         I = np.asarray(self.inertia, dtype=float)
@@ -97,17 +100,14 @@ class Top:
             )
         lead = np.broadcast_shapes(I.shape[:-1], mgl.shape, omega.shape[:-1], q.shape[:-1])
         unit = np.broadcast_to(quaternion.normalize(q), lead + (4,)).reshape(-1, 4)
-        motion = _Motion(
+        rotation = TopRotation(
             np.broadcast_to(I, lead + (3,)).reshape(-1, 3),
             np.broadcast_to(mgl, lead).reshape(-1),
             np.broadcast_to(omega, lead + (3,)).reshape(-1, 3),
             unit,
         )
         object.__setattr__(self, "_lead", lead)
-        object.__setattr__(self, "_motion", motion)
-
-    _lead: tuple[int, ...] = ()
-    _motion: _Motion = None  # type: ignore[assignment]
+        object.__setattr__(self, "_rotation", rotation)
 
     def at(self, t: ArrayLike) -> TopState:
         """Return the state at times t, (n,) or a single one, s: `.omega` (..., n, 3), `.attitude` (..., n, 4)."""
@@ -119,7 +119,7 @@ class Top:
     @property
     def nutation(self) -> Array:
         """The least and the largest angle of the axis with the vertical, (..., 2), rad."""
-        m = self._motion
+        m = self._rotation
         low = 2 * np.arctan2(np.sqrt(m.below + 0), np.sqrt(2 - m.below))
         high = 2 * np.arctan2(np.sqrt(2 - m.above), np.sqrt(m.above))
         return np.concatenate([low, high], axis=-1).reshape(self._lead + (2,))
@@ -127,7 +127,7 @@ class Top:
     @property
     def nutation_period(self) -> Array:
         """The period of that angle, (...), s; infinite on the way to the sleeping position."""
-        return np.asarray(2 * self._motion.p.quarter / self._motion.rate).reshape(self._lead)
+        return np.asarray(2 * self._rotation.p.quarter / self._rotation.rate).reshape(self._lead)
 
 
 @dataclass(frozen=True)
@@ -139,14 +139,7 @@ class TopState:
 
     @cached_property
     def _both(self) -> Array:
-        t = np.atleast_1d(self.time)
-        motion = self.top._motion
-        out = np.empty((motion.count, len(t), 7))
-        step = max(1, BLOCK // motion.count)
-        for start in range(0, len(t), step):
-            motion.fill(t[start : start + step], out[:, start : start + step])
-        shaped = out.reshape(self.top._lead + (len(t), 7))
-        return shaped if self.time.ndim else shaped[..., 0, :]
+        return in_blocks(self.top._rotation.state_at, self.time, self.top._lead, 7)
 
     @property
     def attitude(self) -> Array:
@@ -167,10 +160,8 @@ class TopState:
     def energy(self) -> Array:
         """Kinetic and potential energy, m g l cos θ included, (..., n), J."""
         w, x, y, z = np.moveaxis(self.attitude, -1, 0)
-        mgl = np.asarray(self.top.mgl, dtype=float)
-        mgl = mgl[..., None] if self.time.ndim and mgl.ndim else mgl
         return np.asarray(
-            (self._moments * self.omega**2).sum(axis=-1) / 2 + mgl * (w * w + z * z - x * x - y * y)
+            (self._moments * self.omega**2).sum(axis=-1) / 2 + self._mgl * (w * w + z * z - x * x - y * y)
         )
 
     def error_estimate(self, of: str = "attitude", moments: ArrayLike = 0.0) -> Array:
@@ -183,19 +174,81 @@ class TopState:
         moments
             Bounds of the errors of the moments of inertia, (..., 3), kg·m², where they were worked out.
         """
-        from rigidbody3d import rounding_in_time
+        require(of, *STATE)
+        bound = self._rounding(of)
+        E, given = np.asarray(moments, dtype=float), self.top
+        # each moment in turn is put off by its error
+        for entry in ([1.0, 1.0, 0.0], [0.0, 0.0, 1.0]) if E.any() else ():
+            I = _moments(given.inertia) + E * entry
+            bound = bound + apart(Top(I, given.mgl, given.omega, given.attitude).at(self.time), self, of)
+        return bound
 
-        return rounding_in_time.top(self, of, moments)
+    def _rounding(self, of: str) -> Array:
+        """Bound what rounding does on the way from the given moments to the state."""
+        rotation, lead = self.top._rotation, self.top._lead
+        shape = lead + self.time.shape
+        late, turned, runs = (v.reshape(shape) for v in rotation.phase_errors(np.atleast_1d(self.time)))
+        late, turned, runs = EPS * late, FEW + EPS * turned, EPS * runs
+        if of == "attitude":
+            return turned
+        I = np.broadcast_to(self._moments, self.omega.shape)
+        w, x, y, z = np.moveaxis(self.attitude, -1, 0)
+        mgl, omega = self._mgl, self.omega
+        weight = np.stack([2 * mgl * (y * z + w * x), -2 * mgl * (x * z - w * y), 0 * x], axis=-1)
+        torque = np.cross(I * omega, omega) + weight
+        rise = np.divide(torque, I, out=np.zeros_like(torque), where=I > 0)
+        # the swing is a sum of two terms with opposite signs, each as large as the fall from the vertical gives
+        up, down = np.sqrt(w * w + z * z), np.sqrt(x * x + y * y)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            terms = [
+                np.abs(push.reshape(lead + (1,) * self.time.ndim)) * np.where(b > 0, a / b, 0.0)
+                for push, a, b in ((rotation.plus, down, up), (rotation.minus, up, down))
+            ]
+        swing = np.minimum(terms[0] + terms[1], 1e300) / (2 * I[..., 0])
+        level = np.sqrt(np.square(omega[..., :2]).sum(axis=-1))
+        around = FEW * (level + swing) + runs * level
+        bound = late[..., None] * np.sqrt(np.square(rise).sum(axis=-1, keepdims=True)) + around[..., None]
+        bound = np.concatenate([bound, np.zeros_like(bound), EPS * np.abs(omega[..., 2:])], axis=-1)
+        bound[..., 1] = bound[..., 0]
+        if of == "omega":
+            return np.asarray(bound)
+        kinetic = (I * omega**2).sum(axis=-1) / 2
+        if of == "energy":  # it stays what it was however late the state is
+            return np.asarray(2 * FEW * (kinetic + np.abs(mgl)) + I[..., 0] * level * FEW * swing)
+        size = np.sqrt(np.square(I * omega).sum(axis=-1))
+        error = turned * size + np.sqrt(np.square(I * bound).sum(axis=-1))
+        return np.asarray(error[..., None] + np.zeros(3))
 
     @property
     def _moments(self) -> Array:
-        I = np.asarray(self.top.inertia, dtype=float)
-        I = np.diagonal(I, axis1=-2, axis2=-1) if I.shape[-2:] == (3, 3) else I
+        I = _moments(self.top.inertia)
         return I[..., None, :] if self.time.ndim else I
 
+    @property
+    def _mgl(self) -> Array:
+        mgl = np.asarray(self.top.mgl, dtype=float)
+        return mgl[..., None] if self.time.ndim and mgl.ndim else mgl
 
-class _Motion:
-    """What is constant in the motion of b tops; arrays (b, 1)."""
+
+def _moments(inertia: ArrayLike) -> Array:
+    """Return principal moments (..., 3) that are given as such or as a diagonal tensor."""
+    I = np.asarray(inertia, dtype=float)
+    return np.diagonal(I, axis1=-2, axis2=-1) if I.shape[-2:] == (3, 3) else I
+
+
+class PhaseErrors(NamedTuple):
+    """What rounding does to the phases of b tops at n times, (b, n) each, in units of ε."""
+
+    late: Array
+    """By how much the state may be late, s."""
+    turned: Array
+    """By how much the body may be turned, rad."""
+    runs: Array
+    """How far the angles have run that turn ω about the axis, rad."""
+
+
+class TopRotation:
+    """The motion of b tops: what is constant in it, arrays (b, 1), and the state at any time."""
 
     def __init__(self, I: Array, mgl: Array, omega: Array, q: Array) -> None:
         self.count, self.omega = len(I), omega
@@ -301,8 +354,27 @@ class _Motion:
             c["minus_line"] * (at.r - (n + p.m) * smooth),
         )
 
-    def fill(self, t: Array, out: Array) -> None:
-        """Write attitude and angular velocity at times t, (b, n, 7)."""
+    def phase_errors(self, t: Array) -> PhaseErrors:
+        """Bound what rounding does to the phases at times t."""
+        way = np.abs(t)
+        phases = (
+            *self._phases(jacobi(self.begin + self.rate * t, self.p)),
+            *self._phases(jacobi(self.begin, self.p)),
+        )
+        begin = 1 + np.abs(self.begin)
+        late = 3 * begin / self.rate + 4 * way
+        runs = sum(np.abs(x) for x in phases) + np.abs(self.extra) * way
+        turned = begin + 4 * self.rate * way + 3 * runs
+        if len(self.simple):
+            spin, nod = (np.sqrt(np.square(x).sum(axis=-1))[:, None] for x in (self.spin, self.precession))
+            late[self.simple] = 4 * way
+            runs[self.simple] = (spin + nod) * way
+            turned[self.simple] = 4 * (spin + nod) * way
+        return PhaseErrors(late, turned, runs)
+
+    def state_at(self, t: Array) -> Array:
+        """Attitude and angular velocity at times t, (b, n, 7)."""
+        out = np.empty((self.count, len(t), 7))
         at = jacobi(self.begin + self.rate * t, self.p)
         plus, minus = self._phases(at)
         turn = self.extra * t / 2
@@ -333,7 +405,8 @@ class _Motion:
         upside = np.flatnonzero(self.upside)
         if len(upside):
             out[upside, :, :4] = quaternion.compose([0.0, -1.0, 0.0, 0.0], out[upside, :, :4])
+        return out
 
 
-def _unit(z: NDArray[Any]) -> NDArray[np.complex128]:
+def _unit(z: Array | NDArray[np.complex128]) -> NDArray[np.complex128]:
     return np.asarray(np.exp(1j * np.angle(z)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 
@@ -55,24 +56,32 @@ class Mechanism(Description):
     """
 
     @classmethod
-    def from_toml(cls, path: str | Path) -> Mechanism:
+    def from_toml(cls, path: str | Path, load: Callable[[Path], bytes] = Path.read_bytes) -> Mechanism:
         """Read the TOML description of a mechanism.
 
         Parameters
         ----------
         path : str or Path
+        load : callable, optional
+            Reads it and the tables beside it.
 
         Raises
         ------
         DescriptionError
             Names the file, the table and the key, what was found and what was expected.
         """
-        return read(Path(path), cls)
+        return read(Path(path), cls, load)
 
     @classmethod
-    def from_toml_text(cls, text: str, file: str = "<text>", folder: Path | None = None) -> Mechanism:
+    def from_toml_text(
+        cls,
+        text: str,
+        file: str = "<text>",
+        folder: Path | None = None,
+        load: Callable[[Path], bytes] = Path.read_bytes,
+    ) -> Mechanism:
         """Read the TOML text of a description; `file` names it in messages, `folder` is where its tables lie."""
-        return read_text(text, cls, file, folder)
+        return read_text(text, cls, file, folder, load)
 
     @cached_property
     def assembly(self) -> Assembly:

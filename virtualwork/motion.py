@@ -384,7 +384,7 @@ class Motion:
     def counterweights(self, links: Sequence[str]) -> tuple[dict[str, complex], Complexes, Complexes]:
         """The counterweights on links with a fixed pivot that leave the least RMS shaking force.
 
-        See `virtualwork.counterweights.least_squares`.
+        See `virtualwork.study.counterweights.least_squares`.
         """
         return least_squares(self, links)
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.stress.pairs import Pairs
-from rigidbody3d import Body, Motion, Shaft, principal
-from rigidbody3d.inertia import compose, turn
+from rigidbody3d import Body, Motion, Shaft, compose, principal
+from rigidbody3d.inertia import turn
 
 Real = NDArray[np.float64]
 exact = np.vectorize(Fraction, otypes=[object])

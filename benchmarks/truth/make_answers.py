@@ -6,22 +6,18 @@ Nothing of dalembert is imported: each answer is worked out here by another road
 from __future__ import annotations
 
 import json
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import mpmath as mp
 import numpy as np
 
+from benchmarks.truth.four_bar import circles
+from benchmarks.truth.rotation import period_of, power, taylor
+
 FOLDER = Path(__file__).with_name("answers")
 mp.mp.dps = 50
-
-
-def circles(p: Any, r1: Any, q: Any, r2: Any, sign: int) -> Any:
-    """Return the point at r1 from p and r2 from q, on the side of q - p that `sign` gives."""
-    d = abs(q - p)
-    along = (d**2 + r1**2 - r2**2) / (2 * d)
-    up = mp.sqrt(r1**2 - along**2)
-    return p + (q - p) / d * mp.mpc(along, sign * up)
 
 
 def series(position: Any, order: int = 2) -> list[Any]:
@@ -51,7 +47,7 @@ def four_bar() -> dict[str, Any]:
     def links(t: Any, angle: float) -> tuple[Any, Any, Any, Any]:
         e1 = mp.expj(mp.mpf(angle) + omega * t)
         # C left of the line from B to D is the open assembly: sign -1 on the other side
-        point = circles(a * e1, b, mp.mpc(d), c, 1)
+        point = circles(a * e1, b, mp.mpc(d), c, 1)[0]
         return e1, (point - a * e1) / b, (point - d) / c, point
 
     out: dict[str, list[Any]] = {"C": [], "coupler": [], "rocker": [], "torque": [], "reactions": []}
@@ -122,9 +118,9 @@ def klann() -> dict[str, Any]:
     def leg(t: Any, angle: float) -> list[Any]:
         """e^{iθ} of coupler, rocker, arm and leg, and the foot."""
         b = pin_a + ab * mp.expj(mp.mpf(angle) + 10 * t)
-        c = circles(b, bc, pin_d, dc, 1)
+        c = circles(b, bc, pin_d, dc, 1)[0]
         g = c + cg * (c - b) / bc * mp.expj(10 * turn)
-        f = circles(pin_e, ef, g, fg, 1)
+        f = circles(pin_e, ef, g, fg, 1)[0]
         h = g + gh * (g - f) / fg * mp.expj(-40 * turn)
         return [(c - b) / bc, (c - pin_d) / dc, (f - pin_e) / ef, (g - f) / fg, h]
 
@@ -223,7 +219,7 @@ def minimax() -> dict[str, Any]:
 
 
 def rotation() -> dict[str, Any]:
-    """Torque-free bodies: attitude after given times, by a Taylor series of high order in small steps."""
+    """Torque-free bodies: attitude after given times, by power series in integers."""
     bodies = [
         ([1.0, 2.0, 3.0], [1.0, 0.1, 0.5], "generic"),
         ([1.0, 2.0, 3.0], [0.5, 0.15, 0.2886751], "near the separatrix"),
@@ -231,103 +227,36 @@ def rotation() -> dict[str, Any]:
         ([2.0, 2.0, 1.0], [0.3, 0.4, 2.0], "symmetric"),
         ([1.0, 1.5, 1.7], [0.01, 2.0, 0.01], "the middle axis"),
     ]
-    out = []
-    for inertia, omega, name in bodies:
-        times = [1.0, 5.0, 20.0]
-        state = [*map(mp.mpf, omega), mp.mpf(1), mp.mpf(0), mp.mpf(0), mp.mpf(0)]
-        at, answers = mp.mpf(0), []
-        for time in times:
-            steps = int(np.ceil((time - float(at)) / 0.125))
-            h = (mp.mpf(time) - at) / steps
-            for _ in range(steps):
-                state = taylor_step([mp.mpf(x) for x in inertia], state, h, 40)
-            at = mp.mpf(time)
-            answers.append(
-                {
-                    "t_s": time,
-                    "omega": [float(x) for x in state[:3]],
-                    "attitude": [float(x) for x in state[3:]],
-                }
-            )
-        out.append({"name": name, "inertia": inertia, "omega": omega, "answers": answers})
-    return {"bodies": out, "long": long_rotation()}
-
-
-def long_rotation() -> dict[str, Any]:
-    """A generic body after up to 10⁵ periods: N times one period's turn about H, then what is left by Taylor series.
-
-    After one period of ω in body axes the body has turned about the momentum by a fixed angle.
-    """
-    inertia, omega = [mp.mpf(1), mp.mpf(2), mp.mpf(3)], [mp.mpf(1), mp.mpf("0.1"), mp.mpf("0.5")]
-    omega = [mp.mpf(float(x)) for x in omega]
-    i1, i2, i3 = inertia
-    twice_energy = mp.fsum(i * w**2 for i, w in zip(inertia, omega, strict=True))
-    square = mp.fsum((i * w) ** 2 for i, w in zip(inertia, omega, strict=True))
-    assert square < i2 * twice_energy  # it circles the axis of the least moment: 1 and 3 change places
-    rate = mp.sqrt((i2 - i1) * (i3 * twice_energy - square) / (i1 * i2 * i3))
-    m = (i3 - i2) * (square - twice_energy * i1) / ((i2 - i1) * (twice_energy * i3 - square))
-    period = 4 * mp.ellipk(m) / rate
-    start = [*omega, mp.mpf(1), mp.mpf(0), mp.mpf(0), mp.mpf(0)]
-
-    def run(time: Any) -> list[Any]:
-        steps, state = max(1, int(mp.ceil(time / 0.125))), start
-        for _ in range(steps):
-            state = taylor_step(inertia, state, time / steps, 40)
-        return state
-
-    once = run(period)
-    assert max(abs(x - y) for x, y in zip(once[:3], omega, strict=True)) < 1e-30
-    momentum = [i * w for i, w in zip(inertia, omega, strict=True)]
-    unit = [h / mp.sqrt(square) for h in momentum]
-    half = mp.atan2(mp.fsum(x * u for x, u in zip(once[4:], unit, strict=True)), once[3])
-    answers = []
-    for time in (1e1, 1e3, 1e4, 1e5, 1e6, 1.4897368369859e6):
-        turns = int(mp.floor(mp.mpf(time) / period))
-        state = run(mp.mpf(time) - turns * period)
-        c, s = mp.cos(turns * half), mp.sin(turns * half)
-        w, x, y, z = state[3:]
-        a, b, d = (s * u for u in unit)
-        turned = [c * w - a * x - b * y - d * z, c * x + a * w + b * z - d * y]
-        turned += [c * y - a * z + b * w + d * x, c * z + a * y - b * x + d * w]
-        answers.append(
-            {
-                "t_s": time,
-                "periods": turns,
-                "omega": [float(v) for v in state[:3]],
-                "attitude": [float(v) for v in turned],
-            }
-        )
     return {
-        "inertia": [float(i) for i in inertia],
-        "omega": [float(w) for w in omega],
-        "period_s": float(period),
-        "answers": answers,
+        "bodies": [
+            {
+                "name": name,
+                "inertia": inertia,
+                "omega": omega,
+                "answers": [at(inertia, omega, time) for time in (1.0, 5.0, 20.0)],
+            }
+            for inertia, omega, name in bodies
+        ],
+        "long": long_rotation(),
     }
 
 
-def taylor_step(inertia: list[Any], state: list[Any], h: Any, order: int) -> list[Any]:
-    """Advance Euler's equations and q' = q·(0, ω)/2 by the power series of both."""
-    i1, i2, i3 = inertia
-    rate = [(i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3]
-    c = [[x] for x in state]
+def at(inertia: list[float], omega: list[float], time: Any, attitude: Any = (1, 0, 0, 0)) -> dict[str, Any]:
+    w, q = taylor(inertia, omega, time, attitude)
+    return {"t_s": float(time), "omega": [float(x) for x in w], "attitude": [float(x) for x in q]}
 
-    def product(x: list[Any], y: list[Any], n: int) -> Any:
-        return mp.fsum(x[k] * y[n - k] for k in range(n + 1))
 
-    for n in range(order):
-        w = c[:3]
-        for axis in range(3):
-            w[axis].append(rate[axis] * product(w[(axis + 1) % 3], w[(axis + 2) % 3], n) / (n + 1))
-        q = c[3:]
-        derivative = [
-            -product(q[1], w[0], n) - product(q[2], w[1], n) - product(q[3], w[2], n),
-            product(q[0], w[0], n) + product(q[2], w[2], n) - product(q[3], w[1], n),
-            product(q[0], w[1], n) + product(q[3], w[0], n) - product(q[1], w[2], n),
-            product(q[0], w[2], n) + product(q[1], w[1], n) - product(q[2], w[0], n),
-        ]
-        for axis in range(4):
-            q[axis].append(derivative[axis] / 2 / (n + 1))
-    return [mp.fsum(x * h**n for n, x in enumerate(series)) for series in c]
+def long_rotation() -> dict[str, Any]:
+    """A generic body after up to 10⁵ periods: after each, ω is as it was, and the body has turned by the same angle."""
+    inertia, omega = [1.0, 2.0, 3.0], [1.0, 0.1, 0.5]
+    period = period_of(inertia, omega)
+    once = taylor(inertia, omega, period)[1]
+    answers = []
+    for time in (1e1, 1e3, 1e4, 1e5, 1e6, 1.4897368369859e6):
+        turns = int(Fraction(time) // period)
+        rest = at(inertia, omega, Fraction(time) - turns * period, power(once, turns))
+        answers.append({**rest, "t_s": time, "periods": turns})
+    return {"inertia": inertia, "omega": omega, "period_s": float(period), "answers": answers}
 
 
 def main() -> None:

@@ -282,16 +282,20 @@ class Exact:
 
     def angle(self, link: str, order: int) -> Any:
         """A link's angle, unwrapped from the start, or its time derivative."""
-        return self.theta[link][order] * math.factorial(order)
+        with mp.workdps(DIGITS):
+            return self.theta[link][order] * math.factorial(order)
 
     def loads(self) -> list[tuple[str, complex, Any, Any]]:
-        """(body, point, force, torque) of weights, inertia, forces, torques and springs."""
+        """(body, point, force, torque) of weights, inertia, forces, torques and springs; a motor is a mass on its carrier."""
         m = self.m
         found: list[tuple[str, complex, Any, Any]] = []
+        masses = [(name, link.mass, link.center) for name, link in m.links.items()]
+        masses += [(motor.carrier, motor.mass, motor.center) for motor in m.motors]
+        for name, mass, center in masses:
+            if mass:
+                force = mp.mpf(mass) * (mp.mpc(m.gravity) - self.point(name, center, 2))
+                found.append((name, center, force, mp.mpf(0)))
         for name, link in m.links.items():
-            if link.mass:
-                force = mp.mpf(link.mass) * (mp.mpc(m.gravity) - self.point(name, link.center, 2))
-                found.append((name, link.center, force, mp.mpf(0)))
             if link.inertia:
                 found.append((name, 0j, mp.mpc(0), -mp.mpf(link.inertia) * self.angle(name, 2)))
         for f in m.forces:
@@ -307,18 +311,34 @@ class Exact:
             pull = mp.mpf(s.stiffness) * (1 - mp.mpf(s.free_length) / length) * d
             pull += mp.mpf(s.damping) * mp.re(mp.conj(d) * v) / length**2 * d
             found += [(a, za, pull, mp.mpf(0)), (b, zb, -pull, mp.mpf(0))]
+        for ts in m.torsion_springs:
+            angle, rate = (self.angle(ts.links[1], k) - self.angle(ts.links[0], k) for k in (0, 1))
+            torque = mp.mpf(ts.stiffness) * (angle - mp.mpf(ts.free_angle)) + mp.mpf(ts.damping) * rate
+            found += [(ts.links[0], 0j, mp.mpc(0), torque), (ts.links[1], 0j, mp.mpc(0), -torque)]
         return [load for load in found if load[0] != GROUND]
+
+    def generalized_loads(self) -> list[Any]:
+        """The work of the loads for each coordinate: θ, x, y of every link."""
+        q = [mp.mpf(0)] * (3 * len(self.links))
+        for body, z, force, torque in self.loads():
+            c = 3 * self.links.index(body)
+            arm = mp.mpc(z) * mp.expj(self.theta[body][0])
+            q[c] += torque + mp.im(mp.conj(arm) * force)
+            q[c + 1] += mp.re(force)
+            q[c + 2] += mp.im(force)
+        return q
 
     def forces(self) -> dict[tuple[str, str, int], Any]:
         """The multipliers by label: ("pin:B", body, 0 or 1) the components on that body, ("input", "0", 0) the effort."""
         with mp.workdps(DIGITS):
-            q = [mp.mpf(0)] * (3 * len(self.links))
-            for body, z, force, torque in self.loads():
-                c = 3 * self.links.index(body)
-                arm = mp.mpc(z) * mp.expj(self.theta[body][0])
-                q[c] += torque + mp.im(mp.conj(arm) * force)
-                q[c + 1] += mp.re(force)
-                q[c + 2] += mp.im(force)
-            rows = self._equations(0)
-            self._factor([row for _, row in rows])
-            return dict(zip(self.labels, self._solve_transposed([-v for v in q]), strict=True))
+            rows = [row for _, row in self._equations(0)]
+            for (kind, which, _), row in zip(self.labels, rows, strict=True):
+                if kind == "input":  # a motor on a link reacts there, not on what its angle is counted from
+                    for motor in self.m.motors:
+                        if motor.drives == self.m.inputs[int(which)].link:
+                            c = 3 * self.links.index(motor.carrier)
+                            row[c] = row.get(c, mp.mpf(0)) - 1
+            self._factor(rows)
+            return dict(
+                zip(self.labels, self._solve_transposed([-v for v in self.generalized_loads()]), strict=True)
+            )

@@ -24,7 +24,7 @@ def _power_of_two(x: float) -> Fraction:
     return Fraction(2) ** int(np.floor(np.log2(float(x))))
 
 
-def _step(inertia: list[int], mgl: int, state: State, left: int) -> tuple[State, int]:
+def _step(inertia: list[int], mgl: int, given: list[int], state: State, left: int) -> tuple[State, int]:
     """Advance ω and q by the power series of Euler's equations and q' = q·(0, ω)/2, as far as 40 digits reach."""
     c = [[x] for x in state]
     w, q = c[:3], c[3:]
@@ -34,10 +34,11 @@ def _step(inertia: list[int], mgl: int, state: State, left: int) -> tuple[State,
         return total >> BITS
 
     for n in range(ORDER):
-        torque = [0, 0, 0]
+        torque = given if n == 0 else [0, 0, 0]
         if mgl:  # of the weight, in body axes
-            torque[0] = mgl * (2 * (product(q[2], q[3]) + product(q[0], q[1]))) >> BITS
-            torque[1] = mgl * (2 * (product(q[0], q[2]) - product(q[1], q[3]))) >> BITS
+            torque = torque.copy()
+            torque[0] += mgl * (2 * (product(q[2], q[3]) + product(q[0], q[1]))) >> BITS
+            torque[1] += mgl * (2 * (product(q[0], q[2]) - product(q[1], q[3]))) >> BITS
         # all products of order n before anything of order n + 1 is appended
         new = []
         for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
@@ -67,7 +68,12 @@ def _step(inertia: list[int], mgl: int, state: State, left: int) -> tuple[State,
 
 
 def taylor(
-    inertia: Any, omega: Any, time: Any, attitude: Any = (1, 0, 0, 0), mgl: float = 0.0
+    inertia: Any,
+    omega: Any,
+    time: Any,
+    attitude: Any = (1, 0, 0, 0),
+    mgl: float = 0.0,
+    torque: Any = (0, 0, 0),
 ) -> tuple[list[Fraction], list[Fraction]]:
     """Return ω and q at a time from exact data, as fractions of some 40 digits; in units that are powers of two."""
     heavy, fast = (
@@ -79,9 +85,10 @@ def taylor(
     moments = [_fixed(Fraction(x) / heavy) for x in inertia]
     state = [*(_fixed(Fraction(x) / fast) for x in omega), *map(_fixed, attitude)]
     left, push = _fixed(Fraction(time) * fast), _fixed(Fraction(mgl) / (heavy * fast * fast))
+    given = [_fixed(Fraction(x) / (heavy * fast * fast)) for x in torque]
     length = sum(x * x for x in state[3:])
     while left:
-        state, left = _step(moments, push, state, left)
+        state, left = _step(moments, push, given, state, left)
     if abs(sum(x * x for x in state[3:]) - length) > length >> 100:
         raise ArithmeticError("the series has lost the length of the quaternion")
     return [Fraction(x, ONE) * fast for x in state[:3]], [Fraction(x, ONE) for x in state[3:]]

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.read import options
-from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+from cli.show.columns import Result
+from cli.show.output import command
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
+@command
 def run(
     table: Annotated[
         str, typer.Argument(metavar="TABLE", help="CSV of eccentric masses; - is standard input.")
@@ -54,14 +59,7 @@ def run(
     bearings: Annotated[
         str | None, typer.Option(metavar="Z1:Z2", help="The bearing planes, where the tolerance holds.")
     ] = None,
-    json: Json = False,
-    output: Output = None,
-    plot: Plot = None,
-    expect: Expect = None,
-    rtol: Rtol = 1e-3,
-    text: Text = False,
-    digits: Digits = False,
-) -> None:
+) -> Result:
     """Balance rotors from a table of known eccentric masses, in one, two or more planes.
 
     TABLE has the columns mass_* and radius_* (or weight_* and radius_*, or unbalance_*), angle_*, z_* (not
@@ -69,13 +67,17 @@ def run(
     Angles are counter-clockwise as seen against +z.
     """
     # numpy and what stands on it are loaded only once the command line itself is in order
-    from cli.balance import solve as job
+    from cli.balance import columns, words
+    from cli.balance.read import read_rotors
+    from cli.balance.solve import Balancing, Request
+    from cli.read.planes import from_options, from_table
+    from cli.read.tolerance import tolerance_of
 
     if (plane is None) == (planes is None):
         raise options.bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
     if not 1e-9 < gravity < 1e9:
         raise options.bad("--gravity", f"'{gravity:g}': expected a positive number of m/s²")
-    wanted = job.Wanted(
+    request = Request(
         gravity=gravity,
         remove=remove,
         mass_step=options.with_unit("--round-mass", round_mass, "mass", positive=True),
@@ -83,53 +85,20 @@ def run(
         center=options.quantity("--center-z", center_z, "length"),
         tolerance=tolerance_of(grade, speed, rotor_mass, permissible, bearings),
     )
-    from cli.read.planes import from_options, from_table
-
     chosen = from_table(planes) if planes is not None else from_options(plane or [])
-    shown = job.balance(job.read_rotors(table, wanted.gravity, needs_z=chosen.several), chosen, wanted)
-    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)
+    rotors = read_rotors(table, gravity, needs_z=chosen.several)
+    found = Balancing(rotors, chosen, request)
 
+    def figure() -> Figure:
+        from cli.balance.picture import draw
 
-def tolerance_of(
-    grade: str | None,
-    speed: str | None,
-    rotor_mass: str | None,
-    permissible: str | None,
-    bearings: str | None,
-) -> tuple[str | None, float, tuple[float, float] | None] | None:
-    """Return the grade's name, U_per in kg·m and the bearing planes; None where no tolerance is asked for."""
-    from balancing import grade_value, permissible_unbalance
+        return draw(found)
 
-    planes = None
-    if bearings is not None:
-        parts = bearings.split(":")
-        if len(parts) != 2:
-            raise options.bad("--bearings", f"'{bearings}': expected Z1:Z2, such as 0mm:400mm")
-        z1, z2 = (options.quantity("--bearings", part, "length") or 0.0 for part in parts)
-        if z1 == z2:
-            raise options.bad("--bearings", f"'{bearings}': the two bearings lie at the same place")
-        planes = (z1, z2)
-    omega = options.quantity("--speed", speed, "speed", positive=True)
-    mass = options.quantity("--rotor-mass", rotor_mass, "mass", positive=True)
-    if permissible is not None:
-        if grade is not None:
-            raise options.bad("--permissible", "expected --grade or --permissible, not both")
-        whole = options.quantity("--permissible", permissible, "unbalance", positive=True)
-        assert whole is not None
-        return None, whole, planes
-    if grade is None:
-        if planes is not None:
-            raise options.bad(
-                "--bearings", "the bearings are for a tolerance: expected --grade or --permissible too"
-            )
-        return None
-    try:
-        value = grade_value(grade)
-    except ValueError as error:
-        raise options.bad("--grade", error) from None
-    for flag, given in (("--speed", omega), ("--rotor-mass", mass)):
-        if given is None:
-            raise options.bad(flag, "--grade needs --speed and --rotor-mass")
-    assert omega is not None
-    assert mass is not None
-    return f"G{value * 1000:g}", float(permissible_unbalance(value, omega, mass)), planes
+    return Result(
+        document=lambda: columns.document(found),
+        tables={"corrections": lambda: columns.corrections(found)},
+        notes=lambda: words.notes(found),
+        afterword=lambda: words.verdicts(found),
+        figure=figure,
+        warnings=[*rotors.table.warnings, *words.warnings(found)],
+    )

@@ -2,30 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from balancing import correct
+from cli.balance.solve import Balancing
+from cli.read.units import from_si
+from cli.show.picture import arrow, free_direction
+
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Complex = NDArray[np.complex128]
-Panel = tuple[str, Sequence[str], Sequence[str], Complex, Complex]
 
 
-def draw(panels: Sequence[Panel], unit: str, *, remove: bool) -> Figure:
-    """Draw rotors below each other, their planes beside each other, all to one scale per rotor.
+class Panel(NamedTuple):
+    """A rotor's row of panels, in one unit; the correction is what is added."""
 
-    A panel is (rotor, names of the masses, names of the planes, share of each mass in each plane (k, p),
-    correction in each plane (p,)), in `unit`; the correction is what is added.
-    """
+    rotor: str
+    masses: Sequence[str]
+    planes: Sequence[str]
+    shares: Complex
+    """Of each mass in each plane, (k, p)."""
+    made: Complex
+    """The correction in each plane, (p,)."""
+
+
+def _panels(found: Balancing) -> Iterator[Panel]:
+    """Yield the first rotors."""
+    rotors, planes = found.rotors, found.planes
+    mass_names = rotors.table.texts.get("name") or [str(i + 1) for i in range(rotors.table.rows)]
+    for r, name in enumerate(rotors.names[:4]):
+        mine = np.flatnonzero(rotors.rotor == r)
+        rows = found.rows_of(r)
+        here = found.plane_of_row[rows]
+        at = rotors.z[mine, None] if rotors.z is not None else np.zeros((len(mine), 1))
+        plane_z = planes.z[here] if planes.z is not None else np.zeros(len(here))
+        # each mass alone, carried to the planes as they will balance it
+        shares = -correct(rotors.moment[mine, None], at, plane_z).unbalance
+        yield Panel(
+            name if len(rotors.names) > 1 else "",
+            [mass_names[i] for i in mine],
+            [planes.name[p] for p in here],
+            from_si(shares, "unbalance", rotors.unbalance_unit),
+            from_si(found.made[rows], "unbalance", rotors.unbalance_unit),
+        )
+
+
+def draw(found: Balancing) -> Figure:
+    """Draw the first rotors below each other, their planes beside each other, all to one scale per rotor."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    columns = max(len(panel[2]) for panel in panels)
+    panels, remove = list(_panels(found)), found.request.remove
+    unit = found.rotors.unbalance_unit.replace("_", "·")
+    columns = max(len(panel.planes) for panel in panels)
     figure = Figure(figsize=(4.4 * columns, 4.5 * len(panels) + 0.7), layout="constrained")
     grid = figure.subplots(len(panels), columns, subplot_kw={"projection": "polar"}, squeeze=False)
     for axes_row, (rotor, masses, planes, shares, made) in zip(grid, panels, strict=True):
@@ -57,42 +91,3 @@ def draw(panels: Sequence[Panel], unit: str, *, remove: bool) -> Figure:
     )
     figure.suptitle(f"unbalance, {unit}; angles counter-clockwise as seen against +z", fontsize=9)
     return figure
-
-
-def arrow(axes: Axes, value: complex, scale: float, color: str, width: float, style: str, label: str) -> None:
-    if not abs(value) > 1e-9 * scale:
-        return
-    angle, size = float(np.angle(value)), abs(value)
-    axes.annotate(
-        "",
-        xy=(angle, size),
-        xytext=(0, 0),
-        arrowprops={
-            "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
-            "color": color,
-            "lw": width,
-            "ls": style,
-            "shrinkA": 0,
-            "shrinkB": 0,
-        },
-    )
-    if label:
-        axes.annotate(
-            label,
-            xy=(angle, size),
-            xytext=(7 * np.cos(angle), 7 * np.sin(angle)),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize=8,
-        )
-
-
-def free_direction(vectors: Sequence[complex]) -> float:
-    """Return the direction, in degrees, in the middle of the widest gap between vectors: room for the scale."""
-    angles = np.sort(np.degrees(np.angle([v for v in vectors if v])) % 360)
-    if not len(angles):
-        return 22.5
-    gaps = np.diff(np.append(angles, angles[0] + 360))
-    widest = int(np.argmax(gaps))
-    return float((angles[widest] + gaps[widest] / 2) % 360)

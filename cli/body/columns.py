@@ -1,119 +1,225 @@
-"""The digits that hold of a body's answers: bounds of the rounding errors of all that `dalembert body` shows."""
+"""A body and its motion as columns, and as the JSON document."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
+from cli.body.solve import Array, MovingBody
 from cli.read.parts import READ
+from cli.read.units import G0, degrees
+from cli.show.columns import Column, Table
+from rigidbody3d.inertia import Principal
 
 if TYPE_CHECKING:
-    from cli.body.solve import Answer
-    from cli.show.output import Columns
-
-Real = NDArray[np.float64]
-
-_MOTION = {
-    "momentum_kg_m2_s": "momentum",
-    "momentum_about_kg_m2_s": "momentum_about",
-    "momentum_rate_N_m": "rate",
-    "rate_relative_N_m": "relative",
-    "rate_transport_N_m": "transport",
-    "momentum_rate_about_N_m": "rate_about",
-    "inertia_force_N": "inertia_force",
-    "inertia_moment_N_m": "inertia_moment",
-    "energy_J": "energy",
-}
+    from cli.show.columns import Cell, Document, Json
 
 
-def errors(answer: Answer) -> Columns:
-    """Return bounds in the columns of the CSV, and in those of the terminal's table."""
-    bounds, corrections = _vectors(answer), _corrections(answer)
-    columns: dict[str, list[float]] = {}
-    below = [0.0] * len(next(iter(corrections.values()), []))
-    for name, bound in bounds.items():
-        columns[name] = [*([float(bound), 0.0, 0.0] if np.ndim(bound) == 0 else bound), *below]
-    for name, bound in corrections.items():
-        columns[f"correction_{name}"] = [0.0, 0.0, 0.0, *bound]
-    # the table: a row for each quantity, then mass and angle of each correction
-    rows = [[float(b), 0.0, 0.0, 0.0] if np.ndim(b) == 0 else [0.0, *b] for b in bounds.values()]
-    for pair in zip(*(corrections.get(name, ()) for name in ("mass_kg", "angle_deg")), strict=True):
-        rows += [[value, 0.0, 0.0, 0.0] for value in pair]
-    return {**columns, **dict(zip(("value", "x", "y", "z"), map(list, zip(*rows, strict=True)), strict=True))}
+class Quantity(NamedTuple):
+    """A scalar or a vector with the bounds of its components' errors."""
+
+    name: str
+    unit: str
+    value: ArrayLike
+    error: Callable[[], ArrayLike]
+
+    @property
+    def header(self) -> str:
+        """Its name with its unit."""
+        return f"{self.name}_{self.unit}" if self.unit else self.name
 
 
-def _vectors(answer: Answer) -> dict[str, Any]:
-    """Return bounds under the names, and in the order, of what is shown."""
-    body = answer.parts.whole
-    error, moments = body.error_estimate(), body.principal
-    principal = moments.error_estimate(error.inertia)
-    bounds: dict[str, Any] = {"mass_kg": float(error.mass), "center_m": error.center}
-    bounds |= {f"inertia_{axis}_kg_m2": row for axis, row in zip("xyz", error.inertia, strict=True)}
-    bounds["principal_kg_m2"] = principal.moments
-    bounds |= {f"principal_axis_{i + 1}": row for i, row in enumerate(principal.axes)}
-    if answer.moving:
-        for name, quantity in _MOTION.items():
-            bounds[name] = answer.motion.error_estimate(quantity, answer.point, error, READ)
-    if answer.wanted.shaft is not None:
-        shaft = answer.shaft
-        static, dynamic, axial, torque = (
-            shaft.error_estimate(name, READ) for name in ("static", "dynamic", "axial", "drive_torque")
-        )
-        for i in range(2):
-            bounds[f"bearing{i + 1}_static_N"] = [*static[i], float(axial) if i == 0 else 0.0]
-            bounds[f"bearing{i + 1}_dynamic_N"] = [*dynamic[i], 0.0]
-            if answer.correction is not None:
-                left = float(_corrected(answer)[i])
-                bounds[f"bearing{i + 1}_corrected_N"] = [left, left, 0.0]
-        bounds["drive_torque_N_m"] = float(torque)
-    return bounds
+def _quantities(found: MovingBody) -> Iterator[Quantity]:
+    """Yield what is shown, in the order in which it is shown."""
+    body, moments = found.parts.whole, found.parts.whole.principal
+
+    def tensor_error(row: int) -> Array:
+        return np.asarray(found.body_error.inertia[row])
+
+    def principal_error() -> Principal:
+        return moments.error_estimate(found.body_error.inertia)
+
+    def axis_error(axis: int) -> Array:
+        return np.asarray(principal_error().axes[axis])
+
+    yield Quantity("mass", "kg", body.mass, lambda: found.body_error.mass)
+    yield Quantity("center", "m", body.center, lambda: found.body_error.center)
+    for i, axis in enumerate("xyz"):
+        yield Quantity(f"inertia_{axis}", "kg_m2", body.inertia[i], partial(tensor_error, i))
+    yield Quantity("principal", "kg_m2", moments.moments, lambda: principal_error().moments)
+    for i in range(3):
+        yield Quantity(f"principal_axis_{i + 1}", "", moments.axes[i], partial(axis_error, i))
+    if found.moving:
+        yield from _of_motion(found)
+    if found.request.shaft is not None:
+        yield from _of_shaft(found)
 
 
-def _unbalance(answer: Answer) -> Real:
-    """Bound the corrections' unbalances, (p,): their own rounding, and what that of the shaft's becomes in them."""
-    from balancing import correct
+def _of_motion(found: MovingBody) -> Iterator[Quantity]:
+    motion, point = found.motion, found.point
 
-    s, fix = answer.wanted.shaft, answer.correction
-    assert s is not None
-    assert s.planes is not None
-    assert s.planes.z is not None
-    assert fix is not None
-    given = answer.shaft.error_estimate("unbalance", READ)
-    # the planes' places are read too: as good as unbalances that are off by as much of the moment
-    given = given + READ * np.abs(answer.shaft.unbalance)
-    share = correct(np.eye(2, dtype=complex), answer.shaft.bearings, s.planes.z).unbalance
-    z = np.asarray(s.planes.z)
-    spread = np.ptp(z) or 1.0
-    misplaced = READ * (np.abs(z).max() + np.abs(answer.shaft.bearings).max()) / spread
-    return np.asarray(
-        fix.error_estimate() + given @ np.abs(share) + misplaced * np.abs(fix.unbalance).sum() * (len(z) > 1)
+    def error(of: str) -> ArrayLike:
+        return motion.error_estimate(of, point, found.body_error, READ)
+
+    for name, unit, value, of in (
+        ("momentum", "kg_m2_s", motion.momentum, "momentum"),
+        ("momentum_about", "kg_m2_s", motion.momentum_about(point), "momentum_about"),
+        ("momentum_rate", "N_m", motion.rate, "rate"),
+        ("rate_relative", "N_m", motion.relative, "relative"),
+        ("rate_transport", "N_m", motion.transport, "transport"),
+        ("momentum_rate_about", "N_m", motion.rate_about(point), "rate_about"),
+        ("inertia_force", "N", motion.inertia_force, "inertia_force"),
+        ("inertia_moment", "N_m", motion.inertia_wrench.moment, "inertia_moment"),
+        ("energy", "J", motion.energy, "energy"),
+    ):
+        yield Quantity(name, unit, value, partial(error, of))
+
+
+def _of_shaft(found: MovingBody) -> Iterator[Quantity]:
+    """Forces of the bearings across the axis; the first takes the axial force."""
+    shaft = found.shaft
+
+    def error(of: str, i: int) -> list[float]:
+        axial = float(shaft.error_estimate("axial", READ)) if of == "static" and i == 0 else 0.0
+        return [*shaft.error_estimate(of, READ)[i], axial]
+
+    def left_error(i: int) -> list[float]:
+        return [*found.corrected_error[[i, i]], 0.0]
+
+    for i in range(2):
+        static = [*shaft.static[i], float(shaft.axial) if i == 0 else 0.0]
+        yield Quantity(f"bearing{i + 1}_static", "N", static, partial(error, "static", i))
+        dynamic = [*shaft.dynamic[i], 0.0]
+        yield Quantity(f"bearing{i + 1}_dynamic", "N", dynamic, partial(error, "dynamic", i))
+        if found.correction is not None:
+            left = [*found.corrected[i], 0.0]
+            yield Quantity(f"bearing{i + 1}_corrected", "N", left, partial(left_error, i))
+    yield Quantity(
+        "drive_torque", "N_m", shaft.drive_torque, lambda: shaft.error_estimate("drive_torque", READ)
     )
 
 
-def _corrected(answer: Answer) -> Real:
-    """Bound the bearings' forces once corrected, (2,): a difference of nearly equal forces."""
-    s, fix = answer.wanted.shaft, answer.correction
-    assert s is not None
-    assert s.planes is not None
-    assert fix is not None
-    z, bearings = np.asarray(s.planes.z), answer.shaft.bearings
-    arm = np.abs(z - bearings[::-1, None]) / abs(bearings[1] - bearings[0])
-    rounded = _unbalance(answer) + 4 * READ * np.abs(fix.unbalance)
-    size = np.hypot(s.speed**2, s.speed_rate)
-    own = answer.shaft.error_estimate("unbalance", READ) + 4 * READ * np.abs(answer.shaft.unbalance)
-    return np.asarray(size * (own + arm @ rounded))
+def axes(found: MovingBody) -> Table:
+    """A row for each axis, then one for each correction plane; scalars stand in the first row."""
+    corrections = found.corrections
+    below = len(corrections)
+
+    def filled(value: ArrayLike, rest: Cell) -> list[Cell]:
+        numbers = _numbers(value)
+        return [*numbers, *[rest] * (3 - len(numbers) + below)]
+
+    def error(q: Quantity) -> list[Cell]:
+        return filled(q.error(), 0.0)
+
+    def of_correction(name: str) -> list[Cell]:
+        return [0.0, 0.0, 0.0, *(getattr(bound, name) for bound in found.correction_errors)]
+
+    columns = [Column("axis", "", [*"xyz", *(c.plane for c in corrections)])]
+    for q in _quantities(found):
+        columns.append(Column(q.name, q.unit, filled(q.value, None), partial(error, q)))
+    if corrections:
+        _, z, radius, *amounts = zip(*corrections, strict=True)
+        columns.append(Column("correction_z", "m", [None, None, None, *z]))
+        columns.append(Column("correction_radius", "m", [None, None, None, *radius]))
+        for name, unit, values in zip(
+            ("unbalance", "mass", "angle"), ("kg_m", "kg", "deg"), amounts, strict=True
+        ):
+            columns.append(
+                Column(f"correction_{name}", unit, [None, None, None, *values], partial(of_correction, name))
+            )
+    return Table(columns, keys=("axis",))
 
 
-def _corrections(answer: Answer) -> dict[str, list[float]]:
-    s, fix = answer.wanted.shaft, answer.correction
-    if s is None or s.planes is None or fix is None:
-        return {}
-    bound, amount, radius = _unbalance(answer), np.abs(fix.unbalance), np.asarray(s.planes.radius)
-    angle = np.divide(bound, amount, out=np.zeros_like(bound), where=amount > 0)
-    return {
-        "unbalance_kg_m": bound.tolist(),
-        "mass_kg": ((bound + READ * amount) / radius).tolist(),
-        "angle_deg": np.degrees(angle).tolist(),
+def quantities(found: MovingBody) -> Table:
+    """The terminal's table: a row for each quantity, then mass and angle of each correction."""
+
+    def laid(value: ArrayLike, rest: Cell) -> list[Cell]:
+        numbers = _numbers(value)
+        return [*numbers, rest, rest, rest] if len(numbers) == 1 else [rest, *numbers]
+
+    def of_correction(i: int, name: str) -> float:
+        return float(getattr(found.correction_errors[i], name))
+
+    rows = list(_quantities(found))
+    for i, c in enumerate(found.corrections):
+        rows.append(Quantity(f"plane {c.plane}: mass", "kg", c.mass, partial(of_correction, i, "mass")))
+        rows.append(Quantity(f"plane {c.plane}: angle", "deg", c.angle, partial(of_correction, i, "angle")))
+    values = zip(*(laid(row.value, None) for row in rows), strict=True)
+
+    def error(k: int) -> list[Cell]:
+        return [laid(row.error(), 0.0)[k] for row in rows]
+
+    return Table(
+        [
+            Column("quantity", "", [row.header for row in rows]),
+            *(
+                Column(name, "", column, partial(error, k))
+                for k, (name, column) in enumerate(zip(("value", "x", "y", "z"), values, strict=True))
+            ),
+        ]
+    )
+
+
+def document(found: MovingBody) -> Document:
+    """The JSON document."""
+    body, motion, moments, point = found.parts.whole, found.motion, found.parts.whole.principal, found.point
+    document: Document = {
+        "mass_kg": float(body.mass),
+        "center_m": _plain(body.center),
+        "inertia_kg_m2": _plain(body.inertia),
+        "principal_kg_m2": _plain(moments.moments),
+        "principal_axes": _plain(moments.axes),
+        "momentum_kg_m2_s": _plain(motion.momentum),
+        "about_m": _plain(point),
+        "momentum_about_kg_m2_s": _plain(motion.momentum_about(point)),
+        "momentum_rate_N_m": _plain(motion.rate),
+        "momentum_rate_about_N_m": _plain(motion.rate_about(point)),
+        "rate_terms_N_m": {"relative": _plain(motion.relative), "transport": _plain(motion.transport)},
+        "inertia_force_N": _plain(motion.inertia_force),
+        "inertia_moment_N_m": _plain(motion.inertia_wrench.moment),
+        "energy_J": float(motion.energy),
+        "products": "+∫xy dm; the matrix carries -I_xy",
     }
+    if found.request.shaft is None:
+        return document
+    shaft = found.shaft
+    bearings: list[Document] = [
+        {"z_m": z, "static_N": _plain(static), "dynamic_N": _plain(dynamic)}
+        for z, static, dynamic in zip(found.request.shaft.bearings, shaft.static, shaft.dynamic, strict=True)
+    ]
+    if found.correction is not None:
+        for bearing, left in zip(bearings, found.corrected, strict=True):
+            bearing["corrected_dynamic_N"] = _plain(left)
+    document["shaft"] = {
+        "bearings": bearings,
+        "axial_N": float(shaft.axial),
+        "drive_torque_N_m": float(shaft.drive_torque),
+        "static_unbalance_kg_m": float(np.abs(shaft.static_unbalance)),
+        "static_angle_deg": float(degrees(shaft.static_unbalance)),
+        "corrections": [
+            {
+                "plane": c.plane,
+                "z_m": c.z,
+                "radius_m": c.radius,
+                "unbalance_kg_m": c.unbalance,
+                "mass_kg": c.mass,
+                "weight_N": c.mass * G0,
+                "angle_deg": c.angle,
+            }
+            for c in found.corrections
+        ],
+    }
+    return document
+
+
+def _numbers(value: ArrayLike) -> list[float]:
+    numbers: list[float] = np.atleast_1d(np.asarray(value, dtype=float) + 0.0).tolist()
+    return numbers
+
+
+def _plain(value: ArrayLike) -> Json:
+    return (np.asarray(value, dtype=float) + 0.0).tolist()  # type: ignore[no-any-return]

@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.read import options
-from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+from cli.show.columns import Result
+from cli.show.output import command
 
 if TYPE_CHECKING:
-    from cli.body.solve import ShaftWanted
+    from matplotlib.figure import Figure
+
+    from cli.body.solve import ShaftRequest
 
 _VECTOR = "X,Y,Z"
 
 
+@command
 def run(
     parts: Annotated[str, typer.Argument(metavar="PARTS", help="CSV of parts; - is standard input.")],
     omega: Annotated[
@@ -59,14 +63,7 @@ def run(
         list[str] | None,
         typer.Option(metavar="NAME:Z:RADIUS", help="A correction plane of the shaft, such as A:0mm:20mm."),
     ] = None,
-    json: Json = False,
-    output: Output = None,
-    plot: Plot = None,
-    expect: Expect = None,
-    rtol: Rtol = 1e-3,
-    text: Text = False,
-    digits: Digits = False,
-) -> None:
+) -> Result:
     """Put a body together from parts: mass, centre of mass, inertia; its angular momentum and what its motion asks for.
 
     PARTS has the columns part, shape, mass_* (a hole: negative) or density_*, x_* y_* z_* of its centre of mass,
@@ -75,9 +72,11 @@ def run(
     tube radius, inner_radius, length; box width, height, depth; plate width, height; sphere radius, inner_radius;
     tensor ixx iyy izz ixy ixz iyz, products as +∫xy dm; mesh file, file_unit (STL, OBJ). Thin shapes take linear_density_* or area_density_*.
     """
-    from cli.body import solve as job
+    from cli.body import columns, words
+    from cli.body.solve import MovingBody, Request
+    from cli.read.parts import read_parts
 
-    wanted = job.Wanted(
+    request = Request(
         omega=options.vector("--omega", omega, "speed"),
         alpha=options.vector("--alpha", alpha, "angular acceleration"),
         frame_omega=options.vector("--frame-omega", frame_omega, "speed"),
@@ -103,15 +102,20 @@ def run(
         ):
             if given is not None:
                 raise options.bad(flag, "a shaft turns about z at --speed and --speed-rate")
-    show(
-        job.solve(parts, wanted),
-        json=json,
-        output=output,
-        plot=plot,
-        expect=expect,
-        rtol=rtol,
-        text=text,
-        digits=digits,
+    found = MovingBody(read_parts(parts), request)
+
+    def figure() -> Figure:
+        from cli.body.picture import draw
+
+        return draw(found)
+
+    return Result(
+        document=lambda: columns.document(found),
+        tables={"body": lambda: columns.axes(found)},
+        screen=lambda: columns.quantities(found),
+        notes=lambda: words.notes(found),
+        figure=figure,
+        warnings=[*found.parts.warnings, *words.warnings(found)],
     )
 
 
@@ -121,8 +125,8 @@ def _shaft(
     speed_rate: str | None,
     gravity: str | None,
     correct: list[str] | None,
-) -> ShaftWanted | None:
-    from cli.body.solve import ShaftWanted
+) -> ShaftRequest | None:
+    from cli.body.solve import ShaftRequest
     from cli.read.planes import from_options
 
     if shaft is None:
@@ -135,17 +139,11 @@ def _shaft(
             if given:
                 raise options.bad(flag, "this is for a shaft: expected --shaft Z1:Z2 too")
         return None
-    ends = shaft.split(":")
-    if len(ends) != 2:
-        raise options.bad("--shaft", f"'{shaft}': expected Z1:Z2, such as 0mm:400mm")
-    z1, z2 = (options.quantity("--shaft", end, "length") or 0.0 for end in ends)
-    if z1 == z2:
-        raise options.bad("--shaft", f"'{shaft}': the two bearings lie at the same place")
     planes = from_options(correct, "--correct") if correct else None
     if planes is not None and planes.z is None:
         raise options.bad("--correct", "a correction plane of a shaft needs its place: NAME:Z:RADIUS")
-    return ShaftWanted(
-        bearings=(z1, z2),
+    return ShaftRequest(
+        bearings=options.two_bearings("--shaft", shaft),
         speed=options.quantity("--speed", speed, "speed") or 0.0,
         speed_rate=options.quantity("--speed-rate", speed_rate, "angular acceleration") or 0.0,
         gravity=options.vector("--gravity", gravity, "acceleration") or (0.0, 0.0, 0.0),

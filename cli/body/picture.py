@@ -2,38 +2,36 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from cli.body.solve import MovingBody
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from cli.body.solve import Answer
-
-Array = NDArray[np.float64]
+    from matplotlib.figure import Figure, FigureBase
 
 
-def draw(answer: Answer) -> Figure:
+def draw(found: MovingBody) -> Figure:
     """Draw the body; beside it, for a shaft, the forces of the bearings seen along and across it."""
     from matplotlib.figure import Figure
 
-    shaft = answer.wanted.shaft is not None
+    shaft = found.request.shaft is not None
     figure = Figure(figsize=(11 if shaft else 7, 6), layout="constrained")
-    panels: Any = figure.subfigures(1, 2, width_ratios=(1.25, 1)) if shaft else (figure, None)
-    left, right = panels
-    _body(left, answer)
-    if right is not None:
-        _bearings(right, answer)
+    if shaft:
+        left, right = figure.subfigures(1, 2, width_ratios=(1.25, 1), squeeze=False)[0]
+        _body(left, found)
+        _bearings(right, found)
+    else:
+        _body(figure, found)
     return figure
 
 
-def _body(figure: Any, answer: Answer) -> None:
+def _body(figure: FigureBase, found: MovingBody) -> None:
     from matplotlib.lines import Line2D
 
     axes = figure.add_subplot(projection="3d")
-    parts, whole = answer.parts.each, answer.parts.whole
+    parts, whole = found.parts.each, found.parts.whole
     center = whole.center
     lengths = np.sqrt(np.clip(np.trace(parts.inertia, axis1=1, axis2=2) / 2 / parts.mass, 0, None))
     reach = float(max(np.abs(parts.center - center).max(), lengths.max(), 1e-12))
@@ -47,7 +45,7 @@ def _body(figure: Any, answer: Answer) -> None:
             *parts.center[~solid].T, s=size[~solid], facecolor="none", edgecolor="0.3", depthshade=False
         )
     if len(parts.mass) <= 12:
-        for name, at in zip(answer.parts.name, parts.center, strict=True):
+        for name, at in zip(found.parts.name, parts.center, strict=True):
             axes.text(*at, f"  {name}", fontsize=8)
     axes.scatter(*center, marker="+", color="black", s=90)
     moments, directions = whole.principal
@@ -64,7 +62,7 @@ def _body(figure: Any, answer: Answer) -> None:
             ls="-.",
             lw=1,
         )
-    motion = answer.motion
+    motion = found.motion
     span = max(reach, float(gyration.max()))
     for vector, label, color, style in (
         (motion.omega, "angular velocity", "tab:red", "-"),
@@ -89,11 +87,11 @@ def _body(figure: Any, answer: Answer) -> None:
     figure.legend(handles=handles, fontsize=8, loc="outside lower left", ncols=2, frameon=False)
 
 
-def _bearings(figure: Any, answer: Answer) -> None:
-    shaft, wanted = answer.shaft, answer.wanted.shaft
-    assert wanted is not None
-    z = np.asarray(wanted.bearings)
-    parts = answer.parts.each
+def _bearings(figure: FigureBase, found: MovingBody) -> None:
+    shaft, request = found.shaft, found.request.shaft
+    assert request is not None
+    z = np.asarray(request.bearings)
+    parts = found.parts.each
     for component, axes in enumerate(figure.subplots(2, 1, sharex=True)):
         axes.axhline(0, color="0.7", lw=3)
         axes.plot(parts.center[:, 2], 0 * parts.center[:, 2], "o", color="0.5", ms=5)
@@ -102,8 +100,8 @@ def _bearings(figure: Any, answer: Answer) -> None:
             ("static", shaft.static[:, component], "0.45", -0.012),
             ("dynamic", shaft.dynamic[:, component], "tab:red", 0.012),
         ]
-        if answer.correction is not None:
-            kinds.append(("after correction", answer.corrected[:, component], "tab:blue", 0.036))
+        if found.correction is not None:
+            kinds.append(("after correction", found.corrected[:, component], "tab:blue", 0.036))
         for name, force, color, shift in kinds:
             axes.bar(z + shift * span, force, width=0.02 * span, color=color, label=name)
         axes.plot(z, [0, 0], "^", color="black", ms=9, label="bearings")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.read import options
-from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
+from cli.show.shown import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
 
 if TYPE_CHECKING:
     from cli.field_runs import Runs
@@ -167,8 +167,7 @@ def run(
         return
     if runs is None:
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
-    from cli.balance.command import tolerance_of
-    from cli.commands.place import places
+    from cli.read.tolerance import tolerance_of
 
     tolerance = tolerance_of(grade, speed, rotor_mass, permissible, None)
     limits = _limits(max_mass or [])
@@ -203,16 +202,16 @@ def run(
         monte_carlo=monte_carlo,
         four_run=method == "four-run",
         ridge=ridge,
-        tolerance=None if tolerance is None else tolerance[:2],
+        tolerance=None if tolerance is None else (tolerance.grade, tolerance.permissible),
         radius=arm,
         conventions=_conventions(method, phase_lag, rotation),
-        places=places(positions, blades, first),
+        places=options.places(positions, blades, first),
     )
     field = Field(measured, wanted, stored)
     shown = field.shown()
     beside: dict[Path, bytes] = {}
     if save_influence is not None:
-        from cli.show.output import csv_text
+        from cli.show.text import csv_text
 
         beside[save_influence] = csv_text(field.coefficients()).encode()
     if report is not None:
@@ -220,7 +219,7 @@ def run(
 
         source = "standard input" if runs == "-" else Path(runs).name
         beside[report] = html(field, source, shown.warnings)
-    show(shown, beside=beside, **shared)  # type: ignore[arg-type]
+    show(shown, beside=beside, **shared)
 
 
 def _conventions(method: str, phase_lag: bool, rotation: str | None) -> str:

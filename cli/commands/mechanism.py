@@ -11,19 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cli.read import options
-from cli.show.output import (
-    Digits,
-    Expect,
-    Json,
-    Output,
-    Plot,
-    Rtol,
-    Shown,
-    Text,
-    csv_text,
-    show,
-    suffix_among,
-)
+from cli.show.output import suffix_among
+from cli.show.shown import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
+from cli.show.text import csv_text
 
 if TYPE_CHECKING:
     from cli.mechanism.asked import Asked

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cli.read import options
-from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+from cli.show.shown import Digits, Expect, Json, Output, Plot, Rtol, Text, show
 
 
 def run(
@@ -102,7 +102,7 @@ def run(
         if diameter is not None:
             raise options.bad("--stock", "weights from stock are not drilled: expected --stock or --drill")
     moved = _planes(options.quantity("--at-z", at_z, "length"), to_z)
-    chosen = places(positions, blades, first)
+    chosen = options.places(positions, blades, first)
     if weights is not None and chosen is None:
         raise options.bad("--stock", "expected --positions or --blades for the weights to go to")
     from cli import place_job as job
@@ -138,23 +138,6 @@ def _planes(at: float | None, text: str | None) -> tuple[float, list[float]] | N
     return at, planes
 
 
-def places(positions: str | None, blades: int | None, first: str) -> list[float] | None:
-    """Return the angles of the places, in degrees; None where none are given."""
-    if positions is not None and blades is not None:
-        raise options.bad("--blades", "expected --positions or --blades, not both")
-    if blades is not None:
-        start = _angle("--first", first)
-        return [(start + 360.0 * k / blades) % 360.0 for k in range(blades)]
-    if positions is None:
-        return None
-    chosen = [_angle("--positions", part) for part in positions.split(",")]
-    turned = sorted(angle % 360.0 for angle in chosen)
-    for one, other in zip(turned, [*turned[1:], turned[0] + 360.0], strict=True):
-        if len(turned) > 1 and other - one < 1e-7:
-            raise options.bad("--positions", f"two positions at {one:g}deg")
-    return chosen
-
-
 def _vector(spec: str) -> tuple[tuple[float, str], tuple[float, str]]:
     """Read `83.5g@308.87deg`."""
     mass, mark, angle = spec.partition("@")
@@ -169,11 +152,3 @@ def _vector(spec: str) -> tuple[tuple[float, str], tuple[float, str]]:
     if size[0] < 0:
         raise options.bad("MASS@ANGLE", f"'{spec}': expected a mass that is not negative")
     return size, turn
-
-
-def _angle(flag: str, text: str) -> float:
-    """Read an angle, in degrees."""
-    given = options.with_unit(flag, text, "angle")
-    assert given is not None
-    value, unit = given
-    return value if unit == "deg" else value * 180 / 3.141592653589793

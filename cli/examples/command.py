@@ -10,10 +10,11 @@ from typing import Annotated, Any
 import typer
 
 from cli.errors import DataError, nearest
-from cli.show.output import write
+from cli.show.files import write
 
 EXAMPLES = files("cli") / "examples"
 ABOUT = "example.toml"
+EXPECTED = "expected.csv"
 
 
 def run(
@@ -34,10 +35,14 @@ def run(
             continue
         here = Path(file.name)
         data = file.read_bytes()
-        if here.exists() and not _is_an_examples(here):
-            raise DataError(f"{file.name}: there is another file of this name here: nothing was overwritten")
+        if here.name == EXPECTED and _is_an_examples(here) and here.read_bytes() != data:
+            here = Path(f"{name}-{EXPECTED}")
+        known = _is_an_examples(here) or (here.is_file() and here.read_bytes() == data)
+        if here.exists() and not known:
+            raise DataError(f"{here}: there is another file of this name here: nothing was overwritten")
         write(here, data)
-        print(f"wrote {file.name}")
+        kept = "" if here.name == file.name else f" ({file.name} is another example's)"
+        print(f"wrote {here}{kept}")
     print(f"source: {described['source']}\nrun:\n  {described['command']}")
 
 

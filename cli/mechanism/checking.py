@@ -43,6 +43,7 @@ def check_document(job: Job) -> dict[str, Any]:
         f"input_limits_{unit}": shown(check.input_limits),
         f"dead_points_{unit}": shown(check.dead_points),
         f"change_points_{unit}": shown(check.change_points),
+        **({"singular": list(check.singular)} if check.singular else {}),
     }
 
 
@@ -70,6 +71,8 @@ def check_text(document: dict[str, Any]) -> str:
             else ", ".join("open" if v is None else f"{v:.12g}" for v in values) + f" {unit}"
         )
         lines.append(f"{key.replace('_', ' ')}: {text}")
+    if "singular" in d:
+        lines.append(f"singular in every pose: {', '.join(d['singular'])}")
     return "\n".join(lines)
 
 
@@ -104,7 +107,7 @@ def newton_tables(job: Job) -> tuple[list[AllAtOnce], dict[str, Any]]:
 
 def newton_text(document: dict[str, Any]) -> str:
     """The table of iterates, the Jacobian at the guess, and the difference to the closed form."""
-    from cli.show.output import table_text
+    from cli.show.text import table_text
 
     rows = document["iterates"]
     table = table_text({key: [row[key] for row in rows] for key in rows[0]})
@@ -189,7 +192,7 @@ def limit_warnings(job: Job) -> list[str]:
                     text += f": the input {name} has the limit{'s' * (len(shown) > 1)} {values} {unit}"
             lines.append(text)
         lines += _branch_lines(job, motion)
-        lines += motion.assembly.warnings
+        lines += track.warnings()
     return list(dict.fromkeys(lines))
 
 

@@ -131,7 +131,8 @@ def warnings(job: Job) -> list[str]:
             ),
         ):
             bad = there & ~np.isfinite(values).all(axis=1) & ~d.locked
-            found += _listed(job, bad, what)
+            if not motion.assembly.track.folded:  # singular in every pose: that is said once
+                found += _listed(job, bad, what)
         if d.scene.friction:
             found += _listed(
                 job, there & d.locked, "friction locks the mechanism: no reaction balances its own friction"
@@ -273,12 +274,17 @@ def equilibria_text(rows: list[dict[str, Any]]) -> str:
     for row in rows:
         word = {True: "stable", False: "unstable", None: "undecided"}[row["stable"]]
         if "inputs" in row:
-            place = ", ".join(f"{name} {next(iter(v.values())):.6g}" for name, v in row["inputs"].items())
+            place = ", ".join(f"{name} {_input_text(value)}" for name, value in row["inputs"].items())
         else:
-            place = f"{row['input_deg']:.6g}°" if "input_deg" in row else f"{row['input_m']:.6g} m"
+            place = _input_text(row)
         energy = "" if row["potential_J"] is None else f", potential {row['potential_J']:.6g} J"
         lines.append(f"  {place}: {word}{energy}")
     return "\n".join(lines)
+
+
+def _input_text(values: dict[str, Any]) -> str:
+    """The value of an input with its unit."""
+    return f"{values['input_m']:.6g} m" if "input_m" in values else f"{values['input_deg']:.6g}°"
 
 
 # -- counterweights -----------------------------------------------------------------------------------------------

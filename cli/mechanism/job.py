@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cli.errors import MEMORY, DataError, nearest
 from cli.mechanism.inputs import Inputs
+from cli.read.files import load as load_bytes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,8 +30,8 @@ def load(path: str) -> Mechanism:
     file = "standard input" if path == "-" else path
     try:
         if path == "-":
-            return Mechanism.from_toml_text(sys.stdin.buffer.read().decode("utf-8-sig"), file)
-        return Mechanism.from_toml(Path(path))
+            return Mechanism.from_toml_text(load_bytes(path).decode("utf-8-sig"), file, load=load_bytes)
+        return Mechanism.from_toml(path, load_bytes)
     except UnicodeDecodeError:
         raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
     except (OSError, ValueError) as error:

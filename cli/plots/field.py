@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.balance.picture import arrow, free_direction
 from cli.field_text import unit
+from cli.show.picture import arrow, free_direction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.balance.picture import arrow, free_direction
+from cli.show.picture import arrow, free_direction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

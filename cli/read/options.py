@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import typer
 
 from cli.read.units import SMALLEST, UNITS, parse_number, parse_quantity, to_si
@@ -40,6 +42,49 @@ def quantity(flag: str, text: str | None, dimension: str, *, positive: bool = Fa
     """Read a value in SI; None stays None."""
     given = with_unit(flag, text, dimension, positive=positive)
     return None if given is None else float(to_si(given[0], dimension, given[1]))
+
+
+def needed(flag: str, text: str, dimension: str, *, positive: bool = False) -> float:
+    """Read a value that is given, in SI."""
+    value = quantity(flag, text, dimension, positive=positive)
+    assert value is not None
+    return value
+
+
+def in_degrees(flag: str, text: str) -> float:
+    """Read an angle; one given in degrees is not turned to radians and back."""
+    given = with_unit(flag, text, "angle")
+    assert given is not None
+    value, unit = given
+    return value if unit == "deg" else value * 180 / math.pi
+
+
+def two_bearings(flag: str, text: str) -> tuple[float, float]:
+    """Read `Z1:Z2`, the places of two bearings, m."""
+    parts = text.split(":")
+    if len(parts) != 2:
+        raise bad(flag, f"'{text}': expected Z1:Z2, such as 0mm:400mm")
+    z1, z2 = (needed(flag, part, "length") for part in parts)
+    if z1 == z2:
+        raise bad(flag, f"'{text}': the two bearings lie at the same place")
+    return z1, z2
+
+
+def places(positions: str | None, blades: int | None, first: str) -> list[float] | None:
+    """Return the angles of the places where masses can go, in degrees; None where none are given."""
+    if positions is not None and blades is not None:
+        raise bad("--blades", "expected --positions or --blades, not both")
+    if blades is not None:
+        start = in_degrees("--first", first)
+        return [(start + 360.0 * k / blades) % 360.0 for k in range(blades)]
+    if positions is None:
+        return None
+    chosen = [in_degrees("--positions", part) for part in positions.split(",")]
+    turned = sorted(angle % 360.0 for angle in chosen)
+    for one, other in zip(turned, [*turned[1:], turned[0] + 360.0], strict=True):
+        if len(turned) > 1 and other - one < 1e-7:
+            raise bad("--positions", f"two positions at {one:g}deg")
+    return chosen
 
 
 def plane_vector(flag: str, text: str) -> complex:

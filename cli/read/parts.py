@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError, nearest, quote
+from cli.read.files import note
 from cli.read.tables import Table, read
 from cli.read.units import UNITS, cosine_sine, to_si
 from rigidbody3d import Body, check, compose, load_mesh, mesh, tensor
@@ -85,12 +87,19 @@ def read_parts(path: str) -> Parts:
                 center[index] = own
         else:
             mass[index], inertia[index] = _part(table, index, shape.lower(), row, warnings, name[index])
-    _check_tensors(table, mass, inertia)
-    rotation = turns @ _along(table, values)
-    shapes = [shape.lower() for shape in table.texts["shape"]]
+    missed = _check_tensors(table, mass, inertia, name, warnings)
+    for index in np.flatnonzero(mass == 0).tolist():
+        warnings.append(f"{table.file}: part {quote(name[index])}: mass 0: left out")
+    kept = np.flatnonzero(mass)
+    place = {index: at for at, index in enumerate(kept.tolist())}
+    name, rows = [name[i] for i in kept], [rows[i] for i in kept]
+    meshes = {place[i]: rough for i, rough in meshes.items()}
+    rotation = (turns @ _along(table, values))[kept]
+    shapes = [table.texts["shape"][i].lower() for i in kept]
+    mass, center, inertia = mass[kept], center[kept], inertia[kept]
     drawn = Body(mass, center, inertia, partial(_reading, shapes, rows, meshes, mass, center, inertia))
     turned = drawn.turned(rotation)
-    each = replace(turned, rounding=partial(_turning, drawn, rotation, table))
+    each = replace(turned, rounding=partial(_turning, drawn, rotation, table, kept))
     total = mass.sum()
     if not total > 0:
         raise DataError(
@@ -98,7 +107,7 @@ def read_parts(path: str) -> Parts:
         )
     whole = compose(each)
     verdict = check(whole.inertia)
-    if not verdict.valid:
+    if not verdict.valid and not verdict.margin >= -missed:
         raise DataError(
             f"{table.file}: no body is made of these parts: {verdict.reason}: is a hole outside its part?"
         )
@@ -128,14 +137,9 @@ def _part(
     if shape != TENSOR:
         for key, value in dimensions.items():
             if value < 0 or (value == 0 and key != "inner_radius"):
-                raise table.error(index, table.numbers[key].header, f"{value:g}", "a positive number")
+                raise table.wrong(index, key, "a positive number")
         if dimensions.get("inner_radius", 0.0) > dimensions.get("radius", np.inf):
-            raise table.error(
-                index,
-                table.numbers["inner_radius"].header,
-                f"{row['inner_radius']:g}",
-                "no more than the radius",
-            )
+            raise table.wrong(index, "inner_radius", "no more than the radius")
     mass = _mass(table, index, shape, row, dimensions)
     if shape != TENSOR:
         formulas: Any = SHAPES[shape]  # they hold for plain numbers too, and those are faster one by one
@@ -148,21 +152,41 @@ def _part(
     return mass, given
 
 
-def _check_tensors(table: Table, mass: Array, inertia: Array) -> None:
-    """Refuse a given tensor that no body can have; all at once, for one by one takes long."""
+def _check_tensors(table: Table, mass: Array, inertia: Array, name: list[str], warnings: list[str]) -> float:
+    """Refuse a given tensor that no body can have; all at once, for one by one takes long.
+
+    What its last printed digit explains is said and taken as it is; returned is by how much all of these miss, kg·m².
+    """
     rows = [index for index, shape in enumerate(table.texts["shape"]) if shape.lower() == TENSOR]
+    missed = 0.0
     if not rows:
-        return
+        return missed
     verdict = check(inertia[rows] * np.sign(mass[rows])[:, None, None])
-    if not verdict.valid.all():
-        index = rows[int(np.argmin(verdict.valid))]
-        column = table.numbers["ixx"]
-        raise table.error(
-            index,
-            column.header,
-            f"{to_si(column.values[index], 'inertia', column.unit):g}",
-            f"a tensor that a body can have: {verdict.reason}",
+    for at in np.flatnonzero(~verdict.valid):
+        index, by = rows[at], -float(verdict.margin[at])
+        digit = _last_digit(table, index)
+        # the digit's own rounding is no reason to refuse
+        if not by <= digit * (1 + 1e-6):
+            reason = check(inertia[index] * np.sign(mass[index])).reason
+            raise table.wrong(index, "ixx", f"a tensor that a body can have: {reason}")
+        warnings.append(
+            f"{table.file}: part {quote(name[index])}: the tensor breaks the triangle inequality by {by:.3g} kg·m², "
+            f"no more than its last printed digit ({digit:.3g} kg·m²): taken as it is"
         )
+        missed += by
+    return missed
+
+
+def _last_digit(table: Table, index: int) -> float:
+    """The last printed digit of a row's moments and products, the coarsest, kg·m²; a whole number is exact."""
+    digits = [0.0]
+    for key in (*MOMENTS, *PRODUCTS):
+        if key in table.numbers:
+            written = re.match(r"[+-]?\d*[.,](\d*)(?:[eE]([+-]?\d+))?", table.written(index, key))
+            if written is not None:
+                power = int(written.group(2) or 0) - len(written.group(1))
+                digits.append(float(to_si(10.0**power, "inertia", table.numbers[key].unit)))
+    return max(digits)
 
 
 def _mesh(
@@ -180,7 +204,7 @@ def _mesh(
     if ("mass" in row) == ("density" in row) or not row.get("density", 1.0) > 0 or row.get("mass", 1.0) == 0:
         raise table.error(index, "shape", MESH, "with it a mass, or a positive density_kg_m3")
     try:
-        vertices, faces = load_mesh(str(folder / cell))
+        vertices, faces = load_mesh(str(note(folder / cell)))
         vertices = to_si(vertices, "length", unit)
         volume, center, inertia = mesh(vertices, faces)
     except ImportError:
@@ -208,29 +232,21 @@ def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimension
     densities = [key for key in DENSITIES.values() if key in row]
     if "mass" in row:
         if densities:
-            raise table.error(
-                index,
-                table.numbers[densities[0]].header,
-                f"{row[densities[0]]:g}",
-                "mass or density, not both",
-            )
-        if row["mass"] == 0:
-            raise table.error(index, table.numbers["mass"].header, "0", "a mass that is not zero")
+            raise table.wrong(index, densities[0], "mass or density, not both")
         return row["mass"]
     if not densities:
         raise table.error(index, "mass", "", "a mass, or a density where the shape has a volume")
     key = densities[0]
-    header = table.numbers[key].header
     if not row[key] > 0:
-        raise table.error(index, header, f"{row[key]:g}", "a positive density (a hole is a negative mass)")
+        raise table.wrong(index, key, "a positive density (a hole is a negative mass)")
     kind = 0 if shape == TENSOR else SHAPES[shape].thin
     if DENSITIES.get(kind) != key or len(densities) > 1:
         wanted = f"{DENSITIES[kind]} or mass" if kind else "mass"
-        raise table.error(index, header, f"{row[key]:g}", f"{wanted} for a {shape}")
+        raise table.wrong(index, key, f"{wanted} for a {shape}")
     known: Any = SHAPES[shape]
     mass = row[key] * float(known.measure(**dict.fromkeys(known.optional, 0.0) | dimensions))
     if mass == 0:
-        raise table.error(index, header, f"{row[key]:g}", "a mass that is not zero: this shape has no volume")
+        raise table.wrong(index, key, "a mass that is not zero: this shape has no volume")
     return mass
 
 
@@ -243,7 +259,8 @@ def _reading(
     inertia: Array,
 ) -> BodyError:
     """Bound what is off in the parts before they are turned: numbers as read, and their shapes' formulas."""
-    from rigidbody3d.rounding import BodyError, Bounded, shaped
+    from dalembert.arithmetic.bounded import Bounded
+    from rigidbody3d.rounding import BodyError, shaped
 
     masses, tensors = READ * np.abs(mass), READ * np.abs(inertia)
     centers = READ * np.abs(center)
@@ -267,7 +284,7 @@ def _reading(
     return BodyError(masses, centers, tensors)
 
 
-def _turning(drawn: Body, rotation: Array, table: Table) -> BodyError:
+def _turning(drawn: Body, rotation: Array, table: Table, kept: NDArray[np.intp]) -> BodyError:
     """Bound the parts as turned: a matrix of zeros and ones is exact, another has its angles' own rounding."""
     from rigidbody3d.rounding import turned
 
@@ -277,8 +294,8 @@ def _turning(drawn: Body, rotation: Array, table: Table) -> BodyError:
             column = table.numbers[name]
             angle += np.abs(np.nan_to_num(to_si(column.values, "angle", column.unit)))
     plain = np.isin(rotation, (-1.0, 0.0, 1.0)).all(axis=(-1, -2))
-    off = np.where(plain, 0.0, READ * (4 + angle))
-    return turned(drawn, rotation, None, np.broadcast_to(off[:, None, None], rotation.shape))
+    off = np.where(plain, 0.0, READ * (4 + angle[kept]))
+    return turned(drawn.numbers, rotation, None, np.broadcast_to(off[:, None, None], rotation.shape))
 
 
 def _turns(table: Table) -> Array:
@@ -301,7 +318,8 @@ def _along(table: Table, values: dict[str, Array]) -> Array:
     given = [values.get(f"axis_{axis}") for axis in "xyz"]
     if all(column is None for column in given):
         return np.broadcast_to(np.eye(3), (table.rows, 3, 3))
-    axis = np.stack([np.zeros(table.rows) if column is None else column for column in given], axis=-1)
+    blank = np.full(table.rows, np.nan)
+    axis = np.stack([blank if column is None else column for column in given], axis=-1)
     axis = np.where(np.isnan(axis).all(axis=-1, keepdims=True), [0.0, 0.0, 1.0], np.nan_to_num(axis))
     size = np.sqrt(np.square(axis).sum(axis=-1))
     if (size == 0).any():

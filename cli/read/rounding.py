@@ -37,9 +37,3 @@ def angle_error(vector: Any, bound: Any, degrees: Any) -> Real:
     turn = np.arcsin(np.where(known, error / np.where(known, size, 1.0), 0.0))
     turn = np.where(known, turn, np.where(error > 0, np.pi, 0.0))
     return np.asarray(np.degrees(turn) + 2 * EPS * np.abs(shown))
-
-
-def angle_text(degrees: Any, spec: str) -> str:
-    """Format an angle in [0, 360); what rounds to a full turn is 0."""
-    text = format(float(degrees), spec)
-    return format(0.0, spec) if float(text) == 360.0 else text

@@ -10,17 +10,17 @@ from __future__ import annotations
 import csv
 import io
 import re
-import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import islice
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.errors import DataError, cell_error, nearest, quote
-from cli.read.units import LARGEST, UNITS, find_unit, parse_number
+from cli.errors import DataError, cell_error, quote
+from cli.read.files import read_bytes
+from cli.read.units import LARGEST, UNITS, find_unit, nearest_unit, parse_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,6 +44,11 @@ class Cells:
     header: str
     unit: str
     values: list[str]
+    decimal_comma: bool = False
+
+    def number(self, text: str) -> float:
+        """Read a number out of a cell; ValueError where it is none, or has not the decimal mark of the file."""
+        return parse_number(_pointed(text) if self.decimal_comma else text)
 
 
 @dataclass
@@ -60,6 +65,32 @@ class Table:
     warnings: list[str] = field(default_factory=list)
     _source: _Source | None = None
 
+    @cached_property
+    def _written(self) -> list[list[str]]:
+        assert self._source is not None
+        return [cells for _, cells in self._source.records()]
+
+    def written(self, index: int, quantity: str) -> str:
+        """Return a cell of a number column as the file wrote it; looked up for messages only."""
+        return self._written[index + 1][self.header.index(self.numbers[quantity].header)].strip()
+
+    def wrong(self, index: int, quantity: str, expected: str) -> DataError:
+        """Make the one line for a number: column and value as the file wrote them."""
+        column = self.numbers[quantity].header
+        return self.error(index, column, self.written(index, quantity), expected)
+
+    def points(self, names: Iterable[str]) -> None:
+        """Write a point for the decimal comma in these columns of texts, where a comma cannot part cells."""
+        columns = {name: self.texts[name] for name in names}
+        if self._source is None or not self._source.has_commas(columns.values()):
+            return
+        for name, column in columns.items():
+            for i, cell in enumerate(column):
+                try:
+                    column[i] = _pointed(cell)
+                except ValueError:
+                    raise self.error(i, name, cell, WITH_COMMA) from None
+
     def where(self, index: int) -> tuple[int, int]:
         """Return the number of a data row (from 1) and its line in the file."""
         assert self._source is not None
@@ -73,9 +104,7 @@ class Table:
     def reject(self, bad: NDArray[np.bool_], quantity: str, expected: str) -> None:
         """Raise the error of the first cell of a number column for which `bad` holds."""
         if bad.any():
-            index = int(np.argmax(bad))
-            column = self.numbers[quantity]
-            raise self.error(index, column.header, f"{column.values[index]:g}", expected)
+            raise self.wrong(int(np.argmax(bad)), quantity, expected)
 
     def require(self, quantity: str, dimension: str) -> Numbers:
         """Return a column of numbers, or say that the table lacks it."""
@@ -151,6 +180,16 @@ def read(
     return table
 
 
+WITH_COMMA = "a number with a decimal comma, as elsewhere in the file"
+
+
+def _pointed(text: str) -> str:
+    """Write a point for the decimal comma; ValueError where there is a point already."""
+    if "." in text:
+        raise ValueError(text)
+    return text.replace(",", ".")
+
+
 _LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
 
 
@@ -164,6 +203,10 @@ class _Source:
     header: list[str]
     warnings: list[str]
     large: bool
+
+    def has_commas(self, columns: Iterable[Iterable[str]]) -> bool:
+        """Tell whether these cells have decimal commas: where no comma parts cells, and one stands in a cell."""
+        return self.delimiter != "," and any("," in cell for column in columns for cell in column)
 
     def records(self) -> Iterator[tuple[int, list[str]]]:
         """Yield (line, cells) of the header and of every row that is not blank."""
@@ -180,12 +223,7 @@ class _Source:
 
 
 def _open(path: str) -> _Source:
-    file = "standard input" if path == "-" else path
-    try:
-        data = sys.stdin.buffer.read() if path == "-" else Path(path).read_bytes()
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise DataError(f"{file}: {reason}") from None
+    file, data = read_bytes(path)
     warnings: list[str] = []
     text = _decode(file, data, warnings)
     source = _Source(file, text, _delimiter(text), [], warnings, text.count("\n") >= LARGE)
@@ -266,7 +304,7 @@ def _find_columns(
                 header = source.header[strays[0]]
                 suffix = header[len(name) + 1 :]
                 problem = f"the unknown unit '{suffix}'" if suffix else "no unit"
-                hint = nearest(suffix, UNITS[dimension]) if suffix else ""
+                hint = nearest_unit(suffix, dimension) if suffix else ""
                 raise DataError(
                     f"{source.file}: the column {header} has {problem}: expected {spellings(name, dimension)}{hint}"
                 )
@@ -291,15 +329,15 @@ def _read_small(source: _Source, table: Table, plan: _Plan, marker: str) -> None
         rows.append(record)
     table.rows = len(rows)
     columns = list(zip(*rows, strict=True)) or [()] * width
-    decimal_comma = source.delimiter != "," and any(
-        "," in cell for _, index, _, kind, _ in plan if kind == "number" for cell in columns[index]
-    )
+    decimal_comma = source.has_commas(columns[index] for _, index, _, kind, _ in plan if kind != "text")
     for name, index, unit, kind, may_be_blank in plan:
         column = columns[index]
         if kind == "text":
             table.texts[name] = [cell.strip() for cell in column]
         elif kind == "cell":
-            table.cells[name] = Cells(source.header[index], unit, [cell.strip() for cell in column])
+            table.cells[name] = Cells(
+                source.header[index], unit, [cell.strip() for cell in column], decimal_comma
+            )
         else:
             values = np.empty(table.rows)
             for i, cell in enumerate(column):
@@ -311,17 +349,9 @@ def _read_small(source: _Source, table: Table, plan: _Plan, marker: str) -> None
                     values[i] = np.nan
                 else:
                     try:
-                        if decimal_comma:
-                            if "." in text:
-                                raise ValueError
-                            text = text.replace(",", ".")
-                        values[i] = parse_number(text)
+                        values[i] = parse_number(_pointed(text) if decimal_comma else text)
                     except ValueError:
-                        expected = (
-                            "a number with a decimal comma, as elsewhere in the file"
-                            if decimal_comma
-                            else "a number"
-                        )
+                        expected = WITH_COMMA if decimal_comma else "a number"
                         raise table.error(i, source.header[index], cell, expected) from None
             table.numbers[name] = Numbers(source.header[index], unit, values)
 
@@ -361,6 +391,7 @@ def _read_large(source: _Source, table: Table, plan: _Plan, marker: str) -> bool
             **exact,
         )
 
+    decimal_comma = False
     try:
         frame = read(".")
     except ValueError:
@@ -370,6 +401,7 @@ def _read_large(source: _Source, table: Table, plan: _Plan, marker: str) -> bool
             frame = read(",")
         except ValueError:
             return False
+        decimal_comma = True
     rows = len(frame)
     marks: dict[tuple[int, str], str] = {}
     for name, index, unit, kind, may_be_blank in plan:
@@ -392,7 +424,10 @@ def _read_large(source: _Source, table: Table, plan: _Plan, marker: str) -> bool
             table.texts[name] = named[column.codes].tolist()
             continue
         else:
-            table.cells[name] = Cells(source.header[index], unit, frame[index].str.strip().tolist())
+            cells = frame[index].str.strip().tolist()
+            if source.has_commas([cells]) and not decimal_comma:
+                return False
+            table.cells[name] = Cells(source.header[index], unit, cells, decimal_comma)
             continue
         if not (np.abs(values) <= LARGEST).all():
             return False
@@ -402,3 +437,15 @@ def _read_large(source: _Source, table: Table, plan: _Plan, marker: str) -> bool
     table.rows = rows
     table.marks.update(marks)
     return True
+
+
+def number_names(names: list[str]) -> tuple[list[str], NDArray[np.intp]]:
+    """Number names in the order in which they first stand."""
+    if len(names) >= LARGE:
+        import pandas as pd
+
+        codes, unique = pd.factorize(np.array(names, dtype=object))
+        return unique.tolist(), codes.astype(np.intp)
+    first: dict[str, int] = {}
+    codes = np.array([first.setdefault(name, len(first)) for name in names], dtype=np.intp)
+    return list(first), codes

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar, overload
 
 from cli.errors import nearest
 
@@ -17,18 +17,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Unit = tuple[float, float]
+Scaled = TypeVar("Scaled", float, complex, "NDArray[np.float64]", "NDArray[np.complex128]")
 
 _LENGTH: dict[str, Unit] = {"m": (1, 1), "mm": (1, 1000), "cm": (1, 100), "um": (1, 10**6), "in": (127, 5000)}
 _LB = (45359237, 10**8)
 _OZ = (45359237, 16 * 10**8)
-_G0 = 9.80665
+G0 = 9.80665
 _TURN = (math.pi, 180)
 
 UNITS: dict[str, dict[str, Unit]] = {
     "number": {"": (1, 1)},
     "length": _LENGTH,
     "mass": {"kg": (1, 1), "g": (1, 1000), "mg": (1, 10**6), "lb": _LB, "oz": _OZ},
-    "force": {"N": (1, 1), "kN": (1000, 1), "lbf": (_LB[0] * _G0, _LB[1])},
+    "force": {"N": (1, 1), "kN": (1000, 1), "lbf": (_LB[0] * G0, _LB[1])},
     "angle": {"deg": _TURN, "rad": (1, 1)},
     "unbalance": {
         "kg_m": (1, 1),
@@ -54,7 +55,7 @@ UNITS: dict[str, dict[str, Unit]] = {
         "N_m": (1, 1),
         "N_mm": (1, 1000),
         "kN_m": (1000, 1),
-        "lbf_in": (_LB[0] * _G0 * 127, _LB[1] * 5000),
+        "lbf_in": (_LB[0] * G0 * 127, _LB[1] * 5000),
     },
     "density": {"kg_m3": (1, 1), "g_cm3": (1000, 1)},
     "area density": {"kg_m2": (1, 1), "g_cm2": (10, 1)},
@@ -63,35 +64,40 @@ UNITS: dict[str, dict[str, Unit]] = {
 }
 """Dimension -> suffix -> unit. The first suffix of each dimension is SI."""
 
-# A vibration is a displacement, a velocity or an acceleration; it keeps its unit, and the units do not mix.
-AMPLITUDES: dict[str, Unit] = {
-    "um": (1, 10**6),
-    "mm": (1, 1000),
-    "m": (1, 1),
-    "mil": (127, 5 * 10**6),
-    "in": (127, 5000),
-    "mm_s": (1, 1000),
-    "m_s": (1, 1),
-    "in_s": (127, 5000),
-    "mm_s2": (1, 1000),
-    "m_s2": (1, 1),
-    "g": (_G0, 1),
+# A vibration is a displacement, a velocity, an acceleration or what an instrument gave without a scale; it keeps its
+# unit, and the units of different rows do not mix.
+AMPLITUDES: dict[str, dict[str, Unit]] = {
+    "length": {
+        "um": (1, 10**6),
+        "mm": (1, 1000),
+        "m": (1, 1),
+        "mil": (127, 5 * 10**6),
+        "in": (127, 5000),
+    },
+    "velocity": {"mm_s": (1, 1000), "m_s": (1, 1), "in_s": (127, 5000)},
+    "acceleration": {"mm_s2": (1, 1000), "m_s2": (1, 1), "g": (G0, 1)},
+    "voltage": {"V": (1, 1), "mV": (1, 1000)},
+    "digital signal": {"counts": (1, 1)},
 }
 # A tag says how it is read: peak, peak to peak, r.m.s.; amplitudes of different tags are different quantities.
 TAGS = ("", "_pk", "_pp", "_rms")
-UNITS["amplitude"] = {unit + tag: si for tag in TAGS for unit, si in AMPLITUDES.items()}
+UNITS["amplitude"] = {
+    unit + tag: si for tag in TAGS for units in AMPLITUDES.values() for unit, si in units.items()
+}
 
 # What influence coefficients are per: a mass or an unbalance.
 UNITS["per"] = {**UNITS["mass"], **UNITS["unbalance"]}
 
 
+def _tag(unit: str) -> str:
+    return next((tag for tag in TAGS[1:] if unit.endswith(tag)), "")
+
+
 def amplitude_kind(unit: str) -> tuple[str, str]:
-    """Return what an amplitude measures (displacement, velocity, acceleration) and its tag; only like ones convert."""
-    tag = next((tag for tag in TAGS[1:] if unit.endswith(tag)), "")
-    bare = unit[: len(unit) - len(tag)]
-    if bare in ("g", "mm_s2", "m_s2"):
-        return "acceleration", tag
-    return "velocity" if bare.endswith("_s") else "displacement", tag
+    """Return what an amplitude measures (length, velocity, acceleration …) and its tag; only like ones convert."""
+    tag = _tag(unit)
+    bare = unit.removesuffix(tag)
+    return next(kind for kind, units in AMPLITUDES.items() if bare in units), tag
 
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII)
@@ -105,13 +111,52 @@ def find_unit(dimension: str, suffix: str) -> str | None:
     return next((unit for unit in units if unit.lower() == suffix.lower()), None)
 
 
-def to_si(value: Any, dimension: str, unit: str) -> Any:
+def dimensions(unit: str) -> set[str]:
+    """Return the dimensions that have a unit of this name; of an amplitude, what it measures."""
+    found = {
+        dimension
+        for dimension in UNITS
+        if dimension not in ("number", "amplitude", "per") and find_unit(dimension, unit)
+    }
+    amplitude = find_unit("amplitude", unit)
+    return found | {amplitude_kind(amplitude)[0]} if amplitude else found
+
+
+def column_dimensions(name: str) -> set[str]:
+    """Return the dimensions of the unit at the end of a column's name, the longest that is one; none for a name."""
+    parts = name.split("_")
+    return next(filter(None, (dimensions("_".join(parts[k:])) for k in range(1, len(parts)))), set())
+
+
+def nearest_unit(suffix: str, dimension: str) -> str:
+    """Suggest the unit of the dimension that is meant; a unit of another dimension is called what it is."""
+    others = dimensions(suffix)
+    if others:
+        return f"; '{suffix}' is a unit of {' or '.join(sorted(others))}"
+    word = suffix.lower()
+    same = [unit for unit in UNITS[dimension] if word.replace("_", "") == unit.lower().replace("_", "")]
+    plural = [unit for unit in UNITS[dimension] if word == f"{unit.lower()}s"]
+    if same or plural:
+        return f"; did you mean '{(same or plural)[0]}'?"
+
+    # mm2 is no misspelt mm, nor mil_s a misspelt mil or mil_rms: short words are not guessed at
+    def like(unit: str) -> bool:
+        return (
+            unit.count("_") >= suffix.count("_")
+            and _tag(unit) == _tag(suffix)
+            and re.findall(r"\d", unit) == re.findall(r"\d", suffix)
+        )
+
+    return nearest(suffix, filter(like, UNITS[dimension]), cutoff=0.75) if len(suffix) > 3 else ""
+
+
+def to_si(value: Scaled, dimension: str, unit: str) -> Scaled:
     """Convert a number or an array from `unit` to SI."""
     numerator, denominator = UNITS[dimension][unit]
     return value * numerator / denominator
 
 
-def from_si(value: Any, dimension: str, unit: str) -> Any:
+def from_si(value: Scaled, dimension: str, unit: str) -> Scaled:
     """Convert a number or an array from SI to `unit`."""
     numerator, denominator = UNITS[dimension][unit]
     return value * denominator / numerator
@@ -148,7 +193,7 @@ def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
         if not suffix:
             raise ValueError(f"'{text}' has no unit (units: {known})")
         raise ValueError(
-            f"'{text}' has the unknown {dimension} unit '{suffix}' (units: {known}){nearest(suffix, UNITS[dimension])}"
+            f"'{text}' has the unknown {dimension} unit '{suffix}' (units: {known}){nearest_unit(suffix, dimension)}"
         )
     value = float(number)
     if not abs(value) <= LARGEST:
@@ -192,10 +237,15 @@ def phasor(magnitude: NDArray[np.float64], angle: NDArray[np.float64], unit: str
     return z
 
 
-def degrees(z: Any) -> Any:
+@overload
+def degrees(z: NDArray[np.complex128]) -> NDArray[np.float64]: ...
+@overload
+def degrees(z: complex) -> float: ...
+def degrees(z: complex | NDArray[np.complex128]) -> float | NDArray[np.float64]:
     """Return the angle of a complex number, or of each in an array, in degrees in [0, 360); 0 for zero."""
     import numpy as np
 
+    vector = np.asarray(z)
     # + 0.0: the angle of -0 is 0, not 180; and a tiny negative angle plus 360 rounds to 360 itself
-    angle = np.degrees(np.arctan2(np.imag(z) + 0.0, np.real(z) + 0.0)) % 360.0
+    angle = np.degrees(np.arctan2(vector.imag + 0.0, vector.real + 0.0)) % 360.0
     return np.where(angle >= 360.0, 0.0, angle)[()]

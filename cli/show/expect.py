@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from cli.errors import DataError, nearest
 from cli.read.tables import read
-from cli.read.units import parse_number
+from cli.read.units import column_dimensions, parse_number
 
-Columns = Mapping[str, Sequence[Any]]
+Columns = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,9 @@ def compare(
         if name not in columns:
             raise DataError(
                 f"{file}: the result has no column '{name}': expected some of "
-                f"{', '.join(columns)}{nearest(name, columns)}"
+                f"{', '.join(columns)}{nearest(name, _alike(name, columns))}"
             )
+    expected.points(name for name in header if _is_number(columns[name]))
     matched = [name for name in header if name in keys and not (is_input(name) and "step" in header)]
     rows = list(_match(columns, file, expected.texts, matched, expected.rows, rtol))
     named = [key for key in keys if key in columns and (key in matched or not is_input(key))]
@@ -74,6 +76,18 @@ def compare(
     if not total:
         raise DataError(f"{file}: no expected value in it: nothing would be checked")
     return Report(lines, f"{total - wrong} of {total} values within {rtol:g}", wrong == 0)
+
+
+def _alike(name: str, columns: Iterable[str]) -> list[str]:
+    """Return the columns of the dimension that a name's unit has; all of them for a name without a unit."""
+    asked = column_dimensions(name)
+    return [column for column in columns if not asked or asked & column_dimensions(column)]
+
+
+def _is_number(column: Sequence[Any]) -> bool:
+    """Tell whether a column of the result holds numbers: names and verdicts keep their commas."""
+    known = next((value for value in column if value is not None), None)
+    return isinstance(known, Real)
 
 
 def is_input(name: str) -> bool:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.read import options
-from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+from cli.show.columns import Result
+from cli.show.output import command
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Method(StrEnum):
@@ -25,6 +29,7 @@ class Integrator(StrEnum):
     splitting = "splitting"
 
 
+@command
 def run(
     body: Annotated[
         str, typer.Argument(metavar="BODY.toml", help="The body and its state; - is standard input.")
@@ -43,14 +48,7 @@ def run(
     integrator: Annotated[
         Integrator, typer.Option(help="For integration; the splitting is for a symmetric top.")
     ] = Integrator.dop853,
-    json: Json = False,
-    output: Output = None,
-    plot: Plot = None,
-    expect: Expect = None,
-    rtol: Rtol = 1e-3,
-    text: Text = False,
-    digits: Digits = False,
-) -> None:
+) -> Result:
     """Turn a body through time: angular velocity, attitude, momentum and energy at any instant.
 
     BODY.toml holds inertia = [I1, I2, I3] (or a 3 × 3 matrix, or parts = "parts.csv"), kg·m²; omega in body axes,
@@ -58,13 +56,31 @@ def run(
     (then inertia is about the fixed point, the axis is body z and gravity acts along -z of space), or torque =
     [x, y, z] in N·m with frame = "body" or "space".
     """
-    from cli.spin import solve as job
+    import numpy as np
+
+    from cli.spin import columns, words
+    from cli.spin.read import read_body
+    from cli.spin.solve import Rotation
 
     if time is not None and at:
         raise options.bad("--at", "expected --time or --at, not both")
     times = options.time_range("--time", time) if time is not None else [_time(text) for text in at or ["0"]]
-    shown = job.solve(body, times, method.value if method else None, integrator.value)
-    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)
+    given = read_body(body)
+    found = Rotation(given, np.array(times), method.value if method else None, integrator.value)
+    found.states  # noqa: B018  faults of the data are found before anything is shown
+
+    def figure() -> Figure:
+        from cli.spin.picture import draw
+
+        return draw(found)
+
+    return Result(
+        document=lambda: columns.document(found),
+        tables={"states": lambda: columns.states(found)},
+        notes=lambda: words.notes(found),
+        figure=figure,
+        warnings=[*given.warnings, *words.warnings(found)],
+    )
 
 
 def _time(text: str) -> float:

@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cli.spin.read import Array
+from cli.spin.solve import Rotation
 from rigidbody3d import principal
 from rigidbody3d.attitude import rotate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from cli.spin.solve import Answer
-
-Array = NDArray[np.float64]
+    from mpl_toolkits.mplot3d import Axes3D
 LINES = (("tab:red", "-"), ("tab:blue", "--"), ("0.2", ":"))
 
 
-def draw(answer: Answer) -> Figure:
+def draw(found: Rotation) -> Figure:
     """Draw the rotation over the times asked for; from a single time, from zero to there."""
     from matplotlib.figure import Figure
 
-    given = answer.given
-    time = _fine(answer)
-    states = answer.at(time)
+    given = found.given
+    time = _fine(found)
+    states = found.at(time)
     free = given.torque is None and given.mgl is None
     figure = Figure(figsize=(11, 7.4), layout="constrained")
-    panels: Any = figure.subfigures(2, 1, height_ratios=(1, 1.7))
-    upper, lower = panels
+    upper, lower = figure.subfigures(2, 1, height_ratios=(1, 1.7), squeeze=False)[:, 0]
     axes = upper.subplots()
     for component, name, (color, style) in zip(states.omega.T, "xyz", LINES, strict=True):
         axes.plot(time, component, color=color, ls=style, lw=1.4, label=f"$\\omega_{name}$")
@@ -42,24 +39,24 @@ def draw(answer: Answer) -> Figure:
         upper.suptitle(given.name, fontsize=11)
     left = lower.add_subplot(1, 2, 1, projection="3d")
     if free:
-        _polhode(left, answer, states.omega)
+        _polhode(left, found, states.omega)
     else:
         _curve(left, states.omega)
         left.set_title("angular velocity in body axes, rad/s", fontsize=10)
     right = lower.add_subplot(1, 2, 2, projection="3d")
-    _trace(right, answer, states.attitude)
+    _trace(right, found, states.attitude)
     return figure
 
 
-def _fine(answer: Answer) -> Array:
-    ends = [min(0.0, float(answer.time.min())), float(answer.time.max())]
-    if len(answer.time) > 1:
-        ends[0] = float(answer.time.min())
-    size = float(np.linalg.norm(answer.given.omega))
+def _fine(found: Rotation) -> Array:
+    ends = [min(0.0, float(found.time.min())), float(found.time.max())]
+    if len(found.time) > 1:
+        ends[0] = float(found.time.min())
+    size = float(np.linalg.norm(found.given.omega))
     if ends[0] == ends[1]:
-        ends[1] = ends[0] + (answer.period or (2 * np.pi / size if size else 1.0))
+        ends[1] = ends[0] + (found.period or (2 * np.pi / size if size else 1.0))
     turns = (ends[1] - ends[0]) * size / (2 * np.pi)
-    return np.linspace(ends[0], ends[1], int(np.clip(60 * turns, 600, 6000 if answer.exact else 2000)))
+    return np.linspace(ends[0], ends[1], int(np.clip(60 * turns, 600, 6000 if found.exact else 2000)))
 
 
 def _sphere(scale: Array, axes: Array) -> Array:
@@ -69,10 +66,10 @@ def _sphere(scale: Array, axes: Array) -> Array:
     return np.asarray(np.einsum("ki,knm->inm", axes, scale[:, None, None] * unit))
 
 
-def _polhode(axes: Any, answer: Answer, omega: Array) -> None:
+def _polhode(axes: Axes3D, found: Rotation, omega: Array) -> None:
     """Energy: Σ I ω² = 2T; momentum: Σ I² ω² = H²."""
-    moments, directions = principal(answer.given.inertia)
-    spin = directions @ answer.given.omega
+    moments, directions = principal(found.given.inertia)
+    spin = directions @ found.given.omega
     energy, momentum = (moments * spin**2).sum(), np.linalg.norm(moments * spin)
     if (moments > 0).all() and energy > 0:
         from matplotlib.lines import Line2D
@@ -96,7 +93,7 @@ def _polhode(axes: Any, answer: Answer, omega: Array) -> None:
     axes.set_title("polhode on the energy and momentum ellipsoids, rad/s", fontsize=10)
 
 
-def _curve(axes: Any, omega: Array) -> None:
+def _curve(axes: Axes3D, omega: Array) -> None:
     axes.plot(*omega.T, color="tab:red", lw=2)
     axes.scatter(*omega[0], color="tab:red", s=18)
     for name in "xyz":
@@ -106,9 +103,9 @@ def _curve(axes: Any, omega: Array) -> None:
     axes.set_aspect("equal")
 
 
-def _trace(axes: Any, answer: Answer, attitude: Array) -> None:
+def _trace(axes: Axes3D, found: Rotation, attitude: Array) -> None:
     """The path on the unit sphere of space of the body's axis: of a body of revolution its own, else the most moved one."""
-    given = answer.given
+    given = found.given
     moments, directions = principal(given.inertia)
     if given.mgl is not None:
         axis = np.array([0.0, 0.0, 1.0])

@@ -1,31 +1,22 @@
-"""What `dalembert spin` does: a body from TOML, its states in time, what is constant in its motion."""
+"""The rotation of a body in time, and what is constant in its motion."""
 
 from __future__ import annotations
 
-import sys
-import tomllib
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
-from pathlib import Path
-from typing import Any
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from cli.errors import DataError, nearest
-from cli.read.units import LARGEST
-from cli.show.output import Columns, Shown
-from rigidbody3d import Body, FreeBody, FreeState, Top, TopState, Trajectory, check, integrate, principal
+from cli.errors import DataError
+from cli.spin.read import Array, TurningBody
+from rigidbody3d import FreeBody, FreeState, Top, TopState, Trajectory, integrate, principal
 from rigidbody3d import cones as cones_of
 from rigidbody3d import sleeping_threshold as threshold_of
 from rigidbody3d import steady_precession as steady_of
-from rigidbody3d.attitude import normalize, rotate
+from rigidbody3d.attitude import rotate
 from rigidbody3d.spin import MOST
 
-Array = NDArray[np.float64]
-
-KEYS = ("name", "inertia", "parts", "omega", "attitude", "top", "torque", "frame")
 UNASKED = 20_000
 """Steps of an integration that nobody asked for by name: some seconds."""
 EQUAL = 1e-12
@@ -33,138 +24,10 @@ EQUAL = 1e-12
 
 
 @dataclass(frozen=True)
-class Given:
-    """The body as described."""
-
-    file: str
-    name: str
-    inertia: Array
-    omega: Array
-    attitude: Array
-    mgl: float | None
-    torque: Array | None
-    frame: str
-    warnings: list[str]
-    rounded: Callable[[], Array] | None = None
-    """Bounds of the errors of the tensor of a body made of parts, (3, 3)."""
-
-
-def read_body(path: str) -> Given:
-    """Read BODY.toml."""
-    file = "standard input" if path == "-" else path
-    try:
-        data = sys.stdin.buffer.read() if path == "-" else Path(path).read_bytes()
-        document = tomllib.loads(data.decode("utf-8-sig"))
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise DataError(f"{file}: {reason}") from None
-    except RecursionError:
-        raise DataError(f"{file}: no valid TOML: nested too deeply") from None
-    for key in document:
-        if key not in KEYS:
-            raise DataError(f"{file}: unknown key '{key}': expected {', '.join(KEYS)}{nearest(key, KEYS)}")
-    top = document.get("top")
-    mgl = None
-    if top is not None:
-        if not isinstance(top, dict) or set(top) != {"mgl"}:
-            raise DataError(f"{file}: [top] holds mgl = weight times distance, N·m, and nothing else")
-        mgl = float(_numbers(file, "top.mgl", top["mgl"], ()))
-    warnings: list[str] = []
-    rounded: Callable[[], Array] | None = None
-    if ("inertia" in document) == ("parts" in document):
-        raise DataError(f'{file}: expected inertia = [I1, I2, I3] (or a matrix) or parts = "parts.csv"')
-    if "parts" in document:
-        from cli.read.parts import read_parts
-
-        if not isinstance(document["parts"], str):
-            raise DataError(f"{file}: parts: found {document['parts']!r}, expected the name of a CSV file")
-        folder = Path() if path == "-" else Path(path).parent
-        parts = read_parts(str(folder / document["parts"]))
-        warnings += parts.warnings
-        about = None if mgl is None else [0.0, 0.0, 0.0]
-        inertia = parts.whole.inertia if about is None else parts.whole.about(about)
-        rounded = partial(_tensor_error, parts.whole, about)
-    else:
-        inertia = _numbers(file, "inertia", document["inertia"], (3,), (3, 3))
-    try:
-        verdict = check(inertia)
-    except ValueError as error:
-        raise DataError(f"{file}: inertia: {error}") from None
-    if not verdict.valid:
-        raise DataError(f"{file}: inertia: no body has it: {verdict.reason}")
-    if not verdict.moments[1] > 0:
-        raise DataError(
-            f"{file}: inertia: found no moment of inertia: expected at least two that are positive"
-        )
-    if "omega" not in document:
-        raise DataError(f"{file}: no omega: expected the angular velocity in body axes, rad/s")
-    torque = document.get("torque")
-    frame = document.get("frame", "body")
-    if frame not in ("body", "space"):
-        raise DataError(f'{file}: frame: found {frame!r}, expected "body" or "space"')
-    attitude = _numbers(file, "attitude", document.get("attitude", [1, 0, 0, 0]), (4,))
-    try:
-        attitude = normalize(attitude)
-    except ValueError as error:
-        raise DataError(f"{file}: attitude: {error}") from None
-    return Given(
-        file,
-        str(document.get("name", "")),
-        inertia,
-        _numbers(file, "omega", document["omega"], (3,)),
-        attitude,
-        mgl,
-        None if torque is None else _numbers(file, "torque", torque, (3,)),
-        frame,
-        warnings,
-        rounded,
-    )
-
-
-def _tensor_error(body: Body, about: list[float] | None) -> Array:
-    return body.error_estimate(about).inertia
-
-
-def _numbers(file: str, key: str, value: Any, *shapes: tuple[int, ...]) -> Array:
-    wanted = " or ".join("×".join(map(str, shape)) if shape else "one" for shape in shapes)
-
-    def plain(x: Any) -> bool:
-        return (
-            all(map(plain, x))
-            if isinstance(x, list)
-            else isinstance(x, (int, float)) and not isinstance(x, bool)
-        )
-
-    try:
-        array = np.array(value, dtype=float) if plain(value) else np.array([np.nan])
-    except (ValueError, OverflowError):
-        array = np.array([np.nan])
-    if array.shape not in shapes or not (np.abs(array) <= LARGEST).all():
-        raise DataError(
-            f"{file}: {key}: found {value!r}, expected {wanted} finite number{'s' * (wanted != 'one')}"
-        )
-    return array
-
-
-def solve(path: str, times: list[float], method: str | None, integrator: str) -> Shown:
-    """Read the body and work out its states."""
-    answer = Answer(read_body(path), np.array(times), method, integrator)
-    answer.states  # noqa: B018  faults of the data are found before anything is shown
-    return Shown(
-        document=answer.document,
-        columns=answer.columns(),
-        notes=answer.notes,
-        figure=answer.figure,
-        errors=answer.errors,
-        warnings=[*answer.given.warnings, *answer.warnings()],
-    )
-
-
-@dataclass(frozen=True)
-class Answer:
+class Rotation:
     """A body in time; each quantity is computed when it is first asked for."""
 
-    given: Given
+    given: TurningBody
     time: Array
     method: str | None
     integrator: str
@@ -291,104 +154,27 @@ class Answer:
             "sleeping_threshold_rad_s": _finite(threshold_of(across, along, g.mgl)) if along else None,
         }
 
-    def warnings(self) -> list[str]:
-        """Say what was done otherwise than a reader might think."""
-        found = []
-        if self.given.mgl is not None and self.round_moments is None:
-            found.append("a top whose moments across body z differ has no closed form: it was integrated")
-        steady = self.steady()
-        if steady is not None and steady["slow_rad_s"] is None:
-            found.append("the spin is too slow for steady precession at this tilt")
-        return found
-
-    # --- what is shown ---
-
-    def document(self) -> dict[str, Any]:
-        """Return the JSON document."""
-        s = self.states
-        rows = zip(
-            self.time.tolist(),
-            (s.omega + 0.0).tolist(),
-            (s.attitude + 0.0).tolist(),
-            (s.momentum + 0.0).tolist(),
-            s.energy.tolist(),
-            strict=True,
-        )
-        names = ("t_s", "omega_rad_s", "attitude", "momentum_kg_m2_s", "energy_J")
-        return {
-            "states": [dict(zip(names, row, strict=True)) for row in rows],
-            "method": "exact" if self.exact else self.integrator,
-            "drift": self.drift,
-            "period_s": self.period,
-            "nutation_period_s": self._nutation_period(),
-            "cones": self.cones(),
-            "steady": self.steady(),
-        }
-
-    def _nutation_period(self) -> float | None:
+    @property
+    def nutation_period(self) -> float | None:
+        """The period of nutation of a top; None of any other body."""
         return _finite(self.states.top.nutation_period) if isinstance(self.states, TopState) else None
 
-    def columns(self) -> Columns:
-        """Return the CSV: a row for each time."""
-        s = self.states
-        columns: dict[str, Any] = {"t_s": self.time}
-        columns |= {f"omega_{a}_rad_s": s.omega[:, i] for i, a in enumerate("xyz")}
-        columns |= {f"attitude_{a}": s.attitude[:, i] for i, a in enumerate("wxyz")}
-        columns |= {f"momentum_{a}_kg_m2_s": s.momentum[:, i] for i, a in enumerate("xyz")}
-        columns["energy_J"] = s.energy
-        plain: dict[str, Any] = {name: np.asarray(column) + 0.0 for name, column in columns.items()}
-        return plain
-
-    def errors(self) -> Columns:
-        """Return bounds of the rounding errors, of an integration of its method too, in the columns of the CSV."""
+    @cached_property
+    def bounds(self) -> dict[str, Array]:
+        """Bounds of the rounding errors of the states, of an integration of its method too."""
         s, rounded = self.states, self.given.rounded
         tensor = np.zeros((3, 3)) if rounded is None else rounded()
         if isinstance(s, TopState):
             # two moments that differ by rounding were taken as one
             between = np.abs(np.diff(np.diag(_tensor(self.given.inertia))[:2]))[0] / 2
-            off = np.diag(tensor) + [between, between, 0.0]
-            found = {of: s.error_estimate(of, off) for of in ("omega", "attitude", "momentum", "energy")}
-        else:
-            found = {of: s.error_estimate(of, tensor) for of in ("omega", "attitude", "momentum", "energy")}
-        columns: dict[str, Any] = {f"omega_{a}_rad_s": found["omega"][:, i] for i, a in enumerate("xyz")}
-        # a turn by an angle moves a quaternion by half of it
-        columns |= {f"attitude_{a}": found["attitude"] / 2 for a in "wxyz"}
-        columns |= {f"momentum_{a}_kg_m2_s": found["momentum"][:, i] for i, a in enumerate("xyz")}
-        columns["energy_J"] = found["energy"]
-        return columns
-
-    def notes(self) -> str:
-        """Say what is constant in the motion."""
-        lines = [
-            "omega in body axes, momentum in space axes, attitude [w, x, y, z] from body to space; "
-            + ("closed form" if self.exact else f"integrated by {self.integrator}")
-        ]
-        drift = self.drift
-        if drift["momentum"] is not None:
-            lines.append(f"drift: momentum {drift['momentum']:.2g}, energy {drift['energy']:.2g} (relative)")
-        if self.period is not None:
-            lines.append(f"period of omega in body axes: {self.period:.6g} s")
-        nutation = self._nutation_period()
-        if nutation is not None:
-            lines.append(f"period of nutation: {nutation:.6g} s")
-        for found in (self.cones(), self.steady()):
-            if found is not None:
-                lines.append(
-                    ", ".join(f"{name}: {'none' if x is None else f'{x:.6g}'}" for name, x in found.items())
-                )
-        return "\n".join(lines)
-
-    def figure(self) -> Any:
-        """Draw ω(t), the polhode and the trace of the body's axis."""
-        from cli.spin.picture import draw
-
-        return draw(self)
+            tensor = np.diag(tensor) + [between, between, 0.0]
+        return {of: s.error_estimate(of, tensor) for of in ("omega", "attitude", "momentum", "energy")}
 
 
 def _tensor(inertia: Array) -> Array:
     return np.diag(inertia) if inertia.ndim == 1 else inertia
 
 
-def _finite(x: Any) -> float | None:
-    value = float(x)
+def _finite(x: ArrayLike) -> float | None:
+    value = float(np.asarray(x))
     return value if np.isfinite(value) else None

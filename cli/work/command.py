@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cli.read import options
-from cli.show.output import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+from cli.show.shown import Digits, Expect, Json, Output, Plot, Rtol, Text, show
 
 
 def run(

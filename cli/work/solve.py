@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from cli.errors import DataError, quote
 from cli.read.tables import Table, read, spellings
 from cli.read.units import from_si, parse_number, to_si
-from cli.show.output import Shown, table_text
+from cli.show.shown import Shown
+from cli.show.text import table_text
 from virtualwork.textbook.link_states import KINDS, Balance, LinkStates, UnitLoad, balance
 
 if TYPE_CHECKING:

@@ -42,12 +42,24 @@ class Doubled:
     def __add__(self, other: Doubled | Array | float) -> Doubled:
         b = _doubled(other)
         total, rest = two_sum(self.high, b.high)
-        return Doubled(total, rest + (self.low + b.low))
+        return _settled(total, rest + (self.low + b.low))
 
     def __mul__(self, other: Doubled | Array | float) -> Doubled:
         b = _doubled(other)
         product, rest = two_product(self.high, b.high)
-        return Doubled(product, rest + (self.high * b.low + self.low * b.high))
+        return _settled(product, rest + (self.high * b.low + self.low * b.high))
+
+    def __truediv__(self, other: Doubled | Array | float) -> Doubled:
+        b = _doubled(other)
+        first = self.high / b.high
+        return _settled(first, (self - b * first).value / b.high)
+
+    def __rtruediv__(self, other: Array | float) -> Doubled:
+        return _doubled(other) / self
+
+    def __abs__(self) -> Doubled:
+        sign = np.where(self.high < 0, -1.0, 1.0)
+        return Doubled(self.high * sign, self.low * sign)
 
     def __neg__(self) -> Doubled:
         return Doubled(-self.high, -self.low)
@@ -60,6 +72,12 @@ class Doubled:
 
     __radd__ = __add__
     __rmul__ = __mul__
+
+
+def _settled(high: Array, low: Array) -> Doubled:
+    """The same number with low below half a unit in the last place of high: a cancellation leaves it above."""
+    total = np.asarray(high + low)
+    return Doubled(total, low - (total - high))
 
 
 def _doubled(x: Doubled | Array | float) -> Doubled:

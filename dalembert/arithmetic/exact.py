@@ -1,4 +1,4 @@
-"""Sums and products with their rounding errors kept, so that a nearly balanced rotor loses no digits."""
+"""Sums and products with their rounding errors kept."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+EPS = float(np.finfo(float).eps)
+"""From 1 to the next number."""
+UNIT = EPS / 2
+"""The largest relative error of one rounding."""
 
 
 def two_sum(a: Array, b: Array) -> tuple[Array, Array]:
@@ -24,7 +29,8 @@ def two_product(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def _halves(a: Array) -> tuple[Array, Array]:
-    c = 134217729.0 * a  # 2²⁷ + 1
+    # 2²⁷ + 1
+    c = 134217729.0 * a
     high = c - (c - a)
     return high, a - high
 

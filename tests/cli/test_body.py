@@ -106,7 +106,7 @@ def test_pictures_are_written(body, tmp_path) -> None:
         ("part,shape,mass_kg\na,disk,1\n", ("radius", "a disk needs radius")),
         ("part,shape,mass_kg,radius_m\na,disk,1,\n", ("row 1", "radius_m", "a disk needs radius")),
         ("part,shape,mass_kg,radius_m\na,disk,1,-2\n", ("radius_m", "'-2'", "positive")),
-        ("part,shape,mass_kg,radius_m\na,disk,0,1\n", ("mass_kg", "not zero")),
+        ("part,shape,mass_kg,radius_m\na,disk,0,1\n", ("masses add up to 0 kg", "positive total")),
         ("part,shape,density_kg_m3,radius_m\na,sphere,-5,1\n", ("density_kg_m3", "positive density")),
         ("part,shape,density_kg_m3,radius_m\na,disk,5,1\n", ("density_kg_m3", "area_density or mass")),
         ("part,shape,mass_kg,density_kg_m3,radius_m\na,sphere,1,5,1\n", ("not both",)),
@@ -190,3 +190,37 @@ def test_a_mesh_without_its_library_or_its_file_is_one_line(body) -> None:
     assert done.returncode == 1
     assert len(done.stderr.splitlines()) == 1
     assert body("part,shape,mass_kg\nb,mesh,1\n").returncode == 1
+
+
+def test_a_blank_axis_is_z_whatever_columns_there_are(body) -> None:
+    rods = "part,shape,mass_kg,length_m,axis_x\nalong x,rod,1,6,1\nalong z,rod,1,2,\n"
+    inertia = json.loads(body(rods, "--json").stdout)["inertia_kg_m2"]
+    # m l²/12 = 3 across the long rod, 1/3 across the short one
+    assert [inertia[i][i] for i in range(3)] == pytest.approx([1 / 3, 3 + 1 / 3, 3], rel=1e-14)
+
+
+def test_a_part_without_mass_is_left_out(body) -> None:
+    marked = DISK.replace("\ndisk", "\nmarker,point,0,,9\ndisk") + "frame,point,0,,\n"
+    done = body(marked, "--omega", "0,4,12", "--json")
+    assert done.returncode == 0, done.stderr
+    assert "part 'marker': mass 0: left out" in done.stderr
+    plain = json.loads(body(DISK, "--omega", "0,4,12", "--json").stdout)
+    assert json.loads(done.stdout) | {"warnings": []} == plain
+    assert body(marked, "--digits").returncode == 0
+
+
+TENSOR = "part,shape,mass_kg,ixx_kg_mm2,iyy_kg_mm2,izz_kg_mm2\narm,tensor,1,{}\n"
+
+
+def test_a_tensor_rounded_in_its_last_digit_is_taken(body) -> None:
+    done = body(TENSOR.format("3.33,3.33,6.67"), "--json")  # 10/3, 10/3, 20/3
+    assert done.returncode == 0, done.stderr
+    assert "breaks the triangle inequality by 1e-08 kg·m²" in done.stderr
+    assert json.loads(done.stdout)["inertia_kg_m2"][2][2] == pytest.approx(6.67e-6, rel=1e-14)
+
+
+def test_a_tensor_beyond_its_last_digit_is_refused_as_written(body) -> None:
+    done = body(TENSOR.format("3.33,3.33,6.690"))
+    assert done.returncode == 1
+    assert "found '3.33'" in done.stderr
+    assert "triangle inequality" in done.stderr

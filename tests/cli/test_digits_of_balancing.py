@@ -15,7 +15,9 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from cli.show.output import digits_that_hold, table_text
+from cli.show.columns import Column, Table
+from cli.show.digits import digits_that_hold
+from cli.show.text import table_text
 
 Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -252,5 +254,8 @@ def test_nothing_is_worked_out_without_the_option(tmp_path: Path) -> None:
 def test_a_table_does_not_round_an_angle_to_a_full_turn() -> None:
     table = table_text({"angle_deg": [359.99999999, 359.99, 360.0]})
     assert table.split() == ["angle_deg", "0", "359.99", "360"]  # a given 360 stays
-    cut = digits_that_hold({"angle_deg": [359.99999999, 12.3456]}, {"angle_deg": [1e-3, 1e-3]})
-    assert list(cut["angle_deg"]) == [0.0, 12.35]
+    cut, unknown = digits_that_hold(
+        Table([Column("angle", "deg", [359.99999999, 12.3456], lambda: [1e-3, 1e-3])])
+    )
+    assert cut.cells == {"angle_deg": [0.0, 12.35]}
+    assert not unknown

@@ -57,3 +57,16 @@ def test_an_unknown_example(dalembert: Dalembert) -> None:
     done = dalembert("examples", "riul-roto")
     assert done.returncode == 1
     assert "did you mean 'riul-rotor'?" in done.stderr
+
+
+def test_the_expected_values_of_another_example_are_kept(dalembert: Dalembert, tmp_path: Path) -> None:
+    dalembert("examples", "klann")
+    before = (tmp_path / "expected.csv").read_text()
+    for _ in range(2):
+        done = dalembert("examples", "riul-rotor")
+        assert done.returncode == 0
+        assert "wrote riul-rotor-expected.csv" in done.stdout
+    assert (tmp_path / "expected.csv").read_text() == before
+    expected = ("--expect", "riul-rotor-expected.csv")
+    rotor = ("rotor.csv", "--plane", "A:0mm:20mm", "--plane", "B:90mm:20mm", "--gravity", "10")
+    assert dalembert("balance", *rotor, *expected).returncode == 0

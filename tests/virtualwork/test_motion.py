@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
 from virtualwork.formulas.closed_forms import angle_and_slide, cross, turning_slide, two_angles, two_slides
-from virtualwork.plan.order import Group
+from virtualwork.plan.steps import Group
 
 R = math.radians
 

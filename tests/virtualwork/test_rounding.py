@@ -16,7 +16,7 @@ import pytest
 from benchmarks.stress import random_linkages
 from benchmarks.stress.campaigns import replay
 from benchmarks.stress.groups import compare
-from benchmarks.truth.four_bar import two_rates
+from benchmarks.truth.four_bar import circles, two_rates
 from benchmarks.truth.mechanism import Exact
 from virtualwork import (
     Force,
@@ -180,10 +180,7 @@ def test_a_chain_of_a_hundred_links() -> None:
         rates, before = [], "B"
         for i in range(bars):
             foot = 1.0 * (i + 1)
-            base = foot - pin
-            s = abs(base)
-            along = (s**2 + mp.mpf(length) ** 2 - mp.mpf(0.75) ** 2) / (2 * s)
-            p = base / s * mp.mpc(along, mp.sqrt(mp.mpf(length) ** 2 - along**2))
+            p = circles(pin, mp.mpf(length), mp.mpc(foot), mp.mpf(0.75), 1)[0] - pin
             length = 2 - length
             q = pin + p - foot
             w3, w4 = two_rates(p, q, -v)

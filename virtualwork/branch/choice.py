@@ -95,6 +95,7 @@ class Along(Passage, Protocol):
     length: float
     whole: bool
     flips: dict[str, Reals]
+    folded: set[str]
 
     def run(self, steps: Iterable[Step], st: State) -> None:
         """Work out positions, each group on its branch."""

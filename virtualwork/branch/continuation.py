@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from virtualwork.branch.choice import Along
+from virtualwork.formulas.double_roots import settle, singular
 from virtualwork.formulas.linear import solve, stack, stack_rows
 from virtualwork.formulas.newton import newton, write_unknowns
 from virtualwork.formulas.numbers import Reals
@@ -108,9 +109,23 @@ class Continuation:
         self.stopped[side] = True
         self.ends.append((self._limit(side), -side))
 
+    def singular(self) -> bool:
+        """Whether the Jacobian is singular at all nodes."""
+        some = np.unique(np.linspace(0, len(self.q) - 1, 24).astype(int))
+        st = State([np.array(self.q)[some]], many=True)
+        with np.errstate(all="ignore"):
+            self.track.run(self.before, st)
+            write_unknowns(self.group, st, np.array(self.x)[some])
+        return singular(self.group, st, len(some))
+
     @property
     def crossings(self) -> list[float]:
-        """The change points met: where the determinant goes through zero and the branch goes on."""
+        """The change points met: where the determinant goes through zero and the branch goes on.
+
+        Where it is zero in every pose its sign is noise, and there are none.
+        """
+        if self.group.name in self.track.folded:
+            return []
         for a, b in self._crossed:
             if (a, b) not in self._found:
                 centre, half = (a + b) / 2, (b - a) / 2
@@ -208,6 +223,9 @@ class Continuation:
         start[~inside] = np.nan
         with np.errstate(all="ignore"):
             found, closed = newton(self.group, many, start, self.size)
+            if self.group.name in self.track.folded:
+                found = settle(self.group, many, found, self.size)
+                st.folded.add(self.group.name)
         found[~(closed & inside)] = np.nan
         write_unknowns(self.group, st, found)
         st.margin[self.group.name] = (

@@ -74,8 +74,12 @@ class Track:
         self._repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
         # no change point anywhere, however far the input turns
         self.settled = False
+        # groups that are singular in every pose
+        self.folded: set[str] = set()
         # where one turn begins, and what it has
         self._period: tuple[float, dict[str, list[ChangePoint]]] | None = None
+        if not self.active:
+            self._look_around()
 
     # --- what poses ask ---------------------------------------------------------------------------------------
     def run(self, steps: Iterable[Step], st: State) -> None:
@@ -87,12 +91,12 @@ class Track:
         if group.kind == "Newton":
             self._close_newton(group, st)
             return
-        case = self.assembly.cases[group.name]
-        if group.name in self.flips:
-            case.solve(st, self.sign(group, st.inputs[0]), self.assembly.mechanism.size)
+        case, size = self.assembly.cases[group.name], self.assembly.mechanism.size
+        if group.name in self.flips and group.name not in self.folded:
+            case.solve(st, self.sign(group, st.inputs[0]), size)
             self.mend(group, st)
         else:
-            case.solve(st, self.assembly.signs[group.name], self.assembly.mechanism.size)
+            case.solve(st, self.assembly.signs[group.name], size, group.name in self.folded)
         for body in self.assembly.geared.intersection(group.members):
             st.angle[body] = self.unwound(body, st.inputs[0], np.angle(st.turn[body]))
 
@@ -231,6 +235,48 @@ class Track:
                 if near.any():
                     yield change, near, q[near] - change.input
 
+    def _look_around(self) -> None:
+        """With several inputs: which closed forms are singular at all poses around the guess."""
+        at = self.assembly.mechanism.at
+        golden = np.sqrt(np.arange(2.0, 2 + len(at)))
+        off = (np.multiply.outer(np.arange(1.0, 25), golden) % 1.0 - 0.5) * 0.1 * self.length
+        st = State([a + off[:, j] for j, a in enumerate(at)], many=True)
+        with np.errstate(all="ignore"):
+            for s in self.plan.steps:
+                if isinstance(s, Group) and s.kind == "Newton":
+                    return
+                self.assembly.run_untracked([s], st)
+                if isinstance(s, Group) and self._meets(s, st.margin[s.name]):
+                    self.folded.add(s.name)
+                    self.assembly.cases[s.name].solve(st, 1, self.assembly.mechanism.size, folded=True)
+
+    def _meets(self, group: Group, margin: Number) -> bool:
+        """Whether a radicand is zero to rounding wherever there is one."""
+        if group.kind == "PRP":
+            return False
+        m = np.abs(np.atleast_1d(margin))
+        m = m[np.isfinite(m)]
+        return len(m) > 4 and bool((m <= self._noise(group)).all())
+
+    def _noise(self, group: Group) -> float:
+        """The rounding of a group's radicand."""
+        size, r = self.assembly.mechanism.size, self._radii(group)
+        return 256 * EPS * (1 + (size / r) ** 2 if r else 1)
+
+    def warnings(self) -> tuple[str, ...]:
+        """The assembly's warnings, and the groups that are singular in every pose in what was covered."""
+        found = []
+        for g in self.plan.groups:
+            if g.name in self.folded:
+                guides = self.assembly.mechanism.guides
+                what = ", ".join([*g.members, *(f"the slide at {guides[s].point}" for s in g.slides)])
+                found.append(
+                    f"singular in every pose: the speed of {what} is not determined: the assemblies of {g.name} meet "
+                    "all along. Places are those where they meet; rates and forces that hang on them are left out"
+                )
+        meeting = tuple(f"[guess] at: {name} " for name in self.folded)
+        return (*found, *(w for w in self.assembly.warnings if not (meeting and w.startswith(meeting))))
+
     # --- looking ahead ------------------------------------------------------------------------------------------
     def margin(self, group: Group, q: Reals) -> Reals:
         """The group's radicand at inputs q, on the branch known so far."""
@@ -256,12 +302,17 @@ class Track:
                     st.angle[body] = self.unwound(body, q, np.angle(st.turn[body]))
             elif isinstance(s, Group):
                 self._continued(s).extend(a, b)
+                if self._continued(s).singular():
+                    self.folded.add(s.name)
                 self.close(s, st)
             else:
                 self.run([s], st)
 
     def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
         """Find where the radicand crosses or touches zero; say whether a change point was found."""
+        if self._meets(group, m):
+            self.folded.add(group.name)
+            return True
         if np.mean(np.abs(m) < 1e-14) > 0.9:
             return False  # stretched all along: zeros of rounding are no change points
         inside = (q >= a) & (q < b)
@@ -316,9 +367,7 @@ class Track:
             where, depth = centre + widen * half * float(best), float(fit(best))
             level = float(np.abs(m).max())
             centre = where
-        size, r = self.assembly.mechanism.size, self._radii(group)
-        noise = 256 * EPS * (1 + (size / r) ** 2 if r else 1) + 1e-9 * EPS * level
-        return where, depth, noise
+        return where, depth, self._noise(group) + 1e-9 * EPS * level
 
     def _radii(self, group: Group) -> float:
         arms = [abs(a) for a in self.assembly.cases[group.name].arms if a]
@@ -334,8 +383,9 @@ class Track:
     def turns(self) -> int | None:
         """How many turns of the input bring every group back to where it stood: the period of the branch.
 
-        A branch that passes an odd number of change points in a turn needs two; a fractional gear its own number.
-        None with a slide or several inputs, and where no number of turns up to `TURNS` does it.
+        A branch that passes an odd number of change points in a turn needs two; a fractional gear its own number. A
+        branch between two limits needs what tells its own inputs apart. None with a slide or several inputs, and where
+        no number of turns up to `TURNS` does it.
         """
         if not self.active or self.assembly.mechanism.inputs[0].is_slide:
             return None
@@ -354,8 +404,20 @@ class Track:
             self.cover(self.start - n * self.length, self.start + self.length)
             # beyond a limit there is nothing to compare: what is not assembled contradicts nothing
             if not (np.abs(self._stands(q - n * self.length) - here) > SAME).any():
-                return n
-        return None
+                return self._between_limits(n)
+        return self._between_limits(None)
+
+    def _between_limits(self, n: int | None) -> int | None:
+        """The turns of a range between two limits; n where there is none."""
+        if n == 1 or not self.has_limits:
+            return n
+        shifts = (0.0,) if n is None else (0.0, n * self.length)
+        every = [(limit.input + shift, limit.side) for limit in self._ends() for shift in shifts]
+        above = [q for q, side in every if q > self.start and side < 0]
+        below = [q for q, side in every if q < self.start and side > 0]
+        if not above or not below:
+            return n
+        return max(1, int(np.ceil((min(above) - max(below)) / self.length)))
 
     def _stands(self, q: Reals) -> Complexes:
         """Rotations and slides (over the size) of all groups at inputs q; NaN where not assembled."""
@@ -381,6 +443,10 @@ class Track:
         """Where the input can go no further, over one period of the branch or what was covered, to full precision."""
         back = self.length if self.assembly.mechanism.inputs[0].is_slide or not self._repeats else 0.0
         self.cover(self.start - back, self.start + (self.period or self.length))
+        return self._ends()
+
+    def _ends(self) -> list[Limit]:
+        """The limits in what was covered."""
         by_name = {g.name: g for g in self.plan.groups}
         found = [self._root(by_name[name], a, b) for name, a, b in self._brackets]
         for name, marched in self._marched.items():

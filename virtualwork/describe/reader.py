@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import itertools
 import math
 import tomllib
@@ -14,9 +15,11 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.errors import DescriptionError, MechanismError
 from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link
+from virtualwork.describe.tables import rows
 from virtualwork.describe.units import EXPECTED, parse, scaled, unit
 
 D = TypeVar("D", bound=Description)
+Load = Callable[[Path], bytes]
 
 LARGEST = 1e60  # SI: no quantity of a machine is larger, and no product of five of them overflows
 TABLES = {
@@ -25,8 +28,8 @@ TABLES = {
 }  # fmt: skip
 
 
-def read(path: Path, make: Callable[..., D]) -> D:
-    """Read a mechanism from a TOML file; `make` takes its parts, as `Description` does.
+def read(path: Path, make: Callable[..., D], load: Load = Path.read_bytes) -> D:
+    """Read a mechanism from a TOML file; `make` takes its parts, `load` reads it and the tables beside it.
 
     Raises
     ------
@@ -35,11 +38,17 @@ def read(path: Path, make: Callable[..., D]) -> D:
     OSError
         Where the file cannot be read.
     """
-    return read_text(path.read_text(encoding="utf-8-sig"), make, str(path), path.parent)
+    return read_text(load(path).decode("utf-8-sig"), make, str(path), path.parent, load)
 
 
-def read_text(text: str, make: Callable[..., D], file: str = "<text>", folder: Path | None = None) -> D:
-    """Read a mechanism from TOML text; `folder` is where its input tables lie."""
+def read_text(
+    text: str,
+    make: Callable[..., D],
+    file: str = "<text>",
+    folder: Path | None = None,
+    load: Load = Path.read_bytes,
+) -> D:
+    """Read a mechanism from TOML text; `folder` is where its input tables lie, which `load` reads."""
     try:
         data = tomllib.loads(text)
     except RecursionError:
@@ -47,7 +56,7 @@ def read_text(text: str, make: Callable[..., D], file: str = "<text>", folder: P
     except ValueError as error:  # a TOMLDecodeError, or a number of thousands of digits
         raise DescriptionError(f"{file}: no valid TOML: {error}") from None
     try:
-        return make(**_Reader(data, folder or Path()).parts())
+        return make(**_Reader(data, folder or Path(), load).parts())
     except MechanismError as error:
         raise type(error)(f"{file}: {error}") from None
 
@@ -55,8 +64,8 @@ def read_text(text: str, make: Callable[..., D], file: str = "<text>", folder: P
 class _Reader:
     """Walks the tables; every complaint names the table and the key."""
 
-    def __init__(self, data: dict[str, Any], folder: Path) -> None:
-        self.data, self.folder = data, folder
+    def __init__(self, data: dict[str, Any], folder: Path, load: Load) -> None:
+        self.data, self.folder, self.load = data, folder, load
         _known(data, TABLES, "the file", "table")
         units = data.get("units", {})
         _known(units, {"length", "angle"}, "[units]", "key")
@@ -291,11 +300,8 @@ class _Reader:
 
     def csv(self, name: Any, where: str) -> list[dict[str, str]]:
         """The rows of a CSV file beside this one."""
-        import csv
-
         try:
-            with (self.folder / str(name)).open(newline="", encoding="utf-8-sig") as stream:
-                return list(csv.DictReader(stream))
+            return rows(self.load(self.folder / str(name)))
         except (OSError, ValueError, csv.Error):
             raise _wrong(where, name, "a CSV file that can be read") from None
 
@@ -434,10 +440,7 @@ class _Reader:
             raise _wrong(f"{where} between", ends, 'two points such as ["crank.B", "ground.D"]')
         found = []
         for end in ends:
-            link, dot, point = str(end).rpartition(".")
-            if not dot:
-                raise _wrong(f"{where} between", end, 'a link and its point such as "crank.B"')
-            self.body(link, f"{where} between")
+            link, point = self.point_of(end, f"{where} between")
             found.append((link, self.place(link, point, f"{where} between")))
         return Spring(
             (found[0], found[1]),
@@ -445,6 +448,20 @@ class _Reader:
             self.number(entry.get("free_length", 0.0), "length", f"{where} free_length"),
             self.number(entry.get("damping", 0.0), "damping", f"{where} damping"),
         )
+
+    def point_of(self, name: Any, where: str) -> tuple[str, str]:
+        """`crank.B`, or the plain name of a point that one body alone has: the body and the point."""
+        link, dot, point = str(name).rpartition(".")
+        if dot:
+            return self.body(link, where), point
+        owners = [body for body, points in self.bodies.items() if name in points]
+        if len(owners) != 1:
+            known = {p for points in self.bodies.values() for p in points}
+            expected = " or ".join(f'"{body}.{name}"' for body in owners)
+            raise _wrong(
+                where, name, expected or f'a link and its point such as "crank.B"{hint(str(name), known)}'
+            )
+        return owners[0], str(name)
 
     def torsion(self, entry: dict[str, Any], i: int) -> TorsionSpring:
         where = f"[[torsion_springs]] {i}"

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from virtualwork.formulas.numbers import Number, Reals
 
+# a singular value below this share of the largest is that of a null vector
+SINGULAR = 1e-6
+
 
 def stack(cols: list[list[Number]], n: int) -> Reals:
     """The real Jacobian (n, 2·loops, unknowns) from complex columns."""
@@ -69,17 +72,22 @@ def inverse_norm(jacobian: Reals) -> Reals:
     return out
 
 
-def singular_poses(cols: list[list[Number]], angles: int, n: int) -> NDArray[np.bool_]:
-    """Which poses have a Jacobian whose smallest singular value is below 1e-6 of its largest."""
+def singular_values(cols: list[list[Number]], angles: int, n: int) -> Reals:
+    """The singular values of the Jacobian (lengths scaled) at each pose; NaN where it is not assembled."""
     jacobian = stack(cols, n)
-    size = np.abs(jacobian[:, :, :angles]).max(initial=0.0)
+    good = np.isfinite(jacobian).all(axis=(1, 2))
+    size = np.abs(jacobian[good][:, :, :angles]).max(initial=0.0)
     if angles and size > 0:
         jacobian[:, :, :angles] /= size
-    good = np.isfinite(jacobian).all(axis=(1, 2))
-    out = np.zeros(n, dtype=bool)
-    s = np.linalg.svd(jacobian[good], compute_uv=False)
-    out[good] = s[:, -1] < 1e-6 * s[:, 0]
+    out = np.full((n, min(jacobian.shape[1:])), np.nan)
+    out[good] = np.linalg.svd(jacobian[good], compute_uv=False)
     return out
+
+
+def singular_poses(cols: list[list[Number]], angles: int, n: int) -> NDArray[np.bool_]:
+    """Which poses have a Jacobian whose smallest singular value is below 1e-6 of its largest."""
+    s = singular_values(cols, angles, n)
+    return np.asarray(s[:, -1] < SINGULAR * s[:, 0])
 
 
 def solve_columns(cols: list[list[Number]], right: list[Number]) -> list[Number]:
@@ -88,3 +96,22 @@ def solve_columns(cols: list[list[Number]], right: list[Number]) -> list[Number]
     n = int(np.prod(shape))
     x = solve(stack(cols, n), -stack_rows(right, n))
     return [x[:, j] if shape else float(x[0, j]) for j in range(x.shape[1])]
+
+
+def solve_determined(cols: list[list[Number]], right: list[Number], angles: int) -> list[Number]:
+    """The same where J is singular in every pose: what a null vector of J moves is not determined, and NaN."""
+    shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(w) for w in right))
+    n = int(np.prod(shape))
+    jacobian, w = stack(cols, n), stack_rows(right, n)
+    good = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(w).all(axis=1)
+    out = np.full((n, jacobian.shape[2]), np.nan)
+    if good.any():
+        size = np.abs(jacobian[good][:, :, :angles]).max(initial=0.0) or 1.0
+        scale = np.array([1.0] * angles + [size] * (jacobian.shape[2] - angles))
+        jacobian = jacobian[good] * scale / size
+        _, s, null = np.linalg.svd(jacobian)
+        loose = (s < SINGULAR * s[:, :1]).astype(float)
+        free = np.einsum("nk,nkj->nj", loose, np.abs(null[:, : s.shape[1]])) > SINGULAR
+        least = -(np.linalg.pinv(jacobian, rcond=SINGULAR) @ (w[good] / size)[..., None])[..., 0]
+        out[good] = np.where(free, np.nan, least * scale)
+    return [out[:, j] if shape else float(out[0, j]) for j in range(out.shape[1])]

@@ -327,6 +327,10 @@ class Solved(Quantity):
         group = self.group
         block.setting.formed.add(group.name)
         loads = [load.value(block) for load in self.paths.on_group(self.group)]
+        if group.name in block.st.folded:
+            # singular in every pose: it may be under stress without any load
+            nothing = np.full(np.shape(block.st.inputs[0]), complex(np.nan, np.nan))[()]
+            return 1.0, [nothing] * len(group.closures)
         if all(load is None for load in loads):
             return 1.0, [None] * len(group.closures)
         cols = block.by[0].columns(group)

@@ -90,6 +90,17 @@ class Many:
         return np.where(np.abs(inverse) * (np.abs(c1) * np.abs(c2)) < 1 / PARALLEL, inverse, np.nan)
 
 
+class Folded:
+    """A kind for two assemblies that meet in every pose: the root is zero, and its noise is left out."""
+
+    def __init__(self, kind: Kind) -> None:
+        self.exp, self.join, self.regular = kind.exp, kind.join, kind.regular
+
+    def sqrt(self, x: Number) -> Number:
+        """Zero."""
+        return 0.0 * x
+
+
 ONE, MANY = One(), Many()
 
 

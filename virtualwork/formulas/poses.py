@@ -154,6 +154,8 @@ class Poses:
                 jacobian = stack(columns(group, st), length)
                 jacobian[:, :, : len(group.angles)] /= size
                 whole[rows] = inverse_norm(jacobian)
+                if st.folded:
+                    whole[rows][np.isfinite(whole[rows])] = np.inf
         return whole
 
     # --- solving ----------------------------------------------------------------------------------------------

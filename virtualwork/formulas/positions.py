@@ -12,7 +12,7 @@ import numpy as np
 
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import angle_and_slide, turning_slide, two_angles, two_slides
-from virtualwork.formulas.numbers import MANY, ONE, Kind, Number, plus
+from virtualwork.formulas.numbers import MANY, ONE, Folded, Kind, Number, plus
 from virtualwork.plan.steps import Angle, Closure, Group, Path, Place, Step, Term, Turn
 
 # poses worked out together: their temporaries stay in the cache
@@ -44,6 +44,8 @@ class State:
         self.point: dict[str | None, Number] = {None: 0j}
         self.slide: dict[int, Number] = {}
         self.margin: dict[str, Number] = {}
+        # groups that are singular in every pose
+        self.folded: set[str] = set()
         # e^{i·input}, where a sweep knows it already
         self.spins: dict[int, Number] = {}
 
@@ -54,6 +56,7 @@ class State:
         other = State(list(inputs), many, None if many != self.many else self.kind)
         for name in ("turn", "angle", "point", "slide", "margin"):
             setattr(other, name, dict(getattr(self, name)))
+        other.folded = set(self.folded)
         return other
 
     def spin(self, j: int) -> Number:
@@ -197,9 +200,10 @@ class Case:
         relative = self.tie.get(body, Angle())
         return z * st.kind.exp(st.affine(relative)) if relative.inputs else z
 
-    def solve(self, st: State, sign: Number, size: float) -> None:
-        """Write the group's rotations and slides into the state."""
+    def solve(self, st: State, sign: Number, size: float, folded: bool = False) -> None:
+        """Write the group's rotations and slides into the state; `folded`: its two assemblies meet in every pose."""
         group = self.group
+        kind: Kind = Folded(st.kind) if folded else st.kind
         w = st.point[self.closure.start] - st.point[self.closure.end]
         if self.known:
             w = w + st.sum(self.known)
@@ -208,23 +212,25 @@ class Case:
             w = np.complex128(w)
         if group.kind == "RRR":
             a, b = group.angles
-            st.turn[a], st.turn[b], margin = two_angles(w, self.arm(0, st), self.arm(1, st), sign, st.kind)
+            st.turn[a], st.turn[b], margin = two_angles(w, self.arm(0, st), self.arm(1, st), sign, kind)
         elif group.kind == "RRP":
             (a,), (g,) = group.angles, group.slides
             z, body = self.rails[0]
             st.turn[a], st.slide[g], margin = angle_and_slide(
-                w, self.arm(0, st), z * st.turn[body], sign, st.kind
+                w, self.arm(0, st), z * st.turn[body], sign, kind
             )
         elif group.kind == "RPR":
             (a,), (g,) = group.angles, group.slides
             st.turn[a], st.slide[g], margin = turning_slide(
-                w, self.arm(0, st), self.rail(st), sign, size, st.kind
+                w, self.arm(0, st), self.rail(st), sign, size, kind
             )
         else:
             g, h = group.slides
             u, v = (z * st.turn[body] for z, body in self.rails)
             st.slide[g], st.slide[h], margin = two_slides(w, u, v)
         st.margin[group.name] = margin
+        if folded:
+            st.folded.add(group.name)
         for tie in group.ties:
             st.turn[tie.body] = st.rotate(tie.angle)
 

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.linear import singular_poses, solve_columns
+from virtualwork.formulas.linear import singular_poses, solve_columns, solve_determined
 from virtualwork.formulas.numbers import Number, cross, plus, times
 from virtualwork.formulas.positions import State, columns
 from virtualwork.plan.steps import Angle, Group, Path, Place, Plan, Step, Term, Turn
@@ -177,6 +177,9 @@ class Rates:
     def _group(self, group: Group, k: int) -> None:
         right = self.right_side(group, k)
         cols = self.columns(group)
+        if group.name in self.st.folded:
+            self.write(group, k, solve_determined(cols, right, len(group.angles)))
+            return
         if group.kind != "Newton":
             (c1, c2), w = cols[0], right[0]
             inverse = self.inverse(group)

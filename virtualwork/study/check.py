@@ -109,7 +109,7 @@ class Check:
         for q in qs:
             inputs = (q, *m.at[1:])
             condition = float(Poses(self.assembly, np.array([inputs])).condition[0])
-            if condition < best:
+            if condition < best or (chosen is None and condition == np.inf):
                 best, chosen = condition, inputs
         if chosen is None:
             raise AssemblyError("check: the mechanism cannot be assembled near its guess")
@@ -176,6 +176,14 @@ class Check:
             if all(abs(q - other) > 1e-8 for other in unique):
                 unique.append(q)
         return tuple(sorted(unique))
+
+    @property
+    def singular(self) -> tuple[str, ...]:
+        """The groups that are singular in every pose: their assemblies meet all along, their rates are not determined."""
+        track = self.assembly.track
+        if track.active:
+            track.cover(*self._span())
+        return tuple(g.name for g in self.assembly.plan.groups if g.name in track.folded)
 
     # --- parts ------------------------------------------------------------------------------------------------
     @property

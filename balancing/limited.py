@@ -10,122 +10,52 @@ it). The dual solution y is the proof: for any y with αᴴy = 0 and Σ|y_s| = 1
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from balancing.cones import Cones, solve
-from balancing.dependence import EPS, DependentPlanes, columns_scaled, roundings
-from balancing.influence import Balance, Infeasible, checked, least_squares
+from balancing.dependence import DependentPlanes, columns_scaled, roundings
+from balancing.qr import smallest_squares
+from dalembert.arithmetic.exact import EPS
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def minimax(
-    influence: ArrayLike,
-    initial: ArrayLike,
-    max_mass: ArrayLike | None = None,
-    *,
-    weights: ArrayLike | None = None,
-) -> Balance:
-    """Find the corrections whose largest residual vibration is the smallest there is.
+class Infeasible(ValueError):
+    """No corrections meet the residual limit; `smallest` is the smallest limit that can be met."""
 
-    Parameters
-    ----------
-    influence
-        α, complex (s, p), amplitude per kg.
-    initial
-        V, complex (s,), amplitude.
-    max_mass
-        Limits |w_p| <= max_mass, scalar or (p,), kg; inf for none.
-    weights
-        w_s >= 0, (s,): max w_s |r_s| is made least. Default 1 each.
-
-    Returns
-    -------
-    Balance
-        `.corrections` (p,) complex, masses to ADD; `.residual` (s,); `.residual_max`; `.bound`: no corrections
-        (within the limits) leave less, so that the largest (weighted) residual lies between the two.
-
-    Raises
-    ------
-    DependentPlanes
-        The sensors do not tell the planes apart, and no limit keeps their masses finite.
-    ValueError
-        Not finite, or shapes that do not fit.
-
-    Notes
-    -----
-    Foiles, Allaire and Gunter, IMechE C576/097 (2000), pose the problem. A sensor that no plane moves
-    sets a floor and is left out of the search: its residual must not excuse the others'.
-
-    Examples
-    --------
-    Goodman's data: three residuals of 0.4, where least squares leaves 10/21.
-
-    >>> fix = minimax([[3, -2], [5, -2], [5, -3]], [1, -1, 0])
-    >>> fix.corrections.real.round(9), fix.residual_max.round(12), round(fix.bound, 12)
-    (array([1. , 1.8]), np.float64(0.4), 0.4)
-    """
-    alpha, v, _ = checked(influence, initial, weights)
-    if alpha.ndim != 2 or v.ndim != 1:
-        raise ValueError(
-            f"one rotor at a time: expected influence (s, p), initial (s,), found {alpha.shape}, {v.shape}"
-        )
-    w = None if weights is None else np.asarray(weights, dtype=float)
-    a, b = (alpha, v) if w is None else (alpha * w[:, None], v * w)
-    limit = _limits(max_mass, alpha.shape[1])
-    # sensors that no plane moves only set a floor
-    moved = np.abs(a).max(axis=1) > 0
-    floor = float(np.abs(b[~moved]).max(initial=0.0))
-    if not moved.all():
-        a, b = a[moved], b[moved]
-    if not len(b):
-        raise DependentPlanes("the readings show no plane at all", np.eye(alpha.shape[1], dtype=complex)[0])
-    corrections, bound = _smallest(a, b, limit)
-    return Balance(alpha, v, corrections, w, max(bound, floor, 0.0), max_mass=_given(limit))
+    def __init__(self, smallest: float) -> None:
+        self.smallest = smallest
+        super().__init__(f"the residual limit cannot be met: the smallest that can is {smallest:.6g}")
 
 
 def limited_least_squares(
-    problem: Balance, root: Real | None, max_mass: ArrayLike | None, max_residual: ArrayLike | None
-) -> Balance:
-    """Least squares with limits; see `balancing.least_squares`. The corrections of `problem` are not looked at."""
-    alpha, v = problem.influence, problem.initial
-    if alpha.ndim != 2 or v.ndim != 1:
-        raise ValueError("limits are for one rotor at a time: expected influence (s, p), initial (s,)")
-    limit = _limits(max_mass, alpha.shape[1])
-    ceiling = np.broadcast_to(np.inf if max_residual is None else np.asarray(max_residual, float), v.shape)
-    if not (ceiling > 0).all():
-        raise ValueError("max_residual must be positive")
-    found = _limited(alpha, v, root, limit, ceiling)
-    return replace(problem, corrections=found, max_mass=_given(limit), max_residual=_given(ceiling))
+    alpha: Complex, v: Complex, root: Real | None, limit: Real, ceiling: Real
+) -> Complex:
+    """Return the corrections of least squares within limits: of masses (p,) and of residuals (s,), inf for none.
 
-
-def _given(limit: Real) -> Real | None:
-    return limit if np.isfinite(limit).any() else None
-
-
-def _limited(alpha: Complex, v: Complex, root: Real | None, limit: Real, ceiling: Real) -> Complex:
-    """Return the corrections of least squares within limits."""
+    `root` are the square roots of weights (s,); None: all are one. Raises Infeasible.
+    """
+    a, b = (alpha, v) if root is None else (alpha * root[:, None], v * root)
     try:
-        free = least_squares(alpha, v, None if root is None else root**2)
-        if (np.abs(free.corrections) <= limit).all() and (np.abs(free.residual) <= ceiling).all():
-            return free.corrections
+        free, _ = smallest_squares(a, b)
+        if (np.abs(free) <= limit).all() and (np.abs(v + np.matvec(alpha, free)) <= ceiling).all():
+            return free
     except DependentPlanes:
         if not np.isfinite(limit).all():
             raise
     capped = np.isfinite(ceiling)
     start = None
     if capped.any():
-        start, bound = _smallest(alpha[capped] / ceiling[capped, None], v[capped] / ceiling[capped], limit)
+        start, bound = smallest_maximum(
+            alpha[capped] / ceiling[capped, None], v[capped] / ceiling[capped], limit
+        )
         reached = float(np.abs((v[capped] + alpha[capped] @ start) / ceiling[capped]).max())
         if bound > 1:
             raise Infeasible(reached * float(ceiling[capped].min()))
         if reached >= 1 - 1e-9:  # nothing to choose from
             return start
-    a, b = (alpha, v) if root is None else (alpha * root[:, None], v * root)
     space = _Space(a, b, limit)
     rows, offset = space.residuals
     cones = [space.limits()]
@@ -160,30 +90,21 @@ def _limited(alpha: Complex, v: Complex, root: Real | None, limit: Real, ceiling
     return np.asarray(w + high * (start - w), dtype=complex)
 
 
-def _limits(max_mass: ArrayLike | None, planes: int) -> Real:
-    limit = np.broadcast_to(np.inf if max_mass is None else np.asarray(max_mass, dtype=float), (planes,))
-    if not (limit > 0).all():
-        raise ValueError("max_mass must be positive")
-    return limit
-
-
-def _smallest(a: Complex, b: Complex, limit: Real) -> tuple[Complex, float]:
-    """Return the minimax corrections and a lower bound of the largest residual."""
+def smallest_maximum(a: Complex, b: Complex, limit: Real) -> tuple[Complex, float]:
+    """Return the minimax corrections (p,) within limits (p,) and a lower bound of the largest |b + a w|."""
     if np.isfinite(limit).any():
         try:
-            free, bound = _smallest(a, b, np.full(len(limit), np.inf))
+            free, bound = smallest_maximum(a, b, np.full(len(limit), np.inf))
             if (np.abs(free) <= limit).all():
                 return free, bound
         except DependentPlanes:
             if not np.isfinite(limit).all():
                 raise
     else:
-        fix = least_squares(a, b)
-        largest = float(fix.residual_max)
-        if not largest > 64 * EPS * max(
-            float(np.abs(b).max()), float((np.abs(a) @ np.abs(fix.corrections)).max())
-        ):
-            return fix.corrections, 0.0
+        free, _ = smallest_squares(a, b)
+        largest = float(np.abs(b + np.matvec(a, free)).max())
+        if not largest > 64 * EPS * max(float(np.abs(b).max()), float((np.abs(a) @ np.abs(free)).max())):
+            return free, 0.0
     space = _Space(a, b, limit)
     q, c = space.residuals
     caps = space.limits()
@@ -225,7 +146,7 @@ class _Space:
         self.limited = np.flatnonzero(np.isfinite(limit))
         w0 = np.zeros(a.shape[1], dtype=complex)
         try:
-            free = least_squares(a, b).corrections
+            free, _ = smallest_squares(a, b)
             if not len(self.limited):
                 w0 = free
         except DependentPlanes:

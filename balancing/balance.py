@@ -1,0 +1,384 @@
+"""Measured vibration -> corrections, and the vibration they leave.
+
+The corrections are the w for which r = V + α w is small (`balancing.influence`): by least squares, or by its largest
+component, with limits on masses and residuals where asked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from balancing.dependence import DependentPlanes, adjoint, columns_scaled, condition_number
+from balancing.limited import limited_least_squares, smallest_maximum
+from balancing.qr import smallest_squares
+from dalembert.arithmetic.exact import EPS
+
+if TYPE_CHECKING:
+    from balancing.rounding import Bounds, Case
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Corrections from influence coefficients; see `least_squares` and `minimax`."""
+
+    influence: Complex
+    """α, (..., s, p), amplitude per kg."""
+    initial: Complex
+    """V, (..., s), amplitude."""
+    corrections: Complex
+    """The masses to ADD, (..., p), complex kg."""
+    weights: Real | None = None
+    """The weights that were asked for, (..., s)."""
+    bound: float | None = None
+    """minimax alone: no corrections whatever leave less than this (from the dual problem)."""
+    ridge: float = 0.0
+    max_mass: Real | None = None
+    """The limits of the corrections that were asked for, (p,)."""
+    max_residual: Real | None = None
+    """The limits of the residual that were asked for, (s,)."""
+
+    singular_values: Real | None = field(default=None, repr=False, compare=False)
+    """Of the scaled coefficients, (..., p), where they are known from the solution."""
+
+    @cached_property
+    def residual(self) -> Complex:
+        """The predicted vibration with the corrections on, (..., s)."""
+        return np.asarray(self.initial + np.matvec(self.influence, self.corrections))
+
+    @property
+    def residual_rms(self) -> Real:
+        """√(mean |residual|²) over the sensors, (...)."""
+        size = np.abs(self.residual)
+        scale = size.max(axis=-1)
+        safe = np.where(scale > 0, scale, 1.0)[..., None]
+        return np.asarray(scale * np.sqrt(np.square(size / safe).mean(axis=-1)))
+
+    @property
+    def residual_max(self) -> Real:
+        """The largest |residual|, (...)."""
+        return np.asarray(np.abs(self.residual).max(axis=-1))
+
+    @cached_property
+    def condition_number(self) -> Real:
+        """σ_max/σ_min of the coefficients after scaling the columns (see `condition_number`), (...)."""
+        if self.singular_values is not None:
+            return np.asarray(self.singular_values[..., 0] / self.singular_values[..., -1])
+        return condition_number(self.influence, self.weights)
+
+    def error_estimate(
+        self,
+        quantity: str = "corrections",
+        *,
+        influence_error: ArrayLike | None = None,
+        initial_error: ArrayLike | None = None,
+    ) -> Real:
+        """Return a bound of the rounding error of a result, in its units and shape.
+
+        Parameters
+        ----------
+        quantity
+            `corrections` (..., p), `residual` (..., s), `residual_max` or `residual_rms` (...): against those of the
+            exact solution.
+        influence_error, initial_error
+            Bounds of the errors of the coefficients (..., s, p) and of the vibration (..., s), which are carried on;
+            None: they are exact.
+
+        Notes
+        -----
+        Least squares: the componentwise perturbation bound of `balancing.rounding`. Limits and minimax: the optimality
+        conditions at the corrections as found (`balancing.optimality`); inf where the optimum is not unique or not
+        a smooth function of the data, with the reason in `error_reason`. Even then `residual_max` of minimax is
+        bounded, by its distance from `bound`.
+
+        Examples
+        --------
+        >>> fix = least_squares([[3, -2], [5, -2], [5, -3]], [1, -1, 0])
+        >>> bool((abs(fix.corrections - [17 / 21, 31 / 21]) <= fix.error_estimate()).all())
+        True
+        """
+        case = self._case(influence_error, initial_error)
+        exact = influence_error is None and initial_error is None
+        bounds = (self._bounds if exact else self._bounds_of(case))[0]
+        if quantity == "corrections":
+            return bounds.solution
+        if quantity == "residual":
+            return bounds.residual
+        if quantity == "residual_max":
+            largest = bounds.residual.max(axis=-1)
+            if self.bound is not None and self.weights is None:
+                # the true optimum lies between the dual bound and what was found
+                gap = max(float(self.residual_max) - self.bound, 0.0)
+                largest = np.minimum(largest, gap + case.evaluation_error.max())
+            return np.asarray(largest)
+        if quantity == "residual_rms":
+            return np.asarray(np.sqrt(np.square(bounds.residual).mean(axis=-1)) + 8 * EPS * self.residual_rms)
+        raise ValueError(f"'{quantity}': expected corrections, residual, residual_max or residual_rms")
+
+    @property
+    def error_reason(self) -> str:
+        """Why `error_estimate` has no bound of the corrections; empty where it has one."""
+        return self._bounds[1]
+
+    @cached_property
+    def _bounds(self) -> tuple[Bounds, str]:
+        return self._bounds_of(self._case())
+
+    def _case(self, influence_error: ArrayLike | None = None, initial_error: ArrayLike | None = None) -> Case:
+        from balancing.rounding import Case
+
+        of_influence, of_initial = (
+            None if error is None else np.asarray(error, dtype=float)
+            for error in (influence_error, initial_error)
+        )
+        return Case(self.influence, self.initial, self.corrections, self.weights, of_influence, of_initial)
+
+    def _bounds_of(self, case: Case) -> tuple[Bounds, str]:
+        if self._free:
+            from balancing.rounding import least_squares_bounds
+
+            return least_squares_bounds(case, self.residual, self.ridge), ""
+        from balancing.optimality import optimum_bounds
+
+        return optimum_bounds(case, self.bound is not None, self.max_mass, self.max_residual)
+
+    @property
+    def _free(self) -> bool:
+        """Whether the corrections are those of least squares: without limits, or where none holds them."""
+        if self.bound is not None:
+            # a rotor that minimax balances to nothing is balanced by least squares
+            noise = np.abs(self.influence) @ np.abs(self.corrections) + np.abs(self.initial)
+            if self.bound > 0 or float(self.residual_max) > 64 * EPS * float(noise.max()):
+                return False
+        return _within(self.corrections, self.max_mass) and _within(self.residual, self.max_residual)
+
+
+def least_squares(
+    influence: ArrayLike,
+    initial: ArrayLike,
+    weights: ArrayLike | None = None,
+    *,
+    ridge: float = 0.0,
+    max_mass: ArrayLike | None = None,
+    max_residual: ArrayLike | None = None,
+) -> Balance:
+    """Find the corrections that leave the least (weighted) sum of squares of residual vibration.
+
+    Parameters
+    ----------
+    influence
+        α, complex (..., s, p), amplitude per kg; the axis s runs over sensors and speeds.
+    initial
+        V, complex (..., s), amplitude.
+    weights
+        w_s >= 0, (..., s): Σ w_s |r_s|² is made least. Default 1 each.
+    ridge
+        λ >= 0 damps the corrections: Σ w|r|² + λ² Σ_p ‖α_p‖² |w_p|² is made least.
+    max_mass
+        Limits |w_p| <= max_mass, scalar or (p,), kg; inf for none. One rotor at a time.
+    max_residual
+        Limits |r_s| <= max_residual, scalar or (s,). One rotor at a time.
+
+    Returns
+    -------
+    Balance
+        `.corrections` (..., p) complex, masses to ADD; `.residual` (..., s); `.condition_number`.
+
+    Raises
+    ------
+    DependentPlanes
+        The sensors do not tell the planes apart (and `ridge` is 0): the combination they do not see is named.
+    Infeasible
+        `max_residual` cannot be met.
+    ValueError
+        Not finite, or shapes that do not fit.
+
+    Notes
+    -----
+    Goodman, J. Eng. Ind. 86 (1964) 273-277. Solved by QR (`balancing.qr`).
+
+    Examples
+    --------
+    Goodman's example has the exact answer 17/21 and 31/21.
+
+    >>> fix = least_squares([[3, -2], [5, -2], [5, -3]], [1, -1, 0])
+    >>> (fix.corrections.real * 21).round(12)
+    array([17., 31.])
+    """
+    alpha, v, root = _checked(influence, initial, weights)
+    if ridge < 0 or not np.isfinite(ridge):
+        raise ValueError("ridge must not be negative")
+    w = None if weights is None else np.asarray(weights, dtype=float)
+    if max_mass is not None or max_residual is not None:
+        if ridge:
+            raise ValueError("ridge does not go with limits: the limits damp already")
+        if alpha.ndim != 2 or v.ndim != 1:
+            raise ValueError("limits are for one rotor at a time: expected influence (s, p), initial (s,)")
+        limit, ceiling = (
+            _limits("max_mass", max_mass, alpha.shape[1]),
+            _limits("max_residual", max_residual, len(v)),
+        )
+        found = limited_least_squares(alpha, v, root, limit, ceiling)
+        return Balance(alpha, v, found, w, max_mass=_given(limit), max_residual=_given(ceiling))
+    a, b = (alpha, v) if root is None else (alpha * root[..., None], v * root)
+    found, sigma = smallest_squares(a, b, ridge)
+    return Balance(alpha, v, found, w, ridge=ridge, singular_values=None if ridge else sigma)
+
+
+def minimax(
+    influence: ArrayLike,
+    initial: ArrayLike,
+    max_mass: ArrayLike | None = None,
+    *,
+    weights: ArrayLike | None = None,
+) -> Balance:
+    """Find the corrections whose largest residual vibration is the smallest there is.
+
+    Parameters
+    ----------
+    influence
+        α, complex (s, p), amplitude per kg.
+    initial
+        V, complex (s,), amplitude.
+    max_mass
+        Limits |w_p| <= max_mass, scalar or (p,), kg; inf for none.
+    weights
+        w_s >= 0, (s,): max w_s |r_s| is made least. Default 1 each.
+
+    Returns
+    -------
+    Balance
+        `.corrections` (p,) complex, masses to ADD; `.residual` (s,); `.residual_max`; `.bound`: no corrections
+        (within the limits) leave less, so that the largest (weighted) residual lies between the two.
+
+    Raises
+    ------
+    DependentPlanes
+        The sensors do not tell the planes apart, and no limit keeps their masses finite.
+    ValueError
+        Not finite, or shapes that do not fit.
+
+    Notes
+    -----
+    Foiles, Allaire and Gunter, IMechE C576/097 (2000), pose the problem. A sensor that no plane moves
+    sets a floor and is left out of the search: its residual must not excuse the others'.
+
+    Examples
+    --------
+    Goodman's data: three residuals of 0.4, where least squares leaves 10/21.
+
+    >>> fix = minimax([[3, -2], [5, -2], [5, -3]], [1, -1, 0])
+    >>> fix.corrections.real.round(9), fix.residual_max.round(12), round(fix.bound, 12)
+    (array([1. , 1.8]), np.float64(0.4), 0.4)
+    """
+    alpha, v, _ = _checked(influence, initial, weights)
+    if alpha.ndim != 2 or v.ndim != 1:
+        raise ValueError(
+            f"one rotor at a time: expected influence (s, p), initial (s,), found {alpha.shape}, {v.shape}"
+        )
+    w = None if weights is None else np.asarray(weights, dtype=float)
+    a, b = (alpha, v) if w is None else (alpha * w[:, None], v * w)
+    limit = _limits("max_mass", max_mass, alpha.shape[1])
+    # sensors that no plane moves only set a floor
+    moved = np.abs(a).max(axis=1) > 0
+    floor = float(np.abs(b[~moved]).max(initial=0.0))
+    if not moved.all():
+        a, b = a[moved], b[moved]
+    if not len(b):
+        raise DependentPlanes("the readings show no plane at all", np.eye(alpha.shape[1], dtype=complex)[0])
+    corrections, bound = smallest_maximum(a, b, limit)
+    return Balance(alpha, v, corrections, w, max(bound, floor, 0.0), max_mass=_given(limit))
+
+
+def initial_unbalance(
+    influence: ArrayLike, initial: ArrayLike, weights: ArrayLike | None = None, *, singular: float = 1e12
+) -> Complex:
+    """Find the unbalance in the correction planes that explains the initial vibration best.
+
+    It is the rotor's: no limit, ridge or rounding of the corrections changes it.
+
+    Parameters
+    ----------
+    influence, initial, weights
+        As for `least_squares`.
+    singular
+        The condition number from which on planes count as dependent.
+
+    Returns
+    -------
+    ndarray
+        u of V = α u, complex (..., p), kg; NaN in each plane where the readings do not determine it: planes that no
+        sensor tells apart, or fewer sensors than planes.
+
+    Raises
+    ------
+    ValueError
+        Not finite, or shapes that do not fit.
+
+    Notes
+    -----
+    The minimum of ‖V - α u‖ is unique in plane p where every null vector of α has a zero there (Golub and Van Loan,
+    Matrix Computations, 4th ed., section 5.5: rank-deficient least squares by the SVD).
+
+    Examples
+    --------
+    Two planes that act alike and a third: 6 is seen of the two together, 5 of the third.
+
+    >>> initial_unbalance([[1, 1, 0], [2, 2, 0], [0, 0, 1]], [6, 12, 5]).real
+    array([nan, nan,  5.])
+    """
+    alpha, v, root = _checked(influence, initial, weights)
+    if bool((condition_number(alpha, weights) < singular).all()):
+        return np.asarray(-least_squares(alpha, v, weights).corrections)
+    a, b = (alpha, v) if root is None else (alpha * root[..., None], v * root)
+    scaled, scale = columns_scaled(a)
+    readings, planes = scaled.shape[-2:]
+    left, sigma, right = np.linalg.svd(scaled, full_matrices=readings < planes)
+    k = sigma.shape[-1]
+    seen = sigma * singular > sigma[..., :1]
+    along = np.matvec(adjoint(left), b) / np.where(seen, sigma, 1.0)
+    u = np.matvec(adjoint(right[..., :k, :]), np.where(seen, along, 0.0)) * scale
+    null = np.concatenate([~seen, np.ones((*seen.shape[:-1], planes - k), dtype=bool)], axis=-1)
+    hidden = np.linalg.norm(np.where(null[..., None], right, 0.0), axis=-2)
+    # a null vector is known to the rounding of α, not to that of its own components
+    return np.where(hidden > 1e-6, complex(np.nan, np.nan), u)
+
+
+def _checked(
+    influence: ArrayLike, initial: ArrayLike, weights: ArrayLike | None
+) -> tuple[Complex, Complex, Real | None]:
+    """Return α, V and the square roots of the weights."""
+    alpha = np.asarray(influence, dtype=complex)
+    v = np.asarray(initial, dtype=complex)
+    if alpha.ndim < 2 or v.ndim < 1 or alpha.shape[-2] != v.shape[-1] or 0 in alpha.shape[-2:]:
+        raise ValueError(f"shapes do not fit: influence {alpha.shape}, initial {v.shape}")
+    if not (np.isfinite(alpha).all() and np.isfinite(v).all()):
+        raise ValueError("influence and initial must be finite")
+    if weights is None:
+        return alpha, v, None
+    w = np.asarray(weights, dtype=float)
+    if not ((w >= 0) & (w < np.inf)).all() or not (w > 0).any():
+        raise ValueError("weights must not be negative, and not all zero")
+    return alpha, v, np.sqrt(w)
+
+
+def _within(z: Complex, limit: Real | None) -> bool:
+    return limit is None or bool((np.abs(z) < limit * (1 - 1e-9)).all())
+
+
+def _limits(name: str, given: ArrayLike | None, count: int) -> Real:
+    limit = np.broadcast_to(np.inf if given is None else np.asarray(given, dtype=float), (count,))
+    if not (limit > 0).all():
+        raise ValueError(f"{name} must be positive")
+    return limit
+
+
+def _given(limit: Real) -> Real | None:
+    return limit if np.isfinite(limit).any() else None

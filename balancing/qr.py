@@ -1,0 +1,63 @@
+"""Least squares by QR: columns scaled by powers of two, rows in the order of their size.
+
+Each row's own digits are kept (Cox and Higham, BIT 38 (1998) 34-50); the normal equations, which square the condition
+number, are never formed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing.dependence import DependentPlanes, adjoint, columns_scaled, require_independent
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Complex, Real]:
+    """Return w (..., p) with Σ|b + a w|² + λ² Σ_p ‖a_p‖² |w_p|² least, and the singular values of the scaled columns.
+
+    Parameters
+    ----------
+    a, b
+        Coefficients (..., s, p) and readings (..., s), complex, weighted already.
+    ridge
+        λ.
+
+    Raises
+    ------
+    DependentPlanes
+        The readings do not tell the planes apart.
+
+    Examples
+    --------
+    >>> w, _ = smallest_squares(np.array([[3, -2], [5, -2], [5, -3]], complex), np.array([1, -1, 0], complex))
+    >>> (w.real * 21).round(12)
+    array([17., 31.])
+    """
+    planes = a.shape[-1]
+    scaled, scale = columns_scaled(a)
+    if ridge:
+        norms = np.linalg.norm(scaled, axis=-2)
+        largest = norms.max(axis=-1, keepdims=True)
+        norms = np.where(norms > 0, norms, np.where(largest > 0, largest, 1.0))
+        scaled = np.concatenate([scaled, ridge * norms[..., None] * np.eye(planes)], axis=-2)
+        b = np.concatenate([b, np.zeros((*b.shape[:-1], planes))], axis=-1)
+    order = np.argsort(-np.abs(scaled).max(axis=-1), axis=-1, kind="stable")
+    if scaled.ndim == 2 and b.ndim == 1:
+        scaled, b = scaled[order], b[order]
+    else:
+        lead = np.broadcast_shapes(scaled.shape[:-2], b.shape[:-1])
+        scaled = np.broadcast_to(scaled, lead + scaled.shape[-2:])
+        b = np.broadcast_to(b, lead + b.shape[-1:])
+        order = np.broadcast_to(order, lead + order.shape[-1:])
+        scaled = np.take_along_axis(scaled, order[..., None], axis=-2)
+        b = np.take_along_axis(b, order, axis=-1)
+    readings = scaled.shape[-2]
+    if readings < planes:
+        require_independent(scaled, scale, readings, planes, "readings", DependentPlanes)
+    q, r = np.linalg.qr(scaled)
+    sigma = require_independent(r, scale, readings, planes, "readings", DependentPlanes)
+    x = np.linalg.solve(r, -(adjoint(q) @ b[..., None]))[..., 0]
+    return np.asarray(x * scale + 0.0, dtype=complex), sigma

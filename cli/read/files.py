@@ -1,0 +1,60 @@
+"""The files that a call reads: each is remembered, so that no output is written over it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+import typer
+
+from cli.errors import DataError
+
+# device and inode: a link to a file is the file
+_read: set[tuple[int, int]] = set()
+
+
+def forget() -> None:
+    """Begin a call: nothing has been read."""
+    _read.clear()
+
+
+def note(path: str | Path) -> Path:
+    """Remember that a file is read."""
+    with suppress(OSError, ValueError):
+        found = os.stat(path)
+        _read.add((found.st_dev, found.st_ino))
+    return Path(path)
+
+
+def load(path: str | Path) -> bytes:
+    """Read a file, or standard input for `-`; OSError or ValueError where it cannot be."""
+    return sys.stdin.buffer.read() if path == "-" else note(path).read_bytes()
+
+
+def read_bytes(path: str) -> tuple[str, bytes]:
+    """Read a file: what messages call it, and what it holds."""
+    file = "standard input" if path == "-" else path
+    try:
+        return file, load(path)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise DataError(f"{file}: {reason}") from None
+
+
+def refuse_inputs(outputs: Iterable[Path]) -> None:
+    """Refuse outputs that are inputs of this call, or one another, before any of them is written."""
+    seen: set[str] = set()
+    for path in outputs:
+        try:
+            found = os.stat(path)
+        except (OSError, ValueError):
+            found = None
+        if found is not None and (found.st_dev, found.st_ino) in _read:
+            raise typer.BadParameter(f"'{path}' is an input: expected another file; nothing was written")
+        name = os.path.realpath(path)
+        if name in seen:
+            raise typer.BadParameter(f"'{path}' is given twice: expected a file for each output")
+        seen.add(name)

@@ -1,0 +1,53 @@
+"""The options of a balance tolerance: --grade with --speed and --rotor-mass, or --permissible; --bearings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cli.read import options
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A permissible residual unbalance."""
+
+    grade: str | None
+    permissible: float
+    """U_per, kg·m."""
+    bearings: tuple[float, float] | None = None
+    """Where along the shaft it holds, m; None: in the correction planes."""
+
+
+def tolerance_of(
+    grade: str | None,
+    speed: str | None,
+    rotor_mass: str | None,
+    permissible: str | None,
+    bearings: str | None,
+) -> Tolerance | None:
+    """Read the tolerance; None where none is asked for."""
+    from balancing import grade_value, permissible_unbalance
+
+    planes = None if bearings is None else options.two_bearings("--bearings", bearings)
+    omega = options.quantity("--speed", speed, "speed", positive=True)
+    mass = options.quantity("--rotor-mass", rotor_mass, "mass", positive=True)
+    if permissible is not None:
+        if grade is not None:
+            raise options.bad("--permissible", "expected --grade or --permissible, not both")
+        whole = options.needed("--permissible", permissible, "unbalance", positive=True)
+        return Tolerance(None, whole, planes)
+    if grade is None:
+        if planes is not None:
+            raise options.bad(
+                "--bearings", "the bearings are for a tolerance: expected --grade or --permissible too"
+            )
+        return None
+    try:
+        value = grade_value(grade)
+    except ValueError as error:
+        raise options.bad("--grade", error) from None
+    if omega is None:
+        raise options.bad("--speed", "--grade needs --speed and --rotor-mass")
+    if mass is None:
+        raise options.bad("--rotor-mass", "--grade needs --speed and --rotor-mass")
+    return Tolerance(f"G{value * 1000:g}", float(permissible_unbalance(value, omega, mass)), planes)

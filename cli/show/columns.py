@@ -1,0 +1,72 @@
+"""A result as columns: name, unit, values, bounds of their rounding errors. Text, CSV, JSON and pictures all walk these."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import numpy as np
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    Cell = str | float | None
+    Values = Sequence[Cell] | NDArray[np.float64]
+    Json = None | str | float | Sequence["Json"] | Mapping[str, "Json"]
+    Document = dict[str, Json]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A quantity of a table: strings are names, None and NaN are empty cells."""
+
+    name: str
+    unit: str
+    """What its header ends in, such as `N_m`; empty for names and plain numbers."""
+    values: Values
+    error: Callable[[], Values] | None = None
+    """Bounds of the rounding errors of computed numbers, in the same unit; inf where no digit is known."""
+
+    @property
+    def header(self) -> str:
+        """The header: `torque_N_m`."""
+        return f"{self.name}_{self.unit}" if self.unit else self.name
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of one length."""
+
+    columns: Sequence[Column]
+    keys: Sequence[str] = ()
+    """The headers of the columns that name a row."""
+
+    @property
+    def cells(self) -> dict[str, Values]:
+        """Header -> values."""
+        return {column.header: column.values for column in self.columns}
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a command has found, in every form it can be shown in; each is formed when it is asked for."""
+
+    document: Callable[[], Document]
+    """The JSON document, without its warnings."""
+    tables: Mapping[str, Callable[[], Table]]
+    """Name -> table; the first is the CSV."""
+    screen: Callable[[], Table] | None = None
+    """The terminal's table, where another layout reads better than that of the CSV."""
+    notes: Callable[[], str] = lambda: ""
+    """What the terminal shows above the table."""
+    afterword: Callable[[], str] = lambda: ""
+    """What the terminal shows below the table."""
+    figure: Callable[[], Figure] | None = None
+    beside: Mapping[Path, Callable[[], bytes]] = field(default_factory=dict)
+    """Files that options of the command itself ask for."""
+    warnings: list[str] = field(default_factory=list)
+    failed: bool = False
+    """Whether nothing that was asked for could be found: status 1, once all is shown."""

@@ -1,0 +1,81 @@
+"""Columns as text: CSV with every digit, an aligned table with six; documents as JSON."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cli.show.columns import Cell, Document, Values
+
+
+def csv_text(columns: Mapping[str, Values]) -> str:
+    """Return CSV with every digit of every number."""
+    import csv
+
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*map(_plain_column, columns.values()), strict=True))
+    return stream.getvalue()
+
+
+def _plain_column(column: Values) -> Sequence[object]:
+    """Return a column's cells as CSV writes them, a numpy array of finite numbers in one step."""
+    if not isinstance(column, Sequence) and column.dtype.kind == "f" and (column == column).all():
+        numbers: list[float] = column.tolist()
+        return numbers
+    return [plain(value) for value in column]
+
+
+def plain(value: object) -> str | float:
+    """Return a cell as CSV writes it: numpy's numbers as Python's, yes and no as JSON spells them."""
+    value = value.item() if hasattr(value, "item") else value
+    if value is None or value != value:
+        return ""
+    return str(value).lower() if isinstance(value, bool) else value  # type: ignore[return-value]
+
+
+def table_text(columns: Mapping[str, Values]) -> str:
+    """Return an aligned table, numbers to 6 significant digits and to the right, names to the left."""
+    printed = []
+    for name, column in columns.items():
+        values = [plain(value) for value in column]
+        cells = [_six_digits(name, value) if isinstance(value, float) else str(value) for value in values]
+        width = max(map(len, [name, *cells]))
+        left = any(isinstance(value, str) and value for value in values)
+        printed.append([cell.ljust(width) if left else cell.rjust(width) for cell in [name, *cells]])
+    return "".join("  ".join(row).rstrip() + "\n" for row in zip(*printed, strict=True))
+
+
+def _six_digits(name: str, value: float) -> str:
+    cell = f"{value:.6g}"
+    return "0" if cell == "360" and value < 360 and name.endswith("_deg") else cell
+
+
+def angle_text(degrees: float, spec: str) -> str:
+    """Format an angle in [0, 360); what rounds to a full turn is 0."""
+    text = format(float(degrees), spec)
+    return format(0.0, spec) if float(text) == 360.0 else text
+
+
+def paragraphs(*parts: str) -> str:
+    """Join what is not empty with a blank line between."""
+    return "\n".join(part.rstrip("\n") + "\n" for part in parts if part)
+
+
+def json_parts(document: Document) -> Iterator[str]:
+    """Yield a document in parts: the text of a long sweep is three times the size of its numbers."""
+    import json
+
+    encoder = json.JSONEncoder(
+        ensure_ascii=False, indent=1, allow_nan=False, default=lambda array: array.tolist()
+    )
+    yield from encoder.iterencode(document)
+    yield "\n"
+
+
+def transposed(rows: Sequence[Mapping[str, Cell]]) -> dict[str, list[Cell]]:
+    """Return rows as columns."""
+    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}

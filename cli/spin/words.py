@@ -1,0 +1,38 @@
+"""What is said of a rotation in time."""
+
+from __future__ import annotations
+
+from cli.spin.solve import Rotation
+
+
+def warnings(found: Rotation) -> list[str]:
+    """Say what was done otherwise than a reader might think."""
+    said = []
+    if found.given.mgl is not None and found.round_moments is None:
+        said.append("a top whose moments across body z differ has no closed form: it was integrated")
+    steady = found.steady()
+    if steady is not None and steady["slow_rad_s"] is None:
+        said.append("the spin is too slow for steady precession at this tilt")
+    return said
+
+
+def notes(found: Rotation) -> str:
+    """Say what is constant in the motion."""
+    lines = [
+        "omega in body axes, momentum in space axes, attitude [w, x, y, z] from body to space; "
+        + ("closed form" if found.exact else f"integrated by {found.integrator}")
+    ]
+    drift = found.drift
+    if drift["momentum"] is not None:
+        lines.append(f"drift: momentum {drift['momentum']:.2g}, energy {drift['energy']:.2g} (relative)")
+    if found.period is not None:
+        lines.append(f"period of omega in body axes: {found.period:.6g} s")
+    nutation = found.nutation_period
+    if nutation is not None:
+        lines.append(f"period of nutation: {nutation:.6g} s")
+    for rates in (found.cones(), found.steady()):
+        if rates is not None:
+            lines.append(
+                ", ".join(f"{name}: {'none' if x is None else f'{x:.6g}'}" for name, x in rates.items())
+            )
+    return "\n".join(lines)

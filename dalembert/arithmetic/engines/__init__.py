@@ -1,0 +1,133 @@
+"""What runs a tape: floats for a few lanes, numpy for many, LLVM's code where it is installed and pays.
+
+Which one runs is chosen here, by the size of the work and by what is installed; `DALEMBERT_ENGINE=python|numpy|llvm`
+overrides. All agree to rounding.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dalembert.arithmetic.engines import blocks, floats
+from dalembert.arithmetic.tape import Tape
+
+Reals = NDArray[np.float64]
+ENGINES = ("python", "numpy", "llvm")
+FEW = 4  # lanes up to which Python's floats are faster than numpy's calls
+PAYS = 3e8  # operations × lanes of one tape from which compiling it pays (some 0.1 s with the import)
+
+_done: dict[Tape, float] = {}
+
+
+class Outputs(Mapping[str, Any]):
+    """The results of a run by name.
+
+    Attributes
+    ----------
+    tape : Tape
+    table : array (outputs, lanes), or a sequence of floats where every input was one
+    """
+
+    __slots__ = ("table", "tape")
+
+    def __init__(self, tape: Tape, table: Any) -> None:
+        self.tape, self.table = tape, table
+
+    def __getitem__(self, name: str) -> Any:
+        return self.table[self.tape.rows[name]]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.tape.names)
+
+    def __len__(self) -> int:
+        return len(self.tape.outputs)
+
+
+def run(tape: Tape, inputs: Mapping[str, Any], engine: str | None = None) -> Outputs:
+    """Run a tape on lanes.
+
+    Parameters
+    ----------
+    tape : Tape
+    inputs : mapping of name to float, or array (n,)
+        A float is the same for every lane. Further names are ignored.
+    engine : "python", "numpy" or "llvm"
+        Chosen by the size of the work where not given.
+
+    Returns
+    -------
+    Outputs
+        Mapping of an output's name to its values (n,), or a number where all inputs are numbers.
+
+    Raises
+    ------
+    KeyError
+        Where an input is missing.
+    ValueError
+        Where two inputs have different lengths, or the engine is unknown.
+
+    Examples
+    --------
+    >>> from dalembert.arithmetic.recorded import RECORDED, Recorder
+    >>> recorder = Recorder()
+    >>> tape = recorder.tape({"x": recorder.input("r") * RECORDED.cos(recorder.input("q"))})
+    >>> run(tape, {"r": 2.0, "q": np.array([0.0, 1.0])})["x"].round(3)
+    array([2.   , 1.081])
+    """
+    values = [inputs[name] for name in tape.inputs]
+    engine = engine or os.environ.get("DALEMBERT_ENGINE")
+    one = all(isinstance(value, float) for value in values)
+    if one and engine in (None, "python") and floats.takes(tape):
+        # one pose: nothing of numpy on the way, but at a singular place, where its numbers go on with infinity and NaN
+        try:
+            return Outputs(tape, floats.compiled(tape)(*values))
+        except (ZeroDivisionError, ValueError, OverflowError):
+            engine = "numpy"
+    columns = [np.asarray(value, dtype=float) for value in values]
+    lengths = {len(column) for column in columns if column.ndim}
+    if len(lengths) > 1:
+        raise ValueError(f"inputs of different lengths: {', '.join(map(str, sorted(lengths)))}")
+    n = lengths.pop() if lengths else 1
+    engine = engine or chosen(tape, n)
+    if engine not in ENGINES:
+        raise ValueError(f"engine '{engine}': expected {', '.join(ENGINES)}")
+    table = np.empty((len(tape.outputs), n))
+    if engine == "python" and floats.takes(tape):
+        _on_floats(tape, columns, table)
+    elif not (engine == "llvm" and _on_llvm(tape, columns, table)):
+        blocks.run(tape, columns, table)
+    return Outputs(tape, table if any(column.ndim for column in columns) else table[:, 0])
+
+
+def chosen(tape: Tape, n: int) -> str:
+    """The engine for n lanes: compiled code only once the tape has been asked for so often that it pays."""
+    if n <= FEW:
+        return "python"
+    _done[tape] = _done.get(tape, 0.0) + n * tape.cost
+    return "llvm" if _done[tape] > PAYS else "numpy"
+
+
+def _on_floats(tape: Tape, columns: list[Reals], table: Reals) -> None:
+    function = floats.compiled(tape)
+    given = (
+        np.stack([np.broadcast_to(column, table.shape[1]) for column in columns]).T
+        if columns
+        else table[:0].T
+    )
+    for lane, values in enumerate(given.tolist()):
+        try:
+            table[:, lane] = function(*values)
+        except (ZeroDivisionError, ValueError, OverflowError):
+            blocks.run(tape, [np.array([value]) for value in values], table[:, lane : lane + 1])
+
+
+def _on_llvm(tape: Tape, columns: list[Reals], table: Reals) -> bool:
+    # llvmlite takes some 0.1 s to load: only where it works
+    from dalembert.arithmetic.engines import llvm
+
+    return llvm.run(tape, columns, table)

@@ -1,0 +1,61 @@
+"""The tape as straight-line Python on floats: for one pose or a few, without numpy's cost of a call."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+
+from dalembert.arithmetic.tape import SIGNS, Tape
+
+LONGEST = 2000  # operations of one function: Python's own compiler slows down on longer ones
+DEEPEST = 12  # operations of one expression
+
+
+@lru_cache(maxsize=256)
+def compiled(tape: Tape) -> Callable[..., tuple[float, ...]]:
+    """The tape as a function of floats: inputs in the order of `tape.inputs`, outputs in that of `tape.outputs`.
+
+    It raises where Python's own arithmetic does: ZeroDivisionError, ValueError (a root), OverflowError.
+    """
+    uses = [0] * len(tape.operations)
+    for kind, *arguments in tape.operations:
+        if kind not in ("const", "input"):
+            for a in arguments:
+                # an argument of a select is worked out only where it is taken: it must not be wanted elsewhere
+                uses[a] += 2 if kind == "select" else 1
+    for _, number in tape.outputs:
+        uses[number] += 2
+    text: list[str] = []
+    depth: list[int] = []
+    lines: list[str] = []
+    for number, (kind, *arguments) in enumerate(tape.operations):
+        if kind == "const":
+            text.append(repr(arguments[0]) if math.isfinite(arguments[0]) else f"float('{arguments[0]}')")
+            depth.append(0)
+        elif kind == "input":
+            text.append(f"x{tape.inputs.index(arguments[0])}")
+            depth.append(0)
+        else:
+            expression = SIGNS[kind].format(*(text[a] for a in arguments))
+            deep = 1 + max(depth[a] for a in arguments)
+            if uses[number] == 1 and deep < DEEPEST:
+                text.append(f"({expression})")
+                depth.append(deep)
+            else:
+                lines.append(f"v{number} = {expression}")
+                text.append(f"v{number}")
+                depth.append(0)
+    inputs = ", ".join(f"x{k}" for k in range(len(tape.inputs)))
+    results = "".join(f"{text[number]}, " for _, number in tape.outputs)
+    source = (
+        f"def tape({inputs}):\n" + "".join(f"    {line}\n" for line in lines) + f"    return ({results})\n"
+    )
+    room: dict[str, object] = {name: getattr(math, name) for name in ("sin", "cos", "atan2", "sqrt")}
+    exec(compile(source, "<tape>", "exec"), room)
+    return room["tape"]  # type: ignore[return-value]
+
+
+def takes(tape: Tape) -> bool:
+    """Is the tape short enough for one Python function?"""
+    return len(tape.operations) <= LONGEST

@@ -1,0 +1,183 @@
+"""The tape as machine code with explicit vectors, through llvmlite (the extra `fast`): no compiler is needed.
+
+Compiled code is kept on disk in the platform's cache folder, by tape, processor and version; a damaged file or a folder
+that cannot be written is ignored. Where a machine forbids making code at run time, one warning says so and numpy
+does the work.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+import threading
+import warnings
+from collections.abc import Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dalembert.arithmetic.engines import circular
+from dalembert.arithmetic.tape import Tape
+
+Reals = NDArray[np.float64]
+LONGEST = 8000  # operations: about a second to compile; numpy runs what is longer
+FORMAT = "2"  # of the code below: another number makes old files on disk useless
+
+_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
+# kept for the life of the process: compiled code holds their addresses
+_EXACT = {"sin": _FUNCTION(circular.sin), "cos": _FUNCTION(circular.cos)}
+_lock = threading.Lock()
+_compiled: dict[tuple[Tape, frozenset[str]], Code | None] = {}
+_unusable: list[str] = []
+
+
+class Code:
+    """Compiled code of one tape, and the engine that holds it in memory."""
+
+    def __init__(self, width: int, keeper: Any, address: int) -> None:
+        self.width, self._keeper = width, keeper
+        pointer = ctypes.POINTER(ctypes.c_void_p)
+        kind = ctypes.CFUNCTYPE(None, ctypes.c_int64, pointer, ctypes.c_void_p, ctypes.c_int64)
+        self._call = kind(address)
+
+    def __call__(self, columns: Sequence[Reals], out: Reals) -> None:
+        """Run: `out` is (outputs, n). At least one vector is done, and the last may do lanes again."""
+        n = out.shape[1]
+        columns, table = [np.ascontiguousarray(c) if c.ndim else c for c in columns], out
+        if n < self.width:
+            table = np.empty((len(out), self.width))
+            columns = [c if c.ndim == 0 else np.resize(c, self.width) for c in columns]
+        elif out.strides[1] != out.itemsize:
+            table = np.empty(out.shape)
+        pointers = (ctypes.c_void_p * max(len(columns), 1))(*(c.ctypes.data for c in columns))
+        self._call(table.shape[1], pointers, table.ctypes.data, table.strides[0] // table.itemsize)
+        if table is not out:
+            out[:] = table[:, :n]
+
+
+def run(tape: Tape, columns: Sequence[Reals], out: Reals) -> bool:
+    """Run a tape; False where this machine or this tape is not for compiled code."""
+    if len(tape.operations) > LONGEST or _unusable or not out.size:
+        return False
+    uniform = frozenset(name for name, x in zip(tape.inputs, columns, strict=True) if not x.ndim)
+    with _lock:
+        key = (tape, uniform)
+        if key not in _compiled:
+            _compiled[key] = _code(tape, uniform)
+        code = _compiled[key]
+    if code is None:
+        return False
+    code(columns, out)
+    return True
+
+
+def _code(tape: Tape, uniform: frozenset[str]) -> Code | None:
+    try:
+        import llvmlite
+        import llvmlite.binding as binding
+    except ImportError:
+        _unusable.append("llvmlite is not installed")
+        return None
+    try:
+        binding.initialize_native_target()
+        binding.initialize_native_asmprinter()
+        _name_system_functions(binding)
+        cpu, features = binding.get_host_cpu_name(), binding.get_host_cpu_features()
+        width = 8 if features.get("avx512f") else 4 if features.get("avx2") else 2
+        # whole vectors of 512 bits where the processor has them
+        told = ",".join([features.flatten(), "-prefer-256-bit"]) if width == 8 else features.flatten()
+        machine = binding.Target.from_default_triple().create_target_machine(
+            cpu=cpu, features=told, opt=2, jit=True
+        )
+        name = "|".join(
+            [FORMAT, llvmlite.__version__, cpu, told, sys.platform, tape.key, ",".join(sorted(uniform))]
+        )
+        path = folder() / (sha256(name.encode()).hexdigest() + ".o")
+        code = _read(path)
+        if code is None:
+            code = _made(binding, machine, tape, uniform, width)
+            _keep(path, code)
+        empty = binding.parse_assembly("")
+        engine = binding.create_mcjit_compiler(empty, machine)
+        engine.add_object_file(binding.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+        address = engine.get_function_address("tape")
+        if not address:
+            raise RuntimeError("the compiled function is not found")
+        return Code(width, engine, address)
+    except Exception as error:
+        # whatever LLVM and the system say: the work is done by numpy, and said so once
+        _unusable.append(str(error))
+        warnings.warn(
+            f"no code can be made at run time ({error}); numpy does the work", RuntimeWarning, stacklevel=2
+        )
+        return None
+
+
+def _name_system_functions(binding: Any) -> None:
+    library = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
+    if not hasattr(library, "atan2"):
+        from ctypes.util import find_library
+
+        library = ctypes.CDLL(find_library("m"))
+    for name in ("sin", "cos", "atan2"):
+        address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
+        binding.add_symbol(f"dalembert_{name}", address)
+    for name, function in _EXACT.items():
+        binding.add_symbol(f"dalembert_exact_{name}", ctypes.cast(function, ctypes.c_void_p).value)
+
+
+def _made(binding: Any, machine: Any, tape: Tape, uniform: frozenset[str], width: int) -> bytes:
+    """The object code of a tape."""
+    from dalembert.arithmetic.engines.lowered import lowered
+
+    module = binding.parse_assembly(str(lowered(tape, uniform, width)))
+    module.verify()
+    options = binding.create_pipeline_tuning_options(speed_level=1)
+    binding.create_pass_builder(machine, options).getModulePassManager().run(
+        module, binding.create_pass_builder(machine, options)
+    )
+    return bytes(machine.emit_object(module))
+
+
+def folder() -> Path:
+    """Where compiled code is kept: `DALEMBERT_CACHE`, else the platform's cache folder."""
+    given = os.environ.get("DALEMBERT_CACHE")
+    if given:
+        return Path(given)
+    home = Path.home()
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local"))
+    elif sys.platform == "darwin":
+        base = home / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
+    return base / "dalembert"
+
+
+def _read(path: Path) -> bytes | None:
+    """Code kept on disk, if it is whole: its own digest stands before it."""
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    code = data[32:]
+    return code if code and sha256(code).digest() == data[:32] else None
+
+
+def _keep(path: Path, code: bytes) -> None:
+    """Keep code on disk: whole or not at all, and in silence where that cannot be."""
+    partial = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_bytes(sha256(code).digest() + code)
+        os.replace(partial, path)
+    except OSError:
+        try:
+            partial.unlink(missing_ok=True)
+        except OSError:
+            return

@@ -1,0 +1,332 @@
+"""Recorded numbers: handed to a formula in place of floats, they write down the operations that it performs.
+
+A `Real` is a sign and the number of an operation; a `Complex` is a pair of them. Python's own floats and complexes
+stay what they are as long as they meet only their like. What is written down is short: equal operations are one,
+signs are carried along instead of computed, and zeros and ones vanish (0·x is 0 even where x could be infinite).
+All of this is exact, but for the sign of a zero: the same operations on floats give the same bits.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from dalembert.arithmetic.tape import Operation, Tape, shortened
+
+Number = Any
+"""A float, a complex, a `Real` or a `Complex`."""
+
+
+class Recorder:
+    """Writes down what is done with its inputs.
+
+    Examples
+    --------
+    The law of cosines; the sign of the cosine costs nothing, and what no output needs is not on the tape:
+
+    >>> recorder = Recorder()
+    >>> a, b, q = (recorder.input(name) for name in "abq")
+    >>> waste = a / b
+    >>> c = (a * a + b * b + 2 * (-a) * b * RECORDED.cos(q)).sqrt()
+    >>> recorder.tape({"c": c}).cost
+    9
+    """
+
+    def __init__(self) -> None:
+        self._operations: list[Operation] = []
+        self._known: dict[Operation, int] = {}
+
+    def input(self, name: str) -> Real:
+        """An input; the same name is the same number."""
+        return Real(self, self.node("input", name))
+
+    def node(self, kind: str, *arguments: Any) -> int:
+        """The number of an operation, which is written down if it is new."""
+        if kind in ("add", "mul") and arguments[0] > arguments[1]:
+            arguments = (arguments[1], arguments[0])
+        operation = (kind, *arguments)
+        found = self._known.get(operation)
+        if found is None:
+            found = self._known[operation] = len(self._operations)
+            self._operations.append(operation)
+        return found
+
+    def difference(self, a: int, b: int) -> Real:
+        """a − b; b − a, where that is known, with the other sign."""
+        turned = self._known.get(("sub", b, a))
+        return Real(self, self.node("sub", a, b)) if turned is None else Real(self, turned, True)
+
+    def tape(self, outputs: Mapping[str, Number]) -> Tape:
+        """The tape of named results; a plain float is a constant.
+
+        Raises
+        ------
+        TypeError
+            Where an output is complex: its parts are two outputs.
+        """
+        found = []
+        for name, value in outputs.items():
+            if isinstance(value, (Complex, complex)):
+                raise TypeError(f"output {name} is complex: record its parts")
+            found.append((name, lifted(self, value).settled))
+        return shortened(self._operations, found)
+
+
+def lifted(recorder: Recorder, value: Number) -> Real:
+    """A number as a recorded one; a constant by its size, so that both signs are one."""
+    if isinstance(value, Real):
+        return value
+    value = float(value)
+    return Real(recorder, recorder.node("const", abs(value)), math.copysign(1.0, value) < 0)
+
+
+def _plain(value: Number) -> bool:
+    # numpy's scalars are instances of float or offer __float__ without being recorded numbers
+    return isinstance(value, (int, float)) or (
+        not isinstance(value, (Real, Complex, complex)) and hasattr(value, "__float__")
+    )
+
+
+class Real:
+    """A recorded real number."""
+
+    # numpy's scalars hand the operation on to us
+    __array_ufunc__ = None
+    __slots__ = ("negative", "number", "recorder")
+
+    def __init__(self, recorder: Recorder, number: int, negative: bool = False) -> None:
+        self.recorder, self.number, self.negative = recorder, number, negative
+
+    def __repr__(self) -> str:
+        return f"Real({'-' if self.negative else ''}v{self.number})"
+
+    @property
+    def settled(self) -> int:
+        """The number of the operation that has the value itself, sign and all."""
+        return self.recorder.node("neg", self.number) if self.negative else self.number
+
+    @property
+    def real(self) -> Real:
+        return self
+
+    @property
+    def imag(self) -> float:
+        return 0.0
+
+    def conjugate(self) -> Real:
+        return self
+
+    def __neg__(self) -> Real:
+        return Real(self.recorder, self.number, not self.negative)
+
+    def __pos__(self) -> Real:
+        return self
+
+    def __abs__(self) -> Real:
+        if self.recorder._operations[self.number][0] in ("abs", "sqrt", "const"):
+            return Real(self.recorder, self.number)
+        return Real(self.recorder, self.recorder.node("abs", self.number))
+
+    def sqrt(self) -> Real:
+        """The root; NaN where the number is negative."""
+        return Real(self.recorder, self.recorder.node("sqrt", self.settled))
+
+    def __add__(self, other: Number) -> Number:
+        if isinstance(other, (Complex, complex)):
+            return Complex(self + other.real, other.imag)
+        if _plain(other) and other == 0:
+            return self
+        o = lifted(self.recorder, other)
+        if self.negative == o.negative:
+            return Real(self.recorder, self.recorder.node("add", self.number, o.number), self.negative)
+        if self.number == o.number:
+            return 0.0
+        first, second = (o, self) if self.negative else (self, o)
+        return self.recorder.difference(first.number, second.number)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Number) -> Number:
+        return self + -other
+
+    def __rsub__(self, other: Number) -> Number:
+        return -self + other
+
+    def __mul__(self, other: Number) -> Number:
+        if isinstance(other, (Complex, complex)):
+            return Complex(product(self, other.real), product(self, other.imag))
+        if _plain(other):
+            if other == 0:
+                return 0.0
+            if abs(other) == 1:
+                return self if other > 0 else -self
+        o = lifted(self.recorder, other)
+        return Real(
+            self.recorder, self.recorder.node("mul", self.number, o.number), self.negative != o.negative
+        )
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Number) -> Number:
+        if isinstance(other, (Complex, complex)):
+            return Complex(self, 0.0) / other
+        # by a power of two: the product is exact too
+        if _plain(other) and abs(math.frexp(other)[0]) == 0.5 and 1e-300 < abs(other) < 1e300:
+            return self * (1.0 / other)
+        o = lifted(self.recorder, other)
+        return Real(
+            self.recorder, self.recorder.node("div", self.number, o.number), self.negative != o.negative
+        )
+
+    def __rtruediv__(self, other: Number) -> Number:
+        if isinstance(other, complex):
+            return Complex(quotient(other.real, self), quotient(other.imag, self))
+        return quotient(other, self)
+
+    def __pow__(self, power: int) -> Number:
+        """A whole power, by repeated squaring."""
+        if power < 0:
+            return 1.0 / self**-power
+        result: Number = 1.0
+        square: Number = self
+        while power:
+            if power & 1:
+                result = square * result
+            square, power = (square * square if power > 1 else square), power >> 1
+        return result
+
+
+def product(a: Number, b: Number) -> Number:
+    """a·b, nothing where one is exactly nothing."""
+    return 0.0 if (_plain(a) and a == 0) or (_plain(b) and b == 0) else a * b
+
+
+def quotient(a: Number, b: Real) -> Number:
+    """a/b of a float and a recorded number."""
+    if a == 0:
+        return 0.0
+    o = lifted(b.recorder, a)
+    return Real(b.recorder, b.recorder.node("div", o.number, b.number), o.negative != b.negative)
+
+
+class Complex:
+    """A recorded complex number: its parts are floats or recorded."""
+
+    __array_ufunc__ = None
+    __slots__ = ("imag", "real")
+
+    def __init__(self, real: Number, imag: Number) -> None:
+        self.real, self.imag = real, imag
+
+    def __repr__(self) -> str:
+        return f"Complex({self.real!r}, {self.imag!r})"
+
+    def conjugate(self) -> Complex:
+        return Complex(self.real, -self.imag)
+
+    def __neg__(self) -> Complex:
+        return Complex(-self.real, -self.imag)
+
+    def __add__(self, other: Number) -> Complex:
+        return Complex(self.real + other.real, self.imag + other.imag)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Number) -> Complex:
+        return Complex(self.real - other.real, self.imag - other.imag)
+
+    def __rsub__(self, other: Number) -> Complex:
+        return Complex(other.real - self.real, other.imag - self.imag)
+
+    def __mul__(self, other: Number) -> Complex:
+        if isinstance(other, Real) or _plain(other):
+            return Complex(product(self.real, other), product(self.imag, other))
+        a, b, c, d = self.real, self.imag, other.real, other.imag
+        return Complex(product(a, c) - product(b, d), product(a, d) + product(b, c))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Number) -> Complex:
+        if isinstance(other, Real) or _plain(other):
+            return Complex(
+                0.0 if _plain(self.real) and self.real == 0 else self.real / other,
+                0.0 if _plain(self.imag) and self.imag == 0 else self.imag / other,
+            )
+        turned = self * other.conjugate()
+        size = squared(other)
+        return Complex(turned.real / size, turned.imag / size)
+
+    def __rtruediv__(self, other: Number) -> Complex:
+        return Complex(other.real, other.imag) / self
+
+    def __abs__(self) -> Number:
+        return RECORDED.sqrt(squared(self))
+
+
+def squared(z: Number) -> Number:
+    """|z|²."""
+    return product(z.real, z.real) + product(z.imag, z.imag)
+
+
+class Recorded:
+    """The functions of recorded numbers; of plain ones they are Python's own."""
+
+    @staticmethod
+    def const(value: float) -> float:
+        return value
+
+    @staticmethod
+    def sqrt(x: Number) -> Number:
+        if isinstance(x, Real):
+            return x.sqrt()
+        return math.sqrt(x) if x >= 0 else math.nan
+
+    @staticmethod
+    def sin(x: Number) -> Number:
+        if isinstance(x, Real):
+            return Real(x.recorder, x.recorder.node("sin", x.number), x.negative)
+        return math.sin(x)
+
+    @staticmethod
+    def cos(x: Number) -> Number:
+        return Real(x.recorder, x.recorder.node("cos", x.number)) if isinstance(x, Real) else math.cos(x)
+
+    @staticmethod
+    def atan2(y: Number, x: Number) -> Number:
+        recorder = y.recorder if isinstance(y, Real) else x.recorder if isinstance(x, Real) else None
+        if recorder is None:
+            return math.atan2(y, x)
+        y, x = lifted(recorder, y), lifted(recorder, x)
+        return Real(recorder, recorder.node("atan2", y.number, x.settled), y.negative)
+
+    @staticmethod
+    def select(test: Number, positive: Number, otherwise: Number) -> Number:
+        if not isinstance(test, Real):
+            return positive if test > 0 else otherwise
+        recorder = test.recorder
+        a, b = lifted(recorder, positive), lifted(recorder, otherwise)
+        if a.number == b.number and a.negative == b.negative:
+            return positive
+        return Real(recorder, recorder.node("select", test.settled, a.settled, b.settled))
+
+    @staticmethod
+    def join(real: Number, imag: Number) -> Number:
+        """real + i·imag."""
+        return complex(real, imag) if _plain(real) and _plain(imag) else Complex(real, imag)
+
+    @classmethod
+    def turn(cls, angle: Number) -> Number:
+        """e^{i·angle}."""
+        if isinstance(angle, Real):
+            return Complex(cls.cos(angle), cls.sin(angle))
+        return cmath.rect(1.0, angle)
+
+    @classmethod
+    def angle(cls, z: Number) -> Number:
+        """The angle of a complex number, in (−π, π]."""
+        return cls.atan2(z.imag, z.real)
+
+
+RECORDED = Recorded()

@@ -1,0 +1,130 @@
+"""Records of arrays: compared by their numbers, told in one line, laid out as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Kind = TypeVar("Kind", bound=type)
+
+FEW = 9
+"""So many numbers are told one by one."""
+
+
+def record(kind: Kind) -> Kind:
+    """Let a frozen dataclass or a named tuple compare by its numbers and tell itself in one line.
+
+    One that has a `to_frame` shows that table in a notebook. A dataclass is expected with `eq=False, repr=False`; a
+    `__repr__` of its own stays.
+
+    Examples
+    --------
+    >>> from typing import NamedTuple
+    >>> @record
+    ... class Wrench(NamedTuple):
+    ...     force: np.ndarray
+    ...     moment: float
+    >>> Wrench(np.array([1.0, 0.1 + 0.2]), 2.0)
+    Wrench(force=[1 0.3], moment=2)
+    >>> Wrench(np.ones(2), 0.0) == Wrench(np.ones(2), 0.0), Wrench(np.ones(2), 0.0) == Wrench(np.ones(3), 0.0)
+    (True, False)
+    """
+    own: dict[str, Callable[..., object]] = {"__eq__": _equal}
+    if issubclass(kind, tuple) or "__repr__" not in vars(kind):
+        own["__repr__"] = _told
+    if hasattr(kind, "to_frame"):
+        own["_repr_html_"] = _html
+    for name, method in own.items():
+        setattr(kind, name, method)
+    return kind
+
+
+def numbers(value: object) -> str:
+    """Tell numbers in one line: a few one by one, complex ones as size and angle, many by their shape.
+
+    >>> numbers([0.5, 2j]), numbers(np.zeros((1000, 3)))
+    ('[0.5∠0° 2∠90°]', '(1000, 3) numbers from 0 to 0')
+    """
+    x = np.asarray(value)
+    if x.dtype.kind not in "biufc":
+        return str(value) if isinstance(value, str) else repr(value)
+    if x.size > FEW:
+        size = np.abs(x) if x.dtype.kind == "c" else x
+        return f"{x.shape} numbers from {np.nanmin(size):.6g} to {np.nanmax(size):.6g}"
+    if x.ndim:
+        return f"[{' '.join(numbers(part) for part in x)}]"
+    number = x.item()
+    if isinstance(number, complex):
+        return f"{abs(number):.6g}∠{np.degrees(np.angle(number)):.5g}°"
+    return str(number) if isinstance(number, bool) else f"{number + 0:.6g}"
+
+
+def table(columns: Mapping[str, ArrayLike], axes: Iterable[str]) -> pd.DataFrame:
+    """Return a table of columns (...) that broadcast, a row an element, indexed by its place along each named axis.
+
+    Of columns with fewer axes than names the last names count.
+    """
+    import pandas as pd
+
+    arrays = dict(zip(columns, np.broadcast_arrays(*columns.values()), strict=True))
+    shape = next(iter(arrays.values())).shape
+    index = None
+    if shape:
+        names = list(axes)
+        names = [*(f"{names[0]}{i}" for i in range(len(shape) - len(names) + 1)), *names[1:]]
+        index = pd.MultiIndex.from_product([range(n) for n in shape], names=names[-len(shape) :])
+    return pd.DataFrame(
+        {name: array.ravel() for name, array in arrays.items()}, index=index if shape else [0]
+    )
+
+
+def components(name: str, vector: ArrayLike, of: str = "xyz") -> dict[str, NDArray[np.float64]]:
+    """Return a vector's (..., k) components as columns; `*` in the name stands for the component's letter.
+
+    >>> components("omega_*_rad_s", [1.0, 2.0, 3.0])["omega_y_rad_s"]
+    array(2.)
+    """
+    v = np.asarray(vector)
+    return {name.replace("*", letter): v[..., i] for i, letter in enumerate(of)}
+
+
+def _values(of: object) -> dict[str, object]:
+    if is_dataclass(of):
+        return {f.name: getattr(of, f.name) for f in fields(of) if f.compare}
+    return {name: getattr(of, name) for name in getattr(of, "_fields", ())}
+
+
+def _equal(self: object, other: object) -> bool:
+    if type(self) is not type(other):
+        return False
+    here, there = _values(self), _values(other)
+    return all(alike(here[name], there[name]) for name in here)
+
+
+def alike(a: object, b: object) -> bool:
+    """Say whether two values are the same, arrays by all their numbers; NaN is NaN."""
+    if (
+        hasattr(a, "__array__")
+        or hasattr(b, "__array__")
+        or (isinstance(a, list | tuple) and not hasattr(a, "_fields"))
+    ):
+        x, y = np.asarray(a), np.asarray(b)
+        return bool(np.array_equal(x, y, equal_nan=x.dtype.kind in "fc" and y.dtype.kind in "fc"))
+    return bool(a == b)
+
+
+def _told(self: object) -> str:
+    values = (f"{name}={numbers(value)}" for name, value in _values(self).items() if value is not None)
+    return f"{type(self).__name__}({', '.join(values)})"
+
+
+def _html(self: object) -> str:
+    frame: pd.DataFrame = self.to_frame()  # type: ignore[attr-defined]
+    return str(frame.to_html(max_rows=20))

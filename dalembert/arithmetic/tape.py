@@ -1,0 +1,197 @@
+"""The tape: the real operations that a formula performs, written down once, as data.
+
+A tape is a list of operations in the order in which they can be done; the number of an operation is its place in the
+list, and its arguments are the numbers of earlier ones. Nothing is done twice, and nothing is on it that no output
+hangs on. It is made by `recorded.Recorder`, transformed by `adjoint`, and run by `engines`, or by `Tape.on` with any
+kind of number: floats, arrays, recorded numbers, many digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from typing import Any, Protocol
+
+Operation = tuple[str, *tuple[Any, ...]]
+"""(kind, arguments …): `("const", value)`, `("input", name)`, or a kind of `SIGNS` and the numbers of its arguments."""
+
+SIGNS = {
+    "add": "{} + {}",
+    "sub": "{} - {}",
+    "mul": "{} * {}",
+    "div": "{} / {}",
+    "neg": "-{}",
+    "abs": "abs({})",
+    "sqrt": "sqrt({})",
+    "sin": "sin({})",
+    "cos": "cos({})",
+    "atan2": "atan2({}, {})",
+    # the only decision: the second where the first is positive, else the third (NaN is not positive)
+    "select": "({1} if {0} > 0 else {2})",
+}
+
+
+class Kind(Protocol):
+    """The functions of one kind of number; sums, products, quotients and absolute values are the numbers' own."""
+
+    def const(self, value: float) -> Any: ...
+    def sqrt(self, x: Any) -> Any: ...
+    def sin(self, x: Any) -> Any: ...
+    def cos(self, x: Any) -> Any: ...
+    def atan2(self, y: Any, x: Any) -> Any: ...
+    def select(self, test: Any, positive: Any, otherwise: Any) -> Any: ...
+
+
+@dataclass(frozen=True)
+class Tape:
+    """A list of real operations and the names of its results.
+
+    Attributes
+    ----------
+    operations : tuple of (kind, arguments …)
+    outputs : tuple of (name, number of an operation)
+
+    Examples
+    --------
+    >>> from dalembert.arithmetic.recorded import Recorder
+    >>> recorder = Recorder()
+    >>> x, y = recorder.input("x"), recorder.input("y")
+    >>> tape = recorder.tape({"norm": (x * x + y * y).sqrt(), "product": y * x})
+    >>> print(tape)
+    x
+    y
+    v2 = x * x
+    v3 = y * y
+    v4 = v2 + v3
+    v5 = sqrt(v4)
+    v6 = x * y
+    norm: v5
+    product: v6
+    >>> tape.cost, tape.pruned(["product"]).cost
+    (5, 1)
+    """
+
+    operations: tuple[Operation, ...]
+    outputs: tuple[tuple[str, int], ...]
+
+    @cached_property
+    def inputs(self) -> tuple[str, ...]:
+        """The names of the inputs, in the order of their first use."""
+        return tuple(operation[1] for operation in self.operations if operation[0] == "input")
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names of the outputs."""
+        return tuple(name for name, _ in self.outputs)
+
+    @cached_property
+    def rows(self) -> Mapping[str, int]:
+        """The place of each output."""
+        return {name: row for row, name in enumerate(self.names)}
+
+    @cached_property
+    def cost(self) -> int:
+        """The count of operations, inputs and constants not counted."""
+        return sum(operation[0] not in ("const", "input") for operation in self.operations)
+
+    @cached_property
+    def key(self) -> str:
+        """A name for caches on disk: the same for the same operations in every process."""
+        return sha256(repr((self.operations, self.outputs)).encode()).hexdigest()
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.operations, self.outputs))
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __reduce__(self) -> tuple[type[Tape], tuple[object, ...]]:
+        # what is worked out when first asked for does not travel: hashes of text differ between processes
+        return Tape, (self.operations, self.outputs)
+
+    def __str__(self) -> str:
+        names: list[str] = []
+        lines = []
+        for number, (kind, *arguments) in enumerate(self.operations):
+            if kind == "const":
+                names.append(repr(arguments[0]))
+                continue
+            if kind == "input":
+                names.append(str(arguments[0]))
+                lines.append(str(arguments[0]))
+                continue
+            names.append(f"v{number}")
+            lines.append(f"v{number} = {SIGNS[kind].format(*(names[a] for a in arguments))}")
+        return "\n".join([*lines, *(f"{name}: {names[number]}" for name, number in self.outputs)])
+
+    def pruned(self, names: Iterable[str]) -> Tape:
+        """The tape of some of the outputs, in the order asked for, with only what they hang on.
+
+        Raises
+        ------
+        KeyError
+            Where an output of that name is not on the tape.
+        """
+        known = dict(self.outputs)
+        return shortened(self.operations, [(name, known[name]) for name in names])
+
+    def on(self, inputs: Mapping[str, Any], kind: Kind) -> dict[str, Any]:
+        """The outputs, worked out operation by operation on any kind of number."""
+        values = self.values(inputs, kind)
+        return {name: values[number] for name, number in self.outputs}
+
+    def values(self, inputs: Mapping[str, Any], kind: Kind) -> list[Any]:
+        """The value of every operation, on any kind of number."""
+        found: list[Any] = []
+        for name, *arguments in self.operations:
+            if name == "const":
+                found.append(kind.const(arguments[0]))
+            elif name == "input":
+                found.append(inputs[arguments[0]])
+            else:
+                found.append(performed(name, [found[a] for a in arguments], kind))
+        return found
+
+
+def performed(name: str, values: list[Any], kind: Kind) -> Any:
+    """One operation on numbers of a kind."""
+    match name:
+        case "add":
+            return values[0] + values[1]
+        case "sub":
+            return values[0] - values[1]
+        case "mul":
+            return values[0] * values[1]
+        case "div":
+            return values[0] / values[1]
+        case "neg":
+            return -values[0]
+        case "abs":
+            return abs(values[0])
+        case _:
+            return getattr(kind, name)(*values)
+
+
+def shortened(operations: Iterable[Operation], outputs: Iterable[tuple[str, int]]) -> Tape:
+    """The tape of outputs: what they do not hang on is left out, and the rest numbered anew."""
+    operations, outputs = list(operations), list(outputs)
+    wanted = [False] * len(operations)
+    for _, number in outputs:
+        wanted[number] = True
+    for number in range(len(operations) - 1, -1, -1):
+        kind, *arguments = operations[number]
+        if wanted[number] and kind not in ("const", "input"):
+            for a in arguments:
+                wanted[a] = True
+    place: dict[int, int] = {}
+    kept: list[Operation] = []
+    for number, (kind, *arguments) in enumerate(operations):
+        if wanted[number]:
+            place[number] = len(kept)
+            if kind not in ("const", "input"):
+                arguments = [place[a] for a in arguments]
+            kept.append((kind, *arguments))
+    return Tape(tuple(kept), tuple((name, place[number]) for name, number in outputs))

@@ -1,0 +1,41 @@
+"""What states in time have in common: they are worked out in blocks, and laid out as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dalembert.arithmetic.records import components, table
+from rigidbody3d.rounding_in_time import State
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+BLOCK = 8192
+"""So many states are worked out at once: what is intermediate stays in the cache."""
+
+
+def in_blocks(work: Callable[[Array], Array], time: Array, lead: tuple[int, ...], width: int) -> Array:
+    """Return what `work` gives of b bodies at times (n,), (b, n, width), as (..., n, width); at one time (..., width)."""
+    t = np.atleast_1d(time)
+    bodies = int(np.prod(lead))
+    out = np.empty((bodies, len(t), width))
+    step = max(1, BLOCK // max(bodies, 1))
+    for start in range(0, len(t), step):
+        out[:, start : start + step] = work(t[start : start + step])
+    return out.reshape(lead + time.shape + (width,))
+
+
+def frame_of(state: State, time: Array) -> pd.DataFrame:
+    """Return a table of states: t_s, ω in body axes, attitude, momentum in space axes, energy."""
+    columns = {"t_s": time}
+    columns |= components("omega_*_rad_s", state.omega)
+    columns |= components("attitude_*", state.attitude, "wxyz")
+    columns |= components("momentum_*_kg_m2_s", state.momentum)
+    columns |= {"energy_J": state.energy}
+    return table(columns, ("body", "state") if time.ndim else ("body",))

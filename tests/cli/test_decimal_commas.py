@@ -1,0 +1,90 @@
+"""Decimal commas are read wherever the comma does not part the cells."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+
+FAN = """run;sensor;amplitude_mm_s;phase_deg;trial_plane;trial_mass_g;trial_angle_deg
+0;1;3,4;116,5;;;
+1;1;1,8;42;A;2,25;10,5
+"""
+TWO = """run;sensor;amplitude_um;phase_deg;trial_plane;trial_mass_g;trial_angle_deg
+0;1;30;116;;;
+0;2;31;16;;;
+1;1;12;42;"A;B";"2,25;3,5";"10,5;20"
+1;2;14;40;"A;B";"2,25;3,5";"10,5;20"
+2;1;15;82;B;2,5;10,5
+2;2;17;340;B;2,5;10,5
+"""
+
+
+def pointed(text: str) -> str:
+    """The same table with points."""
+    return text.replace(",", ".")
+
+
+@pytest.mark.parametrize("text", [FAN, TWO])
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_trial_masses_and_angles(text: str, mark: str, dalembert: Dalembert) -> None:
+    if mark == "\t":
+        quoted = text.split('"')
+        text = "".join(part if k % 2 else part.replace(";", mark) for k, part in enumerate(quoted))
+    with_commas, with_points = (dalembert("field", "-", stdin=t) for t in (text, pointed(text)))
+    assert with_commas.returncode == 0, with_commas.stderr
+    assert with_commas.stdout == with_points.stdout
+
+
+def test_a_long_table(dalembert: Dalembert) -> None:
+    head, first, second = FAN.splitlines()
+    for numbers in ("{};{}", "{};{},5"):  # whole amplitudes and such with a comma
+        body = "\n".join(
+            f"{r};{a}\n{r};{b}"
+            for r in range(6000)
+            for a, b in [(first.replace("3,4", numbers.format(3, 4)[2:]), second)]
+        )
+        text = f"rotor;{head}\n{body}\n"
+        done = dalembert("field", "-", stdin=text)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout == dalembert("field", "-", stdin=pointed(text)).stdout
+
+
+def test_a_cell_with_a_point_among_commas_is_named(dalembert: Dalembert) -> None:
+    done = dalembert("field", "-", stdin=FAN.replace("2,25", "2.25"))
+    assert done.returncode == 1
+    assert "row 2 (line 3), column trial_mass_g: found '2.25'" in done.stderr
+    assert "decimal comma" in done.stderr
+
+
+COMMANDS = {
+    "field": ("field", "-"),
+    "balance": ("balance", "-", "--plane", "A:20mm"),
+    "place": ("place", "7.1996g@33.3deg", "--blades", "16"),
+}
+TABLES = {"field": FAN, "balance": "mass_kg,radius_mm,angle_deg\n1.25,10.5,33.3\n", "place": ""}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_expected_values(command: str, mark: str, dalembert: Dalembert, tmp_path: Path) -> None:
+    found = dalembert(*COMMANDS[command], stdin=TABLES[command])
+    assert found.returncode == 0, found.stderr
+    assert "." in found.stdout
+    expected = tmp_path / "expected.csv"
+    expected.write_text(found.stdout.replace(",", mark).replace(".", ","))
+    done = dalembert(*COMMANDS[command], "--expect", "expected.csv", stdin=TABLES[command])
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "WRONG" not in done.stdout
+
+
+def test_a_name_keeps_its_comma(dalembert: Dalembert, tmp_path: Path) -> None:
+    table = "rotor;mass_kg;radius_mm;angle_deg\nno 1,5;1,25;10;30\n"
+    (tmp_path / "expected.csv").write_text("rotor;mass_kg;angle_deg\nno 1,5;0,625;210,0\n")
+    done = dalembert("balance", "-", "--plane", "A:20mm", "--expect", "expected.csv", stdin=table)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "no 1,5" in done.stdout
