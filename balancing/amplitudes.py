@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.phase import angle_of
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import record, table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -18,7 +23,8 @@ STARTS = 24
 """Directions from which the fit is started: it has few minima, all found from so many."""
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class AmplitudeFit:
     """Influence coefficients of one plane from amplitudes; see `influence_from_amplitudes`."""
 
@@ -32,6 +38,17 @@ class AmplitudeFit:
     """The amplitudes it was found from, (s,), those of the trial runs (r, s), and the trial masses (r,), kg."""
     trials: Real
     trial_masses: Complex
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with a row per sensor: initial, influence (size per kg, angle_deg), misfit, condition_number."""
+        columns = {
+            "initial": self.initial,
+            "influence_per_kg": np.abs(self.influence),
+            "angle_deg": np.degrees(angle_of(self.influence)),
+            "misfit": self.misfit,
+            "condition_number": self.condition_number,
+        }
+        return table(columns, ("sensor",))
 
     @cached_property
     def _at(self) -> _Normal:

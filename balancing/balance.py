@@ -15,17 +15,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.dependence import DependentPlanes, adjoint, columns_scaled, condition_number
 from balancing.limited import limited_least_squares, smallest_maximum
+from balancing.phase import angle_of
 from balancing.qr import smallest_squares
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import numbers, record, table
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from balancing.rounding import Bounds, Case
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Balance:
     """Corrections from influence coefficients; see `least_squares` and `minimax`."""
 
@@ -47,6 +52,20 @@ class Balance:
 
     singular_values: Real | None = field(default=None, repr=False, compare=False)
     """Of the scaled coefficients, (..., p), where they are known from the solution."""
+
+    def __repr__(self) -> str:
+        largest = numbers(self.residual_max)
+        return f"<Balance: corrections {numbers(self.corrections)} kg leave at most {largest}>"
+
+    def to_frame(self, of: str = "corrections") -> pd.DataFrame:
+        """Return a table with a row per plane (mass_kg, angle_deg), or `of="residual"` per sensor (amplitude, phase_deg)."""
+        if of == "corrections":
+            names, values, axis = ("mass_kg", "angle_deg"), self.corrections, "plane"
+        elif of == "residual":
+            names, values, axis = ("amplitude", "phase_deg"), self.residual, "sensor"
+        else:
+            raise ValueError(f"'{of}': expected corrections or residual")
+        return table({names[0]: np.abs(values), names[1]: np.degrees(angle_of(values))}, ("rotor", axis))
 
     @cached_property
     def residual(self) -> Complex:

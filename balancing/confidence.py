@@ -12,12 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from balancing.balance import least_squares
 from balancing.dependence import adjoint
 from balancing.influence import influence_coefficients
+from dalembert.arithmetic.records import record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Readings:
     """The readings from which corrections were found, and their errors; one rotor.
 

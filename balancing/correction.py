@@ -23,8 +23,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.phase import angle_of
 from balancing.rotor import BLOCK
 from dalembert.arithmetic.exact import UNIT, exact_sum, two_product, two_sum
+from dalembert.arithmetic.records import numbers, record, table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,6 +46,7 @@ class CoincidentPlanes(ValueError):
         )
 
 
+@record
 class Unbalances(NamedTuple):
     """The static unbalance (kg·m) and the couple unbalance (kg·m²), complex."""
 
@@ -51,7 +54,8 @@ class Unbalances(NamedTuple):
     couple: Complex
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Correction:
     """Corrections of rotors with known unbalances; see `correct`."""
 
@@ -236,33 +240,21 @@ class Correction:
     @property
     def angle(self) -> Real:
         """The angles of the corrections to add, (..., p), rad in [0, 2π)."""
-        angle = np.angle(self.unbalance + 0.0) % (2 * np.pi)  # + 0.0: the angle of -0 is 0
-        return np.where(angle >= 2 * np.pi, 0.0, angle)
+        return angle_of(self.unbalance)
 
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row per rotor and plane: z_m, unbalance_kg_m, angle_deg."""
-        import pandas as pd
-
-        planes = np.broadcast_to(self.planes, self.unbalance.shape)
-        index = pd.MultiIndex.from_product(
-            [range(n) for n in self.unbalance.shape[:-1]] + [range(planes.shape[-1])]
-        )
-        return pd.DataFrame(
-            {
-                "z_m": planes.ravel(),
-                "unbalance_kg_m": np.abs(self.unbalance).ravel(),
-                "angle_deg": np.degrees(self.angle).ravel(),
-            },
-            index=index.set_names([*(f"rotor{i}" for i in range(index.nlevels - 1)), "plane"]),
-        )
-
-    def _repr_html_(self) -> str:
-        html: str = self.to_frame().to_html(max_rows=20)
-        return html
+        columns = {
+            "z_m": self.planes,
+            "unbalance_kg_m": np.abs(self.unbalance),
+            "angle_deg": np.degrees(self.angle),
+        }
+        return table(columns, ("rotor", "plane"))
 
     def __repr__(self) -> str:
         rotors = self.static.size
-        return f"<Correction of {rotors} rotor{'s' * (rotors != 1)} in {self.planes.shape[-1]} plane(s): unbalance {self.unbalance}>"
+        many = f"{rotors} rotor{'s' * (rotors != 1)} in {self.planes.shape[-1]} plane(s)"
+        return f"<Correction of {many}: unbalance {numbers(self.unbalance)} kg·m>"
 
 
 def correct(moment: ArrayLike, z: ArrayLike = 0.0, planes: ArrayLike = (0.0,)) -> Correction:

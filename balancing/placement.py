@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.correction import correct
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import record, table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Placement:
     """Masses at given positions; see `place` and `place_from_stock`."""
 
@@ -28,6 +34,10 @@ class Placement:
     """No masses at these positions, within the limits, come nearer to the target than this, kg."""
     free: tuple[int, ...] = ()
     """The positions whose masses were worked out; the others are full, empty, or weights from stock."""
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with a row per position: angle_deg, mass_kg."""
+        return table({"angle_deg": np.degrees(self.angles), "mass_kg": self.masses}, ("position",))
 
     @property
     def total(self) -> complex:

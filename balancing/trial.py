@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -33,6 +34,7 @@ def trial_unbalance(
     return np.asarray(share * mass / planes * STANDARD_GRAVITY / omega**2)
 
 
+@record
 class TrialEffect(NamedTuple):
     """What a trial mass changed: the amplitude by this share, the phase by this angle (rad), (...,) each."""
 
@@ -62,6 +64,7 @@ def trial_effect(before: ArrayLike, after: ArrayLike) -> TrialEffect:
     return TrialEffect(amplitude[()], phase[()])
 
 
+@record
 class Indexed(NamedTuple):
     """The unbalance of the rotor itself, and that of what it is mounted on, in the plane's own unit."""
 
@@ -105,6 +108,7 @@ def index_balancing(readings: ArrayLike, turned: ArrayLike = (0.0, np.pi)) -> In
     return Indexed(solution[..., 0], solution[..., 1])
 
 
+@record
 class ErrorBudget(NamedTuple):
     """The error of a residual unbalance, and the readings from which on a rotor is in or out of tolerance."""
 
@@ -138,7 +142,7 @@ def error_budget(permissible: ArrayLike, random: ArrayLike = (), systematic: Arr
     U_per - ΔU, the user rejects one above U_per + ΔU; between the two it is not decided.
 
     >>> error_budget(100.0, random=[3.0, 4.0], systematic=[2.0])
-    ErrorBudget(error=array(7.), accept=array(93.), reject=array(107.))
+    ErrorBudget(error=7, accept=93, reject=107)
     """
     u = np.asarray(permissible, dtype=float)
     r, s = np.asarray(random, dtype=float), np.asarray(systematic, dtype=float)

@@ -8,19 +8,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.records import components, numbers, record, table
 from rigidbody3d import rounding
-from rigidbody3d.inertia import Principal, principal, shift, turn
+from rigidbody3d.inertia import Principal, principal, products, shift, turn
 from rigidbody3d.rounding import BodyError, Numbers
 from rigidbody3d.shapes import inertia_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Body:
     """Mass (...), centre of mass (..., 3) and inertia tensor at it (..., 3, 3), kg, m, kg·m²; leading axes are bodies.
 
@@ -51,6 +57,12 @@ class Body:
         object.__setattr__(self, "center", np.broadcast_to(center, lead + (3,)))
         object.__setattr__(self, "inertia", np.broadcast_to(inertia, lead + (3, 3)))
 
+    def __repr__(self) -> str:
+        if self.mass.ndim:
+            return f"<Body: {self.mass.size} bodies, {self.mass.sum():.6g} kg together>"
+        moments = numbers(self.principal.moments)
+        return f"<Body: {self.mass:.6g} kg at {numbers(self.center)} m, principal moments {moments} kg·m²>"
+
     @classmethod
     def of(
         cls, shape: str, mass: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0), **dimensions: ArrayLike
@@ -79,6 +91,14 @@ class Body:
     def about(self, point: ArrayLike) -> Array:
         """Return the tensor about a point (..., 3): the parallel axis theorem, (..., 3, 3), kg·m²."""
         return np.asarray(self.inertia + shift(self.mass, self.center - np.asarray(point, dtype=float)))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with a row per body: mass_kg, x_m …, and the tensor at the centre of mass, ixx_kg_m2 … iyz_kg_m2."""
+        I = self.inertia
+        columns = {"mass_kg": self.mass} | components("*_m", self.center)
+        columns |= {f"i{a}{a}_kg_m2": I[..., i, i] for i, a in enumerate("xyz")}
+        columns |= {f"i{ab}_kg_m2": products(I)[..., i] for i, ab in enumerate(("xy", "xz", "yz"))}
+        return table(columns, ("body",))
 
     @property
     def principal(self) -> Principal:

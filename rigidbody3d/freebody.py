@@ -4,21 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import record
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.free_rotation import FreeRotation
 from rigidbody3d.inertia import principal
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require, tensors_off
-from rigidbody3d.states import in_blocks
+from rigidbody3d.states import frame_of, in_blocks
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class FreeBody:
     """A rigid body that no torque acts on, from its inertia and its state at time zero.
 
@@ -128,7 +134,8 @@ class FreeBody:
         return self._rotation.m1.reshape(self._lead)
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class FreeState:
     """The state of a free body at given times; each quantity is computed when it is first asked for."""
 
@@ -162,6 +169,10 @@ class FreeState:
             moments, axes = moments[..., None, :], axes[..., None, :, :]
         spin = np.einsum("...ij,...j->...i", axes, self.omega)
         return np.asarray((moments * spin**2).sum(axis=-1) / 2)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with a row per state: t_s, ω in body axes, attitude, momentum in space axes, energy."""
+        return frame_of(self, self.time)
 
     def error_estimate(self, of: str = "attitude", tensor: ArrayLike = 0.0) -> Array:
         """Return a bound of the rounding error of a quantity, the given data as exact.

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.records import record
 from rigidbody3d import rounding
 
 Array = NDArray[np.float64]
@@ -31,6 +32,7 @@ class _Rates(NamedTuple):
     fast: Array
 
 
+@record
 class Steady(_Rates):
     """The two rates of steady precession, `.slow` and `.fast`, rad/s; NaN where the spin is too slow for any."""
 
@@ -109,6 +111,7 @@ class _Cones(NamedTuple):
     spin: Array
 
 
+@record
 class Cones(_Cones):
     """The cones of a free symmetric body: half angles, rad, and rates, rad/s.
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.records import record
 from rigidbody3d import rounding
 
 Array = NDArray[np.float64]
@@ -22,6 +23,7 @@ RTOL = 1e-9
 """By how much of the largest principal moment a tensor may miss the triangle inequality: flat bodies meet it exactly."""
 
 
+@record
 class Principal(NamedTuple):
     """Principal moments in ascending order (..., 3), and their axes as the rows of a rotation (..., 3, 3)."""
 
@@ -60,6 +62,7 @@ class Principal(NamedTuple):
         return Principal(*rounding.principal(self.moments, self.axes, tensor))
 
 
+@record
 class Validity(NamedTuple):
     """Whether a body can have a tensor; see `check`."""
 

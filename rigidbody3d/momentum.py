@@ -13,21 +13,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.bounded import read
+from dalembert.arithmetic.records import components, numbers, record, table
 from rigidbody3d import rounding
 from rigidbody3d.inertia import shift
 from rigidbody3d.rounding import BodyError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
 BLOCK = 8192  # states worked out at once: their columns stay in the cache
 
 
+@record
 class Wrench(NamedTuple):
     """A force and a moment, (..., 3) each, N and N·m."""
 
@@ -35,7 +40,8 @@ class Wrench(NamedTuple):
     moment: Array
 
 
-@dataclass(frozen=True, init=False, eq=False)
+@record
+@dataclass(frozen=True, init=False, eq=False, repr=False)
 class Motion:
     """A rigid body in motion, one state or many: what its momentum is and what forces the motion asks for.
 
@@ -112,6 +118,20 @@ class Motion:
         object.__setattr__(self, "frame_omega", None)
         if frame_omega is not None:
             keep("frame_omega", frame_omega, 3)
+
+    def __repr__(self) -> str:
+        states = np.broadcast_shapes(self.inertia.shape[:-2], self.omega.shape[:-1], self.mass.shape)
+        if states:
+            return f"<Motion: {np.prod(states)} states, omega {numbers(self.omega)} rad/s>"
+        return f"<Motion: omega {numbers(self.omega)} rad/s, momentum {numbers(self.momentum)} kg·m²/s>"
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with a row per state: ω, H and its rate, d'Alembert's inertia force, kinetic energy."""
+        columns = components("omega_*_rad_s", self.omega)
+        columns |= components("momentum_*_kg_m2_s", self.momentum)
+        columns |= components("momentum_rate_*_N_m", self.rate)
+        columns |= components("inertia_force_*_N", self.inertia_force)
+        return table(columns | {"energy_J": self.energy}, ("state",))
 
     @cached_property
     def momentum(self) -> Array:
@@ -315,6 +335,7 @@ def _scaled(factor: Array, vectors: Array, sign: float = 1.0) -> Array:
 # --- percussion ---
 
 
+@record
 class Blow(NamedTuple):
     """What an impulse changes: velocity of the centre of mass, angular velocity, and the impulse of the pin."""
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.bounded import Bounded, apply, stack
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import record
 from rigidbody3d.shapes import SHAPES
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ def times(I: Bounded, w: Bounded) -> Bounded:
 # --- mass properties ---
 
 
+@record
 class BodyError(NamedTuple):
     """Bounds of the rounding errors of a body's mass (...), centre (..., 3) and tensor (..., 3, 3)."""
 

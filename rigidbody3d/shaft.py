@@ -13,19 +13,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.bounded import read
+from dalembert.arithmetic.records import components, numbers, record, table
 from rigidbody3d import rounding
 from rigidbody3d.body import Body
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-@dataclass(frozen=True, init=False, eq=False)
+@record
+@dataclass(frozen=True, init=False, eq=False, repr=False)
 class Shaft:
     """A body turning about the z-axis on two bearings, in the position drawn.
 
@@ -84,6 +90,20 @@ class Shaft:
         object.__setattr__(self, "speed", np.asarray(speed, dtype=float))
         object.__setattr__(self, "speed_rate", np.asarray(speed_rate, dtype=float))
         object.__setattr__(self, "gravity", np.asarray(gravity, dtype=float))
+
+    def __repr__(self) -> str:
+        speed, unbalance = numbers(self.speed), numbers(self.unbalance)
+        return f"<Shaft: bearings at {numbers(self.bearings)} m, {speed} rad/s, unbalance {unbalance} kg·m>"
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with a row per bearing: z_m, what it carries at rest and because of the turning, the unbalance."""
+        columns = {"z_m": self.bearings}
+        columns |= components("static_*_N", self.static, "xy") | components("dynamic_*_N", self.dynamic, "xy")
+        columns |= {
+            "unbalance_kg_m": np.abs(self.unbalance),
+            "angle_deg": np.degrees(np.angle(self.unbalance)) % 360,
+        }
+        return table(columns, ("shaft", "bearing"))
 
     @property
     def _turning(self) -> Complex:

@@ -13,13 +13,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.records import record
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.inertia import principal
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require, tensors_off
+from rigidbody3d.states import frame_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 Torque = Callable[[float, Array, Array], ArrayLike]
@@ -35,7 +41,8 @@ _STAGES = (
 STAGES = _STAGES + _STAGES[-2::-1]
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     """States at the times asked for: `.omega` (n, 3) in body axes, `.attitude` (n, 4), `.momentum` (n, 3) in space axes."""
 
@@ -65,6 +72,10 @@ class Trajectory:
     @cached_property
     def _finer(self) -> Trajectory:
         return self._run_again(self.tensor)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with a row per state: t_s, ω in body axes, attitude, momentum in space axes, energy."""
+        return frame_of(self, self.time)
 
     def error_estimate(self, of: str = "attitude", tensor: ArrayLike = 0.0) -> Array:
         """Return an estimate of the error, of the method and of rounding together.

@@ -19,17 +19,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import record
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require
-from rigidbody3d.states import in_blocks
+from rigidbody3d.states import frame_of, in_blocks
 from rigidbody3d.top_roots import constants
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
@@ -37,7 +41,8 @@ LIGHTEST = 1e60
 """I ω² over m g l: what it takes from the 200 digits of the roots."""
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Top:
     """A heavy symmetric top from its inertia about the fixed point and its state at time zero.
 
@@ -130,7 +135,8 @@ class Top:
         return np.asarray(2 * self._rotation.p.quarter / self._rotation.rate).reshape(self._lead)
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class TopState:
     """The state of a top at given times; each quantity is computed when it is first asked for."""
 
@@ -163,6 +169,10 @@ class TopState:
         return np.asarray(
             (self._moments * self.omega**2).sum(axis=-1) / 2 + self._mgl * (w * w + z * z - x * x - y * y)
         )
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with a row per state: t_s, ω in body axes, attitude, momentum in space axes, energy."""
+        return frame_of(self, self.time)
 
     def error_estimate(self, of: str = "attitude", moments: ArrayLike = 0.0) -> Array:
         """Return a bound of the rounding error of a quantity, the given data as exact.

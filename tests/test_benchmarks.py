@@ -314,3 +314,41 @@ def test_what_is_a_fault(
         (tmp_path / name).write_bytes(data)
     _, fault = judge(Case("balance", ["balance"], {}), Ended(status, out, err))
     assert fault is None if said is None else said in str(fault)
+
+
+def installed(folder: Path, answer: str) -> Path:
+    """Write a stand-in for an installation's `dalembert` with one worked example."""
+    script = folder / answer
+    script.write_text(
+        '#!/bin/sh\n[ "$2" ] || { echo "one   the only example"; exit; }\n'
+        f'[ "$1" = examples ] && {{ echo "run:"; echo "  dalembert solve x --plot p.svg"; exit; }}\necho "$*"; echo {answer}\n'
+    )
+    script.chmod(0o755)
+    return script
+
+
+def test_outputs_are_compared_byte_for_byte(tmp_path: Path) -> None:
+    from benchmarks.same_outputs import compare
+
+    old, new = (str(installed(tmp_path, answer)) for answer in ("fourty", "forty"))
+    assert compare(old, old) == (5, [])
+    compared, found = compare(old, new)
+    assert compared == 5
+    assert len(found) == 4
+    assert found[1] == "one: dalembert solve x --json\n  line 2\n  old fourty\n  new forty"
+
+
+def test_the_files_that_a_sweep_passes() -> None:
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "benchmarks" / "trace_passes.py")],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    head, *rows = done.stdout.splitlines()
+    counted = {name: [int(x) for x in rest] for name, *rest in (row.split(",") for row in rows)}
+    assert head == "package,files,called,changes"
+    assert {"cli", "virtualwork", "all"} <= set(counted)
+    files, called, changes = counted["virtualwork"]
+    assert 2 < called <= files < changes
+    assert counted["all"][0] == sum(row[0] for name, row in counted.items() if name != "all")

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork import GROUND, Gear, Guess, Guide, Input, Link, Mechanism
+from virtualwork.describe.errors import MechanismError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -231,7 +232,7 @@ def _join(made: _Builder, left: int) -> bool:
     return not loose and all(made.points[b] for b in made.names)
 
 
-def _rows(t: Topology) -> list[tuple[str, tuple[Any, ...]]]:
+def rows(t: Topology) -> list[tuple[str, tuple[Any, ...]]]:
     """Every scalar or vector constraint as data: pins, guides, turns (Σ c·θ = const), slides that are driven."""
     m = t.mechanism
     rows: list[tuple[str, tuple[Any, ...]]] = []
@@ -267,10 +268,10 @@ def _seat(t: Topology, x: Any, body: str, z: complex) -> tuple[complex, complex,
 
 def constraints(t: Topology, x: Reals, inputs: tuple[float, ...]) -> Reals:
     """What every constraint leaves at x (x, y, θ of every link), (3·links,): m, or rad."""
-    return _evaluate(t, x, inputs)[0]
+    return evaluate(t, x, inputs)[0]
 
 
-def _evaluate(t: Topology, x: Reals, inputs: tuple[float, ...]) -> tuple[Reals, Reals]:
+def evaluate(t: Topology, x: Reals, inputs: tuple[float, ...]) -> tuple[Reals, Reals]:
     """Every constraint and its Jacobian."""
     out: list[float] = []
     jacobian: list[Reals] = []
@@ -291,7 +292,7 @@ def _evaluate(t: Topology, x: Reals, inputs: tuple[float, ...]) -> tuple[Reals, 
         turned = (along.conjugate() * 1j * arm).real
         return [(i, sign * along.real), (i + 1, sign * along.imag), (i + 2, sign * turned)]
 
-    for kind, data in _rows(t):
+    for kind, data in rows(t):
         if kind == "pin":
             (p, arm_p, i), (q, arm_q, k) = _seat(t, x, *data[:2]), _seat(t, x, *data[2:])
             for along in (1 + 0j, 1j):
@@ -319,7 +320,7 @@ def _evaluate(t: Topology, x: Reals, inputs: tuple[float, ...]) -> tuple[Reals, 
 
 def regularity(t: Topology) -> float:
     """The least singular value of all constraints at the pose over the largest; 0 where their number does not fit."""
-    jacobian = _evaluate(t, t.unknowns(), t.inputs)[1]
+    jacobian = evaluate(t, t.unknowns(), t.inputs)[1]
     if jacobian.shape[0] != jacobian.shape[1]:
         return 0.0
     s = np.linalg.svd(jacobian, compute_uv=False)
@@ -329,7 +330,7 @@ def regularity(t: Topology) -> float:
 def newton(t: Topology, x: Reals, inputs: tuple[float, ...]) -> Reals | None:
     """All constraints at once by Newton-Raphson from x; None where it does not converge or J turns singular."""
     for _ in range(12):
-        value, jacobian = _evaluate(t, x, inputs)
+        value, jacobian = evaluate(t, x, inputs)
         try:
             step = np.linalg.solve(jacobian, value)
         except np.linalg.LinAlgError:
@@ -340,3 +341,39 @@ def newton(t: Topology, x: Reals, inputs: tuple[float, ...]) -> Reals | None:
         if np.abs(step).max() < 1e-13:
             return x
     return x if np.abs(step).max() < 1e-9 else None
+
+
+def verdict(t: Topology) -> str:
+    """What the program makes of a mechanism at the very pose that its guess gives.
+
+    Returns
+    -------
+    str
+        "put together" where every link stands within rounding of where it was drawn; "refused" where the constraints do
+        not determine the pose and the program says so; everything else is a fault and says what is wrong.
+    """
+    regular = regularity(t)
+    at = np.array([t.inputs]) if len(t.inputs) > 1 else np.array(t.inputs)
+    try:
+        motion = t.mechanism.motion(at)
+        closed = bool(motion.assembled[0])
+        away = _away(t, motion, 0, t.unknowns()) if closed else math.nan
+    except MechanismError as error:
+        return "refused" if regular <= REGULAR else f"refused though regular: {error}"
+    except Exception as error:
+        return f"internal error: {error!r}"
+    if not closed:
+        return "refused" if regular <= REGULAR else "not assembled at its own guess"
+    return "put together" if away < 1e-10 / max(regular, 1e-5) else f"{away:.2g} away from its guess"
+
+
+def _away(t: Topology, motion: Any, i: int, x: Reals) -> float:
+    """How far pose i is from x: chords of the unit circle, and m of every point."""
+    away = 0.0
+    for k, (body, link) in enumerate(t.mechanism.links.items()):
+        turn = cmath.exp(1j * x[3 * k + 2])
+        away = max(away, abs(cmath.exp(1j * motion.link(body).angle[i]) - turn))
+        for z in link.points.values():
+            there = complex(x[3 * k], x[3 * k + 1]) + z * turn
+            away = max(away, abs(motion.at(body, z).complex(0)[i] - there))
+    return away

@@ -11,6 +11,7 @@ from cli.mechanism.job import ORDERS, Job
 
 if TYPE_CHECKING:
     from virtualwork.branch.track import Track
+    from virtualwork.motion import Motion
     from virtualwork.study.newton_table import AllAtOnce
 
 
@@ -190,10 +191,30 @@ def limit_warnings(job: Job) -> list[str]:
                 if shown:
                     values = ", ".join(f"{v:.13g}" for v in shown)
                     text += f": the input {name} has the limit{'s' * (len(shown) > 1)} {values} {unit}"
-            lines.append(text)
+            lines.append(text + _shortfall(job, motion, int(missing[0])))
         lines += _branch_lines(job, motion)
         lines += track.warnings()
     return list(dict.fromkeys(lines))
+
+
+def _shortfall(job: Job, motion: Motion, i: int) -> str:
+    """By how much a pose does not close, and the nearest input where it would."""
+    from virtualwork.branch.shortfall import shortfall
+
+    found = shortfall(motion.assembly, tuple(motion.inputs[i].tolist()))
+    if found is None:
+        return ""
+    factor, unit = (1e3, "mm") if job.mechanism.size < 2 else (1.0, "m")
+    shown = ", ".join(
+        f"{v:.10g} {'m' if e.is_slide else 'deg'}"
+        for e, v in zip(job.mechanism.inputs, job.inputs.shown[i], strict=True)
+    )
+    text = f"; at {shown}: {found.text(lambda v: f'{v * factor:.6g} {unit}')}"
+    if found.nearest is not None:
+        slide = job.mechanism.inputs[0].is_slide
+        there = found.nearest if slide else math.degrees(found.nearest)
+        text += f"; it would close at {there:.10g} {'m' if slide else 'deg'}"
+    return text
 
 
 def _branch_lines(job: Job, motion: Any) -> list[str]:

@@ -36,7 +36,7 @@ def record(kind: Kind) -> Kind:
     >>> Wrench(np.ones(2), 0.0) == Wrench(np.ones(2), 0.0), Wrench(np.ones(2), 0.0) == Wrench(np.ones(3), 0.0)
     (True, False)
     """
-    own: dict[str, Callable[..., object]] = {"__eq__": _equal}
+    own: dict[str, Callable[..., object] | None] = {"__eq__": _equal, "__ne__": _unequal, "__hash__": None}
     if issubclass(kind, tuple) or "__repr__" not in vars(kind):
         own["__repr__"] = _told
     if hasattr(kind, "to_frame"):
@@ -62,27 +62,29 @@ def numbers(value: object) -> str:
         return f"[{' '.join(numbers(part) for part in x)}]"
     number = x.item()
     if isinstance(number, complex):
-        return f"{abs(number):.6g}∠{np.degrees(np.angle(number)):.5g}°"
+        return f"{abs(number):.6g}∠{round(float(np.degrees(np.angle(number))), 3) + 0:g}°"
     return str(number) if isinstance(number, bool) else f"{number + 0:.6g}"
 
 
 def table(columns: Mapping[str, ArrayLike], axes: Iterable[str]) -> pd.DataFrame:
     """Return a table of columns (...) that broadcast, a row an element, indexed by its place along each named axis.
 
-    Of columns with fewer axes than names the last names count.
+    Of columns with fewer axes than names the last names count; several leading axes are numbered.
     """
     import pandas as pd
 
     arrays = dict(zip(columns, np.broadcast_arrays(*columns.values()), strict=True))
     shape = next(iter(arrays.values())).shape
-    index = None
-    if shape:
-        names = list(axes)
-        names = [*(f"{names[0]}{i}" for i in range(len(shape) - len(names) + 1)), *names[1:]]
-        index = pd.MultiIndex.from_product([range(n) for n in shape], names=names[-len(shape) :])
-    return pd.DataFrame(
-        {name: array.ravel() for name, array in arrays.items()}, index=index if shape else [0]
-    )
+    if not shape:
+        return pd.DataFrame({name: [array.item()] for name, array in arrays.items()})
+    lead, *rest = axes
+    leading = len(shape) - len(rest)
+    leads = [lead] if leading == 1 and not rest else [f"{lead}{i}" for i in range(leading)]
+    names = [*leads, *rest]
+    index = pd.RangeIndex(shape[0], name=names[0])
+    if len(shape) > 1:
+        index = pd.MultiIndex.from_product([range(n) for n in shape], names=names)
+    return pd.DataFrame({name: array.ravel() for name, array in arrays.items()}, index=index)
 
 
 def components(name: str, vector: ArrayLike, of: str = "xyz") -> dict[str, NDArray[np.float64]]:
@@ -106,6 +108,10 @@ def _equal(self: object, other: object) -> bool:
         return False
     here, there = _values(self), _values(other)
     return all(alike(here[name], there[name]) for name in here)
+
+
+def _unequal(self: object, other: object) -> bool:
+    return not _equal(self, other)
 
 
 def alike(a: object, b: object) -> bool:

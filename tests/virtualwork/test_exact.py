@@ -23,7 +23,7 @@ def errors(m, q, orders=3):
     for order in range(orders):
         values = [
             (
-                motion.poses.angle(name) if order == 0 else motion.angle_derivative(name, order),
+                motion.poses.angle(name) if order == 0 else motion.poses.angle_derivative(name, order),
                 exact.angle(name, order),
             )
             for name in m.links

@@ -180,7 +180,8 @@ class Continuation:
                 if j != i:
                     weight *= -d2[j] / (d2[i] - d2[j])
             total += weight * (q[i] - near)
-        return float(near + total)
+        # where the determinant runs to a pole instead (a slide that runs away) there is nothing to extrapolate
+        return float(near + total) if 0 <= side * total <= 16 * self.step[side] else float(near)
 
     def _turned_back(self, q: Reals) -> Reals:
         """Beyond a limit the branch is remembered: a whole turn later or earlier the mechanism stands as before."""

@@ -11,11 +11,12 @@ import numpy as np
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.solutions import every_solution, guessed_unknowns
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import AssemblyError, MobilityError
-from virtualwork.formulas.constraints import constraint_jacobian
+from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError
+from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
+from virtualwork.formulas.linear import stack
 from virtualwork.formulas.newton import newton, write_unknowns
 from virtualwork.formulas.numbers import cross, dot
-from virtualwork.formulas.positions import Case, State
+from virtualwork.formulas.positions import Case, State, columns
 from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Turn
@@ -48,7 +49,54 @@ class _Chooser:
         self.phases: dict[int, float] = {}
 
     def choose(self, make: Callable[..., C]) -> C:
+        """The assembly; a mechanism of which a part floats is refused by that part's name."""
         st = State(list(self.m.at))
+        try:
+            if any(2 * len(g.closures) < len(g.angles) + len(g.slides) for g in self.plan.groups):
+                raise MobilityError("[input]: constraints that depend on each other leave a part free")
+            found = self._choose(make, st)
+        except (MechanismError, ZeroDivisionError) as error:
+            self._refuse_floating()
+            if isinstance(error, MechanismError):
+                raise
+            raise AssemblyError(
+                "[guess] at: singular there, so that no direction is determined; give another `at`"
+            ) from None
+        if self._singular(st):
+            self._refuse_floating()
+        return found
+
+    def _singular(self, st: State) -> bool:
+        """Whether a group has a singular Jacobian at the guess, or none at all."""
+        for group in self.plan.groups:
+            if group.kind != "Newton":
+                if not st.margin.get(group.name, 0.0) > 1e-12:
+                    return True
+            else:
+                jacobian = stack(columns(group, st), 1)[0]
+                jacobian[:, : len(group.angles)] /= self.m.size
+                if not np.isfinite(jacobian).all() or not np.linalg.cond(jacobian) < 1e9:
+                    return True
+        return False
+
+    def _refuse_floating(self) -> None:
+        """Refuse a mechanism of which a part is free though the count of its joints and inputs says otherwise."""
+        x = []
+        for name, link in self.m.links.items():
+            turn = complex(np.exp(1j * self.angles.get(name, 0.0)))
+            origin = next((self.points[p] - z * turn for p, z in link.points.items() if p in self.points), 0j)
+            x += [self.angles.get(name, 0.0), origin.real / self.m.size, origin.imag / self.m.size]
+        found = hidden_freedom(self.m, np.array(x))
+        if found is not None:
+            links, joints = found
+            names = ", ".join(e.name for e in self.m.inputs)
+            raise MobilityError(
+                f"a free degree of freedom: {', '.join(links)} can still move while every input ({names}) is held, "
+                f"though by the count the mobility is {self.plan.blocks.mobility}: {', '.join(joints)} "
+                "depend on each other; join the part that is free"
+            )
+
+    def _choose(self, make: Callable[..., C], st: State) -> C:
         signs: dict[str, int] = {}
         starts: dict[str, Any] = {}
         helper = Choice(self.m, self.plan)
@@ -78,7 +126,7 @@ class _Chooser:
 
     def _refuse_overdriven(self, done: Plan, st: State) -> None:
         """Constraints that depend on each other may leave less motion than there are inputs."""
-        _, jacobian = constraint_jacobian(self.m, st)
+        jacobian = Constraints.at(self.m, coordinates(self.m, done, st), {}).jacobian
         try:
             s = np.linalg.svd(jacobian, compute_uv=False)
         except np.linalg.LinAlgError:
@@ -212,7 +260,7 @@ class _Chooser:
             raise AssemblyError(self._choices(group, [t for _, t in found]))
         best = int(np.argmin(distances))
         sign, chosen = found[best]
-        for name in ("turn", "point", "slide", "angle"):
+        for name in ("turn", "point", "slide", "angle", "margin"):
             getattr(st, name).update(getattr(chosen, name))
         return sign
 
@@ -240,8 +288,8 @@ class _Chooser:
             if body in self.angles and body in st.turn:
                 total += abs(complex(st.turn[body]) - np.exp(1j * self.angles[body])) ** 2
             base, terms = self.plan.anchors[body]
-            placed = base in st.point and all(t.slide is None or t.slide in st.slide for t in terms)
-            if placed and body in st.turn:
+            placed = all(t.body in st.turn and (t.slide is None or t.slide in st.slide) for t in terms)
+            if placed and base in st.point and body in st.turn:
                 for name, z in self.m.links[body].points.items():
                     if name in self.points:
                         here = st.point[base] + st.sum(terms) + z * st.turn[body]

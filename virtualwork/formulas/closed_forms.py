@@ -10,7 +10,57 @@ the Jacobian (up to a constant factor), so that it costs nothing.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 from virtualwork.formulas.numbers import ONE, Kind, Number, cross, square
+
+
+@dataclass(frozen=True)
+class Gap:
+    """By how much a loop does not close: the length that it needs and the one that there is, m.
+
+    `what` has the places {needed}, {given} and {by}, the difference, for lengths as they are to be shown.
+    """
+
+    needed: float
+    given: float
+    what: str
+
+    def text(self, show: Callable[[float], str]) -> str:
+        """The sentence, with lengths as `show` writes them."""
+        by = show(abs(self.needed - self.given))
+        return self.what.format(needed=show(self.needed), given=show(self.given), by=by)
+
+
+def gap_of(kind: str, names: tuple[str, ...], w: complex, v: complex, u: complex) -> Gap | None:
+    """Why a closed form has no root, from its W, its (first) arm V, and its second arm or its rail U; None where it has.
+
+    >>> gap_of("RRR", ("coupler", "rocker"), 1264 + 0j, 700 + 0j, 500 + 0j).text("{:g} mm".format)
+    'coupler and rocker together reach 1200 mm, 1264 mm needed: 64 mm short'
+    """
+    if kind == "RRR":
+        d, r1, r2 = abs(w), abs(v), abs(u)
+        both = f"{names[0]} and {names[1]}"
+        if d > r1 + r2:
+            return Gap(d, r1 + r2, f"{both} together reach {{given}}, {{needed}} needed: {{by}} short")
+        if d < abs(r1 - r2):
+            what = f"{both} come no nearer than {{given}}, {{needed}} needed: {{by}} too long"
+            return Gap(d, abs(r1 - r2), what)
+    elif kind == "RRP":
+        y, r = abs(cross(u, w)) / abs(u), abs(v)
+        if y > r:
+            return Gap(y, r, f"{names[0]} reaches {{given}}, {{needed}} needed: {{by}} short")
+    elif kind == "RPR":
+        d, q = abs(w), abs(cross(u, v)) / abs(u)
+        if d < q:
+            what = f"the guide at {names[0]} runs past at {{given}}, {{needed}} needed: {{by}} too far"
+            return Gap(d, q, what)
+    else:
+        offset = abs(cross(u, w)) / abs(u)
+        if abs(cross(u, v)) <= 1e-12 * abs(u) * abs(v):
+            return Gap(offset, 0.0, "its two guides are parallel, {by} apart, and do not meet")
+    return None
 
 
 def two_angles(

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.closed_forms import angle_and_slide, turning_slide, two_angles, two_slides
+from virtualwork.formulas.closed_forms import Gap, angle_and_slide, gap_of, turning_slide, two_angles, two_slides
 from virtualwork.formulas.numbers import MANY, ONE, Folded, Kind, Number, plus
 from virtualwork.plan.steps import Angle, Closure, Group, Path, Place, Step, Term, Turn
 
@@ -200,13 +200,28 @@ class Case:
         relative = self.tie.get(body, Angle())
         return z * st.kind.exp(st.affine(relative)) if relative.inputs else z
 
+    def offset(self, st: State) -> Number:
+        """W: the known part of the loop."""
+        w = st.point[self.closure.start] - st.point[self.closure.end]
+        return w + st.sum(self.known) if self.known else w
+
+    def gap(self, st: State) -> Gap | None:
+        """By how much the group does not close at one pose; None where it does."""
+        group = self.group
+        if group.kind == "RRR":
+            v, u = self.arm(0, st), self.arm(1, st)
+        elif group.kind == "PRP":
+            v, u = (z * st.turn[body] for z, body in self.rails)
+        else:
+            z, body = self.rails[0]
+            v, u = self.arm(0, st), z * st.turn[body] if group.kind == "RRP" else self.rail(st)
+        return gap_of(group.kind, group.angles, complex(self.offset(st)), complex(v), complex(u))
+
     def solve(self, st: State, sign: Number, size: float, folded: bool = False) -> None:
         """Write the group's rotations and slides into the state; `folded`: its two assemblies meet in every pose."""
         group = self.group
         kind: Kind = Folded(st.kind) if folded else st.kind
-        w = st.point[self.closure.start] - st.point[self.closure.end]
-        if self.known:
-            w = w + st.sum(self.known)
+        w = self.offset(st)
         if st.many and isinstance(w, complex):
             # between points that stand: as in any array, what is divided by zero is infinite
             w = np.complex128(w)

@@ -164,6 +164,9 @@ class _Planner:
                 return "Newton"
             own[tie.body] = bases[0][0]
         terms = group.closures[0].terms
+        held = {own.get(t.body) for t in terms} | {t.slide for t in terms}
+        if not held.issuperset((*group.angles, *group.slides)):
+            return "Newton"  # an unknown that its loop does not hold
         turning = {own.get(t.body) for t in terms if t.slide in group.slides and t.slide is not None}
         if len(group.angles) == 2:
             return "RRR"

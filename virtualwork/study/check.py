@@ -14,7 +14,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import AssemblyError
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.constraints import constraint_jacobian
+from virtualwork.formulas.constraints import Constraints, coordinates, dependent
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.positions import State
 
@@ -73,18 +73,13 @@ class Check:
 
     @cached_property
     def _rank(self) -> tuple[int, tuple[str, ...]]:
-        labels, jacobian = constraint_jacobian(self.mechanism, self._typical())
-        if not len(labels):
+        m, plan = self.mechanism, self.assembly.plan
+        here = Constraints.at(m, coordinates(m, plan, self._typical()), self.assembly.phases)
+        if not len(here.labels):
             return 0, ()
-        if not np.isfinite(jacobian).all():
+        if not np.isfinite(here.jacobian).all():
             raise AssemblyError("assembled at no pose of the motion where the joints' rank could be told")
-        u, s, _ = np.linalg.svd(jacobian)
-        rank = int((s > 1e-9 * s[0]).sum())
-        left = u[:, rank:]
-        dependent = [
-            label for label, row in zip(labels, left, strict=True) if np.abs(row).max(initial=0) > 1e-6
-        ]
-        return rank, tuple(dict.fromkeys(dependent))
+        return dependent(here.labels, here.jacobian)
 
     @property
     def mobility_by_rank(self) -> int:

@@ -1,0 +1,59 @@
+"""Mechanisms of any topology, drawn at a pose that is known by construction (benchmarks.stress.topologies)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from time import process_time
+
+import pytest
+
+from benchmarks.stress.topologies import generate, verdict
+
+LONG = 100_000
+
+# of 0.1.0: what was wrong with each of these
+FAULTS = {
+    7: "an angle that a gear needs at second hand",
+    27: "two inputs and an arm that moves stood elsewhere",
+    35: "a gear of ratio 1 does not turn with its arm",
+    42: "gears on each other's links stood elsewhere",
+    67: "a tie inside a group to an angle before it",
+    85: "a slide that runs away: 18 s",
+    165: "a slide read before it is solved",
+    170: "12 s",
+    228: "an input that bends a guide, not assembled",
+    350: "a bar pinned twice to another: a loop without an unknown",
+    439: "a group without a loop",
+    628: "a floating part, in another assembly",
+    674: "a limit extrapolated through a pole",
+    895: "the same, in another assembly",
+    1159: "two pins in one place",
+}
+
+
+@pytest.mark.parametrize("seed", FAULTS)
+def test_a_fault_of_the_campaign(seed: int) -> None:
+    mechanism = generate(seed)
+    verdict(mechanism)
+    start = process_time()
+    assert verdict(generate(seed)) in ("put together", "refused")
+    assert process_time() - start < 3, FAULTS[seed]
+
+
+def _tally(seeds: range) -> None:
+    found = Counter()
+    for seed in seeds:
+        said = verdict(generate(seed))
+        assert said in ("put together", "refused"), f"seed {seed}: {said}"
+        found[said] += 1
+    assert found["put together"] > 0.8 * len(seeds)
+    assert found["refused"] > 0.05 * len(seeds)
+
+
+def test_mechanisms_of_any_topology_stand_at_their_guess_or_are_refused() -> None:
+    _tally(range(200))
+
+
+@pytest.mark.slow
+def test_a_hundred_thousand_of_them() -> None:
+    _tally(range(LONG))
