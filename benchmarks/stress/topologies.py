@@ -133,17 +133,17 @@ class _Builder:
 
     def drive(self) -> tuple[Input, float]:
         """An input of the pose: a link against the ground or another link, or a slide."""
-        rates = dict(zip(("speed", "acceleration"), map(float, self.rng.normal(size=2)), strict=True))
+        speed, acceleration = map(float, self.rng.normal(size=2))
         if self.guides and self.rng.random() < 0.25:
             g = self.guides[int(self.rng.integers(len(self.guides)))]
             d = cmath.exp(1j * (g.angle + self.angles[g.on]))
-            through = self.seat(g.on, complex(g.through))  # type: ignore[arg-type]
+            through = self.seat(g.on, complex(g.through))
             run = self.seat(g.link, self.points[g.link][g.point]) - through
-            return Input(slider=g.point, **rates), (run * d.conjugate()).real
+            return Input(slider=g.point, speed=speed, acceleration=acceleration), (run * d.conjugate()).real
         link = str(self.rng.choice(self.names))
         others = [GROUND, GROUND, *(b for b in self.names if b != link)]
         on = str(self.rng.choice(others))
-        return Input(link=link, on=on, **rates), self.angles[link] - self.angles[on]
+        return Input(link=link, on=on, speed=speed, acceleration=acceleration), self.angles[link] - self.angles[on]
 
 
 def generate(seed: int) -> Topology:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from virtualwork import Guess, Guide, Input, Link, Mechanism
+from virtualwork import AssemblyError, Guess, Guide, Input, Link, Mechanism
 from virtualwork.branch.shortfall import shortfall
 
 
@@ -135,3 +135,19 @@ def test_the_command_says_it_in_millimetres(dalembert, tmp_path):
     (text,) = [w for w in json.loads(run.stdout)["warnings"] if "cannot be assembled" in w]
     assert "at 90 deg: rod reaches 50 mm, 50.2 mm needed: 0.2 mm short" in text
     assert f"it would close at {math.degrees(math.asin(50 / 50.2)):.10g} deg" in text
+
+
+def test_a_guess_where_a_larger_group_does_not_close_says_what_is_left():
+    """The slots stand 300 mm apart and the bar between them is 200 mm long: 100 mm are left."""
+    with pytest.raises(AssemblyError, match=r"its loops stay 0\.\d+ m apart"):
+        _ = Mechanism(
+            {"O": (0, 0)},
+            {
+                "crank": Link({"O": (0, 0), "A": (0.03, 0)}),
+                "rod": Link({"A": (0, 0), "C": (0.15, 0)}),
+                "bar": Link({"P": (0, 0), "Q": (0.2, 0), "C": (0.1, 0.02)}),
+            },
+            [Guide("P", "bar", "ground", -0.1j, 0.0), Guide("Q", "bar", "ground", 0.2j, 0.0)],
+            inputs=Input("crank"),
+            guess=Guess(1.0, {"rod": 0.0, "bar": 1.5}),
+        ).assembly

@@ -13,8 +13,8 @@ from virtualwork.branch.solutions import every_solution, guessed_unknowns
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError
 from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
-from virtualwork.formulas.linear import stack
-from virtualwork.formulas.newton import newton, write_unknowns
+from virtualwork.formulas.linear import stack, stack_rows
+from virtualwork.formulas.newton import gaps, newton, write_unknowns
 from virtualwork.formulas.numbers import cross, dot
 from virtualwork.formulas.positions import Case, State, columns
 from virtualwork.plan.guessed import known_by_guess
@@ -315,12 +315,15 @@ class _Chooser:
     # --- groups with no closed form ------------------------------------------------------------------------
     def _newton(self, group: Group, st: State) -> Any:
         many = st.copy(many=True)
+        why = ""
         start = guessed_unknowns(group, many, self.angles, self.points, self.m, self.plan.directions)
         if start is not None:
             x, closed = newton(group, many, start, self.m.size)
             if closed[0]:
                 write_unknowns(group, st, x)
                 return x[0]
+            left = float(np.linalg.norm(stack_rows(gaps(group, many), 1)))
+            why = f": from the guess on its loops stay {left:.6g} m apart"
         found = every_solution(group, many, self.m.size)
         if len(found) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
             raise MobilityError(
@@ -329,7 +332,7 @@ class _Chooser:
             )
         if len(found) == 0:
             raise AssemblyError(
-                f"[guess] at: {group.name} cannot be assembled there (Newton-Raphson from many starts finds no "
+                f"[guess] at: {group.name} cannot be assembled there{why} (Newton-Raphson from many starts finds no "
                 "closed loop); give an `at` where it can, or check the lengths"
             )
         states = []

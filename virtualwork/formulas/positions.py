@@ -11,7 +11,14 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.closed_forms import Gap, angle_and_slide, gap_of, turning_slide, two_angles, two_slides
+from virtualwork.formulas.closed_forms import (
+    Gap,
+    angle_and_slide,
+    gap_of,
+    turning_slide,
+    two_angles,
+    two_slides,
+)
 from virtualwork.formulas.numbers import MANY, ONE, Folded, Kind, Number, plus
 from virtualwork.plan.steps import Angle, Closure, Group, Path, Place, Step, Term, Turn
 
