@@ -143,7 +143,9 @@ class _Builder:
         link = str(self.rng.choice(self.names))
         others = [GROUND, GROUND, *(b for b in self.names if b != link)]
         on = str(self.rng.choice(others))
-        return Input(link=link, on=on, speed=speed, acceleration=acceleration), self.angles[link] - self.angles[on]
+        return Input(link=link, on=on, speed=speed, acceleration=acceleration), self.angles[
+            link
+        ] - self.angles[on]
 
 
 def generate(seed: int) -> Topology:

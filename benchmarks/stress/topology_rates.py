@@ -54,8 +54,11 @@ def _exact_rows(t: Topology, x: list[_Series], inputs: list[_Series]) -> list[_S
     turns = {body: x[i + 2].turned() for body, i in column.items()} | {GROUND: _series(1)}
 
     def seat(body: str, z: complex) -> _Series:
-        arm = turns[body] * mp.mpmathify(z)
-        return arm if body == GROUND else x[column[body]] + x[column[body] + 1] * mp.mpc(0, 1) + arm
+        arm: _Series = turns[body] * mp.mpmathify(z)
+        if body == GROUND:
+            return arm
+        placed: _Series = x[column[body]] + x[column[body] + 1] * mp.mpc(0, 1) + arm
+        return placed
 
     out = []
     for kind, data in rows(t):

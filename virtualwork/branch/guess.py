@@ -298,8 +298,10 @@ class _Chooser:
 
     def _sign_of_guess(self, group: Group, case: Case, st: State) -> int:
         """Not assembled at the guess: the sign that the guessed angles would have."""
+        gap = case.gap(st)
+        why = "" if gap is None else f" ({gap.text('{:.6g} m'.format)})"
         self.warnings.append(
-            f"[guess] at: {group.name} cannot be assembled there; its branch is that of the guessed angles"
+            f"[guess] at: {group.name} cannot be assembled there{why}; its branch is that of the guessed angles"
         )
         e = [np.exp(1j * self.angles[b]) if b in self.angles else None for b in group.angles]
         try:
