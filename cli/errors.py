@@ -8,6 +8,27 @@ LONGEST = 1200  # characters of a message
 MEMORY = 900e6  # bytes that a result may take: what takes more is refused before it is begun
 
 
+def memory() -> float:
+    """Bytes that a result may take: four fifths of what the machine has free, or of what the process is allowed."""
+    import resource
+    from contextlib import suppress
+    from pathlib import Path
+
+    free = [float("inf")]
+    with suppress(OSError, ValueError, StopIteration):
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        free.append(next(float(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable")))
+    with suppress(OSError, ValueError):
+        group = Path("/sys/fs/cgroup")
+        used = float((group / "memory.current").read_text())
+        free.append(float((group / "memory.max").read_text()) - used)
+    allowed = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if allowed != resource.RLIM_INFINITY:
+        free.append(float(allowed) - 0.5e9)
+    least = max(0.0, min(free))
+    return 0.8 * least if least < float("inf") else MEMORY
+
+
 class DataError(Exception):
     """Bad data: shown as one line, status 1."""
 

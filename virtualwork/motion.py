@@ -28,6 +28,7 @@ from virtualwork.describe.record import same
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.sweep import EvenSweep
 from virtualwork.plan.steps import Step
 from virtualwork.study.counterweights import least_squares
 from virtualwork.study.cycle import Cycle
@@ -233,9 +234,10 @@ class Motion:
         speed: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
         jerk: ArrayLike | None = None,
+        block_of: EvenSweep | None = None,
     ) -> None:
         self.assembly = assembly
-        self.poses = Poses(assembly, angle, speed, acceleration, jerk)
+        self.poses = Poses(assembly, angle, speed, acceleration, jerk, block_of)
         self._units: dict[int, Motion] = {}
 
     def __repr__(self) -> str:
@@ -252,7 +254,7 @@ class Motion:
     __hash__ = object.__hash__
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _again, (self.assembly, self.inputs, self.poses.rates, self.input_error)
+        return _again, (self.assembly, self.inputs, self.poses.rates, self.input_error, self.poses.block_of)
 
     # --- over what ------------------------------------------------------------------------------------------------
     @property
@@ -373,7 +375,7 @@ class Motion:
         if j not in self._units:
             k = self.inputs.shape[1]
             rates: list[list[Number]] = [[float(i == j) for i in range(k)], [0.0] * k, [0.0] * k]
-            self._units[j] = _again(self.assembly, self.inputs, rates, self.input_error)
+            self._units[j] = _again(self.assembly, self.inputs, rates, self.input_error, self.poses.block_of)
         return self._units[j]
 
     @property
@@ -428,8 +430,14 @@ class Motion:
         return str(self.to_frame().to_html(max_rows=20))
 
 
-def _again(assembly: Assembly, inputs: Reals, rates: list[list[Number]], input_error: ArrayLike) -> Motion:
+def _again(
+    assembly: Assembly,
+    inputs: Reals,
+    rates: list[list[Number]],
+    input_error: ArrayLike,
+    block_of: EvenSweep | None,
+) -> Motion:
     """Make a motion again, as pickles and copies do; what it had solved is solved anew when asked for."""
-    motion = Motion(assembly, inputs)
+    motion = Motion(assembly, inputs, block_of=block_of)
     motion.poses.rates, motion.input_error = rates, input_error
     return motion

@@ -57,8 +57,8 @@ def _exact_rows(t: Topology, x: list[_Series], inputs: list[_Series]) -> list[_S
         arm: _Series = turns[body] * mp.mpmathify(z)
         if body == GROUND:
             return arm
-        placed: _Series = x[column[body]] + x[column[body] + 1] * mp.mpc(0, 1) + arm
-        return placed
+        there: _Series = x[column[body]] + x[column[body] + 1] * mp.mpc(0, 1) + arm
+        return there
 
     out = []
     for kind, data in rows(t):

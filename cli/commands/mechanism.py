@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cli.errors import one_line
 from cli.read import options
+from cli.read.files import refuse_inputs
+from cli.show.columns import Column, Table
+from cli.show.digits import digits_that_hold
+from cli.show.files import write
 from cli.show.output import suffix_among
 from cli.show.shown import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
 from cli.show.text import csv_text
@@ -149,6 +155,14 @@ def run(
     )
     try:
         job = _job(file, at, sweep, inputs, names, order, branch)
+        if (
+            as_csv
+            and not (json or text or tables[:1] not in ([], ["--forces"]) or plot or expect)
+            and job.is_long
+        ):
+            if not _stream(job, forces=forces, digits=digits, output=output, states=states):
+                raise typer.Exit(1)
+            return
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not json or expect is not None or output is not None
         document = json or (output is not None and output.suffix.lower() == ".json")
@@ -181,6 +195,59 @@ def run(
         raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
     if not any(job.assembled(motion).any() for motion in job.motions):
         raise typer.Exit(1)
+
+
+def _stream(job: Job, *, forces: bool, digits: bool, output: Path | None, states: Path | None) -> bool:
+    """Write the table of a long sweep a block of poses at a time; return whether some pose is assembled."""
+    from cli.mechanism import digits as bounds
+    from cli.mechanism import forces as of_forces
+    from cli.mechanism import poses
+    from cli.mechanism import states as of_states
+    from cli.mechanism.stream import Stream
+
+    form, errors = of_states.table, bounds.of_states
+    if forces:
+        form, errors = of_forces.table, bounds.of_forces
+    elif job.only is not None:
+        form, errors = poses.wide_table, bounds.of_poses
+    stream = Stream(job, forces)
+    unknown = 0
+
+    def parts(stream: Stream, form: Any, cut: bool) -> Iterator[str]:
+        nonlocal unknown
+        for i, (block, columns) in enumerate(stream.tables(form)):
+            if cut:
+                columns, without = _cut(columns, errors(block))
+                unknown += without
+            yield csv_text(columns, header=i == 0)
+
+    refuse_inputs([path for path in (output, states) if path is not None])
+    if states is not None:
+        every = Stream(replace(job, only=None))
+        write(states, (part.encode() for part in parts(every, of_states.table, False)))
+    if output is not None:
+        write(output, (part.encode() for part in parts(stream, form, digits)))
+    else:
+        for part in parts(stream, form, digits):
+            sys.stdout.write(part)
+        sys.stdout.flush()
+    said = stream.warnings()
+    if unknown:
+        said.append(f"--digits: of {unknown} numbers no digit is known to hold; their cells are empty")
+    for warning in said:
+        print(f"warning: {one_line(warning)}", file=sys.stderr)
+    return stream.any_assembled
+
+
+def _cut(columns: dict[str, Any], errors: Mapping[str, Any]) -> tuple[dict[str, Any], int]:
+    """Cut columns to the digits that hold; return also of how many numbers no digit is known."""
+    listed = []
+    for name, values in columns.items():
+        bounds = errors.get(name)
+        unit = "deg" * name.endswith("_deg")
+        listed.append(Column(name, unit, values, None if bounds is None else partial(list, bounds)))
+    table, unknown = digits_that_hold(Table(listed))
+    return {column.name: column.values for column in table.columns}, unknown
 
 
 def _as_csv(*, json: bool, text: bool, output: Path | None, expect: Path | None) -> bool:

@@ -10,8 +10,8 @@ import numpy as np
 from cli.mechanism.job import ORDERS, Job
 
 if TYPE_CHECKING:
+    from virtualwork.branch.assembly import Assembly
     from virtualwork.branch.track import Track
-    from virtualwork.motion import Motion
     from virtualwork.study.newton_table import AllAtOnce
 
 
@@ -175,15 +175,20 @@ def _on_branch(job: Job, track: Track, found: list[float], digits: int) -> list[
     return sorted({round(math.degrees(v) % full, digits) % full for v in found})
 
 
-def limit_warnings(job: Job) -> list[str]:
-    """One line for the poses that cannot be assembled, with the limit of the input that is near them; and branches."""
+def limit_warnings(job: Job, counted: list[tuple[int, int]] | None = None) -> list[str]:
+    """One line for the poses that cannot be assembled, with the limit of the input that is near them; and branches.
+
+    `counted`: how many these are of each assembly, and the first, where blocks of poses have told it.
+    """
     lines = []
-    for motion in job.motions:
-        track = motion.assembly.track
-        missing = np.flatnonzero(~job.assembled(motion))
+    if counted is None:
+        gaps = [~job.assembled(motion) for motion in job.motions]
+        counted = [(int(gap.sum()), int(np.argmax(gap))) for gap in gaps]
+    for assembly, (missing, first) in zip(job.assemblies, counted, strict=True):
+        track = assembly.track
         name = job.mechanism.inputs[0].name
-        if len(missing):
-            text = f"{len(missing)} of {motion.n} poses cannot be assembled"
+        if missing:
+            text = f"{missing} of {job.inputs.n} poses cannot be assembled"
             if track.active:
                 slide = job.mechanism.inputs[0].is_slide
                 shown = _on_branch(job, track, [v.input for v in track.limits()], 12)
@@ -191,23 +196,24 @@ def limit_warnings(job: Job) -> list[str]:
                 if shown:
                     values = ", ".join(f"{v:.13g}" for v in shown)
                     text += f": the input {name} has the limit{'s' * (len(shown) > 1)} {values} {unit}"
-            lines.append(text + _shortfall(job, motion, int(missing[0])))
-        lines += _branch_lines(job, motion)
+            lines.append(text + _shortfall(job, assembly, first))
+        lines += _branch_lines(job, assembly)
         lines += track.warnings()
     return list(dict.fromkeys(lines))
 
 
-def _shortfall(job: Job, motion: Motion, i: int) -> str:
+def _shortfall(job: Job, assembly: Assembly, i: int) -> str:
     """By how much a pose does not close, and the nearest input where it would."""
     from virtualwork.branch.shortfall import shortfall
 
-    found = shortfall(motion.assembly, tuple(motion.inputs[i].tolist()))
+    pose = job.inputs.part(i, i + 1)
+    found = shortfall(assembly, tuple(pose.values[0].tolist()))
     if found is None:
         return ""
     factor, unit = (1e3, "mm") if job.mechanism.size < 2 else (1.0, "m")
     shown = ", ".join(
         f"{v:.10g} {'m' if e.is_slide else 'deg'}"
-        for e, v in zip(job.mechanism.inputs, job.inputs.shown[i], strict=True)
+        for e, v in zip(job.mechanism.inputs, pose.shown[0], strict=True)
     )
     text = f"; at {shown}: {found.text(lambda v: f'{v * factor:.6g} {unit}')}"
     if found.nearest is not None:
@@ -217,13 +223,13 @@ def _shortfall(job: Job, motion: Motion, i: int) -> str:
     return text
 
 
-def _branch_lines(job: Job, motion: Any) -> list[str]:
+def _branch_lines(job: Job, assembly: Assembly) -> list[str]:
     """Change points on the way from the guess to the poses: which branch was taken, and the other."""
-    track = motion.assembly.track
+    track = assembly.track
     if not track.active:
         return []
-    q = motion.inputs[:, 0]
-    low, high = min(float(q.min()), track.start), max(float(q.max()), track.start)
+    least, largest = job.inputs.span
+    low, high = min(least, track.start), max(largest, track.start)
     lines = []
     slide = job.mechanism.inputs[0].is_slide
     for changes in track.changes.values():
@@ -232,7 +238,7 @@ def _branch_lines(job: Job, motion: Any) -> list[str]:
             continue
         at = _on_branch(job, track, [c.input for c in inside], 9)
         c = inside[0]
-        group = next(g for g in motion.assembly.plan.groups if g.name == c.group)
+        group = next(g for g in assembly.plan.groups if g.name == c.group)
         names = [*group.angles, *(job.mechanism.guides[g].point for g in group.slides)]
 
         def rates(values: Any, names: list[str] = names) -> str:

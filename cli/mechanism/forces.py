@@ -88,7 +88,7 @@ def table(job: Job) -> dict[str, Column]:
     for assembly, motion in zip(job.assemblies, job.motions, strict=True):
         d = motion.dynamics
         put("step", list(job.inputs.steps))
-        if len(job.motions) > 1:
+        if job.several:
             put("branch", [str(assembly.number)] * motion.n)
         several = len(job.mechanism.inputs) > 1
         for j, entry in enumerate(job.mechanism.inputs):
@@ -105,7 +105,7 @@ def table(job: Job) -> dict[str, Column]:
             put(f"{lead}_fx_N", x)
             put(f"{lead}_fy_N", y)
             moment = d.joint_moment(joint, on)
-            if joint.guide is not None or moment.any():
+            if joint.guide is not None or (_rubs(motion, joint, on) if job.block_of else moment.any()):
                 put(f"{lead}_moment_N_m", cells(moment))
         shaking, moment = d.shaking
         put("shaking_fx_N", cells(shaking[:, 0]))
@@ -114,9 +114,27 @@ def table(job: Job) -> dict[str, Column]:
     return columns
 
 
+def _rubs(motion: Motion, joint: Joint, on: str) -> bool:
+    """Whether a pin's friction has a moment on a body: its column stands in every block of a sweep."""
+    return any(
+        r.path is None and r.joint == joint.key and r.body == on for r in motion.dynamics.scene.friction
+    )
+
+
 def warnings(job: Job) -> list[str]:
     """What the forces cannot say, pose by pose: dead points, change points, locked friction, redundant joints."""
-    found: list[str] = []
+    found = [listed(job, what, places, len(places)) for what, places in troubles(job)]
+    return list(dict.fromkeys([*found, *statements(job)]))
+
+
+def troubles(job: Job) -> list[tuple[str, list[float]]]:
+    """What the forces cannot say, and the inputs where they cannot."""
+    found: list[tuple[str, list[float]]] = []
+
+    def note(bad: NDArray[np.bool_], what: str) -> None:
+        if bad.any():
+            found.append((what, job.inputs.shown[bad, 0].tolist()))
+
     for motion in job.motions:
         d = motion.dynamics
         there = motion.assembled
@@ -130,13 +148,18 @@ def warnings(job: Job) -> list[str]:
                 "the joint forces have no finite value: loads in line with the links at a dead or change point",
             ),
         ):
-            bad = there & ~np.isfinite(values).all(axis=1) & ~d.locked
             if not motion.assembly.track.folded:  # singular in every pose: that is said once
-                found += _listed(job, bad, what)
+                note(there & ~np.isfinite(values).all(axis=1) & ~d.locked, what)
         if d.scene.friction:
-            found += _listed(
-                job, there & d.locked, "friction locks the mechanism: no reaction balances its own friction"
-            )
+            note(there & d.locked, "friction locks the mechanism: no reaction balances its own friction")
+    return found
+
+
+def statements(job: Job) -> list[str]:
+    """What is to be said of the forces whatever the pose."""
+    found: list[str] = []
+    for motion in job.motions:
+        d = motion.dynamics
         if d.statics is not None:
             found += d.statics.undetermined()
     for motion in job.motions[:1]:
@@ -158,14 +181,12 @@ def _pinned(job: Job, body: str, center: complex) -> bool:
     return any(GROUND in bodies and points.get(name) == center for name, bodies in job.mechanism.pins.items())
 
 
-def _listed(job: Job, bad: NDArray[np.bool_], what: str) -> list[str]:
-    places = np.flatnonzero(bad)
-    if not len(places):
-        return []
+def listed(job: Job, what: str, places: list[float], count: int) -> str:
+    """One line for what happens at some inputs: the first five of them, and how many more there are."""
     unit = "m" if job.mechanism.inputs[0].is_slide else "deg"
-    named = ", ".join(f"{job.inputs.shown[i, 0]:g} {unit}" for i in places[:5])
-    more = f" and {len(places) - 5} further poses" if len(places) > 5 else ""
-    return [f"at input {named}{more}: {what}"]
+    named = ", ".join(f"{place:g} {unit}" for place in places[:5])
+    more = f" and {count - 5} further poses" if count > 5 else ""
+    return f"at input {named}{more}: {what}"
 
 
 # -- cycle --------------------------------------------------------------------------------------------------------

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +19,8 @@ if TYPE_CHECKING:
 
     from virtualwork import Mechanism
 
-MOST = 2_000_000  # poses in one sweep; `Job.check_size` knows what one takes
+# poses in one sweep: beyond it a double cannot count them; `Job.check_size` knows what one takes in memory
+MOST = 10**15
 
 
 @dataclass(frozen=True)
@@ -30,8 +33,75 @@ class Inputs:
     acceleration: NDArray[np.float64] | None = None
     steps: list[str] = field(default_factory=list)
 
+    # whether the values are given one by one
+    listed = True
 
-def wanted(m: Mechanism, at: list[str] | None, sweep: str | None, table: str | None) -> Inputs:
+    @property
+    def n(self) -> int:
+        """How many poses."""
+        return len(self.shown)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The least and the largest value of the first input."""
+        return float(self.values[:, 0].min()), float(self.values[:, 0].max())
+
+    def part(self, low: int, high: int) -> Inputs:
+        """The poses from low to high."""
+        speed, acceleration = (None if r is None else r[low:high] for r in (self.speed, self.acceleration))
+        return Inputs(self.values[low:high], self.shown[low:high], speed, acceleration, self.steps[low:high])
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep of one input: the poses are formed when they are asked for, a part at a time where they are many."""
+
+    mechanism: Mechanism
+    swept: int
+    rest: list[float]
+    at: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    n: int
+    last: float
+    speed: None = None
+    acceleration: None = None
+    listed = False
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The least and the largest value of the first input."""
+        ends = [float(self.part(i, i + 1).values[0, 0]) for i in (0, self.n - 1)]
+        return min(ends), max(ends)
+
+    def part(self, low: int, high: int) -> Inputs:
+        """The poses from low to high, or to the last."""
+        high = min(high, self.n)
+        shown = np.tile(np.array(self.rest, dtype=float), (high - low, 1))
+        shown[:, self.swept] = self.at(np.arange(low, high, dtype=float))
+        if high == self.n:
+            shown[-1, self.swept] = self.last
+        return replace(_inputs(self.mechanism, shown), steps=[str(i) for i in range(low + 1, high + 1)])
+
+    @cached_property
+    def _whole(self) -> Inputs:
+        return self.part(0, self.n)
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """The inputs in SI, (n, k)."""
+        return self._whole.values
+
+    @property
+    def shown(self) -> NDArray[np.float64]:
+        """The inputs as they are shown, degrees or metres, (n, k)."""
+        return self._whole.shown
+
+    @property
+    def steps(self) -> list[str]:
+        """The poses' names."""
+        return self._whole.steps
+
+
+def wanted(m: Mechanism, at: list[str] | None, sweep: str | None, table: str | None) -> Inputs | Sweep:
     """The inputs that the options ask for."""
     if sum(x is not None for x in (sweep, table)) > 1 or (at and table):
         raise options.bad("--inputs", "expected one of --at, --sweep and --inputs")
@@ -111,7 +181,7 @@ def _at(m: Mechanism, text: str) -> list[float]:
     ]
 
 
-def _sweep(m: Mechanism, text: str, at: list[str] | None) -> Inputs:
+def _sweep(m: Mechanism, text: str, at: list[str] | None) -> Sweep:
     """`0deg:360deg:1deg` or `0deg:360deg/3600`; with several inputs one is swept by name and the others held."""
     (j, span), *more = _named(m, text, "--sweep").items()
     if more:
@@ -128,15 +198,18 @@ def _sweep(m: Mechanism, text: str, at: list[str] | None) -> Inputs:
             "--sweep", f"'{span}': expected START:STOP:STEP or START:STOP/COUNT, such as 0deg:360deg:1deg"
         )
     start, stop = (_quantity(m, j, part, "--sweep") for part in parts[:2])
-    swept: NDArray[np.float64]
+    last = None
     if slash:
         n = options.whole(count)
         if not 1 <= n <= MOST:
             raise options.bad(
                 "--sweep", f"'{span}': expected a whole number of steps from 1 to {MOST} after the /"
             )
-        swept = start + (stop - start) * (np.arange(n + 1, dtype=float) / n)
-        swept[-1] = stop
+        last = stop
+
+        def values(i: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.asarray(start + (stop - start) * (i / n))
+
     else:
         step = _quantity(m, j, parts[2], "--sweep")
         if step == 0 or (stop - start) / step < 0:
@@ -147,13 +220,15 @@ def _sweep(m: Mechanism, text: str, at: list[str] | None) -> Inputs:
         if ratio > MOST:
             raise options.bad("--sweep", f"'{span}': more than {MOST} poses")
         n = round(ratio) if abs(ratio - round(ratio)) <= 1e-9 * max(1.0, ratio) else math.floor(ratio)
-        swept = start + step * np.arange(n + 1, dtype=float)
         if abs(n - ratio) <= 1e-9 * max(1.0, ratio):
-            swept[-1] = stop
+            last = stop
+
+        def values(i: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.asarray(start + step * i)
+
     rest = _at(m, at[0]) if at else [_shown(m, i, value) for i, value in enumerate(_home(m))]
-    shown = np.tile(np.array(rest, dtype=float), (len(swept), 1))
-    shown[:, j] = swept
-    return _inputs(m, shown)
+    end = float(values(np.array([float(n)]))[0]) if last is None else last
+    return Sweep(m, j, rest, values, n + 1, end)
 
 
 def _from_table(m: Mechanism, path: str) -> Inputs:

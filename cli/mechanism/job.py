@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.errors import MEMORY, DataError, nearest
-from cli.mechanism.inputs import Inputs
+from cli.errors import DataError, memory, nearest
+from cli.mechanism.inputs import Inputs, Sweep
 from cli.read.files import load as load_bytes
 
 if TYPE_CHECKING:
@@ -46,11 +46,25 @@ class Job:
 
     file: str
     mechanism: Mechanism
-    inputs: Inputs
+    inputs: Inputs | Sweep
     order: int
     only: Sequence[str] | None = None
     branch: str | None = None
     warnings: list[str] = field(default_factory=list)
+    # the job of which this is a block of poses
+    block_of: Job | None = None
+
+    @property
+    def is_long(self) -> bool:
+        """Whether the poses are more than one block."""
+        from virtualwork.formulas.positions import BLOCK
+
+        return self.inputs.n > BLOCK
+
+    @property
+    def several(self) -> bool:
+        """Whether several assemblies are asked for."""
+        return len((self.block_of or self).assemblies) > 1
 
     @cached_property
     def assemblies(self) -> tuple[Assembly, ...]:
@@ -135,13 +149,13 @@ class Job:
         return 300 + 110 * numbers * json + table * (100 * numbers if wide else 1200 * len(self.links))
 
     def check_size(self, *, json: bool, table: bool, forces: bool) -> None:
-        """Refuse what would take more than a gigabyte, before it is begun."""
+        """Refuse what would take more memory than there is, before it is begun."""
         each = self.bytes_each(json=json, table=table, forces=forces) * len(self.assemblies)
-        poses = len(self.inputs.shown)
-        if poses * each > MEMORY:
+        poses, room = self.inputs.n, memory()
+        if poses * each > room:
             raise DataError(
                 f"{self.file}: {poses} poses of {len(self.links)} links and {len(self.points)} points would take "
-                f"{poses * each / 1e9:.2g} GB: expected at most {MEMORY / each:.0f} poses, or fewer names by --only"
+                f"{float(f'{poses * each / 1e9:.2g}'):g} GB: expected at most {room / each:.0f} poses, or fewer names by --only, or CSV, which is not limited"
             )
 
     def assembled(self, motion: Motion) -> NDArray[np.bool_]:

@@ -148,7 +148,7 @@ def wide_table(job: Job) -> dict[str, Column]:
     """One row for each pose and assembly: what --only asks for, side by side."""
     table: dict[str, Column] = {}
     inputs = inputs_of(job)
-    several = len(job.motions) > 1
+    several = job.several
 
     def put(key: str, values: Column, rows: int) -> None:
         table.setdefault(key, [None] * 0)

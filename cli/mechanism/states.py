@@ -57,7 +57,7 @@ def table(job: Job) -> dict[str, list[Any]]:
 def rows(job: Job) -> list[tuple[Place, dict[str, Any]]]:
     """The table's rows, each with what it holds."""
     found: list[tuple[Place, dict[str, Any]]] = []
-    several = len(job.motions) > 1
+    several = job.several
     for assembly, motion in zip(job.assemblies, job.motions, strict=True):
         order = job.order
         massive = any(r.mass or r.inertia for r in motion.dynamics.scene.rigid.values())

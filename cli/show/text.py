@@ -10,13 +10,14 @@ if TYPE_CHECKING:
     from cli.show.columns import Cell, Document, Values
 
 
-def csv_text(columns: Mapping[str, Values]) -> str:
-    """Return CSV with every digit of every number."""
+def csv_text(columns: Mapping[str, Values], header: bool = True) -> str:
+    """Return CSV with every digit of every number; without its header for a further part of a table."""
     import csv
 
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(columns)
+    if header:
+        writer.writerow(columns)
     writer.writerows(zip(*map(_plain_column, columns.values()), strict=True))
     return stream.getvalue()
 

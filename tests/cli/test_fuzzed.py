@@ -112,9 +112,9 @@ def test_links_that_differ_beyond_all_numbers(dalembert: Dalembert, tmp_path: Pa
 
 
 LARGE = [
-    ("mechanism", "klann.toml", "--sweep", "0deg:360deg/1999999", "--json"),
-    ("mechanism", "klann.toml", "--sweep", "0deg:360deg/1000000"),
-    ("mechanism", "klann.toml", "--sweep", "0deg:360deg/1000000", "--only", "H,G,F", "-o", "h.json"),
+    ("mechanism", "klann.toml", "--sweep", "0deg:360deg/999999999", "--json"),
+    ("mechanism", "klann.toml", "--sweep", "0deg:360deg/999999999", "--text"),
+    ("mechanism", "klann.toml", "--sweep", "0deg:360deg/999999999", "--only", "H,G,F", "-o", "h.json"),
 ]
 
 

@@ -28,7 +28,7 @@ from virtualwork.bounds.second_order import Sizes, grown, inverse, kept, sum_of,
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.positions import SWEEP, State
+from virtualwork.formulas.positions import State
 from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Angle, Closure, Group, Place, Slide, Term, Turn, combined
 
@@ -141,7 +141,7 @@ class MotionErrors:
         plain = len(angle.inputs) == 1 and angle.inputs[0][1] == 1.0
         # in a sweep e^{iθ} is a product of three factors
         error: Any = (
-            1.5 * EPS if angle.inputs and self.n > SWEEP and len(self.poses.mechanism.inputs) == 1 else 0.0
+            1.5 * EPS if angle.inputs and self.poses.swept and len(self.poses.mechanism.inputs) == 1 else 0.0
         )
         for j, k in angle.inputs:
             error = error + abs(k) * self.given[:, j]

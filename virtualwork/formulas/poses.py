@@ -20,6 +20,7 @@ from virtualwork.formulas.linear import inverse_norm, stack
 from virtualwork.formulas.numbers import Complexes, Number, Reals, plus, times
 from virtualwork.formulas.positions import BLOCK, SWEEP, State, columns
 from virtualwork.formulas.rates import Passage, Rates
+from virtualwork.formulas.sweep import EvenSweep
 from virtualwork.plan.steps import Group, Path, Plan, Step, Term, path_reads
 
 
@@ -62,6 +63,8 @@ class Poses:
     Attributes
     ----------
     inputs : array (n, k)
+    block_of : EvenSweep, optional
+        The sweep that these inputs are `BLOCK` poses of: they have the digits of the sweep solved whole.
     input_error : float or array (n, k)
         Bound of the inputs' own errors, for the estimates of rounding errors: 0 where they are exact as given.
     solved : list of (step, order)
@@ -75,7 +78,9 @@ class Poses:
         speed: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
         jerk: ArrayLike | None = None,
+        block_of: EvenSweep | None = None,
     ) -> None:
+        self.block_of = block_of
         self.branch, self.plan = branch, branch.plan
         self.mechanism = m = branch.mechanism
         k = len(m.inputs)
@@ -166,16 +171,30 @@ class Poses:
             if k == 1 and self.n:
                 q = self.inputs[:, 0]
                 self.branch.cover(float(q.min()), float(q.max()))
-            if self.n == 1:
+            if self.n == 1 and self.block_of is None:
                 self._blocks = [State([float(v) for v in self.inputs[0]])]
             else:
                 self._blocks = [
                     State([self.inputs[i : i + BLOCK, j] for j in range(k)], many=True)
                     for i in range(0, self.n, BLOCK)
                 ]
-                if k == 1 and self.n > SWEEP:
-                    _uniform(self.inputs[:, 0], self._blocks)
+                if k == 1 and self.swept:
+                    self._sweep(self.inputs[:, 0], self._blocks)
         return self._blocks
+
+    @property
+    def swept(self) -> bool:
+        """Whether this is a sweep of so many poses, or a block of one, that e^{iq} is formed by angle addition."""
+        return self.n > SWEEP or self.block_of is not None
+
+    def _sweep(self, q: Reals, blocks: list[State]) -> None:
+        """Give the blocks of an even sweep their e^{iq}; where one block is not even, none gets them."""
+        sweep = self.block_of or EvenSweep(q[0], q[-1], self.n)
+        if all(sweep.off(q[i : i + BLOCK]) is not None for i in range(0, len(q), BLOCK)):
+            for st in blocks:
+                turns = sweep.turns(np.asarray(st.inputs[0]))
+                if turns is not None:
+                    st.spins[0] = turns
 
     def rows(self) -> Iterator[tuple[slice, State]]:
         """The blocks, each with the poses that are in it."""
@@ -355,35 +374,3 @@ def part(rate: Number, rows: slice, many: bool) -> Number:
     if isinstance(rate, float):
         return rate or None
     return rate[rows] if many else float(rate[0])
-
-
-def _uniform(q: Reals, blocks: list[State]) -> None:
-    """Give the blocks of a uniform sweep e^{iq} by angle addition: e^{i(q0 + jh)} = e^{iq0}·e^{ijh}.
-
-    Each factor is rounded once and the product twice, whatever the length of the sweep; the sweep's own rounding,
-    the difference between q and q0 + jh, is put back to first order, which is exact here.
-    """
-    n = len(q)
-    h = (q[-1] - q[0]) / (n - 1)
-    top = max(abs(q[0]), abs(q[-1]))
-    size = min(n, BLOCK)
-    ramp = h * np.arange(size)
-    offs = []
-    with np.errstate(invalid="ignore"):
-        for i, st in enumerate(blocks):
-            off = (st.inputs[0] - q[i * BLOCK]) - ramp[: len(st.inputs[0])]
-            bound = 64 * np.finfo(float).eps * max(top, 1e-3)
-            if not (off.max() <= bound and off.min() >= -bound):
-                return
-            offs.append(off)
-    table = np.empty(size, complex)
-    np.cos(ramp, out=table.real)
-    np.sin(ramp, out=table.imag)
-    for i, (st, off) in enumerate(zip(blocks, offs, strict=True)):
-        length = len(off)
-        e = table[:length] * complex(np.cos(q[i * BLOCK]), np.sin(q[i * BLOCK]))
-        turn = np.empty(length, complex)
-        turn.real = 1.0
-        turn.imag = off
-        e *= turn
-        st.spins[0] = e
