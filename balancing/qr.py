@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.dependence import DependentPlanes, adjoint, columns_scaled, require_independent
+from balancing.dependence import DependentPlanes, adjoint, columns_scaled, damping_norms, require_independent
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -39,9 +39,7 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Comple
     planes = a.shape[-1]
     scaled, scale = columns_scaled(a)
     if ridge:
-        norms = np.linalg.norm(scaled, axis=-2)
-        largest = norms.max(axis=-1, keepdims=True)
-        norms = np.where(norms > 0, norms, np.where(largest > 0, largest, 1.0))
+        norms = damping_norms(scaled)
         scaled = np.concatenate([scaled, ridge * norms[..., None] * np.eye(planes)], axis=-2)
         b = np.concatenate([b, np.zeros((*b.shape[:-1], planes))], axis=-1)
     order = np.argsort(-np.abs(scaled).max(axis=-1), axis=-1, kind="stable")

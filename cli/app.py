@@ -16,10 +16,10 @@ from cli.read.files import forget
 # name -> (module with a function `run`, the line shown by `dalembert --help`)
 COMMANDS = {
     "balance": ("cli.balance.command", "Balance rotors from a table of known eccentric masses."),
-    "field": ("cli.commands.field", "Balance rotors from measured vibration and trial masses."),
-    "place": ("cli.commands.place", "Put a correction where masses can go: holes, blades, weights in stock."),
+    "field": ("cli.field.command", "Balance rotors from measured vibration and trial masses."),
+    "place": ("cli.place.command", "Put a correction where masses can go: holes, blades, weights in stock."),
     "mechanism": (
-        "cli.commands.mechanism",
+        "cli.mechanism.command",
         "Solve a planar mechanism: motion, limits, torque, joint forces.",
     ),
     "work": ("cli.work.command", "Find the load that balances a table of link states, by virtual work."),

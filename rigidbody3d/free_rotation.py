@@ -106,7 +106,8 @@ class FreeRotation:
         apart = (
             (Doubled(I2) - I1) * I1 * (Doubled(w1) * w1) - (Doubled(I3) - I2) * I3 * (Doubled(w3) * w3)
         ).value / I2
-        self._large = apart <= 0  # circles the axis of the largest moment
+        # circles the axis of the largest moment
+        self._large = apart <= 0
         big = np.where(self._large, d23 * c1, d12 * c3)
         small = np.where(self._large, d12 * c3, d23 * c1)
         self._rate = np.sqrt(big)

@@ -223,7 +223,8 @@ class TopState:
         if of == "omega":
             return np.asarray(bound)
         kinetic = (I * omega**2).sum(axis=-1) / 2
-        if of == "energy":  # it stays what it was however late the state is
+        # it stays what it was however late the state is
+        if of == "energy":
             return np.asarray(2 * FEW * (kinetic + np.abs(mgl)) + I[..., 0] * level * FEW * swing)
         size = np.sqrt(np.square(I * omega).sum(axis=-1))
         error = turned * size + np.sqrt(np.square(I * bound).sum(axis=-1))

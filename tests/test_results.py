@@ -102,6 +102,12 @@ def test_results_of_the_same_numbers_are_equal(name: str) -> None:
         hash(HERE[name])
 
 
+def test_a_named_tuple_is_the_plain_one_of_the_same_values() -> None:
+    assert HERE["cones"] == tuple(HERE["cones"])  # type: ignore[arg-type]
+    assert HERE["wrench"] == ([-2, 0, 0], HERE["wrench"][1])  # type: ignore[index]
+    assert HERE["wrench"] != ([-2, 0, 0],)
+
+
 @pytest.mark.parametrize("name", HERE)
 def test_results_are_copied_and_stored(name: str) -> None:
     result = HERE[name]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.mechanism.job import Job
+    from cli.mechanism.solve import Job
 
 
 @dataclass
@@ -88,6 +88,6 @@ class Asked:
 
     def figure(self, job: Job) -> Figure:
         """Effort, joint forces and the hodograph of the shaking force over the sweep."""
-        from cli.plots.forces import draw
+        from cli.mechanism.force_picture import draw
 
         return draw(job)

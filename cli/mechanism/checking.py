@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.mechanism.job import ORDERS, Job
+from cli.mechanism.solve import ORDERS, Job
 
 if TYPE_CHECKING:
     from virtualwork.branch.assembly import Assembly

@@ -13,7 +13,7 @@ from cli.mechanism.poses import cells, pair
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cli.mechanism.job import Job
+    from cli.mechanism.solve import Job
     from virtualwork.motion import Motion
     from virtualwork.plan.joints import Joint
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.errors import nearest
-from cli.mechanism.job import Job
+from cli.mechanism.solve import Job
 from cli.read import options
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.mechanism.job import Job
+from cli.mechanism.solve import Job
 from cli.read.units import degrees
 
 if TYPE_CHECKING:

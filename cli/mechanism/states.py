@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cli.mechanism.job import Job
 from cli.mechanism.poses import cells, of_link, pair
+from cli.mechanism.solve import Job
 
 if TYPE_CHECKING:
     from virtualwork.motion import Motion

@@ -13,7 +13,7 @@ from virtualwork.formulas.sweep import EvenSweep
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
-    from cli.mechanism.job import Job
+    from cli.mechanism.solve import Job
 
 Columns = dict[str, Sequence[Any]]
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     Cell = str | float | None
     Values = Sequence[Cell] | NDArray[np.float64]
+    Bounds = Sequence[float] | NDArray[np.float64]
     Json = None | str | float | Sequence["Json"] | Mapping[str, "Json"]
     Document = dict[str, Json]
 
@@ -27,7 +28,7 @@ class Column:
     unit: str
     """What its header ends in, such as `N_m`; empty for names and plain numbers."""
     values: Values
-    error: Callable[[], Values] | None = None
+    error: Callable[[], Bounds] | None = None
     """Bounds of the rounding errors of computed numbers, in the same unit; inf where no digit is known."""
 
     @property

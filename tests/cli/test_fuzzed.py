@@ -13,8 +13,11 @@ from pathlib import Path
 import pytest
 
 from cli.errors import LONGEST
-from cli.mechanism.inputs import wanted
-from cli.mechanism.job import Job, load
+from cli.mechanism.read import wanted
+from cli.mechanism.solve import Job, load
+
+# each is a whole command, or several
+pytestmark = pytest.mark.slow
 
 Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 COMMAND = Path(sys.executable).with_name("dalembert")

@@ -40,7 +40,11 @@ def errors(m, q, orders=3):
     return found, float(motion.condition[0])
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind",
+    # a triad is followed through a whole turn by Newton's method, which takes seconds for each
+    [kind if kind != "triad" else pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS],
+)
 def test_errors_are_those_of_rounding(kind, random_mechanism):
     rng = np.random.default_rng(20261121)
     solved = 0

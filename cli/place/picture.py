@@ -3,27 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from cli.place.solve import Placing
+from cli.read.units import from_si
 from cli.show.picture import arrow, free_direction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from matplotlib.projections.polar import PolarAxes
 
 
-Panel = tuple[str, Sequence[float], Sequence[float], complex, complex]
+class Panel(NamedTuple):
+    """A plane: its places in degrees, the masses on them, what they are to be together and what they are."""
+
+    title: str
+    places: Sequence[float]
+    masses: Sequence[float]
+    target: complex
+    total: complex
 
 
-def draw(panels: Sequence[Panel], unit: str, *, removed: bool) -> Figure:
-    """Draw for each plane its places with their masses on the rim, target and total as vectors.
-
-    A panel is (title, places in degrees, masses, target, total), in `unit`.
-    """
+def draw(found: Placing) -> Figure:
+    """Draw for each plane its places with their masses on the rim, target and total as vectors."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
+    unit, removed = found.request.unit, found.request.removes
+    panels = [
+        Panel(
+            "" if share.z is None else f"z = {from_si(share.z, 'length', 'mm'):g} mm: ",
+            [angle % 360.0 for angle in share.places],
+            from_si(share.placed.masses, "mass", unit).tolist(),
+            from_si(share.goal, "mass", unit),
+            complex(from_si(share.placed.total, "mass", unit)),
+        )
+        for share in found.shares
+    ]
     figure = Figure(figsize=(5.6 * len(panels), 6.2), layout="constrained")
     row = figure.subplots(1, len(panels), subplot_kw={"projection": "polar"}, squeeze=False)[0]
     for axes, panel in zip(row, panels, strict=True):
@@ -45,7 +63,7 @@ def draw(panels: Sequence[Panel], unit: str, *, removed: bool) -> Figure:
     return figure
 
 
-def _panel(axes: Any, panel: Panel, unit: str, *, removed: bool) -> None:
+def _panel(axes: PolarAxes, panel: Panel, unit: str, *, removed: bool) -> None:
     title, places, masses, target, total = panel
     scale = max(abs(target), abs(total), *masses) or 1.0
     rim = 1.2 * scale

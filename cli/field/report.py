@@ -5,12 +5,13 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from cli import field_text as text
+from cli.field import words
+from cli.field.solve import FieldBalancing
 
 if TYPE_CHECKING:
-    from cli.field_job import Field
+    from cli.show.columns import Cell, Values
 
 STYLE = """
 body { font: 10.5pt/1.35 system-ui, sans-serif; color: #111; max-width: 190mm; margin: 8mm auto; padding: 0 4mm; }
@@ -25,34 +26,34 @@ svg { width: 100%; height: auto; max-height: 64mm; } section { break-after: page
 """
 
 
-def html(field: Field, source: str, warnings: Sequence[str]) -> bytes:
+def html(found: FieldBalancing, source: str, warnings: Sequence[str]) -> bytes:
     """Return the report of every rotor, a page each."""
     pages = []
-    for rotor, (k, i) in enumerate(field.place):
-        solved = field.solved[k]
-        name = f"Rotor {escape(field.runs.rotors[rotor])}" if field.several else "Balancing in the field"
+    for rotor, (k, i) in enumerate(found.place):
+        solved = found.solved[k]
+        name = f"Rotor {escape(found.runs.rotors[rotor])}" if found.several else "Balancing in the field"
         parts = [
             f"<h1>{name}</h1>",
-            f'<p class="small">{escape(source)}. {escape(text.conventions(field))}</p>',
+            f'<p class="small">{escape(source)}. {escape(words.conventions(found))}</p>',
             *([f'<p class="warning">{escape(warning)}</p>' for warning in warnings] if rotor == 0 else []),
             "<h2>Readings</h2>",
-            f'<p class="small">{escape("; ".join(text.trials_lines(field, solved, i)))}</p>',
-            _table(text.runs_table(field, solved, i))
+            f'<p class="small">{escape("; ".join(words.trials_lines(found, solved, i)))}</p>',
+            _table(words.runs_table(found, solved, i))
             if solved.group.trials
             else "<p>The initial run stands below, beside the predicted vibration.</p>",
             "<h2>Influence coefficients</h2>",
-            _table(text.influence_table(field, solved, i)),
+            _table(words.influence_table(found, solved, i)),
             '<div class="beside"><div><h2>Corrections</h2>',
-            _table(text.correction_table(field, solved, i), "main"),
-            "".join(f"<p>{escape(line)}</p>" for line in text.split_lines(field, solved, i)),
+            _table(words.correction_table(found, solved, i), "main"),
+            "".join(f"<p>{escape(line)}</p>" for line in words.split_lines(found, solved, i)),
             "</div><div><h2>Predicted vibration</h2>",
-            _table(text.residual_table(field, solved, i)),
+            _table(words.residual_table(found, solved, i)),
             "</div></div>",
-            "".join(f"<p>{escape(line)}</p>" for line in text.summary(field, solved, i)),
+            "".join(f"<p>{escape(line)}</p>" for line in words.summary(found, solved, i)),
         ]
-        if lines := text.verdict(field, solved, i):
+        if lines := words.verdict(found, solved, i):
             parts += ["<h2>Verdict</h2>", "".join(f"<p>{escape(line)}</p>" for line in lines)]
-        parts.append(_picture(field, rotor))
+        parts.append(_picture(found, rotor))
         pages.append(f"<section>{''.join(parts)}</section>")
     document = (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
@@ -61,10 +62,10 @@ def html(field: Field, source: str, warnings: Sequence[str]) -> bytes:
     return document.encode()
 
 
-def _table(columns: Mapping[str, Sequence[Any]], kind: str = "") -> str:
+def _table(columns: Mapping[str, Values], kind: str = "") -> str:
     named = [any(isinstance(cell, str) for cell in column) for column in columns.values()]
 
-    def cell(value: Any, is_name: bool, tag: str = "td") -> str:
+    def cell(value: Cell, is_name: bool, tag: str = "td") -> str:
         shown = "" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)
         return (
             f'<{tag} class="text">{escape(shown)}</{tag}>' if is_name else f"<{tag}>{escape(shown)}</{tag}>"
@@ -78,17 +79,17 @@ def _table(columns: Mapping[str, Sequence[Any]], kind: str = "") -> str:
     return f'<table class="{kind}"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
 
 
-def _picture(field: Field, rotor: int) -> str:
+def _picture(found: FieldBalancing, rotor: int) -> str:
     """Return the polar pictures as SVG, or a sentence where matplotlib is not installed."""
     try:
         import matplotlib
     except ImportError:
         return '<p class="small">(No picture: matplotlib is not installed.)</p>'
-    from cli.plots.field import draw
+    from cli.field.picture import draw
 
     matplotlib.use("Agg")
     matplotlib.rcParams["svg.hashsalt"] = f"dalembert-{rotor}"
     stream = io.StringIO()
-    draw(field, [rotor]).savefig(stream, format="svg", metadata={"Date": None})
+    draw(found, [rotor]).savefig(stream, format="svg", metadata={"Date": None})
     drawing = stream.getvalue()
     return drawing[drawing.index("<svg") :]

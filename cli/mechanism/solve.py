@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.errors import DataError, memory, nearest
-from cli.mechanism.inputs import Inputs, Sweep
+from cli.mechanism.read import Inputs, Sweep
 from cli.read.files import load as load_bytes
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from cli.mechanism.forces import rows_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.mechanism.job import Job
+    from cli.mechanism.solve import Job
 
 STYLES = ("-", "--", "-.", ":")
 GREYS = ("0.0", "0.35", "0.55")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError, quote
-from cli.field_runs import Channel, Runs, apart
+from cli.field.runs import Channel, Runs, apart
 from cli.read.tables import Table, read
 from cli.read.units import UNITS, amplitude_kind, from_si, phasor, to_si
 

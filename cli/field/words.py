@@ -2,52 +2,55 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.read.units import degrees, from_si
+from cli.field.solve import FieldBalancing, Solved
+from cli.read.units import degrees, from_si, to_si
 from cli.show.text import angle_text, table_text
 
 if TYPE_CHECKING:
-    from cli.field_job import Field, Solved
+    from cli.show.columns import Cell
+
+    Columns = dict[str, list[Cell]]
 
 FEW = 6  # so many rotors are shown in full
 
 
-def conventions(field: Field) -> str:
+def conventions(found: FieldBalancing) -> str:
     """Say how angles and phases are counted and what the corrections mean."""
-    wanted = field.wanted
+    request = found.request
     state = (
         "the rotor as it stands, with the trial masses that were left on it"
-        if wanted.from_here
+        if request.from_here
         else "the rotor in its initial state, all trial masses off"
     )
     return (
-        f"{wanted.conventions}\nCorrections: {field.runs.per}{'es' if field.runs.per == 'mass' else 's'} to ADD to {state}, "
+        f"{request.conventions}\nCorrections: {found.runs.per}{'es' if found.runs.per == 'mass' else 's'} to ADD to {state}, "
         "at the radius of the trial masses."
     )
 
 
-def runs_table(field: Field, solved: Solved, i: int) -> dict[str, list[Any]]:
+def runs_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
     """The readings: a row for each sensor, amplitude and phase of each run beside each other."""
     group = solved.group
-    columns: dict[str, list[Any]] = {"sensor": [str(channel) for channel in group.channels]}
+    columns: Columns = {"sensor": [str(channel) for channel in group.channels]}
     for name, values in [("initial", group.initial[i])] + [
         (f"run {trial.run}", group.runs[i, j]) for j, trial in enumerate(group.trials)
     ]:
-        columns[f"{name}: {unit(field)}"] = [float(abs(value)) for value in values]
-        if not field.wanted.four_run:
+        columns[f"{name}: {amplitude_unit(found)}"] = [float(abs(value)) for value in values]
+        if not found.request.four_run:
             columns[f"{name}: phase°"] = [float(degrees(value)) for value in values]
     return columns
 
 
-def trials_lines(field: Field, solved: Solved, i: int) -> list[str]:
+def trials_lines(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
     """What was on the rotor in each trial run, a line each."""
     lines = []
     for j, trial in enumerate(solved.group.trials):
         masses = " + ".join(
-            f"{field._amount(abs(t)):.6g} {field._unit} at {angle_text(degrees(t), '.6g')}° in {plane}"
+            f"{found.amount(abs(t)):.6g} {found.unit} at {angle_text(degrees(t), '.6g')}° in {plane}"
             for plane, t in zip(solved.group.planes, solved.group.on[i, j], strict=True)
             if t
         )
@@ -55,71 +58,69 @@ def trials_lines(field: Field, solved: Solved, i: int) -> list[str]:
     return lines
 
 
-def influence_table(field: Field, solved: Solved, i: int) -> dict[str, list[Any]]:
+def influence_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
     """The influence coefficients: a row for each sensor."""
-    columns: dict[str, list[Any]] = {"sensor": [str(channel) for channel in solved.group.channels]}
-    per = f"{unit(field)}/{field._unit}"
-    from cli.read.units import to_si
-
+    columns: Columns = {"sensor": [str(channel) for channel in solved.group.channels]}
+    per = f"{amplitude_unit(found)}/{found.unit}"
     for p, plane in enumerate(solved.planes):
         alpha = solved.alpha[i, :, p]
         columns[f"{plane}: {per}"] = [
-            float(a) for a in to_si(np.abs(alpha), field.runs.per, field.runs.mass_unit)
+            float(a) for a in to_si(np.abs(alpha), found.runs.per, found.runs.mass_unit)
         ]
         columns[f"{plane}: phase°"] = [round(float(a), 2) for a in degrees(alpha)]
     return columns
 
 
-def correction_table(field: Field, solved: Solved, i: int) -> dict[str, list[Any]]:
+def correction_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
     """The corrections with their uncertainty, and the equivalent removal."""
     w = solved.corrections[i]
-    columns: dict[str, list[Any]] = {
+    columns: Columns = {
         "plane": list(solved.planes),
-        f"ADD {field._unit}": [float(field._amount(abs(c))) for c in w],
+        f"ADD {found.unit}": [float(found.amount(abs(c))) for c in w],
         "at angle°": [float(degrees(c)) for c in w],
     }
-    spreads = field.uncertainty(solved)
+    spreads = found.uncertainty(solved)
     if spreads is not None:
-        columns[f"± {field._unit}"] = [_known(field._amount(x)) for x in spreads[0][i]]
+        columns[f"± {found.unit}"] = [_known(found.amount(x)) for x in spreads[0][i]]
         columns["± angle°"] = [_known(x) for x in spreads[1][i]]
     columns["or REMOVE at°"] = [float(degrees(-c)) if c else 0.0 for c in w]
     return columns
 
 
-def split_lines(field: Field, solved: Solved, i: int) -> list[str]:
+def split_lines(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
     """How each correction is split onto the places there are, a line for each plane."""
     lines = []
     for p, plane in enumerate(solved.planes):
-        parts = field.split(solved.corrections[i, p])
+        parts = found.split(solved.corrections[i, p])
         if parts:
             shares = " + ".join(
-                f"{field._amount(part[2]):.5g} {field._unit} at {part[1]:.5g}° (place {part[0]})"
+                f"{found.amount(part[2]):.5g} {found.unit} at {part[1]:.5g}° (place {part[0]})"
                 for part in parts
             )
             lines.append(f"{plane} split: {shares}")
     return lines
 
 
-def _known(value: Any) -> Any:
+def _known(value: float) -> Cell:
     return float(value) if np.isfinite(value) else "unknown"
 
 
-def residual_table(field: Field, solved: Solved, i: int) -> dict[str, list[Any]]:
+def residual_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
     """Vibration before and after, a row for each sensor."""
     before, after = solved.initial[i], solved.residual[i]
-    columns: dict[str, list[Any]] = {
+    columns: Columns = {
         "sensor": [str(channel) for channel in solved.group.channels],
-        f"before {unit(field)}": [float(abs(v)) for v in before],
-        f"predicted {unit(field)}": [float(abs(v)) for v in after],
+        f"before {amplitude_unit(found)}": [float(abs(v)) for v in before],
+        f"predicted {amplitude_unit(found)}": [float(abs(v)) for v in after],
     }
-    if not field.wanted.four_run:
+    if not found.request.four_run:
         columns["phase°"] = [round(float(degrees(v)), 2) for v in after]
     return columns
 
 
-def unit(field: Field) -> str:
+def amplitude_unit(found: FieldBalancing) -> str:
     """The amplitude's unit as people write it."""
-    text = field.runs.amplitude_unit
+    text = found.runs.amplitude_unit
     tag = ""
     for suffix, name in (("_pp", " pk-pk"), ("_pk", " pk"), ("_rms", " r.m.s.")):
         if text.endswith(suffix):
@@ -127,53 +128,56 @@ def unit(field: Field) -> str:
     return text.replace("um", "µm").replace("_s2", "/s²").replace("_s", "/s") + tag
 
 
-def summary(field: Field, solved: Solved, i: int) -> list[str]:
+def summary(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
     """The figures of merit, a line each."""
     after = solved.residual[i]
     size = np.abs(after)
     lines = [
-        f"residual: r.m.s. {np.sqrt(np.square(size).mean()):.6g}, largest {size.max():.6g} {unit(field)} "
+        f"residual: r.m.s. {np.sqrt(np.square(size).mean()):.6g}, largest {size.max():.6g} {amplitude_unit(found)} "
         f"(before: {np.abs(solved.initial[i]).max():.6g})"
     ]
     if solved.bound is not None:
         lines.append(
-            f"smallest possible largest residual, by the dual problem: {solved.bound[i]:.10g} {unit(field)}"
+            f"smallest possible largest residual, by the dual problem: {solved.bound[i]:.10g} {amplitude_unit(found)}"
         )
     if solved.group.repeats:
         lines.append(
-            f"repeated readings scatter by {solved.group.reading_sd[i]:.4g} {unit(field)} (standard deviation of one reading as a "
+            f"repeated readings scatter by {solved.group.reading_sd[i]:.4g} {amplitude_unit(found)} (standard deviation of one reading as a "
             f"vector, {solved.group.repeats} complex degree{'s' * (solved.group.repeats > 1)} of freedom)"
         )
     if solved.residual_95 is not None:
         known = []
-        if field.wanted.reading_error is not None:
-            relative, angle = field.wanted.reading_error
+        if found.request.reading_error is not None:
+            relative, angle = found.request.reading_error
             known.append(f"of {100 * relative:.3g} % and {np.degrees(angle):.3g}°")
         if solved.group.reading_sd[i]:
             known.append(
                 f"{'or ' if known else ''}as the repeats scatter{' where that is more' if known else ''}"
             )
         lines.append(
-            f"with reading errors {' '.join(known)} (one standard deviation) the largest residual stays below {solved.residual_95[i]:.4g} {unit(field)} in 95 % of cases"
+            f"with reading errors {' '.join(known)} (one standard deviation) the largest residual stays below {solved.residual_95[i]:.4g} {amplitude_unit(found)} in 95 % of cases"
         )
     if np.isfinite(solved.condition[i]):
         lines.append(f"condition number of the scaled coefficients: {solved.condition[i]:.4g}")
     for channel, misfit in zip(
         solved.group.channels, solved.fits[i].misfit if solved.fits else (), strict=False
     ):
-        lines.append(f"sensor {channel}: misfit of the amplitudes {misfit:.3g} {unit(field)} (r.m.s.)")
+        lines.append(
+            f"sensor {channel}: misfit of the amplitudes {misfit:.3g} {amplitude_unit(found)} (r.m.s.)"
+        )
     return lines
 
 
-def verdict(field: Field, solved: Solved, i: int) -> list[str]:
+def verdict(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
     """The ISO verdict, a line for each plane."""
-    if field.wanted.tolerance is None:
+    tolerance = found.request.tolerance
+    if tolerance is None:
         return []
-    grade, whole = field.wanted.tolerance
+    whole = from_si(tolerance.permissible, "unbalance", "g_mm")
     lines = [
-        f"tolerance{' ' + grade if grade else ''}: U_per = {from_si(whole, 'unbalance', 'g_mm'):.6g} g·mm, shared equally"
+        f"tolerance{' ' + tolerance.grade if tolerance.grade else ''}: U_per = {whole:.6g} g·mm, shared equally"
     ]
-    for plane, share, before in field._verdict(solved, i):
+    for plane, share, before in found.verdicts(solved, i):
         initial = (
             "not determined"
             if np.isnan(before)
@@ -185,26 +189,22 @@ def verdict(field: Field, solved: Solved, i: int) -> list[str]:
     return lines
 
 
-def notes(field: Field) -> str:
+def notes(found: FieldBalancing) -> str:
     """Above the terminal's table: conventions, readings, coefficients."""
-    parts = [conventions(field)]
-    for rotor in range(min(len(field.runs.rotors), FEW)):
-        k, i = field.place[rotor]
-        solved = field.solved[k]
-        name = f"rotor {field.runs.rotors[rotor]}: " if field.several else ""
-        parts.append(f"{name}influence coefficients\n" + table_text(influence_table(field, solved, i)))
-    if len(field.runs.rotors) > FEW:
-        parts.append(f"… and {len(field.runs.rotors) - FEW} further rotors\n")
+    parts = [conventions(found)]
+    for rotor, solved, i in found.each(FEW):
+        name = f"rotor {rotor}: " if rotor else ""
+        parts.append(f"{name}influence coefficients\n" + table_text(influence_table(found, solved, i)))
+    if len(found.runs.rotors) > FEW:
+        parts.append(f"… and {len(found.runs.rotors) - FEW} further rotors\n")
     return "\n".join(parts) + "\nmaterial to ADD:"
 
 
-def afterword(field: Field) -> str:
+def afterword(found: FieldBalancing) -> str:
     """Below the terminal's table: removal, residual, confidence, verdict."""
     parts = []
-    for rotor in range(min(len(field.runs.rotors), FEW)):
-        k, i = field.place[rotor]
-        solved = field.solved[k]
-        name = f"rotor {field.runs.rotors[rotor]}: " if field.several else ""
+    for rotor, solved, i in found.each(FEW):
+        name = f"rotor {rotor}: " if rotor else ""
         removal = ", ".join(
             f"{plane} at {angle_text(degrees(-w), '.2f')}°"
             for plane, w in zip(solved.planes, solved.corrections[i], strict=True)
@@ -216,8 +216,8 @@ def afterword(field: Field) -> str:
             else f"{name}nothing to correct",
             "",
         ]
-        lines[1:1] = [f"{name}{line}" for line in split_lines(field, solved, i)]
-        lines += [f"{name}predicted vibration", table_text(residual_table(field, solved, i)).rstrip("\n"), ""]
-        lines += [*summary(field, solved, i), *verdict(field, solved, i)]
+        lines[1:1] = [f"{name}{line}" for line in split_lines(found, solved, i)]
+        lines += [f"{name}predicted vibration", table_text(residual_table(found, solved, i)).rstrip("\n"), ""]
+        lines += [*summary(found, solved, i), *verdict(found, solved, i)]
         parts.append("\n".join(lines))
     return "\n\n".join(parts)

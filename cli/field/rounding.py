@@ -3,45 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing import Balance, condition_number, influence_error
-from cli.read.rounding import EPS, angle_error, size_error
-from cli.read.units import degrees, from_si, to_si
-
-if TYPE_CHECKING:
-    from cli.field_job import Field, Solved
-
-Real = NDArray[np.float64]
+from cli.field.runs import Real
+from cli.field.solve import FieldBalancing, Solved
+from cli.read.rounding import EPS
+from cli.read.units import to_si
 
 
-def errors(field: Field, warnings: list[str]) -> dict[str, Any]:
-    """Return bounds of the rounding errors of the CSV's columns, row by row.
-
-    Corrections that have none (one optimum among several) are NaN here, stay whole, and the reason is said.
-    """
-    per, unit = field.runs.per, field.runs.mass_unit
-    bounds = [correction_errors(field, solved, warnings) for solved in field.solved]
-    flat, bound = field.rows([solved.corrections for solved in field.solved]), field.rows(bounds)
-    out = {
-        f"{per}_{unit}": from_si(size_error(flat, bound), per, unit),
-        "angle_deg": angle_error(flat, bound, degrees(flat)),
-    }
-    if field.uncertain:
-        share = field.rows([_share(field, solved, b) for solved, b in zip(field.solved, bounds, strict=True)])
-        for name in (f"{per}_uncertainty_{unit}", "angle_uncertainty_deg"):
-            out[name] = share * np.nan_to_num(np.asarray(field.columns[name], dtype=float))
-    return out
-
-
-def coefficient_errors(field: Field, solved: Solved) -> Real:
+def coefficient_errors(found: FieldBalancing, solved: Solved) -> Real:
     """Bound the errors of the influence coefficients, (g, s, p)."""
     group = solved.group
-    if field.stored is not None:
-        phase = field.stored.table.require("phase", "angle")
+    if found.stored is not None:
+        phase = found.stored.table.require("phase", "angle")
         turn = float(np.abs(to_si(phase.values, "angle", phase.unit)).max())
         return np.asarray(EPS * (6 + turn / 2) * np.abs(solved.alpha))
     initial, runs, on = group.errors()
@@ -54,25 +30,25 @@ def coefficient_errors(field: Field, solved: Solved) -> Real:
     return influence_error(group.initial, group.runs, group.on, reading_error=(initial, runs), mass_error=on)
 
 
-def correction_errors(field: Field, solved: Solved, warnings: list[str]) -> Real:
+def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]) -> Real:
     """Bound the errors of the corrections, (g, p), SI; NaN where they cannot be bounded."""
-    wanted, group = field.wanted, solved.group
-    of_alpha = coefficient_errors(field, solved)
+    request, group = found.request, solved.group
+    of_alpha = coefficient_errors(found, solved)
     initial, _, on = group.errors()
-    runout = np.array([abs(wanted.runout.get(channel.sensor, 0)) for channel in group.channels])
+    runout = np.array([abs(request.runout.get(channel.sensor, 0)) for channel in group.channels])
     here = solved.initial + np.matvec(solved.alpha, solved.standing)
     of_here = initial + 8 * EPS * (runout + np.abs(solved.initial))
     if solved.standing.any():
         size = np.abs(solved.standing)
         of_standing = on.max(axis=1) + 4 * EPS * size
         of_here = of_here + np.matvec(of_alpha, size) + np.matvec(np.abs(solved.alpha), of_standing)
-    whole = Balance(solved.alpha, here, solved.corrections, group.weights, ridge=wanted.ridge)
-    limit = field.limits(solved.planes)
-    if wanted.objective == "least-squares" and limit is None and wanted.max_residual is None:
+    whole = Balance(solved.alpha, here, solved.corrections, group.weights, ridge=request.ridge)
+    limit = found.limits(solved.planes)
+    if request.objective == "least-squares" and limit is None and request.max_residual is None:
         return whole.error_estimate(influence_error=of_alpha, initial_error=of_here)
     ceiling = None
-    if wanted.max_residual is not None and wanted.objective == "least-squares":
-        ceiling = np.full(here.shape[-1], wanted.max_residual)
+    if request.max_residual is not None and request.objective == "least-squares":
+        ceiling = np.full(here.shape[-1], request.max_residual)
     bounds = []
     for i in range(len(here)):
         one = replace(
@@ -88,23 +64,23 @@ def correction_errors(field: Field, solved: Solved, warnings: list[str]) -> Real
         bounds.append(one.error_estimate(influence_error=of_alpha[i], initial_error=of_here[i]))
         if one.error_reason:
             warnings.append(
-                f"{field.of(group, i)}--digits: the corrections are given in full, for no bound of their error is known: "
+                f"{found.of(group, i)}--digits: the corrections are given in full, for no bound of their error is known: "
                 f"{one.error_reason}"
             )
     return np.where(np.isfinite(bounds), bounds, np.nan)
 
 
-def _share(field: Field, solved: Solved, bound: Real) -> Real:
+def uncertainty_share(found: FieldBalancing, solved: Solved, bound: Real) -> Real:
     """Bound the relative errors of the uncertainties, (g, p).
 
     To first order: the pseudo-inverses of coefficients and trial masses are right to their condition numbers times
     the relative errors of what they are of, and the corrections they are for to their own.
     """
-    of_alpha = np.linalg.norm(coefficient_errors(field, solved), axis=-2)
+    of_alpha = np.linalg.norm(coefficient_errors(found, solved), axis=-2)
     norms = np.linalg.norm(solved.alpha, axis=-2)
     relative = 8 * EPS + (of_alpha / np.where(norms > 0, norms, 1.0)).max(axis=-1)
     share = condition_number(solved.alpha, solved.group.weights) * relative
-    if field.stored is None:
+    if found.stored is None:
         share = share + 8 * EPS * condition_number(solved.group.on)
     # the scatter of repeats is a difference of readings
     sd = solved.group.reading_sd

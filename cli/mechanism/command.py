@@ -23,7 +23,7 @@ from cli.show.text import csv_text
 
 if TYPE_CHECKING:
     from cli.mechanism.asked import Asked
-    from cli.mechanism.job import Job
+    from cli.mechanism.solve import Job
 
 
 def run(
@@ -111,7 +111,7 @@ def run(
     for each pose and link (what `dalembert work` reads); with --only or --forces a row for each pose. In a pipe
     --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
     """
-    from cli.mechanism.job import ORDERS
+    from cli.mechanism.solve import ORDERS
 
     if order is not None and order not in ORDERS:
         raise options.bad("--order", f"'{order}': expected {', '.join(ORDERS)}")
@@ -199,9 +199,9 @@ def run(
 
 def _stream(job: Job, *, forces: bool, digits: bool, output: Path | None, states: Path | None) -> bool:
     """Write the table of a long sweep a block of poses at a time; return whether some pose is assembled."""
-    from cli.mechanism import digits as bounds
     from cli.mechanism import forces as of_forces
     from cli.mechanism import poses
+    from cli.mechanism import rounding as bounds
     from cli.mechanism import states as of_states
     from cli.mechanism.stream import Stream
 
@@ -275,8 +275,8 @@ def _job(
     order: str | None,
     branch: str | None,
 ) -> Job:
-    from cli.mechanism.inputs import wanted
-    from cli.mechanism.job import ORDERS, Job, load
+    from cli.mechanism.read import wanted
+    from cli.mechanism.solve import ORDERS, Job, load
 
     m = load(file)
     q = wanted(m, at, sweep, inputs)
@@ -342,7 +342,7 @@ def _shown(
         return "\n\n".join([*after, *asked.text(of_forces), *told, *(asked.explain(job) if explain else [])])
 
     def errors() -> dict[str, Any]:
-        from cli.mechanism import digits
+        from cli.mechanism import rounding as digits
 
         if not table:
             return {}
@@ -353,7 +353,7 @@ def _shown(
     def figure() -> Any:
         if asked.forces and not graph and len(job.inputs.shown) > 2 and job.motions[0].assembled.any():
             return asked.figure(job)
-        from cli.plots import mechanism as pictures
+        from cli.mechanism import picture as pictures
 
         return pictures.graphs(job, graph) if graph else pictures.draw(job)
 

@@ -14,7 +14,7 @@ from cli.mechanism.poses import LINK, POINT, SLIDE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cli.mechanism.job import Job
+    from cli.mechanism.solve import Job
     from virtualwork.motion import Motion
 
     Reals = NDArray[np.float64]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.mechanism.graphs import quantities
-from cli.mechanism.job import Job
+from cli.mechanism.solve import Job
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
