@@ -145,8 +145,8 @@ class MotionErrors:
         )
         for j, k in angle.inputs:
             error = error + abs(k) * self.given[:, j]
-        # the constant of a gear is itself a difference of angles of this size
-        error = error + EPS * abs(angle.const)
+        # the constant is itself a sum of angles of this size
+        error = error + EPS * max(abs(angle.const), angle.size)
         if not plain:
             error = error + EPS * (abs(angle.const) + 2 * sum(abs(k * st.inputs[j]) for j, k in angle.inputs))
         for base, r in angle.bases:
@@ -309,11 +309,32 @@ class MotionErrors:
             return np.asarray(self.rotation(body) + EPS / 2 * np.abs(np.angle(self._state.turn[body])))
         total = self._moved(body, k)
         total += ROUNDINGS * EPS * np.abs(self.poses.angle_derivative(body, k))
-        for tie in self.ties:
-            if tie.body == body:
-                for base, r in tie.angle.bases:
-                    if base != GROUND:
-                        total += EPS * np.abs(r * self.poses.angle_derivative(base, k))
+        return total + self._tied(body, k)
+
+    def _tied(self, body: str, k: int) -> Reals:
+        """The rounding of the k-th rate of an angle that is a sum of others, theirs among it; (n,), else zero."""
+        total = np.zeros(self.n)
+        angle = next((tie.angle for tie in self.ties if tie.body == body), Angle())
+        terms = [(abs(f), np.abs(self.poses.rate(j, k))) for j, f in angle.inputs]
+        terms += [(abs(r), self._sized(base, k)) for base, r in angle.bases if base != GROUND]
+        if not terms or (len(terms) == 1 and terms[0][0] == 1.0 and angle.inputs):
+            return total
+        for f, size in terms:
+            # the factor, its product, the products of the law of motion, and every sum after it
+            total = total + EPS * (1 + k + len(terms)) / 2 * f * size
+        for base, r in angle.bases:
+            total = total + abs(r) * self._tied(base, k)
+        return total
+
+    def _sized(self, body: str, k: int) -> Reals:
+        """The sizes of what the law of motion adds up to the k-th rate of an angle, (n,)."""
+        if len(self.poses.mechanism.inputs) > 1 or k == 1:
+            return np.abs(self.poses.angle_derivative(body, k))
+        v, a = self.poses.rate(0, 1), self.poses.rate(0, 2)
+        weights = [a, v * v] if k == 2 else [self.poses.rate(0, 3), 3 * v * a, v**3]
+        total = np.zeros(self.n)
+        for order, weight in enumerate(weights, 1):
+            total = total + np.abs(self.poses.angle_coefficient(body, order=order) * weight)
         return total
 
     def slide(self, guide: int, order: int = 0) -> Reals:

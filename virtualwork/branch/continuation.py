@@ -132,6 +132,9 @@ class Continuation:
                 nodes = np.cos(np.pi * (np.arange(12) + 0.5) / 12)
                 x = self.unknowns(centre + half * nodes)
                 det = [self._rate(q, row)[1] for q, row in zip(centre + half * nodes, x, strict=True)]
+                if not np.isfinite(det).all():  # a pose between the two that does not close: no more is known
+                    self._found[a, b] = centre
+                    continue
                 roots = np.polynomial.Chebyshev.fit(nodes, det, 10, domain=[-1, 1]).roots()
                 real = np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= 1.1)])
                 self._found[a, b] = (

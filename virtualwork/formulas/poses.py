@@ -304,6 +304,10 @@ class Poses:
         return -1 if self.inputs.shape[1] == 1 else j
 
     # --- quantities -------------------------------------------------------------------------------------------
+    def rate(self, j: int, order: int) -> Reals:
+        """The order-th derivative of input j in time, (n,)."""
+        return np.broadcast_to(np.asarray(self.rates[order - 1][j], dtype=float), (self.n,))
+
     def angle(self, body: str) -> Reals:
         """A link's angle, (n,) rad."""
         self.solve((f"angle:{body}",), 0)

@@ -394,11 +394,14 @@ class _Planner:
 
 def _plus(a: Angle, b: Angle, factor: float) -> Angle:
     """a + factor·b."""
+    const, more = a.const + factor * b.const, factor * b.const
+    added = abs(more) + abs(const) if a.const and b.const else 0.0
     return Angle(
-        a.const + factor * b.const,
+        const,
         _sums(a.inputs, b.inputs, factor),
         _sums(a.bases, b.bases, factor),
         _sums(a.gears, b.gears, factor),
+        a.size + abs(factor) * b.size + added,
     )
 
 

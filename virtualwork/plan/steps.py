@@ -52,6 +52,8 @@ class Angle:
     inputs: tuple[tuple[int, float], ...] = ()
     bases: tuple[tuple[str, float], ...] = ()
     gears: tuple[tuple[int, float], ...] = ()
+    # of what was added up to const: its rounding is so many times the unit's
+    size: float = field(default=0.0, compare=False)
 
     def at(self, inputs: tuple[float, ...]) -> float | None:
         """The angle at given inputs, or None where it hangs on other angles."""
