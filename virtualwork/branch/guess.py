@@ -52,7 +52,8 @@ class _Chooser:
         """The assembly; a mechanism of which a part floats is refused by that part's name."""
         st = State(list(self.m.at))
         try:
-            if any(2 * len(g.closures) < len(g.angles) + len(g.slides) for g in self.plan.groups):
+            loose = any(2 * len(g.closures) < len(g.angles) + len(g.slides) for g in self.plan.groups)
+            if loose or not self.plan.anchors.keys() >= self.m.links.keys():
                 raise MobilityError("[input]: constraints that depend on each other leave a part free")
             found = self._choose(make, st)
         except (MechanismError, ZeroDivisionError) as error:
