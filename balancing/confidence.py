@@ -181,7 +181,7 @@ class Readings:
             undo = np.linalg.pinv(self.trial_masses)
             gain = np.zeros((1 + undo.shape[0], 1 + undo.shape[1]), dtype=complex)
             gain[0, 0], gain[1:, 0], gain[1:, 1:] = 1.0, -undo.sum(axis=1), undo
-        e_along, e_across, of_size, of_phase = (part.T.ravel() for part in self._errors)
+        e_along, e_across, of_size, of_phase = self._errors
         size = np.abs(self._all.T.ravel())
         unit = np.where(size > 0, self._all.T.ravel() / np.where(size > 0, size, 1.0), 1.0)
         return components(
@@ -189,8 +189,8 @@ class Readings:
             (antilinear @ gain.conj()).reshape(len(w), -1),
             w if along is None else along,
             unit,
-            np.abs(e_along) * of_size,
-            np.abs(e_across) * of_phase,
+            (np.abs(e_along) * of_size).T.ravel(),
+            (np.abs(e_across) * of_phase).T.ravel(),
         )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.propagation import components, response
 from balancing.run_log import Errors, JointFit
-from dalembert.arithmetic.records import record
+from dalembert.arithmetic.records import numbers, record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -59,6 +59,10 @@ class LogBalance:
     """Those of the channels in the least squares of the corrections, (..., s)."""
     along: Complex | None = None
     """The directions of the corrections as given out, where they are not these ones', (..., p)."""
+
+    def __repr__(self) -> str:
+        w, errors = numbers(self.corrections), numbers(self.errors.degrees_of_freedom)
+        return f"LogBalance(corrections={w}, residual={numbers(self.residual)}, degrees_of_freedom={errors})"
 
     @cached_property
     def residual(self) -> Complex:
