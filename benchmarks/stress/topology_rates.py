@@ -9,7 +9,7 @@ import mpmath as mp
 import numpy as np
 
 from benchmarks.stress.topologies import Topology, evaluate, generate, regularity, rows
-from virtualwork.mechanism import GROUND
+from virtualwork import GROUND
 
 DIGITS = 40
 ORDER = 2  # position, velocity, acceleration

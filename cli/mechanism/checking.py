@@ -10,14 +10,14 @@ import numpy as np
 from cli.mechanism.solve import ORDERS, Job
 
 if TYPE_CHECKING:
-    from virtualwork.assembly import Assembly
-    from virtualwork.newton import AllAtOnce
-    from virtualwork.track import Track
+    from virtualwork.branch.assembly import Assembly
+    from virtualwork.branch.track import Track
+    from virtualwork.study.newton_table import AllAtOnce
 
 
 def check_document(job: Job) -> dict[str, Any]:
     """The character of the mechanism."""
-    from virtualwork.check import Check
+    from virtualwork.study.check import Check
 
     check = Check(job.mechanism.assembly)
     slide = bool(job.mechanism.inputs) and job.mechanism.inputs[0].is_slide
@@ -79,7 +79,7 @@ def check_text(document: dict[str, Any]) -> str:
 
 def newton_tables(job: Job) -> tuple[list[AllAtOnce], dict[str, Any]]:
     """Newton-Raphson from the guess at every pose; the table of the first, the largest difference of all."""
-    from virtualwork.newton import all_at_once
+    from virtualwork.study.newton_table import all_at_once
 
     assembly = job.assemblies[0]
     done = [all_at_once(assembly, tuple(row)) for row in job.inputs.values.tolist()]
@@ -126,7 +126,7 @@ def newton_text(document: dict[str, Any]) -> str:
 
 def explain_text(job: Job) -> str:
     """The order of solution, and for this request what was solved and what was skipped."""
-    from virtualwork.assur import Group, Place, Slide, Turn
+    from virtualwork.plan.steps import Group, Place, Slide, Turn
 
     motion = job.motions[0]
     plan = motion.assembly.plan

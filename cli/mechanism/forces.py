@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.mechanism.solve import Job
-    from virtualwork.formulas.reactions import Joint
     from virtualwork.motion import Motion
+    from virtualwork.plan.joints import Joint
 
 Column = list[Any]
 GROUND = "ground"
@@ -116,7 +116,9 @@ def table(job: Job) -> dict[str, Column]:
 
 def _rubs(motion: Motion, joint: Joint, on: str) -> bool:
     """Whether a pin's friction has a moment on a body: its column stands in every block of a sweep."""
-    return any(r.path is None and r.joint == joint.key and r.body == on for r in motion.dynamics.scene.rubs)
+    return any(
+        r.path is None and r.joint == joint.key and r.body == on for r in motion.dynamics.scene.friction
+    )
 
 
 def warnings(job: Job) -> list[str]:
@@ -148,7 +150,7 @@ def troubles(job: Job) -> list[tuple[str, list[float]]]:
         ):
             if not motion.assembly.track.folded:  # singular in every pose: that is said once
                 note(there & ~np.isfinite(values).all(axis=1) & ~d.locked, what)
-        if d.scene.rubs:
+        if d.scene.friction:
             note(there & d.locked, "friction locks the mechanism: no reaction balances its own friction")
     return found
 
@@ -253,7 +255,7 @@ def _split_unit(key: str) -> tuple[str, str]:
 
 def equilibria(job: Job, swept: bool) -> tuple[list[dict[str, Any]], list[str]]:
     """The positions where the loads balance without effort, and what to say of them."""
-    from virtualwork.study.equilibrium import equilibria as search
+    from virtualwork import equilibria as search
 
     m = job.mechanism
     spans = None
@@ -364,6 +366,6 @@ def explain_text(job: Job) -> str:
     lines.append(
         f"  formed for the reactions: {', '.join(sorted(motion.dynamics.reactions.formed)) or 'nothing'}"
     )
-    if motion.dynamics.scene.rubs:
+    if motion.dynamics.scene.friction:
         lines.append(f"  friction: {motion.dynamics.friction_iterations} iterations")
     return "\n".join(lines)

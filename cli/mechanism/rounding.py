@@ -110,7 +110,7 @@ def of_states(job: Job) -> dict[str, Column]:
 
     @cache
     def bounds(motion: Motion, link: str, field: int | None, guide: int | None, key: str) -> Column:
-        along = motion if field is None else motion.dynamics.error_estimate().unit(field)
+        along = motion if field is None else motion.unit(field)
         center = motion.dynamics.scene.rigid[link].center
         if key in ("fvx_m_s", "fvy_m_s"):
             assert guide is not None
@@ -148,8 +148,7 @@ def _guided(motion: Motion, guide: int, link: str) -> Reals:
     g = m.guides[guide]
     if link == g.link:
         return motion.at(link, g.point).error_estimate(1)
-    through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
-    slide, omega = np.abs(motion.slide_derivative(guide, 0)), np.abs(motion.link(link).omega)
-    carried = motion.at(link, through).error_estimate(1)
+    slide, omega = np.abs(motion.poses.slide_derivative(guide, 0)), np.abs(motion.link(link).omega)
+    carried = motion.at(link, m.through(g)).error_estimate(1)
     turned = slide * (r.angle(link, 1) + omega * r.rotation(link)) + omega * r.slide(guide)
     return np.asarray(carried + turned)

@@ -132,14 +132,12 @@ def _virtual(motion: Motion, name: str, j: int) -> Part:
 
 def _marks(motion: Motion, field: int | None) -> list[Mark]:
     """The marks of every input's effort, with the velocities of one field (None: the motion's own)."""
-    from virtualwork.formulas.effort import carrier
-
     m, n = motion.mechanism, motion.n
     found: list[Mark] = []
     for j, entry in enumerate(m.inputs):
         name = f"?{entry.name}"
         if not entry.is_slide:
-            reacts = carrier(motion.dynamics.scene, j)
+            reacts = m.carrier(j)
             plain = len(m.inputs) == 1 and reacts == GROUND
             for link, mark in ((str(entry.link), "?" if plain else name), (reacts, f"{name}*-1")):
                 if link != GROUND:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.motion import EvenSweep, Motion
-from virtualwork.state import BLOCK
+from virtualwork.formulas.positions import BLOCK
+from virtualwork.formulas.sweep import EvenSweep
+from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
     from cli.mechanism.solve import Job

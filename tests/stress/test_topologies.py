@@ -30,6 +30,7 @@ FAULTS = {
     674: "a limit extrapolated through a pole",
     895: "the same, in another assembly",
     1159: "two pins in one place",
+    5095: "two links that no joint holds in place",
 }
 
 
