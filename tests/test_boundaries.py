@@ -56,7 +56,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "cli": (
         ("__main__",),
         ("app",),
-        ("balance", "body", "examples", "field", "mechanism", "place", "spin", "work"),
+        ("balance", "body", "examples", "field", "imports", "mechanism", "place", "spin", "work"),
         ("show",),
         ("read",),
         ("errors",),
