@@ -317,7 +317,7 @@ class Motion:
         """Motion of any point of a link: a name, or coordinates in the link's own axes."""
         if isinstance(point, str):
             return PointMotion(self, link, self.mechanism.bodies[link][point], point)
-        return PointMotion(self, link, as_point(point))
+        return PointMotion(self, link, point if isinstance(point, complex) else as_point(point))
 
     def link(self, name: str) -> LinkMotion:
         """Motion of a link.

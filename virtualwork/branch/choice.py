@@ -63,15 +63,25 @@ class Choice(Record):
         return found
 
     @cached_property
-    def _needed(self) -> dict[frozenset[str], tuple[Step, ...]]:
+    def plain(self) -> dict[str, tuple[Case, int, float]]:
+        """The closed forms that keep their sign wherever the input goes, as far as is known: case, sign, size."""
+        return {
+            name: (self.cases[name], sign, self.mechanism.size)
+            for name, sign in self.signs.items()
+            if name in self.cases and self.geared.isdisjoint(self.cases[name].group.members)
+        }
+
+    @cached_property
+    def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
+        """What targets hang on, as far as it was asked for."""
         return {}
 
     def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
         """The steps that targets hang on; worked out once for each set of targets."""
-        key = frozenset(targets)
-        if key not in self._needed:
-            self._needed[key] = self.plan.needed(key)
-        return self._needed[key]
+        key = tuple(targets)
+        if key not in self.known_steps:
+            self.known_steps[key] = self.plan.needed(key)
+        return self.known_steps[key]
 
     def before(self, group: Group) -> list[Step]:
         """The steps that a group hangs on."""
