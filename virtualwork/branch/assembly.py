@@ -112,7 +112,7 @@ def _combinations(chosen: Assembly) -> list[tuple[dict[str, int], dict[str, Any]
                 for x in every_solution(step, st, m.size):
                     trial = st.copy()
                     write_unknowns(step, trial, x[None])
-                    after.append((trial, signs, starts | {step.name: x}))
+                    after.append((trial, signs, starts | {step.name: tuple(map(float, x))}))
             else:
                 for sign in (1,) if step.kind == "PRP" else (1, -1):
                     trial = st.copy()

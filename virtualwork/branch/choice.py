@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from dalembert.arithmetic.records import record
 from virtualwork.describe.description import Description
 from virtualwork.describe.record import Record
 from virtualwork.formulas.numbers import Reals
@@ -18,6 +19,7 @@ from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, Turn
 
 
+@record
 @dataclass(frozen=True, eq=False, repr=False)
 class Choice(Record):
     """A mechanism put together in one way.
@@ -37,10 +39,13 @@ class Choice(Record):
     mechanism: Description
     plan: Plan = field(repr=False)
     signs: Mapping[str, int] = field(default_factory=dict)
-    starts: Mapping[str, Any] = field(default_factory=dict)
+    starts: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     number: int = 1
     warnings: tuple[str, ...] = field(default=(), repr=False)
     phases: Mapping[int, float] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.mechanism!r}, {self.number})"
 
     @cached_property
     def cases(self) -> dict[str, Case]:
