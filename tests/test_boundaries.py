@@ -22,12 +22,13 @@ HEAVY = {"numpy", "pandas", "scipy", "matplotlib", "rich", "pydantic"}
 LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
-        ("amplitudes", "confidence", "placement", "tolerance", "trial"),
+        ("next_run",),
+        ("amplitudes", "confidence", "doubt", "log_balance", "placement", "tolerance", "trial"),
         ("balance", "correction"),
         ("optimality",),
-        ("limited", "rounding"),
-        ("influence", "qr"),
-        ("cones", "dependence", "phase", "rotor"),
+        ("limited", "rounding", "run_log"),
+        ("influence", "propagation", "qr"),
+        ("cone_problem", "dependence", "phase", "rotor"),
     ),
     "virtualwork": (
         ("__init__",),
@@ -45,7 +46,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "rigidbody3d": (
         ("__init__",),
-        ("freebody", "gyroscope", "momentum", "shaft", "spin", "top"),
+        ("freebody", "gyroscope", "integration", "momentum", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("rounding_in_time",),
         ("inertia",),
@@ -76,74 +77,7 @@ INSTALLED = tuple(package for package in LEVELS if package != "benchmarks")
 PACKAGES = (("benchmarks",), ("dalembert.__init__",), ("cli",), CORE, ("dalembert.arithmetic",))
 
 # What is not yet so, by file. An entry goes when its offence goes; none is added.
-KNOWN: dict[str, set[str]] = {
-    "benchmarks.truth.mechanism": {"reads _rates"},
-    "virtualwork.assembly": {"circle", "no level"},
-    "virtualwork.assur": {"circle", "no level"},
-    "virtualwork.bounds.forces": {
-        "circle",
-        "imports virtualwork.mechanism, upwards",
-        "imports virtualwork.motion, upwards",
-        "reads _rates",
-        "reads _system",
-    },
-    "virtualwork.bounds.motion": {
-        "circle",
-        "imports virtualwork.mechanism, upwards",
-        "imports virtualwork.motion, upwards",
-        "reads _join",
-        "reads _solve",
-        "reads _states",
-    },
-    "virtualwork.bounds.second_order": {"circle", "imports virtualwork.mechanism, upwards"},
-    "virtualwork.branch.change_point": {"circle"},
-    "virtualwork.check": {"no level", "reads _marched"},
-    "virtualwork.describe.reader": {"circle", "imports virtualwork.mechanism, upwards"},
-    "virtualwork.formulas.constraints": {"circle", "imports virtualwork.mechanism, upwards"},
-    "virtualwork.formulas.dynamics": {
-        "circle",
-        "imports virtualwork.bounds.forces, upwards",
-        "imports virtualwork.mechanism, upwards",
-        "imports virtualwork.motion, upwards",
-    },
-    "virtualwork.formulas.effort": {"circle", "imports virtualwork.mechanism, upwards"},
-    "virtualwork.formulas.friction": {"circle", "imports virtualwork.mechanism, upwards", "reads __dict__"},
-    "virtualwork.formulas.load_paths": {"circle", "imports virtualwork.mechanism, upwards"},
-    "virtualwork.formulas.loads": {"circle", "imports virtualwork.mechanism, upwards"},
-    "virtualwork.formulas.quantities": {"circle", "imports virtualwork.mechanism, upwards"},
-    "virtualwork.formulas.reactions": {"circle", "imports virtualwork.mechanism, upwards"},
-    "virtualwork.formulas.scene": {
-        "circle",
-        "imports virtualwork.mechanism, upwards",
-        "imports virtualwork.motion, upwards",
-        "reads _jets",
-        "reads _rates",
-        "reads _rows",
-        "reads _solve",
-    },
-    "virtualwork.formulas.statics": {
-        "circle",
-        "imports virtualwork.mechanism, upwards",
-        "reads _driving",
-        "reads _rubbed",
-    },
-    "virtualwork.joints": {"circle", "no level"},
-    "virtualwork.march": {"circle", "no level"},
-    "virtualwork.mechanism": {"circle"},
-    "virtualwork.motion": {"circle", "imports virtualwork.mechanism, upwards"},
-    "virtualwork.newton": {"circle", "no level"},
-    "virtualwork.plan.graph": {"circle", "imports virtualwork.mechanism, upwards"},
-    "virtualwork.plan.steps": {"circle", "imports virtualwork.mechanism, upwards"},
-    "virtualwork.state": {"circle", "no level"},
-    "virtualwork.study.counterweights": {
-        "imports virtualwork.mechanism, upwards",
-        "imports virtualwork.motion, upwards",
-    },
-    "virtualwork.study.cycle": {"imports virtualwork.motion, upwards", "reads _rates"},
-    "virtualwork.study.equilibrium": {"imports virtualwork.mechanism, upwards", "reads _solve"},
-    "virtualwork.track": {"circle", "no level"},
-    "cli.mechanism.poses": {"reads _marched"},
-}
+KNOWN: dict[str, set[str]] = {}
 
 
 def module_of(file: Path) -> str:

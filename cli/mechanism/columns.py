@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from cli.mechanism.studies import Document, Studies
     from cli.show.columns import Cell
-    from virtualwork.formulas.reactions import Joint
     from virtualwork.motion import Motion
+    from virtualwork.plan.joints import Joint
 
     Reals = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from cli.mechanism.poses import cells, pair
 
 if TYPE_CHECKING:
     from cli.mechanism.solve import Analysis
-    from virtualwork.formulas.reactions import Joint
     from virtualwork.motion import Motion
+    from virtualwork.plan.joints import Joint
 
 Column = list[Any]
 GROUND = "ground"
@@ -74,4 +74,6 @@ def _motion_parts(analysis: Analysis, motion: Motion) -> list[dict[str, Any]]:
 
 def acts_by_friction(motion: Motion, joint: Joint, on: str) -> bool:
     """Whether a pin's friction has a moment on a body: its column stands in every block of a sweep."""
-    return any(r.path is None and r.joint == joint.key and r.body == on for r in motion.dynamics.scene.rubs)
+    return any(
+        r.path is None and r.joint == joint.key and r.body == on for r in motion.dynamics.scene.friction
+    )

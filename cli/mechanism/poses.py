@@ -98,9 +98,7 @@ def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
         return found
     near = 1e-9 * track.length
     q = motion.inputs[:, 0]
-    changes = [float(v) for flips in track.flips.values() for v in flips]
-    changes += [float(v) for march in track._marched.values() for v in march.crossings]
-    for at in changes:
+    for at in track.crossings:
         for i in np.flatnonzero(np.abs(q - at) <= near):
             if "change point" not in found[i]:
                 found[i].append("change point")

@@ -14,8 +14,8 @@ from cli.mechanism.studies import Studies
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from virtualwork.assembly import Assembly
-    from virtualwork.track import Track
+    from virtualwork.branch.assembly import Assembly
+    from virtualwork.branch.track import Track
 
 GROUND = "ground"
 
@@ -145,7 +145,7 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
         ):
             if not motion.assembly.track.folded:  # singular in every pose: that is said once
                 note(there & ~np.isfinite(values).all(axis=1) & ~d.locked, what)
-        if d.scene.rubs:
+        if d.scene.friction:
             note(there & d.locked, "friction locks the mechanism: no reaction balances its own friction")
     return found
 

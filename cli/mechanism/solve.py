@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork import Mechanism
-    from virtualwork.assembly import Assembly
+    from virtualwork.branch.assembly import Assembly
     from virtualwork.motion import Motion
 
 ORDERS = ("position", "velocity", "acceleration", "jerk")
@@ -26,13 +25,13 @@ ORDERS = ("position", "velocity", "acceleration", "jerk")
 
 def load(path: str) -> Mechanism:
     """Read a description; - is standard input."""
-    from virtualwork.describe.reader import loads, read
+    from virtualwork import Mechanism
 
     file = "standard input" if path == "-" else path
     try:
         if path == "-":
-            return loads(load_bytes(path).decode("utf-8-sig"), file, load=load_bytes)
-        return read(Path(path), load_bytes)
+            return Mechanism.from_toml_text(load_bytes(path).decode("utf-8-sig"), file, load=load_bytes)
+        return Mechanism.from_toml(path, load_bytes)
     except UnicodeDecodeError:
         raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
     except (OSError, ValueError) as error:
@@ -77,7 +76,7 @@ class Analysis:
     @property
     def is_long(self) -> bool:
         """Whether the poses are more than one block."""
-        from virtualwork.state import BLOCK
+        from virtualwork.formulas.positions import BLOCK
 
         return self.inputs.n > BLOCK
 
@@ -186,5 +185,5 @@ class Analysis:
         for name in self.points:
             whole &= np.isfinite(motion.point(name).complex(0))
         for name in self.links:
-            whole &= np.isfinite(motion.angle(name))
+            whole &= np.isfinite(motion.link(name).angle)
         return whole

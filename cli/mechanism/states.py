@@ -60,7 +60,7 @@ def table(analysis: Analysis) -> Table:
 
     @cache
     def bounds(motion: Motion, link: str, field: int | None, guide: int | None, key: str) -> list[float]:
-        along = motion if field is None else motion.dynamics.error_estimate().unit(field)
+        along = motion if field is None else motion.unit(field)
         center = motion.dynamics.scene.rigid[link].center
         if key in ("fvx_m_s", "fvy_m_s"):
             assert guide is not None
@@ -171,14 +171,12 @@ def _virtual(motion: Motion, name: str, j: int) -> Part:
 
 def _marks(motion: Motion, field: int | None) -> list[Mark]:
     """The marks of every input's effort, with the velocities of one field (None: the motion's own)."""
-    from virtualwork.formulas.effort import carrier
-
     m, n = motion.mechanism, motion.n
     found: list[Mark] = []
     for j, entry in enumerate(m.inputs):
         name = f"?{entry.name}"
         if not entry.is_slide:
-            reacts = carrier(motion.dynamics.scene, j)
+            reacts = m.carrier(j)
             plain = len(m.inputs) == 1 and reacts == GROUND
             for link, mark in ((str(entry.link), "?" if plain else name), (reacts, f"{name}*-1")):
                 if link != GROUND:
@@ -225,8 +223,7 @@ def _guided(motion: Motion, guide: int, link: str) -> NDArray[np.float64]:
     g = m.guides[guide]
     if link == g.link:
         return motion.at(link, g.point).error_estimate(1)
-    through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
-    slide, omega = np.abs(motion.slide_derivative(guide, 0)), np.abs(motion.link(link).omega)
-    carried = motion.at(link, through).error_estimate(1)
+    slide, omega = np.abs(motion.poses.slide_derivative(guide, 0)), np.abs(motion.link(link).omega)
+    carried = motion.at(link, m.through(g)).error_estimate(1)
     turned = slide * (r.angle(link, 1) + omega * r.rotation(link)) + omega * r.slide(guide)
     return np.asarray(carried + turned)

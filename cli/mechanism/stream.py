@@ -10,8 +10,9 @@ import numpy as np
 
 from cli.mechanism.columns import column
 from cli.show.columns import Table
-from virtualwork.motion import EvenSweep, Motion
-from virtualwork.state import BLOCK
+from virtualwork.formulas.positions import BLOCK
+from virtualwork.formulas.sweep import EvenSweep
+from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
     from cli.mechanism.solve import Analysis

@@ -73,8 +73,8 @@ class Studies:
             found |= newton_document(analysis)
         if request.check:
             found["check"] = check_document(analysis)
-        cyclic = request.swept and len(analysis.mechanism.inputs) == 1
-        if (request.forces or request.flywheel is not None) and cyclic:
+        of_one = request.forces and len(analysis.mechanism.inputs) == 1
+        if (of_one or request.flywheel is not None) and request.swept:
             found["cycle"] = cycle(analysis, request.flywheel)
         if request.equilibrium:
             found["equilibria"], said = equilibria(analysis, request.swept)
@@ -86,7 +86,7 @@ class Studies:
 
 def check_document(analysis: Analysis) -> Document:
     """The character of the mechanism."""
-    from virtualwork.check import Check
+    from virtualwork.study.check import Check
 
     check = Check(analysis.mechanism.assembly)
     slide = bool(analysis.mechanism.inputs) and analysis.mechanism.inputs[0].is_slide
@@ -119,7 +119,7 @@ def check_document(analysis: Analysis) -> Document:
 
 def newton_document(analysis: Analysis) -> Document:
     """Newton-Raphson from the guess at every pose; the table of the first, the largest difference of all."""
-    from virtualwork.newton import all_at_once
+    from virtualwork.study.newton_table import all_at_once
 
     assembly = analysis.assemblies[0]
     done = [all_at_once(assembly, tuple(row)) for row in analysis.inputs.values.tolist()]
@@ -186,7 +186,7 @@ def cycle(analysis: Analysis, coefficient: float | None) -> Document:
 
 def equilibria(analysis: Analysis, swept: bool) -> tuple[list[Document], list[str]]:
     """The positions where the loads balance without effort, and what to say of them."""
-    from virtualwork.study.equilibrium import equilibria as search
+    from virtualwork import equilibria as search
 
     m = analysis.mechanism
     spans = None

@@ -7,7 +7,7 @@ import math
 from cli.mechanism.solve import ORDERS, Analysis
 from cli.mechanism.studies import Document, Studies
 from cli.show.text import table_text
-from virtualwork.assur import Group, Place, Slide, Turn
+from virtualwork.plan.steps import Group, Place, Slide, Turn
 
 
 def afterword(studies: Studies, *, explain: bool) -> str:
@@ -182,7 +182,7 @@ def explain_forces(analysis: Analysis) -> str:
     lines.append(
         f"  formed for the reactions: {', '.join(sorted(motion.dynamics.reactions.formed)) or 'nothing'}"
     )
-    if motion.dynamics.scene.rubs:
+    if motion.dynamics.scene.friction:
         lines.append(f"  friction: {motion.dynamics.friction_iterations} iterations")
     return "\n".join(lines)
 

@@ -144,6 +144,7 @@ def test_extra_columns_are_ignored_and_said(dalembert: Dalembert) -> None:
 
 
 @pytest.mark.parametrize("bad", ["x", "", "nan", "1_0"])
+@pytest.mark.slow
 def test_the_last_of_many_rows_is_named(bad: str, dalembert: Dalembert, tmp_path: Path) -> None:
     rows = 100_000
     (tmp_path / "rotor.csv").write_text("rotor," + HEAD + "7,9,30,60,20\n" * rows + f"8,9,{bad},60,20\n")

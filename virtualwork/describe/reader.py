@@ -7,28 +7,19 @@ import itertools
 import math
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
-from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+from virtualwork.describe.checks import hint
+from virtualwork.describe.description import Description
 from virtualwork.describe.errors import DescriptionError, MechanismError
+from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
+from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link
 from virtualwork.describe.tables import rows
 from virtualwork.describe.units import EXPECTED, parse, scaled, unit
-from virtualwork.mechanism import (
-    GROUND,
-    Force,
-    Friction,
-    Gear,
-    Guess,
-    Guide,
-    Input,
-    Link,
-    Mechanism,
-    Motor,
-    Spring,
-    Torque,
-    TorsionSpring,
-)
+
+D = TypeVar("D", bound=Description)
+Load = Callable[[Path], bytes]
 
 LARGEST = 1e60  # SI: no quantity of a machine is larger, and no product of five of them overflows
 TABLES = {
@@ -37,8 +28,8 @@ TABLES = {
 }  # fmt: skip
 
 
-def read(path: Path, load: Callable[[Path], bytes] = Path.read_bytes) -> Mechanism:
-    """Read a mechanism from a TOML file; `load` reads it and the tables beside it.
+def read(path: Path, make: Callable[..., D], load: Load = Path.read_bytes) -> D:
+    """Read a mechanism from a TOML file; `make` takes its parts, `load` reads it and the tables beside it.
 
     Raises
     ------
@@ -47,15 +38,16 @@ def read(path: Path, load: Callable[[Path], bytes] = Path.read_bytes) -> Mechani
     OSError
         Where the file cannot be read.
     """
-    return loads(load(path).decode("utf-8-sig"), str(path), path.parent, load)
+    return read_text(load(path).decode("utf-8-sig"), make, str(path), path.parent, load)
 
 
-def loads(
+def read_text(
     text: str,
+    make: Callable[..., D],
     file: str = "<text>",
     folder: Path | None = None,
-    load: Callable[[Path], bytes] = Path.read_bytes,
-) -> Mechanism:
+    load: Load = Path.read_bytes,
+) -> D:
     """Read a mechanism from TOML text; `folder` is where its input tables lie, which `load` reads."""
     try:
         data = tomllib.loads(text)
@@ -64,7 +56,7 @@ def loads(
     except ValueError as error:  # a TOMLDecodeError, or a number of thousands of digits
         raise DescriptionError(f"{file}: no valid TOML: {error}") from None
     try:
-        return _Reader(data, folder or Path(), load).mechanism()
+        return make(**_Reader(data, folder or Path(), load).parts())
     except MechanismError as error:
         raise type(error)(f"{file}: {error}") from None
 
@@ -72,7 +64,7 @@ def loads(
 class _Reader:
     """Walks the tables; every complaint names the table and the key."""
 
-    def __init__(self, data: dict[str, Any], folder: Path, load: Callable[[Path], bytes]) -> None:
+    def __init__(self, data: dict[str, Any], folder: Path, load: Load) -> None:
         self.data, self.folder, self.load = data, folder, load
         _known(data, TABLES, "the file", "table")
         units = data.get("units", {})
@@ -109,7 +101,8 @@ class _Reader:
             raise _wrong(where, value, "two numbers [x, y]")
         return complex(*(self.number(v, kind, where) for v in value))
 
-    def mechanism(self) -> Mechanism:
+    def parts(self) -> dict[str, Any]:
+        """Every part of the mechanism, under the name that `Description` gives it."""
         ground = {
             name: self.pair(v, "length", f"[ground] {name}") for name, v in self.table("ground").items()
         }
@@ -120,22 +113,22 @@ class _Reader:
         guides = [self.guide(e, i, "slots") for i, e in self.rows("slots")]
         guides += [self.guide(e, i, "sliders") for i, e in self.rows("sliders")]
         inputs = self.inputs()
-        return Mechanism(
-            ground=ground,
-            links=self.links,
-            guides=guides,
-            gears=[self.gear(e, i) for i, e in self.rows("gears")],
-            inputs=inputs,
-            guess=self.guess(inputs),
-            name=self.name(),
-            gravity=self.gravity(),
-            forces=[self.force(e, i) for i, e in self.rows("forces")],
-            torques=[self.torque(e, i) for i, e in self.rows("torques")],
-            springs=[self.spring(e, i) for i, e in self.rows("springs")],
-            torsion_springs=[self.torsion(e, i) for i, e in self.rows("torsion_springs")],
-            motors=[self.motor(e, i) for i, e in self.rows("motors")],
-            friction=[self.rub(e, i) for i, e in self.rows("friction")],
-        )
+        return {
+            "ground": ground,
+            "links": self.links,
+            "guides": guides,
+            "gears": [self.gear(e, i) for i, e in self.rows("gears")],
+            "inputs": inputs,
+            "guess": self.guess(inputs),
+            "name": self.name(),
+            "gravity": self.gravity(),
+            "forces": [self.force(e, i) for i, e in self.rows("forces")],
+            "torques": [self.torque(e, i) for i, e in self.rows("torques")],
+            "springs": [self.spring(e, i) for i, e in self.rows("springs")],
+            "torsion_springs": [self.torsion(e, i) for i, e in self.rows("torsion_springs")],
+            "motors": [self.motor(e, i) for i, e in self.rows("motors")],
+            "friction": [self.rub(e, i) for i, e in self.rows("friction")],
+        }
 
     def name(self) -> str:
         found = self.data.get("name", "")
@@ -180,7 +173,7 @@ class _Reader:
                 start = v.get("from")
                 if start not in waiting:
                     raise DescriptionError(
-                        f"{where} points.{p} from: unknown point '{start}'{_hint(start, given)}"
+                        f"{where} points.{p} from: unknown point '{start}'{hint(str(start), given)}"
                     )
                 raise DescriptionError(f"{where} points.{p} from: '{start}' hangs on '{p}' itself")
             for p in ready:
@@ -229,7 +222,7 @@ class _Reader:
             through = self.pair(through, "length", f"{where} through")
         elif on in self.bodies and through not in self.bodies[on]:
             raise DescriptionError(
-                f"{where} through: unknown point '{through}' of {on}{_hint(through, self.bodies[on])}"
+                f"{where} through: unknown point '{through}' of {on}{hint(through, self.bodies[on])}"
             )
         angle = self.number(entry.get("angle", 0.0), "angle", f"{where} angle")
         turned = None
@@ -347,12 +340,12 @@ class _Reader:
                 continue
             if isinstance(value, list):
                 if key not in names:
-                    raise DescriptionError(f"{where}: unknown point '{key}'{_hint(key, names)}")
+                    raise DescriptionError(f"{where}: unknown point '{key}'{hint(str(key), names)}")
                 points[key] = self.pair(value, "length", where)
             elif key in self.links:
                 angles[key] = self.number(value, "angle", where)
             else:
-                raise DescriptionError(f"{where}: unknown link '{key}'{_hint(key, self.links)}")
+                raise DescriptionError(f"{where}: unknown link '{key}'{hint(key, self.links)}")
         return Guess(at, angles, points)
 
     # --- loads ----------------------------------------------------------------------------------------------
@@ -367,7 +360,7 @@ class _Reader:
         if isinstance(value, str):
             if value not in self.bodies[link]:
                 raise DescriptionError(
-                    f"{where}: unknown point '{value}' of {link}{_hint(value, self.bodies[link])}"
+                    f"{where}: unknown point '{value}' of {link}{hint(str(value), self.bodies[link])}"
                 )
             return self.bodies[link][value]
         return self.pair(value, "length", where)
@@ -375,7 +368,7 @@ class _Reader:
     def body(self, name: Any, where: str, ground: bool = True) -> str:
         names = self.bodies if ground else self.links
         if not isinstance(name, str) or name not in names:
-            raise DescriptionError(f"{where}: unknown link '{name}'{_hint(name, names)}")
+            raise DescriptionError(f"{where}: unknown link '{name}'{hint(name, names)}")
         return name
 
     def force(self, entry: dict[str, Any], i: int) -> Force:
@@ -466,7 +459,7 @@ class _Reader:
             known = {p for points in self.bodies.values() for p in points}
             expected = " or ".join(f'"{body}.{name}"' for body in owners)
             raise _wrong(
-                where, name, expected or f'a link and its point such as "crank.B"{_hint(name, known)}'
+                where, name, expected or f'a link and its point such as "crank.B"{hint(str(name), known)}'
             )
         return owners[0], str(name)
 
@@ -502,7 +495,7 @@ class _Reader:
         joint = str(entry["joint"])
         names = {p for body in self.bodies.values() for p in body}
         if joint not in names:
-            raise DescriptionError(f"{where} joint: unknown point '{joint}'{_hint(joint, names)}")
+            raise DescriptionError(f"{where} joint: unknown point '{joint}'{hint(joint, names)}")
         return Friction(
             joint,
             self.number(entry["coefficient"], "number", f"{where} coefficient"),
@@ -515,18 +508,13 @@ def _known(entry: Mapping[str, Any], names: set[str], where: str, what: str) -> 
         raise _wrong(where, entry, "a table")
     for key in entry:
         if key not in names:
-            raise DescriptionError(f"{where}: unknown {what} '{key}'{_hint(key, names)}")
+            raise DescriptionError(f"{where}: unknown {what} '{key}'{hint(str(key), names)}")
 
 
 def _need(entry: Mapping[str, Any], keys: tuple[str, ...], where: str) -> None:
     for key in keys:
         if key not in entry:
             raise DescriptionError(f"{where}: '{key}' is missing")
-
-
-def _hint(word: Any, names: Iterable[str]) -> str:
-    close = get_close_matches(str(word), list(names), n=1, cutoff=0.4)
-    return f"; did you mean '{close[0]}'?" if close else ""
 
 
 def _wrong(where: str, found: Any, expected: str) -> DescriptionError:

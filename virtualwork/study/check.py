@@ -6,25 +6,20 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe.description import Description
 from virtualwork.describe.errors import AssemblyError
+from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.constraints import Constraints, coordinates, dependent
-from virtualwork.mechanism import GROUND
-from virtualwork.state import State
+from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.positions import State
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from virtualwork.assembly import Assembly
-    from virtualwork.mechanism import Mechanism
-    from virtualwork.motion import Motion
-
-    Reals = NDArray[np.float64]
-
-EQUAL = 1e-12  # two sums of lengths nearer than this, relative, are equal
+# two sums of lengths nearer than this, relative, are equal
+EQUAL = 1e-12
 
 
 @dataclass(frozen=True)
@@ -42,6 +37,7 @@ class FourBar:
     transmission: tuple[float, float]
 
 
+@dataclass(frozen=True)
 class Check:
     """A mechanism's character; every part is worked out when first read.
 
@@ -59,11 +55,14 @@ class Check:
     ('triple-rocker', [46.567463, 313.432537])
     """
 
-    def __init__(self, assembly: Assembly) -> None:
-        self.assembly = assembly
+    assembly: Assembly
+
+    def __repr__(self) -> str:
+        four_bars = ", ".join(f"{'-'.join(f.links)}: {f.grashof}" for f in self.four_bars) or "no four-bar"
+        return f"Check({self.mechanism.name!r}: mobility {self.mobility}, {four_bars})"
 
     @property
-    def mechanism(self) -> Mechanism:
+    def mechanism(self) -> Description:
         """What is checked."""
         return self.assembly.mechanism
 
@@ -104,8 +103,7 @@ class Check:
         best, chosen = np.inf, None
         for q in qs:
             inputs = (q, *m.at[1:])
-            motion = _motion(self.assembly, inputs)
-            condition = float(motion.condition[0])
+            condition = float(Poses(self.assembly, np.array([inputs])).condition[0])
             if condition < best or (chosen is None and condition == np.inf):
                 best, chosen = condition, inputs
         if chosen is None:
@@ -147,7 +145,7 @@ class Check:
         """Inputs at which the linkage locks, every end of a range of the input, rad, or m.
 
         Angles in [0, period of the branch): where change points make a branch need two turns of the input, the
-        same angle a turn later is another pose (`virtualwork.track.Track.turns`).
+        same angle a turn later is another pose (`virtualwork.branch.track.Track.turns`).
         """
         return self._in_period(
             [limit.input for limit in self.assembly.track.limits()] if self.assembly.track.active else []
@@ -160,9 +158,7 @@ class Check:
         if not track.active:
             return ()
         track.cover(*self._span())
-        found = [float(q) for flips in track.flips.values() for q in flips]
-        found += [float(q) for march in track._marched.values() for q in march.crossings]
-        return self._in_period(found)
+        return self._in_period(track.crossings)
 
     def _in_period(self, found: list[float]) -> tuple[float, ...]:
         period = self.assembly.track.period
@@ -236,17 +232,15 @@ class Check:
         return FourBar(links, lengths, grashof_class(*lengths), (angles[0], angles[-1]))
 
     @cached_property
-    def _sampled(self) -> Motion:
-        """The motion over the whole span, for every four-bar the same."""
-        from virtualwork.motion import Motion
-
+    def _sampled(self) -> Poses:
+        """Poses over the whole span, for every four-bar the same."""
         low, high = self._span()
         q = np.linspace(low, high, 1441)
-        return Motion(self.assembly, q if self.assembly.track.active else np.array([self.mechanism.at]))
+        return Poses(self.assembly, q if self.assembly.track.active else np.array([self.mechanism.at]))
 
     def _seen(self, bodies: tuple[str, ...], corners: list[str]) -> list[float]:
         """The transmission angle over the motion, sampled, for chains that are not driven at their own crank."""
-        b, c, d = (self._sampled.point(p).complex(0) for p in corners[1:])
+        b, c, d = (self._sampled.point_derivative(GROUND, 0j, 0, p) for p in corners[1:])
         mu = np.abs(np.angle((b - c) * np.conj(d - c)))
         mu = mu[np.isfinite(mu)]
         return [float(mu.min()), float(mu.max())] if len(mu) else [math.nan, math.nan]
@@ -295,9 +289,3 @@ def _cycles(order: list[str], pins: dict[frozenset[str], list[str]]) -> list[tup
                     ):
                         found.append((a, b, c, d))
     return found
-
-
-def _motion(assembly: Assembly, inputs: tuple[float, ...]) -> Any:
-    from virtualwork.motion import Motion
-
-    return Motion(assembly, np.array([inputs]))

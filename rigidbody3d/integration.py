@@ -110,7 +110,7 @@ class Trajectory:
             bound = bound + walk * (np.abs(self.energy) + abs(self.mgl))
         else:
             here: Array = getattr(self, of)
-            bound = bound + walk * np.sqrt(np.square(here).sum(axis=-1, keepdims=True)) + 0 * here
+            bound = bound + walk * quaternion.length(here) + 0 * here
         for other in tensors_off(self.tensor, tensor, axes=False):
             bound = bound + apart(self._run_again(other), finer, of)
         return np.asarray(bound)
@@ -372,7 +372,8 @@ def _split(
 def _free_and_kick(state: list[float], h: float, I1: float, I3: float, mgl: float) -> None:
     """Half a kick, a free rotation exp(H h/I1) q exp(e3 (1/I3 - 1/I1) H3 h), half a kick."""
     X, Y, Z, w, x, y, z = state
-    k = h * mgl  # half of 2·mgl·h
+    # half of 2·mgl·h
+    k = h * mgl
     X, Y = X - k * (y * z - w * x), Y + k * (x * z + w * y)
     axis = 2 * (x * z + w * y) * X + 2 * (y * z - w * x) * Y + (w * w - x * x - y * y + z * z) * Z
     size = math.sqrt(X * X + Y * Y + Z * Z)

@@ -6,34 +6,33 @@ corrected by Newton-Raphson on all poses together, so that no error accumulates.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from virtualwork.newton import newton, settle, singular, solve, stack, stack_rows, write_unknowns
-from virtualwork.state import Jets, State, columns
+from virtualwork.branch.choice import Along
+from virtualwork.formulas.double_roots import settle, singular
+from virtualwork.formulas.linear import solve, stack, stack_rows
+from virtualwork.formulas.newton import newton, write_unknowns
+from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.positions import State, columns
+from virtualwork.formulas.rates import Rates
+from virtualwork.plan.steps import Group
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from virtualwork.assembly import Assembly
-    from virtualwork.assur import Group
-    from virtualwork.track import Track
-
-    Reals = NDArray[np.float64]
-
-NODES = 120  # of one turn
-FINEST = 1e-7  # of one turn: a step this short has met a limit
+# of one turn
+NODES = 120
+# of one turn: a step this short has met a limit
+FINEST = 1e-7
 
 
-class March:
+class Continuation:
     """The nodes of one group's branch, from the guess outwards."""
 
-    def __init__(self, track: Track, group: Group) -> None:
+    def __init__(self, track: Along, group: Group) -> None:
         self.track, self.group = track, group
         self.assembly = track.assembly
         self.size = self.assembly.mechanism.size
-        self.before = [s for s in self.assembly.needed(self.assembly.plan.writes(group)) if s is not group]
+        self.before = self.assembly.before(group)
         self.ends: list[tuple[float, int]] = []
         self._crossed: list[tuple[float, float]] = []
         self._found: dict[tuple[float, float], float] = {}
@@ -47,17 +46,16 @@ class March:
     def _state(self, q: float) -> State:
         st = State([np.array([q])], many=True)
         with np.errstate(all="ignore"):
-            self.assembly.run(self.before, st)
+            self.track.run(self.before, st)
         return st
 
     def _rate(self, q: float, x: Reals) -> tuple[Reals, float]:
         """dx/dq and the determinant (its sign is the branch)."""
         st = self._state(q)
         write_unknowns(self.group, st, x[None])
-        d = Jets(self.assembly.plan, st, [[1.0]], self.track)
-        for s in self.before:
-            d.step(s, 1)
-        jacobian = stack(columns(self.group, st, self.assembly.plan), 1)
+        d = Rates(self.assembly.plan, st, [[1.0]], self.track)
+        d.advance(self.before, 1)
+        jacobian = stack(columns(self.group, st), 1)
         right = stack_rows(d.right_side(self.group, 1), 1)
         rate = solve(jacobian, -right)[0]
         if jacobian.shape[1] == jacobian.shape[2]:
@@ -87,7 +85,7 @@ class March:
             guess = x + side * step * rate
             st = self._state(to)
             with np.errstate(all="ignore"):
-                found, closed = newton(self.group, st, self.assembly.plan, guess[None], self.size, limit=12)
+                found, closed = newton(self.group, st, guess[None], self.size, limit=12)
             if closed[0]:
                 new, det = self._rate(to, found[0])
                 # a slide that runs away is measured by itself
@@ -116,9 +114,9 @@ class March:
         some = np.unique(np.linspace(0, len(self.q) - 1, 24).astype(int))
         st = State([np.array(self.q)[some]], many=True)
         with np.errstate(all="ignore"):
-            self.assembly.run(self.before, st)
+            self.track.run(self.before, st)
             write_unknowns(self.group, st, np.array(self.x)[some])
-        return singular(self.group, st, self.assembly.plan, len(some))
+        return singular(self.group, st, len(some))
 
     @property
     def crossings(self) -> list[float]:
@@ -134,6 +132,9 @@ class March:
                 nodes = np.cos(np.pi * (np.arange(12) + 0.5) / 12)
                 x = self.unknowns(centre + half * nodes)
                 det = [self._rate(q, row)[1] for q, row in zip(centre + half * nodes, x, strict=True)]
+                if not np.isfinite(det).all():  # a pose between the two that does not close: no more is known
+                    self._found[a, b] = centre
+                    continue
                 roots = np.polynomial.Chebyshev.fit(nodes, det, 10, domain=[-1, 1]).roots()
                 real = np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= 1.1)])
                 self._found[a, b] = (
@@ -145,7 +146,7 @@ class March:
         """The group's unknowns at inputs q, (n, unknowns)."""
         st = State([q], many=True)
         with np.errstate(all="ignore"):
-            self.assembly.run(self.before, st)
+            self.track.run(self.before, st)
             self.close(st)
         rows = [st.angle[b] for b in self.group.angles] + [st.slide[g] for g in self.group.slides]
         return np.stack([np.broadcast_to(r, q.shape) for r in rows], axis=1)
@@ -222,16 +223,12 @@ class March:
                 root = np.sqrt(np.maximum((limit - q[beyond]) / left, 0.0))[:, None]
                 start[beyond] = x[end] + 2 * rate[end] * left * (1 - root)
                 inside |= beyond
-        many = st
-        if not st.many:
-            many = State([q], many=True)
-            for name in ("turn", "point", "slide", "angle"):
-                setattr(many, name, getattr(st, name))
+        many = st if st.many else st.copy(many=True)
         start[~inside] = np.nan
         with np.errstate(all="ignore"):
-            found, closed = newton(self.group, many, self.assembly.plan, start, self.size)
+            found, closed = newton(self.group, many, start, self.size)
             if self.group.name in self.track.folded:
-                found = settle(self.group, many, self.assembly.plan, found, self.size)
+                found = settle(self.group, many, found, self.size)
                 st.folded.add(self.group.name)
         found[~(closed & inside)] = np.nan
         write_unknowns(self.group, st, found)
@@ -240,13 +237,14 @@ class March:
         )
 
 
-def march_along(assembly: Assembly, group: Group, st: State) -> None:
+def along_lines(track: Along, group: Group, st: State) -> None:
     """With several inputs: every pose on its own straight line of inputs from the guess, all poses together."""
+    assembly = track.assembly
     m = assembly.mechanism
     q = [np.atleast_1d(np.asarray(v, dtype=float)) for v in st.inputs]
     n = max(len(v) for v in q)
     at = m.at
-    before = [s for s in assembly.needed(assembly.plan.writes(group)) if s is not group]
+    before = assembly.before(group)
     far = max(float(np.abs(v - at[j]).max()) for j, v in enumerate(q))
     steps = max(1, int(np.ceil(far / (2 * np.pi / NODES))))
     x: Any = np.tile(np.asarray(assembly.starts[group.name], dtype=float), (n, 1))
@@ -256,9 +254,9 @@ def march_along(assembly: Assembly, group: Group, st: State) -> None:
         t = i / steps
         trial = State([at[j] + t * (np.broadcast_to(v, n) - at[j]) for j, v in enumerate(q)], many=True)
         with np.errstate(all="ignore"):
-            assembly.run(before, trial)
+            track.run(before, trial)
             start = x if last is None else 2 * x - last
-            found, ok = newton(group, trial, assembly.plan, start, m.size)
+            found, ok = newton(group, trial, start, m.size)
         closed &= ok
         last, x = x, np.where(ok[:, None], found, x)
     x[~closed] = np.nan

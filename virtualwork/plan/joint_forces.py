@@ -1,51 +1,28 @@
-"""The joints of a mechanism, and in which order their forces follow from each other."""
+"""In which order joint forces follow from each other: multipliers of loops, balances of bodies and pins."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from virtualwork.describe.description import Description
 from virtualwork.describe.errors import MechanismError
-from virtualwork.mechanism import GROUND
-from virtualwork.plan.steps import Group
+from virtualwork.describe.parts import GROUND
+from virtualwork.plan.joints import joints, relations
+from virtualwork.plan.steps import Group, Plan
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from virtualwork.mechanism import Mechanism
-    from virtualwork.plan.steps import Plan
-
-    Reals = NDArray[np.float64]
-
-Side = tuple[str, str]  # (joint, body): the force of a joint on a body; joint is "pin:B" or "guide:0"
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A joint as the reactions see it: a pin or a guide, and the bodies it joins in the file's order."""
-
-    key: str
-    name: str
-    bodies: tuple[str, ...]
-    guide: int | None = None
-
-
-def joints(m: Mechanism) -> list[Joint]:
-    """Every joint of the mechanism: pins in the order of the file, then guides."""
-    found = [Joint(f"pin:{name}", name, bodies) for name, bodies in m.pins.items()]
-    order = list(m.bodies)
-    for i, g in enumerate(m.guides):
-        found.append(Joint(f"guide:{i}", g.point, tuple(sorted((g.link, g.on), key=order.index)), i))
-    return found
+Reals = NDArray[np.float64]
+# the force of a joint on a body, (joint, body); a joint is "pin:B" or "guide:0"
+Side = tuple[str, str]
 
 
 class Order:
     """How each joint force is found: as a multiplier of a loop, or from the balance of a body or a pin."""
 
-    def __init__(self, mechanism: Mechanism, plan: Plan) -> None:
+    def __init__(self, mechanism: Description, plan: Plan) -> None:
         self.mechanism, self.plan = mechanism, plan
         self.joints = joints(mechanism)
         self.by_key = {joint.key: joint for joint in self.joints}
@@ -100,23 +77,13 @@ class Order:
         unknowns: list[tuple[str, int]] = []
         columns_: list[Reals] = []
 
-        def add(kind: str, i: int, acts: dict[str, float]) -> None:
+        for relation in sorted(relations(self.mechanism), key=lambda r: r.kind == "input"):
             column = np.zeros(len(bodies))
-            for body, factor in acts.items():
+            for body, factor in relation.shares.items():
                 if body != GROUND:
                     column[bodies.index(body)] += factor
-            unknowns.append((kind, i))
+            unknowns.append((relation.kind, relation.number))
             columns_.append(column)
-
-        m = self.mechanism
-        for i, guide in enumerate(m.guides):
-            if guide.is_slider:
-                add("guide", i, {guide.link: 1.0, guide.on: -1.0})
-        for i, gear in enumerate(m.gears):
-            add("gear", i, gear.shares())
-        for j, entry in enumerate(m.inputs):
-            if not entry.is_slide:
-                add("input", j, {str(entry.link): 1.0, entry.on: -1.0})
         pattern = np.array(columns_).reshape(len(unknowns), len(bodies)).T
         return unknowns, pattern, self._rows_of(pattern)
 

@@ -4,7 +4,7 @@ The equations of the joints and the coordinates they hold form a bipartite graph
 decomposition (A. L. Dulmage, N. S. Mendelsohn, Can. J. Math. 10 (1958) 517) is unique; its irreducible blocks, in
 order, are the Assur groups: each is solved when what it hangs on is known. Angles tied by sliders, gears and
 inputs are linear relations and are eliminated before anything else; what remains of a block is its loop closure
-R_1 e^{iθ1} + R_2 e^{iθ2} + ... = 0 (000 eq. 1.3.1; 003) in its own few angles and slides.
+R_1 e^{iθ1} + R_2 e^{iθ2} + ... = 0 (Ibrahim eq. 1.3.1; Nicoletti, lecture 7) in its own few angles and slides.
 """
 
 from __future__ import annotations
@@ -12,34 +12,30 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
-import numpy as np
-
-from virtualwork.mechanism import GROUND
-from virtualwork.plan.graph import Variable, decompose
+from virtualwork.describe.description import Description
+from virtualwork.describe.parts import GROUND
+from virtualwork.plan.graph import decompose
+from virtualwork.plan.guessed import known_by_guess
+from virtualwork.plan.joints import relations
 from virtualwork.plan.steps import (
     Angle,
     Closure,
     Group,
     Kind,
+    Path,
     Place,
     Plan,
     Slide,
     Step,
     Term,
     Turn,
+    Variable,
     combined,
 )
 
-if TYPE_CHECKING:
-    from virtualwork.mechanism import Mechanism
-
-# the position of a point: a known node, and what is added to it
-Chain = tuple[str | None, tuple[Term, ...]]
 Key = TypeVar("Key", int, str)
-
-__all__ = ["Angle", "Closure", "Group", "Place", "Plan", "Slide", "Step", "Term", "Turn", "direction", "plan"]
 
 
 def direction(angle: float) -> complex:
@@ -54,14 +50,14 @@ def direction(angle: float) -> complex:
     return complex(math.cos(angle), math.sin(angle))
 
 
-def plan(m: Mechanism, *, merged: bool = False, phases: Mapping[int, float] | None = None) -> Plan:
+def plan(m: Description, *, merged: bool = False, phases: Mapping[int, float] | None = None) -> Plan:
     """The order of solution of a mechanism.
 
     Parameters
     ----------
-    m : Mechanism
+    m : Description
     merged : bool
-        All loops at once in one group (the Newton-Raphson of 003) instead of group by group.
+        All loops at once in one group (the Newton-Raphson of Nicoletti, lecture 7) instead of group by group.
     phases : mapping of a gear's number to its constant Σ c·θ, rad, optional
         Where they are known already.
 
@@ -73,48 +69,16 @@ def plan(m: Mechanism, *, merged: bool = False, phases: Mapping[int, float] | No
     return _Planner(m, merged, phases or {}).run()
 
 
-def known_by_guess(m: Mechanism) -> tuple[dict[str, float], dict[str, complex]]:
-    """Rough link angles and point positions from the guess, the ground and the inputs, as far as they reach."""
-    angles = dict(m.guess.angles)
-    points = dict(m.ground) | dict(m.guess.points)
-    for j, e in enumerate(m.inputs):
-        if e.link is not None and e.on == GROUND:
-            angles[e.link] = m.at[j]
-    for g in m.guides:
-        if g.turned is not None and g.on == GROUND:
-            angles.setdefault(g.link, g.angle + g.turned)
-        if g.turned is not None and g.link == GROUND:
-            angles.setdefault(g.on, -(g.angle + g.turned))
-    before = -1
-    while len(angles) + len(points) > before:
-        before = len(angles) + len(points)
-        for name, link in m.links.items():
-            here = [p for p in link.points if p in points]
-            if name not in angles and len(here) >= 2:
-                ends = max(
-                    ((a, b) for a in here for b in here),
-                    key=lambda ab: abs(link.points[ab[1]] - link.points[ab[0]]),
-                )
-                local = link.points[ends[1]] - link.points[ends[0]]
-                seen = points[ends[1]] - points[ends[0]]
-                if local and seen:
-                    angles[name] = float(np.angle(seen / local))
-            if name in angles and here:
-                turn = np.exp(1j * angles[name])
-                for p, z in link.points.items():
-                    points.setdefault(p, complex(points[here[0]] + (z - link.points[here[0]]) * turn))
-    return angles, points
-
-
 class _Planner:
     """Walks the blocks in order and writes the steps."""
 
-    def __init__(self, m: Mechanism, merged: bool, phases: Mapping[int, float]) -> None:
+    def __init__(self, m: Description, merged: bool, phases: Mapping[int, float]) -> None:
         self.m, self.merged, self.phases = m, merged, phases
         self.guess = known_by_guess(m)[0] if m.gears else {}
+        self.relations = list(relations(m))
         self.steps: list[Step] = []
         self.angles: dict[str, Angle] = {GROUND: Angle()}
-        self.anchors: dict[str, Chain] = {GROUND: (None, ())}
+        self.anchors: dict[str, Path] = {GROUND: (None, ())}
         self.nodes: set[str] = set()
         self.slides_known: set[int] = set()
         self.directions = {i: direction(g.angle) for i, g in enumerate(m.guides)}
@@ -160,15 +124,11 @@ class _Planner:
         self.guide_nodes[i] = g.point
         return self._place(g.point, g.link, self.m.bodies[g.link][g.point])
 
-    def _through(self, i: int) -> complex:
-        g = self.m.guides[i]
-        return self.m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
-
     # --- one block ----------------------------------------------------------------------------------------
     def _block(self, block: tuple[Variable, ...]) -> None:
         fresh = [name for kind, name in block if kind == "angle"]
         slides = sorted(int(name) for kind, name in block if kind == "slide")
-        driven = {self._driven_guide(j): j for j, e in enumerate(self.m.inputs) if e.is_slide}
+        driven = {self.m.guide_of(e): j for j, e in enumerate(self.m.inputs) if e.is_slide}
         for i in slides:
             if i in driven:
                 self.steps.append(Slide(i, driven[i]))
@@ -193,9 +153,6 @@ class _Planner:
         self.anchors.update(trees)
         self._settle()
 
-    def _driven_guide(self, j: int) -> int:
-        return next(i for i, g in enumerate(self.m.guides) if g.point == self.m.inputs[j].slider)
-
     def _kind(self, group: Group) -> Kind:
         """Chace's case, where the group is one loop with two unknowns that turn or slide simply."""
         if len(group.closures) != 1 or len(group.angles) + len(group.slides) != 2:
@@ -218,25 +175,19 @@ class _Planner:
         return "PRP"
 
     # --- angles: sliders, gears and inputs are linear relations ----------------------------------------------
-    def _relations(self, fresh: list[str]) -> list[tuple[dict[str, float], Angle]]:
-        """Σ c·θ = Σ k·input + const, for every relation all of whose angles are known once this block is."""
-        rows: list[tuple[dict[str, float], Angle]] = []
-        seen = set(self.angles) | set(fresh)
-
-        def add(c: dict[str, float], right: Angle) -> None:
-            if set(c) & set(fresh) and set(c) <= seen:
-                rows.append((c, right))
-
-        for j, e in enumerate(self.m.inputs):
-            if e.link is not None:
-                add({e.link: 1.0, e.on: -1.0}, Angle(inputs=((j, 1.0),)))
-        for g in self.m.guides:
-            if g.turned is not None:
-                add({g.link: 1.0, g.on: -1.0}, Angle(g.angle + g.turned))
-        for i, gear in enumerate(self.m.gears):
-            right = Angle(self.phases[i]) if i in self.phases else Angle(gears=((i, 1.0),))
-            add(gear.shares(), right)
-        return rows
+    def _relations(self, fresh: list[str]) -> list[tuple[Mapping[str, float], Angle]]:
+        """Σ c·θ = const + Σ k·input, for every relation all of whose angles are known once this block is."""
+        new = set(fresh)
+        found = []
+        for relation in self.relations:
+            bodies = relation.shares.keys()
+            if bodies & new and all(body in new or body in self.angles for body in bodies):
+                right = relation.right
+                if relation.gear is not None:
+                    known = self.phases.get(relation.gear)
+                    right = Angle(known) if known is not None else Angle(gears=((relation.gear, 1.0),))
+                found.append((relation.shares, right))
+        return found
 
     def _eliminate(self, fresh: list[str]) -> tuple[list[str], list[Turn]]:
         """Gauss-Jordan on the linear relations: which angles stay free, and what the others are."""
@@ -311,13 +262,13 @@ class _Planner:
                     if name in self.m.pins:
                         self._place(name, body, z)
 
-    def _chain(self, body: str, z: complex, anchors: Mapping[str, Chain]) -> Chain:
+    def _chain(self, body: str, z: complex, anchors: Mapping[str, Path]) -> Path:
         base, terms = anchors[body]
         return base, combined((*terms, Term(z, body)))
 
     def _attach(
-        self, body: str, placed: Collection[str], chain: Callable[[str, complex], Chain]
-    ) -> Chain | None:
+        self, body: str, placed: Collection[str], chain: Callable[[str, complex], Path]
+    ) -> Path | None:
         """The first joint that ties a body to the placed ones: pins first, then guides whose slide is known."""
         points = self.m.bodies[body]
         for name, z in points.items():
@@ -333,29 +284,29 @@ class _Planner:
         return None
 
     def _by_guide(
-        self, i: int, body: str, placed: Collection[str], chain: Callable[[str, complex], Chain]
-    ) -> Chain | None:
+        self, i: int, body: str, placed: Collection[str], chain: Callable[[str, complex], Path]
+    ) -> Path | None:
         g, d = self.m.guides[i], self.directions[i]
         if g.link == body and g.on in placed:
-            base, terms = chain(g.on, self._through(i))
+            base, terms = chain(g.on, self.m.through(self.m.guides[i]))
             found = (
                 base,
                 combined((*terms, Term(d, g.on, i), Term(-self.m.bodies[body][g.point], body))),
             )
         elif g.on == body and g.link in placed:
             base, terms = chain(g.link, self.m.bodies[g.link][g.point])
-            found = base, combined((*terms, Term(-self._through(i), body), Term(-d, body, i)))
+            found = base, combined((*terms, Term(-self.m.through(self.m.guides[i]), body), Term(-d, body, i)))
         else:
             return None
         self.used.add((f"guide {i}", ""))
         return found
 
-    def _loops(self, moving: set[str]) -> tuple[list[Closure], dict[str, Chain]]:
+    def _loops(self, moving: set[str]) -> tuple[list[Closure], dict[str, Path]]:
         """A tree over the block's bodies from what is placed; every joint outside the tree closes a loop."""
         anchors = dict(self.anchors)
-        nodes: dict[str, Chain] = {name: (name, ()) for name in self.nodes}
+        nodes: dict[str, Path] = {name: (name, ()) for name in self.nodes}
         closures: list[Closure] = []
-        # all loops at once: the driven links last, so that loops close over the passive side, as 003 writes them
+        # all loops at once: the driven links last, so that loops close over the passive side, as Nicoletti writes them
         last = {str(e.link) for e in self.m.inputs} if self.merged else set()
         # placed bodies matter where they meet what moves, or one that was placed since the last loops were closed
         fresh = moving | (set(anchors) - self.joined)
@@ -364,7 +315,7 @@ class _Planner:
         self.joined.update(anchors, moving)
         guides = [i for i in range(len(self.m.guides)) if (f"guide {i}", "") not in self.used]
 
-        def chain(body: str, z: complex) -> Chain:
+        def chain(body: str, z: complex) -> Path:
             return self._chain(body, z, anchors)
 
         def join(body: str, name: str) -> None:
@@ -422,7 +373,7 @@ class _Planner:
         for i in guides:
             g = self.m.guides[i]
             if g.link in anchors and g.on in anchors and (f"guide {i}", "") not in self.used:
-                base, terms = chain(g.on, self._through(i))
+                base, terms = chain(g.on, self.m.through(self.m.guides[i]))
                 line = base, combined((*terms, Term(self.directions[i], g.on, i)))
                 pin = chain(g.link, self.m.bodies[g.link][g.point])
                 self.used.add((f"guide {i}", ""))
@@ -434,7 +385,7 @@ class _Planner:
         return closures, {b: a for b, a in anchors.items() if b not in self.anchors}
 
     def _close(
-        self, closures: list[Closure], there: Chain, here: Chain, joint: str, body: str, guide: int | None
+        self, closures: list[Closure], there: Path, here: Path, joint: str, body: str, guide: int | None
     ) -> None:
         (start, plus), (end, minus) = there, here
         terms = combined((*plus, *(Term(-t.z, t.body, t.slide) for t in minus)))
@@ -443,11 +394,14 @@ class _Planner:
 
 def _plus(a: Angle, b: Angle, factor: float) -> Angle:
     """a + factor·b."""
+    const, more = a.const + factor * b.const, factor * b.const
+    added = abs(more) + abs(const) if a.const and b.const else 0.0
     return Angle(
-        a.const + factor * b.const,
+        const,
         _sums(a.inputs, b.inputs, factor),
         _sums(a.bases, b.bases, factor),
         _sums(a.gears, b.gears, factor),
+        a.size + abs(factor) * b.size + added,
     )
 
 

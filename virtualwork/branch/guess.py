@@ -1,187 +1,61 @@
-"""An assembly of a mechanism: the order of solution, and on which branch each group closes.
-
-The guess picks each group's sign once. What a pose at another input looks like follows from the branch alone (no
-marching): the sign of each closed form, turned over at each change point on the way (`virtualwork.track`).
-"""
+"""The guess read: each group's assembly is picked in the order of solution, the one nearest to what the guess says."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from virtualwork.assur import Group, Place, Plan, Slide, Step, Turn, known_by_guess, plan
+from virtualwork.branch.choice import Choice
+from virtualwork.branch.solutions import every_solution, guessed_unknowns
+from virtualwork.describe.description import Description
 from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError
-from virtualwork.formulas.closed_forms import Number, cross, dot
 from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
-from virtualwork.newton import (
-    every_solution,
-    gaps,
-    guessed_unknowns,
-    newton,
-    stack,
-    stack_rows,
-    write_unknowns,
-)
-from virtualwork.state import Case, State, columns, place
+from virtualwork.formulas.linear import stack, stack_rows
+from virtualwork.formulas.newton import gaps, newton, write_unknowns
+from virtualwork.formulas.numbers import cross, dot
+from virtualwork.formulas.positions import Case, State, columns
+from virtualwork.plan.guessed import known_by_guess
+from virtualwork.plan.order import plan
+from virtualwork.plan.steps import Group, Plan, Turn
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from virtualwork.formulas.loads import Acting
-    from virtualwork.mechanism import Mechanism
-    from virtualwork.track import Track
-
-TIE = 1e-9  # two assemblies nearer than this, relative to the mechanism's size, are one
+C = TypeVar("C", bound=Choice)
 
 
-class Assembly:
-    """A mechanism put together in one way.
+def choose(m: Description, make: Callable[..., C]) -> C:
+    """The assembly that the guess chooses; `make` takes what a `Choice` holds.
 
-    Attributes
-    ----------
-    mechanism : Mechanism
-    plan : Plan
-        The order of solution.
-    signs : dict of group name to ±1
-    starts : dict of group name to the unknowns of a Newton group at the guess's input
-    number : int
-        1 for the guess's assembly; others count on.
-    phases : dict of a gear's number to its constant Σ c·θ, rad
+    Raises
+    ------
+    AssemblyError
+        Where the guess is missing and there is more than one: the choices are listed.
     """
-
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        plan_: Plan,
-        signs: Mapping[str, int],
-        starts: Mapping[str, Any],
-        number: int = 1,
-        warnings: tuple[str, ...] = (),
-        phases: Mapping[int, float] | None = None,
-    ) -> None:
-        self.mechanism, self.plan, self.phases = mechanism, plan_, phases or {}
-        self.signs, self.starts, self.number = dict(signs), dict(starts), number
-        self.warnings = warnings
-        self.cases = {g.name: Case(g, dict(plan_.directions)) for g in plan_.groups if g.kind != "Newton"}
-        self._needed: dict[frozenset[str], tuple[Step, ...]] = {}
-        self.acting: dict[bool, Acting] = {}  # the loads at rest and in motion, for all motions
-
-    @classmethod
-    def from_guess(cls, m: Mechanism) -> Assembly:
-        """The assembly that the guess chooses.
-
-        Raises
-        ------
-        AssemblyError
-            Where the guess is missing and there is more than one: the choices are listed.
-        """
-        return _Chooser(m).choose()
-
-    @cached_property
-    def track(self) -> Track:
-        """Change points and limits along the input, found when first needed."""
-        from virtualwork.track import Track
-
-        return Track(self)
-
-    @cached_property
-    def merged(self) -> tuple[Plan, Group | None]:
-        """All loops at once: one plan with one group of every unknown; None where there is no loop."""
-        whole = plan(self.mechanism, merged=True, phases=self.phases)
-        return whole, next(iter(whole.groups), None)
-
-    @cached_property
-    def geared(self) -> set[str]:
-        """Bodies of which a gear of fractional ratio needs the angle itself, with its whole turns, at first or second hand."""
-        found: set[str] = set()
-        for step in reversed(self.plan.steps):
-            for turn in (step,) if isinstance(step, Turn) else step.ties if isinstance(step, Group) else ():
-                found |= {b for b, r in turn.angle.bases if turn.body in found or not float(r).is_integer()}
-        return found
-
-    def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
-        """The steps that targets hang on; worked out once for each set of targets."""
-        key = frozenset(targets)
-        if key not in self._needed:
-            self._needed[key] = self.plan.needed(key)
-        return self._needed[key]
-
-    def run(self, steps: Iterable[Step], st: State, tracked: bool = True) -> None:
-        """Work out positions, step by step."""
-        for step in steps:
-            if isinstance(step, Place):
-                place(step, st)
-            elif isinstance(step, Group):
-                self.close(step, st, tracked)
-            elif isinstance(step, Turn):
-                self.turn(step, st)
-            else:
-                st.slide[step.guide] = st.inputs[step.input]
-
-    def turn(self, step: Turn, st: State) -> None:
-        """A body's rotation; its angle too, where a gear's ratio will need it."""
-        st.turn[step.body] = st.rotate(step.angle)
-        angle = st.affine(step.angle)
-        for base, r in step.angle.bases:
-            if base not in st.angle:
-                return
-            angle = angle + r * st.angle[base]
-        st.angle[step.body] = angle
-
-    def close(self, group: Group, st: State, tracked: bool = True) -> None:
-        """Close the loops of one group."""
-        if group.kind == "Newton":
-            self.track.close_newton(group, st)
-            return
-        case = self.cases[group.name]
-        if tracked and group.name in self.track.folded:
-            case.solve(st, self.signs[group.name], self.mechanism.size, folded=True)
-        elif not tracked or not self.track.active:
-            case.solve(st, self.signs[group.name], self.mechanism.size)
-        else:
-            case.solve(st, self.track.sign(group, st.inputs[0]), self.mechanism.size)
-            self.track.mend(group, st)
-        for body in self.geared.intersection(group.members):
-            angle = np.angle(st.turn[body])
-            st.angle[body] = self.track.unwound(body, st.inputs[0], angle) if tracked else angle
-
-    def state(
-        self, inputs: tuple[float, ...], targets: Iterable[str] | None = None, tracked: bool = True
-    ) -> State:
-        """Positions of one pose, as Python numbers."""
-        st = State(list(inputs), many=False)
-        steps = self.plan.steps if targets is None else self.needed(targets)
-        try:
-            self.run(steps, st, tracked)
-        except ZeroDivisionError:
-            st = State([np.array([q]) for q in inputs], many=True)
-            with np.errstate(all="ignore"):
-                self.run(steps, st, tracked)
-        return st
+    return _Chooser(m).choose(make)
 
 
 class _Chooser:
     """Reads the guess and picks each group's assembly in the order of solution."""
 
-    def __init__(self, m: Mechanism) -> None:
+    def __init__(self, m: Description) -> None:
         self.m = m
         self.plan = plan(m)
         if not m.inputs:
             raise MobilityError("[input]: missing")
         self.angles, self.points = known_by_guess(m)
         self.warnings: list[str] = []
-        self.phases: dict[int, float] = {}  # of the gears: Σ c·θ
+        # of the gears: Σ c·θ
+        self.phases: dict[int, float] = {}
 
-    def choose(self) -> Assembly:
+    def choose(self, make: Callable[..., C]) -> C:
         """The assembly; a mechanism of which a part floats is refused by that part's name."""
-        st = State(list(self.m.at), many=False)
+        st = State(list(self.m.at))
         try:
-            if any(2 * len(g.closures) < len(g.angles) + len(g.slides) for g in self.plan.groups):
+            loose = any(2 * len(g.closures) < len(g.angles) + len(g.slides) for g in self.plan.groups)
+            if loose or not self.plan.anchors.keys() >= self.m.links.keys():
                 raise MobilityError("[input]: constraints that depend on each other leave a part free")
-            found = self._choose(st)
+            found = self._choose(make, st)
         except (MechanismError, ZeroDivisionError) as error:
             self._refuse_floating()
             if isinstance(error, MechanismError):
@@ -189,18 +63,18 @@ class _Chooser:
             raise AssemblyError(
                 "[guess] at: singular there, so that no direction is determined; give another `at`"
             ) from None
-        if self._singular(found, st):
+        if self._singular(st):
             self._refuse_floating()
         return found
 
-    def _singular(self, found: Assembly, st: State) -> bool:
+    def _singular(self, st: State) -> bool:
         """Whether a group has a singular Jacobian at the guess, or none at all."""
-        for group in found.plan.groups:
+        for group in self.plan.groups:
             if group.kind != "Newton":
                 if not st.margin.get(group.name, 0.0) > 1e-12:
                     return True
             else:
-                jacobian = stack(columns(group, st, found.plan), 1)[0]
+                jacobian = stack(columns(group, st), 1)[0]
                 jacobian[:, : len(group.angles)] /= self.m.size
                 if not np.isfinite(jacobian).all() or not np.linalg.cond(jacobian) < 1e9:
                     return True
@@ -223,37 +97,33 @@ class _Chooser:
                 "depend on each other; join the part that is free"
             )
 
-    def _choose(self, st: State) -> Assembly:
+    def _choose(self, make: Callable[..., C], st: State) -> C:
         signs: dict[str, int] = {}
         starts: dict[str, Any] = {}
-        steps: list[Step] = []
-        helper = Assembly(self.m, self.plan, {}, {})
+        helper = Choice(self.m, self.plan)
         for i, step in enumerate(self.plan.steps):
+            open_ = step
             if isinstance(step, Turn) and step.angle.gears:
                 step = self._phased(step, st)
             elif isinstance(step, Group) and any(tie.angle.gears for tie in step.ties):
                 step = replace(step, ties=tuple(self._phased(tie, st) for tie in step.ties))
-            steps.append(step)
-            self.plan = replace(self.plan, steps=(*steps, *self.plan.steps[i + 1 :]))
+            if step is not open_:
+                self.plan = replace(self.plan, steps=(*self.plan.steps[:i], step, *self.plan.steps[i + 1 :]))
             if isinstance(step, Group):
                 if step.kind == "Newton":
                     starts[step.name] = self._newton(step, st)
                 else:
                     signs[step.name] = self._sign(step, helper.cases[step.name], st, signs)
                     st.angle.update({b: float(np.angle(st.turn[b])) for b in step.members})
-            elif isinstance(step, Place):
-                place(step, st)
-            elif isinstance(step, Slide):
-                st.slide[step.guide] = st.inputs[step.input]
             else:
-                helper.turn(step, st)
+                helper.run_untracked([step], st)
         if self.plan.blocks.redundant:
             self._refuse_overdriven(self.plan, st)
         phases = {
             i: sum(c * float(st.angle[body]) for body, c in gear.shares().items())
             for i, gear in enumerate(self.m.gears)
         }
-        return Assembly(self.m, self.plan, signs, starts, 1, tuple(self.warnings), phases)
+        return make(self.m, self.plan, signs, starts, 1, tuple(self.warnings), phases)
 
     def _refuse_overdriven(self, done: Plan, st: State) -> None:
         """Constraints that depend on each other may leave less motion than there are inputs."""
@@ -297,15 +167,13 @@ class _Chooser:
     def solutions(self, group: Group, case: Case, st: State) -> list[tuple[int, State]]:
         found = []
         for sign in (1, -1):
-            trial = State(list(st.inputs), many=False)
-            trial.turn, trial.point, trial.slide = dict(st.turn), dict(st.point), dict(st.slide)
-            trial.angle = dict(st.angle)
+            trial = st.copy()
             try:
                 case.solve(trial, sign, self.m.size)
             except ZeroDivisionError:
                 continue
-            if all(_finite(trial.turn[b]) for b in group.members) and all(
-                _finite(trial.slide[g]) for g in group.slides
+            if all(np.isfinite(trial.turn[b]) for b in group.members) and all(
+                np.isfinite(trial.slide[g]) for g in group.slides
             ):
                 found.append((sign, trial))
         return found
@@ -318,11 +186,9 @@ class _Chooser:
 
     def _near(self, group: Group, case: Case, st: State, signs: Mapping[str, int], sign: int) -> None:
         """Put the group into the state as it stands just beyond a point where its closed form has no direction."""
-        beside = State(
-            [q + 1e-7 * (self.m.size if self.m.inputs[0].is_slide else 1.0) for q in self.m.at], many=False
-        )
-        before = Assembly(self.m, self.plan, signs, {})
-        before.run([s for s in self.plan.needed(self.plan.writes(group)) if s is not group], beside, False)
+        beside = State([q + 1e-7 * (self.m.size if self.m.inputs[0].is_slide else 1.0) for q in self.m.at])
+        before = Choice(self.m, self.plan, signs)
+        before.run_untracked(before.before(group), beside)
         case.solve(beside, sign, self.m.size)
         st.turn.update({b: beside.turn[b] for b in group.members})
         st.slide.update({g: beside.slide[g] for g in group.slides})
@@ -338,13 +204,11 @@ class _Chooser:
         if len(self.m.inputs) != 1:
             return None
         step = 0.02 * (self.m.size if self.m.inputs[0].is_slide else 1.0)
-        before = Assembly(self.m, self.plan, signs, {})
+        before = Choice(self.m, self.plan, signs)
         for side in (1, -1):
-            st = State([self.m.at[0] + side * step], many=False)
+            st = State([self.m.at[0] + side * step])
             try:
-                before.run(
-                    [s for s in self.plan.needed(self.plan.writes(group)) if s is not group], st, False
-                )
+                before.run_untracked(before.before(group), st)
             except (KeyError, ZeroDivisionError):
                 return None
             found = self.solutions(group, case, st)
@@ -453,19 +317,17 @@ class _Chooser:
 
     # --- groups with no closed form ------------------------------------------------------------------------
     def _newton(self, group: Group, st: State) -> Any:
-        many = State([np.array([q]) for q in st.inputs], many=True)
-        many.turn, many.point, many.slide = dict(st.turn), dict(st.point), dict(st.slide)
-        many.angle = dict(st.angle)
+        many = st.copy(many=True)
         why = ""
-        start = guessed_unknowns(group, many, self.angles, self.points, self.m, self.plan)
+        start = guessed_unknowns(group, many, self.angles, self.points, self.m, self.plan.directions)
         if start is not None:
-            x, closed = newton(group, many, self.plan, start, self.m.size)
+            x, closed = newton(group, many, start, self.m.size)
             if closed[0]:
-                self._take(group, st, x)
+                write_unknowns(group, st, x)
                 return x[0]
             left = float(np.linalg.norm(stack_rows(gaps(group, many), 1)))
             why = f": from the guess on its loops stay {left:.6g} m apart"
-        found = every_solution(group, many, self.plan, self.m.size)
+        found = every_solution(group, many, self.m.size)
         if len(found) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
             raise MobilityError(
                 f"{group.name}: more constraints than unknowns, and they contradict each other: a structure, or lengths "
@@ -478,69 +340,11 @@ class _Chooser:
             )
         states = []
         for x in found:
-            trial = State(list(st.inputs), many=False)
-            trial.turn, trial.point, trial.slide = dict(st.turn), dict(st.point), dict(st.slide)
-            trial.angle = dict(st.angle)
+            trial = st.copy()
             write_unknowns(group, trial, x[None])
             states.append(trial)
         if len(found) > 1 and not self._informed(group):
             raise AssemblyError(self._choices(group, states))
         best = int(np.argmin([self._distance(group, trial) for trial in states]))
-        self._take(group, st, found[best][None])
+        write_unknowns(group, st, found[best][None])
         return found[best]
-
-    def _take(self, group: Group, st: State, x: Any) -> None:
-        write_unknowns(group, st, x)
-
-
-def all_assemblies(m: Mechanism) -> tuple[Assembly, ...]:
-    """Every assembly at the guess's input: all signs of the closed forms, all solutions found for the others."""
-    chosen = m.assembly
-    found = [chosen]
-    for signs, starts in _combinations(chosen):
-        if signs != chosen.signs or any(
-            np.abs(np.exp(1j * np.asarray(starts[k])) - np.exp(1j * np.asarray(chosen.starts[k]))).max()
-            > 1e-6
-            for k in starts
-        ):
-            found.append(Assembly(m, chosen.plan, signs, starts, len(found) + 1, phases=chosen.phases))
-    return tuple(found)
-
-
-def _combinations(chosen: Assembly) -> list[tuple[dict[str, int], dict[str, Any]]]:
-    """Walk the steps at the guess's input and fork wherever a group closes in more than one way."""
-    m = chosen.mechanism
-    fronts: list[tuple[State, dict[str, int], dict[str, Any]]] = [(State(list(m.at), many=False), {}, {})]
-    for step in chosen.plan.steps:
-        after: list[tuple[State, dict[str, int], dict[str, Any]]] = []
-        for st, signs, starts in fronts:
-            if not isinstance(step, Group):
-                chosen.run([step], st, tracked=False)
-                after.append((st, signs, starts))
-            elif step.kind == "Newton":
-                for x in every_solution(step, st, chosen.plan, m.size):
-                    trial = _copy(st)
-                    write_unknowns(step, trial, x[None])
-                    after.append((trial, signs, starts | {step.name: x}))
-            else:
-                for sign in (1,) if step.kind == "PRP" else (1, -1):
-                    trial = _copy(st)
-                    try:
-                        chosen.cases[step.name].solve(trial, sign, m.size)
-                    except ZeroDivisionError:
-                        continue
-                    if trial.margin[step.name] >= 0:
-                        after.append((trial, signs | {step.name: sign}, starts))
-        fronts = after
-    return [(signs, starts) for _, signs, starts in fronts]
-
-
-def _copy(st: State) -> State:
-    trial = State(list(st.inputs), st.many)
-    for name in ("turn", "point", "slide", "angle", "margin"):
-        setattr(trial, name, dict(getattr(st, name)))
-    return trial
-
-
-def _finite(value: Number) -> bool:
-    return bool(np.isfinite(value))

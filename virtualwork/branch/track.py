@@ -9,64 +9,33 @@ points between the guess and it: nothing is marched in angle.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from math import factorial, lcm
-from typing import TYPE_CHECKING, Any
+from math import lcm
+from typing import Any
 
 import numpy as np
 
-from virtualwork.assur import Group, Turn
-from virtualwork.branch.change_point import branches
+from virtualwork.branch.change_point import ChangePoint, through
+from virtualwork.branch.choice import Choice
+from virtualwork.branch.continuation import Continuation, along_lines
 from virtualwork.describe.errors import MechanismError
-from virtualwork.formulas.closed_forms import Number
-from virtualwork.state import Jets, State
+from virtualwork.formulas.numbers import EPS, Complexes, Number, Reals
+from virtualwork.formulas.positions import State, run
+from virtualwork.plan.steps import Group, Step, Turn
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from virtualwork.assembly import Assembly
-
-    Reals = NDArray[np.float64]
-
-EPS = float(np.finfo(float).eps)
-SAMPLES = 720  # of one turn, or of one mechanism's size of slide
-ORDER = 12  # of the series through a change point
-REACH = 0.03  # of its radius of convergence, within which it replaces the closed form
-DIP = 0.05  # a radicand below this may touch zero between two samples
-
-
-SAME = 1e-6  # change points nearer than this share of a turn are one
-TURNS = 32  # of the input, within which a branch is looked for to come back to itself
-COMPARED = 60  # poses of a turn
-
-
-@dataclass(frozen=True)
-class ChangePoint:
-    """Where a group's two branches cross: the input, the unknowns there, and their derivatives.
-
-    `turn` and `slide` are the unknowns at the point; `rates[k−1]` their k-th derivatives along the branch taken.
-    """
-
-    group: str
-    input: float
-    turn: tuple[complex, ...]
-    slide: tuple[float, ...]
-    rates: Any
-    reach: float
-    other: Any = None  # first rates of the branch not taken
-
-    def unknown(self, delta: Number, order: int) -> Any:
-        """The unknowns' derivatives of one order at a distance from the point (order 0: their change)."""
-        n = len(self.rates)
-        total = np.zeros((*np.shape(delta), len(self.rates[0])))
-        for j in range(n - order, -1, -1):
-            k = order + j
-            if k == 0:
-                continue
-            total = total + np.multiply.outer(delta**j, self.rates[k - 1]) / factorial(j)
-        return total
+# of one turn, or of one mechanism's size of slide
+SAMPLES = 720
+# a radicand below this may touch zero between two samples
+DIP = 0.05
+# change points nearer than this share of a turn are one
+SAME = 1e-6
+# turns of the input within which a branch is looked for to come back to itself
+TURNS = 32
+# poses of a turn that are compared for it
+COMPARED = 60
 
 
 @dataclass(frozen=True)
@@ -81,7 +50,7 @@ class Limit:
 class Track:
     """What happens to an assembly along its one input."""
 
-    def __init__(self, assembly: Assembly) -> None:
+    def __init__(self, assembly: Choice) -> None:
         self.assembly = assembly
         m = assembly.mechanism
         self.plan = assembly.plan
@@ -93,8 +62,8 @@ class Track:
         self.flips: dict[str, Reals] = {}
         self.changes: dict[str, list[ChangePoint]] = {}
         self._brackets: list[tuple[str, float, float]] = []
-        self._marched: dict[str, Any] = {}
-        self._wound: dict[str, tuple[Reals, Reals]] = {}
+        self._marched: dict[str, Continuation] = {}
+        self._followed: dict[str, tuple[Reals, Reals]] = {}
         # one turn says it all where every turn of a body is a whole number of turns of the input
         whole = all(
             float(k).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, k in s.angle.inputs
@@ -103,14 +72,34 @@ class Track:
         )
         self.whole = whole and not slide
         self._repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
-        self.settled = False  # no change point anywhere, however far the input turns
-        self.folded: set[str] = set()  # groups that are singular in every pose
+        # no change point anywhere, however far the input turns
+        self.settled = False
+        # groups that are singular in every pose
+        self.folded: set[str] = set()
         # where one turn begins, and what it has
         self._period: tuple[float, dict[str, list[ChangePoint]]] | None = None
         if not self.active:
             self._look_around()
 
     # --- what poses ask ---------------------------------------------------------------------------------------
+    def run(self, steps: Iterable[Step], st: State) -> None:
+        """Work out positions, step by step, each group on its branch."""
+        run(steps, st, self.close)
+
+    def close(self, group: Group, st: State) -> None:
+        """Close the loops of one group."""
+        if group.kind == "Newton":
+            self._close_newton(group, st)
+            return
+        case, size = self.assembly.cases[group.name], self.assembly.mechanism.size
+        if group.name in self.flips and group.name not in self.folded:
+            case.solve(st, self.sign(group, st.inputs[0]), size)
+            self.mend(group, st)
+        else:
+            case.solve(st, self.assembly.signs[group.name], size, group.name in self.folded)
+        for body in self.assembly.geared.intersection(group.members):
+            st.angle[body] = self.unwound(body, st.inputs[0], np.angle(st.turn[body]))
+
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""
         if self.settled or not self.active:
@@ -216,17 +205,17 @@ class Track:
 
     def unwound(self, body: str, q: Number, angle: Number) -> Number:
         """An angle with its whole turns, counted from the guess."""
-        if not self.active or body not in self._wound:
+        if not self.active or body not in self._followed:
             return angle
-        nodes, turns = self._wound[body]
+        nodes, turns = self._followed[body]
         good = np.isfinite(turns)
         near = np.interp(q, nodes[good], turns[good])
         whole = angle + 2 * np.pi * np.round((near - angle) / (2 * np.pi))
         return whole if np.ndim(q) else float(whole)
 
-    def _wind(self, body: str, q: Reals, angle: Reals) -> None:
+    def _follow(self, body: str, q: Reals, angle: Reals) -> None:
         """Add samples of an angle and count its turns from the guess."""
-        nodes, angles = self._wound.get(body, (np.empty(0), np.empty(0)))
+        nodes, angles = self._followed.get(body, (np.empty(0), np.empty(0)))
         nodes, first = np.unique(np.append(nodes, q), return_index=True)
         angles = np.append(angles, np.broadcast_to(angle, q.shape))[first]
         good = np.isfinite(angles)
@@ -234,9 +223,9 @@ class Track:
             angles[good] = np.unwrap(angles[good])
             here = np.interp(self.start, nodes[good], angles[good])
             angles = angles - 2 * np.pi * np.round(here / (2 * np.pi))
-            self._wound[body] = nodes, angles
+            self._followed[body] = nodes, angles
 
-    def _near(self, group: Group, q: Number):  # type: ignore[no-untyped-def]
+    def _near(self, group: Group, q: Number) -> Iterator[tuple[ChangePoint, Any, Number]]:
         for change in self.changes.get(group.name, ()):
             if np.ndim(q) == 0:
                 if abs(q - change.input) < change.reach:
@@ -256,7 +245,7 @@ class Track:
             for s in self.plan.steps:
                 if isinstance(s, Group) and s.kind == "Newton":
                     return
-                self.assembly.run([s], st, tracked=False)
+                self.assembly.run_untracked([s], st)
                 if isinstance(s, Group) and self._meets(s, st.margin[s.name]):
                     self.folded.add(s.name)
                     self.assembly.cases[s.name].solve(st, 1, self.assembly.mechanism.size, folded=True)
@@ -293,7 +282,7 @@ class Track:
         """The group's radicand at inputs q, on the branch known so far."""
         st = State([q], many=True)
         with np.errstate(all="ignore"):
-            self.assembly.run(self.assembly.needed(self.plan.writes(group)), st)
+            self.run(self.assembly.needed(self.plan.writes(group)), st)
         return np.broadcast_to(st.margin[group.name], q.shape).astype(float)
 
     def _scan(self, a: float, b: float) -> None:
@@ -302,20 +291,22 @@ class Track:
         st = State([q], many=True)
         for s in self.plan.steps:
             if isinstance(s, Group) and s.kind != "Newton":
-                self.assembly.close(s, st)
+                self.close(s, st)
                 if s.kind == "PRP":
                     continue
                 m = np.broadcast_to(st.margin[s.name], q.shape)
                 if self._look(s, q, m, a, b):
-                    self.assembly.close(s, st)
+                    self.close(s, st)
                 for body in self.assembly.geared.intersection(s.members):
-                    self._wind(body, q, np.angle(st.turn[body]))
+                    self._follow(body, q, np.angle(st.turn[body]))
                     st.angle[body] = self.unwound(body, q, np.angle(st.turn[body]))
             elif isinstance(s, Group):
-                self._march(s, a, b)
-                self.assembly.close(s, st)
+                self._continued(s).extend(a, b)
+                if self._continued(s).singular():
+                    self.folded.add(s.name)
+                self.close(s, st)
             else:
-                self.assembly.run([s], st)
+                self.run([s], st)
 
     def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
         """Find where the radicand crosses or touches zero; say whether a change point was found."""
@@ -351,7 +342,7 @@ class Track:
                     fresh.append(where)
         # the branch through each one can be told only once all of them are known
         for where in fresh:
-            self.changes.setdefault(group.name, []).append(self._through(group, where))
+            self.changes.setdefault(group.name, []).append(through(self, group, where))
         return bool(fresh)
 
     def _bottom(self, group: Group, a: float, b: float) -> tuple[float, float, float] | None:
@@ -382,86 +373,6 @@ class Track:
         arms = [abs(a) for a in self.assembly.cases[group.name].arms if a]
         return min(arms, default=self.assembly.mechanism.size)
 
-    def _through(self, group: Group, q0: float) -> ChangePoint:
-        """The exact branch through a change point.
-
-        Where the links are nearly equal one of the branches turns many times faster than the input: the closed form
-        is then compared with the series closer to the point, until one of the series is the branch.
-        """
-        for span in (0.02, 0.0025, 3e-4, 4e-5):
-            change, miss = self._branch(group, q0, span)
-            if miss < 1e-6:
-                break
-        return change
-
-    def _branch(self, group: Group, q0: float, span: float) -> tuple[ChangePoint, float]:
-        """The series that the closed form follows within a span around a change point, and how far they are apart."""
-        nodes = span * np.cos(np.pi * (np.arange(12) + 0.5) / 12) * self.length / (2 * np.pi)
-        st = State([q0 + nodes], many=True)
-        self.assembly.run(self.assembly.needed(self.plan.writes(group)), st)
-        weights = _at_centre(nodes)
-        turn, slide = [], []
-        for body in group.angles:
-            e = complex(np.sum(weights * st.turn[body]))
-            turn.append(e / abs(e))
-        for g in group.slides:
-            slide.append(float(np.sum(weights * st.slide[g])))
-        before = [s for s in self.assembly.needed(self.plan.writes(group)) if s is not group]
-
-        def jets() -> Jets:
-            at = State([q0], many=False)
-            self.assembly.run(before, at)
-            for j, body in enumerate(group.angles):
-                at.turn[body] = turn[j]
-            for j, g in enumerate(group.slides):
-                at.slide[g] = slide[j]
-            for tie in group.ties:
-                at.turn[tie.body] = at.rotate(tie.angle)
-            d = Jets(self.plan, at, [[1.0]], self)
-            for k in range(1, ORDER + 2):
-                for s in before:
-                    d.step(s, k)
-            return d
-
-        try:
-            found = branches(group, jets, ORDER)
-        except ZeroDivisionError:  # a group that this one hangs on has no direction here
-            found = []
-        best, nearest = None, np.inf
-        probe = int(np.argmax(nodes))
-        for rates in found:
-            change = ChangePoint(group.name, q0, tuple(turn), tuple(slide), np.array(rates), 0.0)
-            move = change.unknown(nodes[probe], 0)
-            miss = (
-                sum(
-                    abs(turn[j] * np.exp(1j * move[j]) - st.turn[body][probe])
-                    for j, body in enumerate(group.angles)
-                )
-                + sum(
-                    abs(slide[j] + move[len(turn) + j] - st.slide[g][probe])
-                    for j, g in enumerate(group.slides)
-                )
-                / self.assembly.mechanism.size
-            )
-            if miss < nearest:
-                best, nearest = rates, miss
-        if best is None or not np.isfinite(best).all():
-            unknown = np.full((ORDER, len(turn) + len(slide)), np.nan)
-            return ChangePoint(group.name, q0, tuple(turn), tuple(slide), unknown, 0.0), np.inf
-        scale = np.array([1.0] * len(turn) + [self.assembly.mechanism.size] * len(slide))
-        terms = [float(np.abs(r / scale).max()) / factorial(k) for k, r in enumerate(best, 1)]
-        radius = (
-            min(t ** (-1 / k) for k, t in enumerate(terms, 1) if t > 0 and k >= 3)
-            if max(terms[2:]) > 0
-            else 1.0
-        )
-        reach = REACH * min(radius, 1.0 if self.length > 6 else self.length)
-        others = [rates[0] for rates in found if rates is not best]
-        change = ChangePoint(
-            group.name, q0, tuple(turn), tuple(slide), np.array(best), reach, others[0] if others else None
-        )
-        return change, float(nearest)
-
     @property
     def has_limits(self) -> bool:
         """Was any limit met in what was covered?"""
@@ -473,7 +384,8 @@ class Track:
         """How many turns of the input bring every group back to where it stood: the period of the branch.
 
         A branch that passes an odd number of change points in a turn needs two; a fractional gear its own number. A
-        branch between two limits needs what tells its own inputs apart. None with a slide or several inputs, and where no number of turns up to `TURNS` does it.
+        branch between two limits needs what tells its own inputs apart. None with a slide or several inputs, and where
+        no number of turns up to `TURNS` does it.
         """
         if not self.active or self.assembly.mechanism.inputs[0].is_slide:
             return None
@@ -507,13 +419,11 @@ class Track:
             return n
         return max(1, int(np.ceil((min(above) - max(below)) / self.length)))
 
-    def _stands(self, q: Reals) -> NDArray[np.complex128]:
+    def _stands(self, q: Reals) -> Complexes:
         """Rotations and slides (over the size) of all groups at inputs q; NaN where not assembled."""
         st = State([q], many=True)
         with np.errstate(all="ignore"):
-            self.assembly.run(
-                self.assembly.needed([key for g in self.plan.groups for key in self.plan.writes(g)]), st
-            )
+            self.run(self.assembly.needed([key for g in self.plan.groups for key in self.plan.writes(g)]), st)
         rows = [st.turn[b] for g in self.plan.groups for b in g.members]
         rows += [st.slide[s] / self.assembly.mechanism.size for g in self.plan.groups for s in g.slides]
         return np.array([np.broadcast_to(row, q.shape) for row in rows])
@@ -567,33 +477,24 @@ class Track:
             b, fb = q, f
         return Limit(group.name, a if abs(fa) < abs(fb) else b, side)
 
+    @property
+    def crossings(self) -> list[float]:
+        """Inputs at which two branches cross, in what was covered: of closed forms, and met on the way of the others."""
+        found = [float(q) for flips in self.flips.values() for q in flips]
+        return found + [float(q) for marched in self._marched.values() for q in marched.crossings]
+
     # --- groups with no closed form ------------------------------------------------------------------------------
-    def _march(self, group: Group, a: float, b: float) -> None:
-        from virtualwork.march import March
-
+    def _continued(self, group: Group) -> Continuation:
         if group.name not in self._marched:
-            self._marched[group.name] = March(self, group)
-        self._marched[group.name].extend(a, b)
-        if self._marched[group.name].singular():
-            self.folded.add(group.name)
+            self._marched[group.name] = Continuation(self, group)
+        return self._marched[group.name]
 
-    def close_newton(self, group: Group, st: State) -> None:
-        """Close a Newton group at the state's poses, from the marched branch."""
-        from virtualwork.march import March, march_along
-
-        if not self.active:
-            march_along(self.assembly, group, st)
-            return
-        if group.name not in self._marched:
-            self._marched[group.name] = March(self, group)
-        self._marched[group.name].close(st)
-
-
-def _at_centre(nodes: Reals) -> Reals:
-    """Weights of polynomial interpolation from the nodes to 0 (barycentric, second form)."""
-    w = np.array([1 / np.prod(x - np.delete(nodes, i)) for i, x in enumerate(nodes)])
-    w = w / -nodes
-    return np.asarray(w / w.sum())
+    def _close_newton(self, group: Group, st: State) -> None:
+        """Close a Newton group at the state's poses, from its continued branch."""
+        if self.active:
+            self._continued(group).close(st)
+        else:
+            along_lines(self, group, st)
 
 
 def _put(store: dict[Any, Any], key: Any, near: Any, value: Any) -> None:

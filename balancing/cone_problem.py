@@ -17,7 +17,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass
-class Cones:
+class ConeProblem:
     """min ½|B z + b|² + t  with |E_k z + e_k| <= h_k + f_k t; without t where all f are zero."""
 
     e: Complex
@@ -33,7 +33,7 @@ def real_rows(e: Complex) -> tuple[Real, Real]:
     return np.concatenate([e.real, -e.imag], axis=1), np.concatenate([e.imag, e.real], axis=1)
 
 
-def solve(problem: Cones) -> tuple[Real, Complex]:
+def solve(problem: ConeProblem) -> tuple[Real, Complex]:
     """Return (Re z, Im z[, t]) and the dual forces of the cones, complex (k,).
 
     In the standard form min ½|Bx + b|² + cᵀx, Gx + s = h, s in the cones, dual z in the cones, with
@@ -99,7 +99,8 @@ def solve(problem: Cones) -> tuple[Real, Complex]:
         wn = sn + zn * _MIRROR
         wn /= 2 * gamma[:, None]
         beta = np.sqrt(s_size / z_size)
-        scaling = np.empty((k, 3, 3))  # W/β; W⁻¹ = J (W/β) J/β
+        # W/β; W⁻¹ = J (W/β) J/β
+        scaling = np.empty((k, 3, 3))
         tail = wn[:, 1:]
         scaling[:, 0, 0] = wn[:, 0]
         scaling[:, 0, 1:] = scaling[:, 1:, 0] = tail
@@ -177,7 +178,7 @@ def _room(lam: Real, normalised: Real, *directions: Real) -> float:
 
 
 def _polish(
-    problem: Cones, with_t: bool, x: Real, s: Real, z: Real, square: Real | None, at: Real
+    problem: ConeProblem, with_t: bool, x: Real, s: Real, z: Real, square: Real | None, at: Real
 ) -> tuple[Real, Complex]:
     """Finish by Newton's method on the active constraints ½(|E z + e|² - (h + f t)²) = 0 with multipliers ν."""
     k, p = problem.e.shape
@@ -220,7 +221,8 @@ def _polish(
         gradient[:, : 2 * p] = re * ra.real[:, None] + im * ra.imag[:, None]
         weight = np.sqrt(np.maximum(trial_nu[active], 0.0))[:, None]
         rows = np.concatenate([weight * re, weight * im])
-        hessian = np.zeros((n, n))  # of orthonormal coordinates: nothing of κ(α) is squared in it
+        # of orthonormal coordinates: nothing of κ(α) is squared in it
+        hessian = np.zeros((n, n))
         hessian[: 2 * p, : 2 * p] = rows.T @ rows
         slope = np.zeros(n)
         if with_t:
