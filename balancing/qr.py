@@ -59,3 +59,11 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Comple
     sigma = require_independent(r, scale, readings, planes, "readings", DependentPlanes)
     x = np.linalg.solve(r, -(adjoint(q) @ b[..., None]))[..., 0]
     return np.asarray(x * scale + 0.0, dtype=complex), sigma
+
+
+def factors(a: Complex) -> tuple[Complex, Complex, Real]:
+    """Return Q (..., m, n) in the order of a's rows, R (..., n, n) and the scale (..., n) of a·diag(scale) = Q R."""
+    scaled, scale = columns_scaled(a)
+    order = np.argsort(-np.abs(scaled).max(axis=-1), axis=-1, kind="stable")
+    q, r = np.linalg.qr(np.take_along_axis(scaled, order[..., None], axis=-2))
+    return np.take_along_axis(q, np.argsort(order, axis=-1)[..., None], axis=-2), r, scale

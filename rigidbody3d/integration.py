@@ -110,7 +110,7 @@ class Trajectory:
             bound = bound + walk * (np.abs(self.energy) + abs(self.mgl))
         else:
             here: Array = getattr(self, of)
-            bound = bound + walk * np.sqrt(np.square(here).sum(axis=-1, keepdims=True)) + 0 * here
+            bound = bound + walk * quaternion.length(here) + 0 * here
         for other in tensors_off(self.tensor, tensor, axes=False):
             bound = bound + apart(self._run_again(other), finer, of)
         return np.asarray(bound)

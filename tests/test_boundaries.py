@@ -22,11 +22,12 @@ HEAVY = {"numpy", "pandas", "scipy", "matplotlib", "rich", "pydantic"}
 LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
-        ("amplitudes", "confidence", "placement", "tolerance", "trial"),
+        ("next_run",),
+        ("amplitudes", "confidence", "doubt", "log_balance", "placement", "tolerance", "trial"),
         ("balance", "correction"),
         ("optimality",),
-        ("limited", "rounding"),
-        ("influence", "qr"),
+        ("limited", "rounding", "run_log"),
+        ("influence", "propagation", "qr"),
         ("cone_problem", "dependence", "phase", "rotor"),
     ),
     "virtualwork": (

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from virtualwork import Mechanism
 
-# poses in one sweep: beyond it a double cannot count them; `Job.check_size` knows what one takes in memory
+# poses in one sweep: beyond it a double cannot count them; `Analysis.check_size` knows what one takes in memory
 MOST = 10**15
 
 
