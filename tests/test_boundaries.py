@@ -34,6 +34,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("__init__",),
         ("mechanism",),
         ("motion",),
+        ("forces",),
         ("family",),
         ("intime",),
         ("study",),

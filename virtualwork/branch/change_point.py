@@ -72,7 +72,8 @@ def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[
     d = start()
     jacobian = stack(d.columns(group), 1)[0]
     if not np.isfinite(jacobian).all():
-        return []  # what the group hangs on is not assembled here
+        # what the group hangs on is not assembled here
+        return []
     u, s, vt = np.linalg.svd(jacobian)
     left, null = u[:, -1], vt[-1]
     span = len(s) - 1

@@ -16,7 +16,7 @@ from virtualwork.formulas.constraints import Constraints, coordinates, hidden_fr
 from virtualwork.formulas.linear import stack, stack_rows
 from virtualwork.formulas.newton import gaps, newton, write_unknowns
 from virtualwork.formulas.numbers import cross, dot
-from virtualwork.formulas.positions import Case, State, columns
+from virtualwork.formulas.positions import Case, State, columns, run
 from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Turn
@@ -116,7 +116,7 @@ class _Chooser:
                     signs[step.name] = self._sign(step, helper.cases[step.name], st, signs)
                     st.angle.update({b: float(np.angle(st.turn[b])) for b in step.members})
             else:
-                helper.run_untracked([step], st)
+                run([step], st)
         if self.plan.blocks.redundant:
             self._refuse_overdriven(self.plan, st)
         phases = {

@@ -135,7 +135,8 @@ class Track:
             # the first point of the turn may be found at its end again
             seam = self.low + (1 - SAME) * self.length
             turn = {name: [c for c in points if c.input < seam] for name, points in self.changes.items()}
-            if not any(len(points) % 2 for points in turn.values()):  # every group is back on its branch
+            # every group is back on its branch
+            if not any(len(points) % 2 for points in turn.values()):
                 self._period = self.low, turn
         return self.settled
 
@@ -193,7 +194,8 @@ class Track:
             rate = self._marched[group.name].bridge(float(np.atleast_1d(q)[i]), k)
             if not np.isfinite(
                 rate
-            ).all():  # close to a limit nothing goes on: what the Jacobian gives is kept
+                # close to a limit nothing goes on: what the Jacobian gives is kept
+            ).all():
                 continue
             for j in range(len(x)):
                 if np.ndim(q) == 0:
@@ -319,7 +321,8 @@ class Track:
             self._fold(group.name)
             return True
         if np.mean(np.abs(m) < 1e-14) > 0.9:
-            return False  # stretched all along: zeros of rounding are no change points
+            # stretched all along: zeros of rounding are no change points
+            return False
         inside = (q >= a) & (q < b)
         crossing = np.flatnonzero((m[:-1] >= 0) != (m[1:] >= 0))
         for i in crossing:
@@ -332,9 +335,11 @@ class Track:
             if found is None:
                 continue
             where, depth, noise = found
-            if depth < -noise and m[i] > 0:  # the gap is narrower than the samples
+            # the gap is narrower than the samples
+            if depth < -noise and m[i] > 0:
                 self._brackets += [(group.name, float(q[i - 1]), where), (group.name, where, float(q[i + 1]))]
-            edge = 1e-9 * self.length  # a change point at the seam of two chunks belongs to both
+            # a change point at the seam of two chunks belongs to both
+            edge = 1e-9 * self.length
             if abs(depth) <= noise and a - edge <= where < b + edge:
                 known = self.flips.setdefault(group.name, np.empty(0))
                 self.assembly.plain.pop(group.name, None)

@@ -49,7 +49,8 @@ def read_text(
         data = tomllib.loads(text)
     except RecursionError:
         raise DescriptionError(f"{file}: no valid TOML: nested too deeply") from None
-    except ValueError as error:  # a TOMLDecodeError, or a number of thousands of digits
+    except ValueError as error:
+        # a TOMLDecodeError, or a number of thousands of digits
         raise DescriptionError(f"{file}: no valid TOML: {error}") from None
     try:
         return make(**_Reader(data, folder or Path(), load).parts())

@@ -107,7 +107,7 @@ def angle_and_slide(
     """Solve W + V·e^{iφ} + s·U = 0 for the rotation and the slide (RRP: a circle and a line, |U| = 1).
 
     In axes along U, V·e^{iφ} is x + iy with y = −Im(W·Ū), x = ±√(r² − y²), and s = −Re(W·Ū) − x.
-    sign is that of x = V·e^{iφ}·U (000 §1.11: the two solution sets of the crank, rod and piston).
+    sign is that of x = V·e^{iφ}·U (Ibrahim §1.11: the two solution sets of the crank, rod and piston).
 
     Returns
     -------
