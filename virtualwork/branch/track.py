@@ -296,8 +296,14 @@ class Track:
         step = (b - a) / SAMPLES
         q: Reals = a + step * (np.arange(-3, SAMPLES + 3, dtype=float) + 0.5)
         st = State([q], many=True)
+        waiting: list[Step] = []
         for s in self.plan.steps:
-            if isinstance(s, Group) and s.kind != "Newton":
+            if not isinstance(s, Group):
+                waiting.append(s)
+                continue
+            run(waiting, st)
+            waiting = []
+            if s.kind != "Newton":
                 self.close(s, st)
                 if s.kind == "PRP":
                     continue
@@ -307,13 +313,11 @@ class Track:
                 for body in self.assembly.geared.intersection(s.members):
                     self._follow(body, q, np.angle(st.turn[body]))
                     st.angle[body] = self.unwound(body, q, np.angle(st.turn[body]))
-            elif isinstance(s, Group):
+            else:
                 self._continued(s).extend(a, b)
                 if self._continued(s).singular():
                     self._fold(s.name)
                 self.close(s, st)
-            else:
-                self.run([s], st)
 
     def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
         """Find where the radicand crosses or touches zero; say whether a change point was found."""
