@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError, quote
-from cli.read.tables import Table, read, spellings
+from cli.read.headers import spellings
+from cli.read.tables import Table, read
 from cli.read.units import from_si, parse_number, to_si
 from cli.show.shown import Shown
 from cli.show.text import table_text
