@@ -20,11 +20,15 @@ if TYPE_CHECKING:
         plane_significance,
         unseen,
     )
+    from balancing.doubt import outlier_probability, phase_sense, repeats, robust_fit
     from balancing.influence import influence_coefficients
     from balancing.limited import Infeasible
+    from balancing.log_balance import LogBalance, region_factor
+    from balancing.next_run import NextRun, suggest_run
     from balancing.placement import Placement, drill_depth, place, place_from_stock, transfer
     from balancing.rotor import by_size
     from balancing.rounding import influence_error
+    from balancing.run_log import JointFit, Undetermined, determined, joint_fit
     from balancing.tolerance import GRADES, allocate, grade_value, permissible_unbalance
     from balancing.trial import (
         ErrorBudget,
@@ -43,8 +47,12 @@ _HOMES = {
     "balancing.confidence": "Readings spread",
     "balancing.correction": "CoincidentPlanes Correction Unbalances correct",
     "balancing.dependence": "DependentPlanes DependentTrials condition_number plane_significance unseen",
+    "balancing.doubt": "outlier_probability phase_sense repeats robust_fit",
     "balancing.influence": "influence_coefficients",
+    "balancing.run_log": "JointFit Undetermined determined joint_fit",
     "balancing.limited": "Infeasible",
+    "balancing.log_balance": "LogBalance region_factor",
+    "balancing.next_run": "NextRun suggest_run",
     "balancing.placement": "Placement drill_depth place place_from_stock transfer",
     "balancing.rotor": "by_size",
     "balancing.rounding": "influence_error",
@@ -76,14 +84,19 @@ __all__ = [
     "ErrorBudget",
     "Indexed",
     "Infeasible",
+    "JointFit",
+    "LogBalance",
+    "NextRun",
     "Placement",
     "Readings",
     "TrialEffect",
     "Unbalances",
+    "Undetermined",
     "allocate",
     "by_size",
     "condition_number",
     "correct",
+    "determined",
     "drill_depth",
     "error_budget",
     "grade_value",
@@ -92,13 +105,20 @@ __all__ = [
     "influence_error",
     "influence_from_amplitudes",
     "initial_unbalance",
+    "joint_fit",
     "least_squares",
     "minimax",
+    "outlier_probability",
     "permissible_unbalance",
+    "phase_sense",
     "place",
     "place_from_stock",
     "plane_significance",
+    "region_factor",
+    "repeats",
+    "robust_fit",
     "spread",
+    "suggest_run",
     "transfer",
     "trial_effect",
     "trial_unbalance",

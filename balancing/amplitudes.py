@@ -61,7 +61,8 @@ class AmplitudeFit:
     def condition_number(self) -> Real:
         """By what factor relative errors of the readings can grow in the coefficient, (s,); inf where circles touch."""
         at = self._at
-        gain = np.linalg.norm(at.gain(at.rows), axis=-2).max(axis=-1)  # largest |∂z/∂R| over the runs
+        # largest |∂z/∂R| over the runs
+        gain = np.linalg.norm(at.gain(at.rows), axis=-2).max(axis=-1)
         size = np.abs(self.influence) * np.abs(self.trial_masses).max() / self.initial
         return np.asarray(gain * (self.trials / self.initial).max(axis=0) / np.where(size > 0, size, np.nan))
 
@@ -176,8 +177,8 @@ class _Normal(NamedTuple):
         return np.asarray(self.inverse @ np.swapaxes(rows, -1, -2))
 
 
-def _normal(z: Complex, read: Real, t: Complex) -> _Normal:
-    """Work out the normal equations at z (n,) for readings (n, r) or (r,)."""
+def _derivatives(z: Complex, read: Real, t: Complex) -> tuple[Real, Real, Real, Real, Real]:
+    """Return |y|, the misfits f, their derivatives (n, r, 2), and Σ ½f² in second derivatives, first without curvature."""
     y = 1 + z[:, None] * t
     length = np.abs(y)
     u = y / np.where(length > 0, length, 1.0)
@@ -187,7 +188,13 @@ def _normal(z: Complex, read: Real, t: Complex) -> _Normal:
     rows = np.stack([slope.real, -slope.imag], axis=-1)
     across = np.stack([slope.imag, slope.real], axis=-1)
     bend = np.where(length > 1e-12, f / np.where(length > 0, length, 1.0), 0.0)
-    hessian = np.einsum("nrk,nrl->nkl", rows, rows) + np.einsum("nr,nrk,nrl->nkl", bend, across, across)
+    normal = np.einsum("nrk,nrl->nkl", rows, rows)
+    return length, f, rows, normal, normal + np.einsum("nr,nrk,nrl->nkl", bend, across, across)
+
+
+def _normal(z: Complex, read: Real, t: Complex) -> _Normal:
+    """Work out the normal equations at z (n,) for readings (n, r) or (r,)."""
+    length, f, rows, _, hessian = _derivatives(z, read, t)
     a, b, c = hessian[:, 0, 0], hessian[:, 0, 1], hessian[:, 1, 1]
     det = a * c - b * b
     sure = np.abs(det) > 64 * EPS * (np.abs(a * c) + b * b)
@@ -205,19 +212,8 @@ def _fit(read: Real, t: Complex) -> tuple[complex, float, complex]:
     damping = np.full(z.shape, 1e-3)
     cost = _cost(z, read, t)
     for _ in range(80):
-        y = 1 + z[:, None] * t
-        length = np.abs(y)
-        u = y / np.where(length > 0, length, 1.0)
-        f = length - read
-        # d|y| = Re(ū t dz): rows (Re, -Im) of ū t
-        slope = u.conj() * t
-        j = np.stack([slope.real, -slope.imag], axis=-1)
-        gradient = np.einsum("nrk,nr->nk", j, f)
-        # exact curvature: |y|'' = (Im ū t dz)²/|y|
-        across = np.stack([slope.imag, slope.real], axis=-1)
-        bend = np.where(length > 1e-12, f / np.where(length > 0, length, 1.0), 0.0)
-        normal = np.einsum("nrk,nrl->nkl", j, j)
-        hessian = normal + np.einsum("nr,nrk,nrl->nkl", bend, across, across)
+        _, f, rows, normal, hessian = _derivatives(z, read, t)
+        gradient = np.einsum("nrk,nr->nk", rows, f)
         definite = (hessian[:, 0, 0] > 0) & (
             np.linalg.det(hessian) > 1e-9 * np.trace(hessian, axis1=1, axis2=2) ** 2
         )

@@ -23,7 +23,7 @@ from dalembert.arithmetic.records import numbers, record, table
 if TYPE_CHECKING:
     import pandas as pd
 
-    from balancing.rounding import Bounds, Case
+    from balancing.rounding import Bounds, Solved
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -123,9 +123,9 @@ class Balance:
         >>> bool((abs(fix.corrections - [17 / 21, 31 / 21]) <= fix.error_estimate()).all())
         True
         """
-        case = self._case(influence_error, initial_error)
+        solved = self._solved(influence_error, initial_error)
         exact = influence_error is None and initial_error is None
-        bounds = (self._bounds if exact else self._bounds_of(case))[0]
+        bounds = (self._bounds if exact else self._bounds_of(solved))[0]
         if quantity == "corrections":
             return bounds.solution
         if quantity == "residual":
@@ -135,7 +135,7 @@ class Balance:
             if self.bound is not None and self.weights is None:
                 # the true optimum lies between the dual bound and what was found
                 gap = max(float(self.residual_max) - self.bound, 0.0)
-                largest = np.minimum(largest, gap + case.evaluation_error.max())
+                largest = np.minimum(largest, gap + solved.evaluation_error.max())
             return np.asarray(largest)
         if quantity == "residual_rms":
             return np.asarray(np.sqrt(np.square(bounds.residual).mean(axis=-1)) + 8 * EPS * self.residual_rms)
@@ -148,25 +148,27 @@ class Balance:
 
     @cached_property
     def _bounds(self) -> tuple[Bounds, str]:
-        return self._bounds_of(self._case())
+        return self._bounds_of(self._solved())
 
-    def _case(self, influence_error: ArrayLike | None = None, initial_error: ArrayLike | None = None) -> Case:
-        from balancing.rounding import Case
+    def _solved(
+        self, influence_error: ArrayLike | None = None, initial_error: ArrayLike | None = None
+    ) -> Solved:
+        from balancing.rounding import Solved
 
         of_influence, of_initial = (
             None if error is None else np.asarray(error, dtype=float)
             for error in (influence_error, initial_error)
         )
-        return Case(self.influence, self.initial, self.corrections, self.weights, of_influence, of_initial)
+        return Solved(self.influence, self.initial, self.corrections, self.weights, of_influence, of_initial)
 
-    def _bounds_of(self, case: Case) -> tuple[Bounds, str]:
+    def _bounds_of(self, solved: Solved) -> tuple[Bounds, str]:
         if self._free:
             from balancing.rounding import least_squares_bounds
 
-            return least_squares_bounds(case, self.residual, self.ridge), ""
+            return least_squares_bounds(solved, self.residual, self.ridge), ""
         from balancing.optimality import optimum_bounds
 
-        return optimum_bounds(case, self.bound is not None, self.max_mass, self.max_residual)
+        return optimum_bounds(solved, self.bound is not None, self.max_mass, self.max_residual)
 
     @property
     def _free(self) -> bool:

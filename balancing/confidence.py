@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.balance import least_squares
-from balancing.dependence import adjoint
 from balancing.influence import influence_coefficients
+from balancing.propagation import components, response
 from dalembert.arithmetic.records import record
 
 Real = NDArray[np.float64]
@@ -168,47 +168,30 @@ class Readings:
 
         Notes
         -----
-        With M = (αᴴWα)⁻¹ = R⁻¹R⁻ᴴ of the QR factors, δ the residual's change at fixed corrections and e the residual,
-
-            dw = -M αᴴW δ - M dαᴴ W e,
-
-        where the second term is there because the coefficients, too, come from readings.
+        First order (`balancing.propagation`): the coefficients, too, come from readings.
         """
         alpha, w = self.coefficients, corrections
         weight = np.ones(len(alpha)) if weights is None else np.asarray(weights, dtype=float)
-        a = np.sqrt(weight)[:, None] * alpha
-        if ridge:
-            norms = np.linalg.norm(a, axis=0)
-            norms = np.where(norms > 0, norms, norms.max())
-            a = np.concatenate([a, ridge * np.diag(norms)])
-        scale = 1 / np.linalg.norm(a, axis=0)
-        q, r = np.linalg.qr(a * scale)
-        inverse = np.linalg.inv(r) * scale[:, None]
-        gain = (inverse @ adjoint(q))[:, : len(alpha)] * np.sqrt(weight)  # M αᴴ W, (p, s)
-        share = self._share(w)
-        linear = -gain[:, None, :] * share[:, None]  # (p, 1 + r, s)
-        antilinear = np.zeros_like(linear)
-        if self.trials is not None and self.trial_masses is not None:
-            left = weight * (self.vibration + alpha @ w)
-            m, undo = inverse @ adjoint(inverse), np.linalg.pinv(self.trial_masses)
-            by_run = -(m @ undo.conj())[..., None] * left  # (p, r, s)
-            # the ridge, too, follows the coefficients: λ² ‖α_p‖² w_p
-            pull = (ridge**2 * w * alpha * weight[:, None]).T  # (p, s)
-            by_run = by_run - np.einsum("pj,js,jr->prs", m, pull, undo.conj())
-            pull = (ridge**2 * w * alpha.conj() * weight[:, None]).T
-            forward = -np.einsum("pj,js,jr->prs", m, pull, undo)
-            antilinear[:, 1:], antilinear[:, 0] = by_run, -by_run.sum(axis=1)
-            linear[:, 1:] += forward
-            linear[:, 0] -= forward.sum(axis=1)
+        linear, antilinear = response(alpha, w, self.vibration + alpha @ w, weight, ridge)
+        # from vibration and coefficients to the runs, (1 + p, 1 + r)
+        gain = np.ones((1, 1), dtype=complex)
+        if self.trials is None or self.trial_masses is None:
+            linear, antilinear = linear[..., :1], antilinear[..., :1]
+        else:
+            undo = np.linalg.pinv(self.trial_masses)
+            gain = np.zeros((1 + undo.shape[0], 1 + undo.shape[1]), dtype=complex)
+            gain[0, 0], gain[1:, 0], gain[1:, 1:] = 1.0, -undo.sum(axis=1), undo
         e_along, e_across, of_size, of_phase = self._errors
-        size = np.where(np.abs(w) > 0, np.abs(w), 1.0)
-        back = np.where(np.abs(w) > 0, w.conj() / size, 1.0)[
-            :, None, None
-        ]  # turns each correction onto the real axis
-        radial = back * (linear * e_along + antilinear * e_along.conj()) * of_size
-        across = back * 1j * (linear * e_across - antilinear * e_across.conj()) * of_phase
-        parts = np.stack([np.stack([x.real, x.imag]) for x in (radial, across)])  # (2, 2, p, 1 + r, s)
-        return np.asarray(np.einsum("eaprs,ebprs->pab", parts, parts))
+        size = np.abs(self._all.T.ravel())
+        unit = np.where(size > 0, self._all.T.ravel() / np.where(size > 0, size, 1.0), 1.0)
+        return components(
+            (linear @ gain).reshape(len(w), -1),
+            (antilinear @ gain.conj()).reshape(len(w), -1),
+            w if along is None else along,
+            unit,
+            (np.abs(e_along) * of_size).T.ravel(),
+            (np.abs(e_across) * of_phase).T.ravel(),
+        )
 
 
 def spread(samples: Complex, about: Complex) -> Real:

@@ -100,7 +100,8 @@ class Correction:
     def unbalance(self) -> Complex:
         """The unbalance to ADD in each plane, (..., p), kg·m."""
         rotors = len(self.moment) if self.moment.ndim > 1 else 1
-        if rotors > 1 and self.moment.size > 2 * BLOCK:  # in parts whose temporaries stay in the cache
+        # in parts whose temporaries stay in the cache
+        if rotors > 1 and self.moment.size > 2 * BLOCK:
             step = max(1, BLOCK * rotors // self.moment.size)
             parts = [slice(i, i + step) for i in range(0, rotors, step)]
             return np.concatenate(

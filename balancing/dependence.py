@@ -89,7 +89,8 @@ def plane_significance(influence: ArrayLike, weights: ArrayLike | None = None) -
         u, sigma, _ = np.linalg.svd(others, full_matrices=False)
         keep = sigma > threshold(*unit.shape[-2:]) * sigma[..., :1]
         left = unit[..., j]
-        for _ in range(2):  # twice is enough (Kahan, Parlett)
+        # twice is enough (Kahan, Parlett)
+        for _ in range(2):
             inside = np.where(keep, np.matvec(adjoint(u), left), 0)
             left = left - np.matvec(u, inside)
         out[..., j] = np.linalg.norm(left, axis=-1)
@@ -124,12 +125,13 @@ def columns_scaled(a: Complex) -> tuple[Complex, Real]:
     square = np.einsum("...sp,...sp->...p", size, size)
     low, high = square.min(), square.max()
     if low > 1e-280 and high < 1e280:
-        if high < 4 * low:  # within a factor of two already
+        # within a factor of two already
+        if high < 4 * low:
             return a, np.ones(square.shape)
-        exponent = (
-            np.frexp(square.max(axis=-1, keepdims=True) / square)[1] - 1
-        ) >> 1  # ⌊log₂ of the norms' ratio⌋
-    else:  # the squares leave the range of numbers, or a column is zero
+        # ⌊log₂ of the norms' ratio⌋
+        exponent = (np.frexp(square.max(axis=-1, keepdims=True) / square)[1] - 1) >> 1
+    else:
+        # the squares leave the range of numbers, or a column is zero
         peak = np.maximum(np.abs(a.real), np.abs(a.imag)).max(axis=-2)
         highest = peak.max(axis=-1, keepdims=True)
         exponent = np.where(peak > 0, np.frexp(highest)[1] - np.frexp(peak)[1], 0)
@@ -137,6 +139,13 @@ def columns_scaled(a: Complex) -> tuple[Complex, Real]:
         return a, np.ones(square.shape)
     scale = np.ldexp(1.0, exponent)
     return a * scale[..., None, :], scale
+
+
+def damping_norms(a: Complex) -> Real:
+    """Return ‖a_p‖ of each column, (..., p): what a ridge damps it by; of one of zeros the largest, or 1."""
+    norms = np.linalg.norm(a, axis=-2)
+    largest = norms.max(axis=-1, keepdims=True)
+    return np.where(norms > 0, norms, np.where(largest > 0, largest, 1.0))
 
 
 def threshold(rows: int, columns: int) -> float:

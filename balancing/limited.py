@@ -2,7 +2,7 @@
 
     min t   with |V_s + α_s w| <= t,  |w_p| <= m_p
 
-is a second-order cone problem: |·| of a complex number is a cone in three dimensions (`balancing.cones` solves
+is a second-order cone problem: |·| of a complex number is a cone in three dimensions (`balancing.cone_problem` solves
 it). The dual solution y is the proof: for any y with αᴴy = 0 and Σ|y_s| = 1 no w leaves less than Re(yᴴV), since
 
     max_s |r_s| >= Re Σ ȳ_s r_s = Re yᴴ(V + α w) = Re yᴴV.
@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.cones import Cones, solve
+from balancing.cone_problem import ConeProblem, solve
 from balancing.dependence import DependentPlanes, columns_scaled, roundings
 from balancing.qr import smallest_squares
 from dalembert.arithmetic.exact import EPS
@@ -54,7 +54,8 @@ def limited_least_squares(
         reached = float(np.abs((v[capped] + alpha[capped] @ start) / ceiling[capped]).max())
         if bound > 1:
             raise Infeasible(reached * float(ceiling[capped].min()))
-        if reached >= 1 - 1e-9:  # nothing to choose from
+        # nothing to choose from
+        if reached >= 1 - 1e-9:
             return start
     space = _Space(a, b, limit)
     rows, offset = space.residuals
@@ -63,7 +64,7 @@ def limited_least_squares(
         ratio = alpha[capped] / ceiling[capped, None]
         here = (v[capped] + alpha[capped] @ space.start) / ceiling[capped]
         cones.append((space.within(ratio), here, np.ones(int(capped.sum()))))
-    problem = Cones(
+    problem = ConeProblem(
         np.concatenate([c[0] for c in cones]),
         np.concatenate([c[1] for c in cones]),
         np.concatenate([c[2] for c in cones]),
@@ -109,7 +110,7 @@ def smallest_maximum(a: Complex, b: Complex, limit: Real) -> tuple[Complex, floa
     q, c = space.residuals
     caps = space.limits()
     readings = len(c)
-    problem = Cones(
+    problem = ConeProblem(
         np.concatenate([q, caps[0]]),
         np.concatenate([c, caps[1]]),
         np.concatenate([np.zeros(readings), caps[2]]),
@@ -180,7 +181,8 @@ class _Space:
         w = np.asarray(
             self.start + self.scale * np.linalg.solve(self.r, z[:p] + 1j * z[p : 2 * p]), dtype=complex
         )
-        if len(self.limited):  # rounding must not carry a mass over its limit
+        # rounding must not carry a mass over its limit
+        if len(self.limited):
             over = np.abs(w) > self.limit
             w = np.where(over, w * (self.limit / np.where(over, np.abs(w), 1.0)), w)
             tight = over & (np.abs(w) > self.limit)

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.cones import real_rows
+from balancing.cone_problem import real_rows
 from balancing.dependence import adjoint, columns_scaled, roundings
-from balancing.rounding import Bounds, Case
+from balancing.rounding import Bounds, Solved
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -49,16 +49,16 @@ class _Rows:
 
 
 def optimum_bounds(
-    case: Case, minimax: bool, max_mass: Real | None, max_residual: Real | None
+    solved: Solved, minimax: bool, max_mass: Real | None, max_residual: Real | None
 ) -> tuple[Bounds, str]:
     """Bound the errors of the corrections and of the residual; inf with the reason where they are not bounded."""
-    sensors, planes = case.influence.shape
+    sensors, planes = solved.influence.shape
     try:
-        found = _Optimum(case.corrections, minimax, _rows(case, minimax, max_mass, max_residual))
+        found = _Optimum(solved.corrections, minimax, _rows(solved, minimax, max_mass, max_residual))
     except _NotBounded as reason:
         nothing = Bounds(np.full(planes, np.inf), np.full(sensors, np.inf))
         return nothing, str(reason)
-    residual = found.bound(case.influence) + case.evaluation_error
+    residual = found.bound(solved.influence) + solved.evaluation_error
     return Bounds(found.bound(np.eye(planes, dtype=complex)), residual), ""
 
 
@@ -66,17 +66,18 @@ class _NotBounded(Exception):
     """Why there is no bound."""
 
 
-def _rows(case: Case, minimax: bool, max_mass: Real | None, max_residual: Real | None) -> _Rows:
-    alpha, v, w = case.influence, case.initial, case.corrections
+def _rows(solved: Solved, minimax: bool, max_mass: Real | None, max_residual: Real | None) -> _Rows:
+    alpha, v, w = solved.influence, solved.initial, solved.corrections
     sensors, planes = alpha.shape
     c = roundings(planes)
-    da, db = case.data_errors
+    da, db = solved.data_errors
     limit = np.broadcast_to(np.inf if max_mass is None else max_mass, (planes,))
     limited = np.flatnonzero(np.isfinite(limit))
     caps = np.zeros((len(limited), planes), dtype=complex)
     caps[np.arange(len(limited)), limited] = 1 / limit[limited]
-    weight = np.ones(sensors) if case.weights is None else case.weights
-    if minimax:  # readings that no plane moves are no part of it
+    weight = np.ones(sensors) if solved.weights is None else solved.weights
+    # readings that no plane moves are no part of it
+    if minimax:
         e, at, de, dat = (x * (weight if x.ndim == 1 else weight[:, None]) for x in (alpha, v, da, db))
         moved = np.abs(e).max(axis=1) > 0
         e, at, de, dat = e[moved], at[moved], de[moved], dat[moved]
@@ -116,8 +117,10 @@ class _Optimum:
         planes = len(w)
         value = rows.offset + rows.e @ w
         size = np.abs(value)
-        wrong = rows.e_error[0] @ np.abs(w) + rows.e_error[1]  # of each value
-        radius = rows.h + rows.f  # the unit is chosen so that t = 1
+        # of each value
+        wrong = rows.e_error[0] @ np.abs(w) + rows.e_error[1]
+        # the unit is chosen so that t = 1
+        radius = rows.h + rows.f
         active = size >= radius * (1 - ACTIVE) - 4 * wrong
         if not active.any():
             raise _NotBounded("no limit is reached, and the optimum lies within rounding of the edge of one")
@@ -127,9 +130,8 @@ class _Optimum:
         diagonal = np.abs(np.diag(upper))
         if len(upper) < planes or not diagonal.min() > 1e-15 * diagonal.max():
             raise _NotBounded("the planes depend on each other, and no limit tells them apart")
-        undo: Complex = np.asarray(
-            scale[:, None] * np.linalg.inv(upper), dtype=complex
-        )  # w = undo z: coordinates without units or κ(α)
+        # w = undo z: coordinates without units or κ(α)
+        undo: Complex = np.asarray(scale[:, None] * np.linalg.inv(upper), dtype=complex)
         e, value, f = rows.e[active], value[active], rows.f[active]
         self.wrong = wrong[active]
         self.e, self.size = e, size[active]
@@ -190,7 +192,8 @@ class _Optimum:
         out += np.abs(response[:, : 2 * p] @ self.squares.T) @ np.concatenate([off, off])
         # of the rows themselves in the sums of the pulls: in the coordinates of w
         pulls = da.T @ np.abs(self.left) + self._of_active(self.rows.e_error[0]).T @ self.mu
-        back = self.undo.conj()  # zᵣ = Re Σ conj(undo) g …
+        # zᵣ = Re Σ conj(undo) g …
+        back = self.undo.conj()
         by_re = response[:, :p] @ back.real.T + response[:, p : 2 * p] @ back.imag.T
         by_im = -response[:, :p] @ back.imag.T + response[:, p : 2 * p] @ back.real.T
         out += (np.abs(by_re) + np.abs(by_im)) @ pulls

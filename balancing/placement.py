@@ -117,7 +117,8 @@ def place(target: complex, angles: ArrayLike, max_mass: ArrayLike | None = None)
     if not np.isfinite(limit).all():
         sines = np.abs(np.imag(np.roll(arms, -1) * arms.conj()))
         slimmest = float(sines[sines > 1e-9].min(initial=1.0))
-        limit = np.where(np.isfinite(limit), limit, 4 * size / slimmest)  # more than any share can be
+        # more than any share can be
+        limit = np.where(np.isfinite(limit), limit, 4 * size / slimmest)
     masses, free = _exact(goal, arms, limit) or _nearest(goal, arms, limit)
     found = np.zeros(n)
     found[order] = np.where(masses > 4e-15 * size, masses, 0.0)
@@ -247,7 +248,8 @@ def place_from_stock(
     room = max(2 * int(np.log(SUMS) / np.log(len(loads))), 2)
     used = np.argsort(away, kind="stable")[:room]
     halves = []
-    for part in (used[0::2], used[1::2]):  # every other one: both halves reach in all directions
+    # every other one: both halves reach in all directions
+    for part in (used[0::2], used[1::2]):
         sums, mass, count = np.zeros(1, dtype=complex), np.zeros(1), np.zeros(1, dtype=np.intp)
         choice = np.zeros((1, len(part)), dtype=np.int16)
         for column, position in enumerate(part):
@@ -291,7 +293,8 @@ def place_from_stock(
                 found = (least, float(ma[a[i]] + mb[b[j]]), int(a[i]), int(b[j]))
                 if best is None or found[0] < best[0] - slack or found[1] < best[1] - slack:
                     best = found
-    assert best is not None  # no weight anywhere is always a choice
+    # no weight anywhere is always a choice
+    assert best is not None
     masses = np.zeros(len(theta))
     masses[used[0::2]], masses[used[1::2]] = loads[xa[best[2]]], loads[xb[best[3]]]
     return Placement(goal, theta, masses, best[0] if room >= len(theta) else 0.0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.dependence import DependentPlanes, adjoint, columns_scaled, require_independent
+from balancing.dependence import DependentPlanes, adjoint, columns_scaled, damping_norms, require_independent
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -39,9 +39,7 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Comple
     planes = a.shape[-1]
     scaled, scale = columns_scaled(a)
     if ridge:
-        norms = np.linalg.norm(scaled, axis=-2)
-        largest = norms.max(axis=-1, keepdims=True)
-        norms = np.where(norms > 0, norms, np.where(largest > 0, largest, 1.0))
+        norms = damping_norms(scaled)
         scaled = np.concatenate([scaled, ridge * norms[..., None] * np.eye(planes)], axis=-2)
         b = np.concatenate([b, np.zeros((*b.shape[:-1], planes))], axis=-1)
     order = np.argsort(-np.abs(scaled).max(axis=-1), axis=-1, kind="stable")
@@ -61,3 +59,11 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Comple
     sigma = require_independent(r, scale, readings, planes, "readings", DependentPlanes)
     x = np.linalg.solve(r, -(adjoint(q) @ b[..., None]))[..., 0]
     return np.asarray(x * scale + 0.0, dtype=complex), sigma
+
+
+def factors(a: Complex) -> tuple[Complex, Complex, Real]:
+    """Return Q (..., m, n) in the order of a's rows, R (..., n, n) and the scale (..., n) of a·diag(scale) = Q R."""
+    scaled, scale = columns_scaled(a)
+    order = np.argsort(-np.abs(scaled).max(axis=-1), axis=-1, kind="stable")
+    q, r = np.linalg.qr(np.take_along_axis(scaled, order[..., None], axis=-2))
+    return np.take_along_axis(q, np.argsort(order, axis=-1)[..., None], axis=-2), r, scale

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-BLOCK = 16384  # masses in one pass: its temporaries stay in the cache
+# masses in one pass: its temporaries stay in the cache
+BLOCK = 16384
 
 
 def by_size(rotor: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
@@ -37,8 +38,10 @@ def by_size(rotor: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], NDArray
     count = np.bincount(rotor)
     start = np.cumsum(count) - count
     width = np.maximum(count, 1)
-    exponent = np.frexp(width - 0.5)[1]  # ⌈log₂ width⌉
-    for e in np.flatnonzero(np.bincount(exponent)):  # np.unique would import numpy.ma
+    # ⌈log₂ width⌉
+    exponent = np.frexp(width - 0.5)[1]
+    # np.unique would import numpy.ma
+    for e in np.flatnonzero(np.bincount(exponent)):
         size = 2 ** int(e)
         alike = np.flatnonzero(exponent == e)
         step = np.arange(size)

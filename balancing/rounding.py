@@ -18,7 +18,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import adjoint, columns_scaled, roundings
+from balancing.dependence import adjoint, columns_scaled, damping_norms, roundings
 from balancing.influence import influence_coefficients
 
 Real = NDArray[np.float64]
@@ -96,7 +96,8 @@ def influence_error(
     v0, v = np.asarray(initial, dtype=complex), np.asarray(trials, dtype=complex)
     t = np.asarray(trial_masses, dtype=complex)
     alpha = influence_coefficients(v0, v, t)
-    change = np.swapaxes(v - v0[..., None, :], -1, -2)  # (..., s, r)
+    # (..., s, r)
+    change = np.swapaxes(v - v0[..., None, :], -1, -2)
     c = roundings(t.shape[-1])
     off: Real = c * np.abs(change)
     if reading_error is not None:
@@ -108,7 +109,7 @@ def influence_error(
     return perturbed(each, -change, alpha, left, of_masses[..., None, :, :], off).solution
 
 
-class Case(NamedTuple):
+class Solved(NamedTuple):
     """A problem with corrections as found, and bounds of the errors of its data; None: weights of one, exact data."""
 
     influence: Complex
@@ -137,11 +138,11 @@ class Case(NamedTuple):
         return np.asarray(own if self.initial_error is None else own + self.initial_error)
 
 
-def least_squares_bounds(case: Case, residual: Complex, ridge: float) -> Bounds:
+def least_squares_bounds(solved: Solved, residual: Complex, ridge: float) -> Bounds:
     """Bound the errors of the corrections of a least-squares problem without limits, and of its residual."""
-    alpha, v, w = case.influence, case.initial, case.corrections
-    da, db = case.data_errors
-    root = np.ones(v.shape) if case.weights is None else np.sqrt(case.weights)
+    alpha, v, w = solved.influence, solved.initial, solved.corrections
+    da, db = solved.data_errors
+    root = np.ones(v.shape) if solved.weights is None else np.sqrt(solved.weights)
     a, b, r = alpha * root[..., None], v * root, residual * root
     da, db = da * root[..., None], db * root
     if ridge:
@@ -151,21 +152,20 @@ def least_squares_bounds(case: Case, residual: Complex, ridge: float) -> Bounds:
     # a reading without weight takes no part: its residual follows the corrections
     follows = np.matvec(np.abs(alpha), bounds.solution)
     left = np.where(root > 0, np.minimum(bounds.residual[..., : v.shape[-1]] / safe, follows), follows)
-    return Bounds(bounds.solution, left + case.evaluation_error)
+    return Bounds(bounds.solution, left + solved.evaluation_error)
 
 
 def _damped(
     ridge: float, a: Complex, b: Complex, r: Complex, da: Real, db: Real, w: Complex
 ) -> tuple[Complex, Complex, Complex, Real, Real]:
     """Return the problem with the rows λ‖α_p‖ w_p of `ridge` below it."""
-    norms = np.linalg.norm(a, axis=-2)
-    norms = ridge * np.where(norms > 0, norms, norms.max(axis=-1, keepdims=True))
+    norms = ridge * damping_norms(a)
     below = norms[..., None] * np.eye(a.shape[-1])
     of_norms = ridge * np.linalg.norm(da, axis=-2)[..., None] * np.eye(a.shape[-1])
     lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1])
     zeros = np.zeros((*lead, a.shape[-1]))
 
-    def joined(one: NDArray[Kind], other: NDArray[Kind], axis: int) -> NDArray[Kind]:
+    def joined(one: NDArray[Kind], other: NDArray[Kind] | Real, axis: int) -> NDArray[Kind]:
         axes = -axis
         shape = lead + one.shape[-axes:], lead + other.shape[-axes:]
         return np.concatenate([np.broadcast_to(one, shape[0]), np.broadcast_to(other, shape[1])], axis=axis)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.truth import reference
-from virtualwork.mechanism import Force, Guess, Input, Link, Mechanism, Torque
+from virtualwork import Force, Guess, Input, Link, Mechanism, Torque
 
 if TYPE_CHECKING:
     Real = NDArray[np.float64]

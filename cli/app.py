@@ -6,7 +6,6 @@ import os
 import sys
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
 
 import typer
 
@@ -16,10 +15,10 @@ from cli.read.files import forget
 # name -> (module with a function `run`, the line shown by `dalembert --help`)
 COMMANDS = {
     "balance": ("cli.balance.command", "Balance rotors from a table of known eccentric masses."),
-    "field": ("cli.commands.field", "Balance rotors from measured vibration and trial masses."),
-    "place": ("cli.commands.place", "Put a correction where masses can go: holes, blades, weights in stock."),
+    "field": ("cli.field.command", "Balance rotors from measured vibration and trial masses."),
+    "place": ("cli.place.command", "Put a correction where masses can go: holes, blades, weights in stock."),
     "mechanism": (
-        "cli.commands.mechanism",
+        "cli.mechanism.command",
         "Solve a planar mechanism: motion, limits, torque, joint forces.",
     ),
     "work": ("cli.work.command", "Find the load that balances a table of link states, by virtual work."),
@@ -65,7 +64,7 @@ def build(called: str | None) -> typer.Typer:
     return app
 
 
-def main(front: Callable[[str | None], Callable[..., Any]] = build) -> None:
+def main(front: Callable[[str | None], Callable[..., object]] = build) -> None:
     """Run the command; a data error is one line on standard error and status 1, never a traceback.
 
     `front` builds the command line: one that is used many times need not be built each time.

@@ -9,10 +9,10 @@ from rigidbody3d.body import Body, compose
 from rigidbody3d.freebody import FreeBody, FreeState
 from rigidbody3d.gyroscope import cones, gyroscopic_couple, sleeping_threshold, steady_precession
 from rigidbody3d.inertia import check, principal, products, shift, tensor
+from rigidbody3d.integration import Trajectory, integrate
 from rigidbody3d.momentum import Motion, Wrench, strike
 from rigidbody3d.shaft import Shaft
 from rigidbody3d.shapes import SHAPES, inertia_of, load_mesh, measure_of, mesh
-from rigidbody3d.spin import Trajectory, integrate
 from rigidbody3d.top import Top, TopState
 
 __all__ = [

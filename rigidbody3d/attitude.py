@@ -76,9 +76,8 @@ def normalize(q: ArrayLike) -> Array:
     if not (np.isfinite(q).all() and (largest > 0).all()):
         raise ValueError("a quaternion must be finite and not zero")
     scaled = q / largest
-    length = np.sqrt(np.square(scaled).sum(axis=-1, keepdims=True))
     # a quaternion that is one already stays the one that was given
-    return np.where(np.abs(np.square(q).sum(axis=-1, keepdims=True) - 1) < 4e-16, q, scaled / length)
+    return np.where(np.abs(np.square(q).sum(axis=-1, keepdims=True) - 1) < 4e-16, q, scaled / length(scaled))
 
 
 def rotate(q: ArrayLike, vector: ArrayLike) -> Array:
@@ -146,7 +145,7 @@ def from_matrix(matrix: ArrayLike) -> Array:
     )
     best = np.argmax(np.diagonal(table, axis1=-2, axis2=-1), axis=-1)
     row = np.take_along_axis(table, best[..., None, None], axis=-2)[..., 0, :]
-    return np.asarray(row / np.sqrt(np.square(row).sum(axis=-1, keepdims=True)))
+    return np.asarray(row / length(row))
 
 
 def from_vector(turn: ArrayLike) -> Array:
@@ -158,7 +157,7 @@ def from_vector(turn: ArrayLike) -> Array:
     array([0., 0., 0., 1.])
     """
     v = np.asarray(turn, dtype=float)
-    half = np.sqrt(np.square(v).sum(axis=-1, keepdims=True)) / 2
+    half = length(v) / 2
     safe = np.where(half > 0, half, 1.0)
     return np.concatenate([np.cos(half), v / 2 * np.where(half > 0, np.sin(half) / safe, 1.0)], axis=-1)
 
@@ -198,8 +197,13 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> Array:
     0.0
     """
     turn = compose(a, inverse(b))
-    sine = np.sqrt(np.square(turn[..., 1:]).sum(axis=-1))
+    sine = length(turn[..., 1:])[..., 0]
     return np.asarray(2 * np.arctan2(sine, np.abs(turn[..., 0])))
+
+
+def length(vectors: Array) -> Array:
+    """Return |v| of vectors (..., k), as (..., 1)."""
+    return np.asarray(np.sqrt(np.square(vectors).sum(axis=-1, keepdims=True)))
 
 
 def left_matrix(q: Array) -> Array:

@@ -57,9 +57,11 @@ def parameter(m: Array, m1: Array) -> Parameter:
     a = np.ones_like(m1)
     b = np.sqrt(np.where(lone, 1.0, m1))
     ladder = []
-    for _ in range(24):  # 9 steps at m₁ = 1e-300
+    # 9 steps at m₁ = 1e-300
+    for _ in range(24):
         ladder.append((a, b))
-        if np.all(np.abs(a - b) <= 2e-8 * a):  # the next step squares it
+        # the next step squares it
+        if np.all(np.abs(a - b) <= 2e-8 * a):
             break
         a, b = (a + b) / 2, np.sqrt(a * b)
     mean = (a + b) / 2
@@ -86,7 +88,8 @@ def jacobi(u: Array, p: Parameter) -> Jacobi:
     r = u - turns * half
     x = r * p.mean
     sine, cosine = np.sin(x), np.cos(x)
-    small = np.abs(x) < 1e-9  # there sn = r, to r³
+    # there sn = r, to r³
+    small = np.abs(x) < 1e-9
     cotangent = cosine / np.where(small, 1.0, sine)
     c = p.mean * cotangent
     a = cotangent

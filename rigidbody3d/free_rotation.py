@@ -106,7 +106,8 @@ class FreeRotation:
         apart = (
             (Doubled(I2) - I1) * I1 * (Doubled(w1) * w1) - (Doubled(I3) - I2) * I3 * (Doubled(w3) * w3)
         ).value / I2
-        self._large = apart <= 0  # circles the axis of the largest moment
+        # circles the axis of the largest moment
+        self._large = apart <= 0
         big = np.where(self._large, d23 * c1, d12 * c3)
         small = np.where(self._large, d12 * c3, d23 * c1)
         self._rate = np.sqrt(big)
@@ -239,21 +240,17 @@ class FreeRotation:
         across = np.zeros((self.count, 1, 3))
         way = np.abs(t)
         if len(self._simple):
-            spin, nod = (_length(x)[:, None] for x in (self._spin, self._precession))
+            spin, nod = (quaternion.length(x) for x in (self._spin, self._precession))
             late[self._simple] = 4 * way
             turned[self._simple] = 4 * (spin + nod) * way
             own = np.where(self._spin != 0, 0.0, self.omega[self._simple])
-            across[self._simple, 0] = np.where(self._spin != 0, 0.0, _length(own)[:, None])
+            across[self._simple, 0] = np.where(self._spin != 0, 0.0, quaternion.length(own))
         if len(self._general):
             begin = 1 + np.abs(self._u0)
             late[self._general] = 3 * begin / self._rate + 4 * way
             node = np.abs(self._node(self._jacobi(t))) + np.abs(self._node(self._jacobi(np.zeros(1))))
             turned[self._general] = begin + 4 * (np.abs(self._drift) + self._rate) * way + 3 * node
         return PhaseErrors(late, turned, across)
-
-
-def _length(vectors: Array) -> Array:
-    return np.asarray(np.sqrt(np.square(vectors).sum(axis=-1)))
 
 
 def _cyclic(count: int) -> Array:

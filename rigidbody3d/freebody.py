@@ -119,7 +119,7 @@ class FreeBody:
         """
         require(of, "period", "momentum", "energy")
         here = getattr(self, of)
-        size = _length(here) if of == "momentum" else np.abs(here)
+        size = quaternion.length(here) if of == "momentum" else np.abs(here)
         total = FEW * np.where(np.isfinite(size), size, 0.0)
         for other in tensors_off(self.inertia, tensor):
             there = getattr(FreeBody(other, self.omega, self.attitude), of)
@@ -220,10 +220,6 @@ class FreeState:
             bound = EPS * late[..., None] * np.abs(rise) + FEW * (np.abs(w) + across)
             return (bound @ np.abs(axes)).reshape(*shape, 3)
         # both stay what they were however late the state is
-        size = FEW * 3 * (np.abs(body.energy) if of == "energy" else _length(body.momentum)[..., 0])
+        size = FEW * 3 * (np.abs(body.energy) if of == "energy" else quaternion.length(body.momentum)[..., 0])
         found = np.zeros(shape) + (size[..., None] if self.time.ndim else size)
         return found[..., None] + np.zeros(3) if of == "momentum" else found
-
-
-def _length(vectors: Array) -> Array:
-    return np.asarray(np.sqrt(np.square(vectors).sum(axis=-1, keepdims=True)))

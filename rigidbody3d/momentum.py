@@ -23,13 +23,12 @@ from dalembert.arithmetic.records import components, numbers, record, table
 from rigidbody3d import rounding
 from rigidbody3d.inertia import shift
 from rigidbody3d.rounding import BodyError
+from rigidbody3d.states import BLOCK
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
-
-BLOCK = 8192  # states worked out at once: their columns stay in the cache
 
 
 @record

@@ -226,7 +226,8 @@ def shaft(
     m, c, I = body
     z1, z2 = (bearings[..., i] for i in range(2))
     weight = m[..., None] * gravity
-    U = m[..., None] * c[..., :2]  # x and y as the last axis
+    # x and y as the last axis
+    U = m[..., None] * c[..., :2]
     push, pull = -(speed**2), speed_rate
 
     def moment(z: Bounded) -> Bounded:

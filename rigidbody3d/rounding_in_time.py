@@ -50,7 +50,7 @@ def apart(there: State, here: State, of: str) -> Array:
     if of == "attitude":
         return quaternion.angle_between(there.attitude, here.attitude)
     off = np.abs(getattr(there, of) - getattr(here, of))
-    return np.asarray(off if of == "energy" else np.sqrt(np.square(off).sum(axis=-1, keepdims=True)))
+    return np.asarray(off if of == "energy" else quaternion.length(off))
 
 
 def tensors_off(inertia: ArrayLike, tensor: ArrayLike, axes: bool = True) -> list[Array]:

@@ -215,18 +215,19 @@ class TopState:
                 for push, a, b in ((rotation.plus, down, up), (rotation.minus, up, down))
             ]
         swing = np.minimum(terms[0] + terms[1], 1e300) / (2 * I[..., 0])
-        level = np.sqrt(np.square(omega[..., :2]).sum(axis=-1))
+        level = quaternion.length(omega[..., :2])[..., 0]
         around = FEW * (level + swing) + runs * level
-        bound = late[..., None] * np.sqrt(np.square(rise).sum(axis=-1, keepdims=True)) + around[..., None]
+        bound = late[..., None] * quaternion.length(rise) + around[..., None]
         bound = np.concatenate([bound, np.zeros_like(bound), EPS * np.abs(omega[..., 2:])], axis=-1)
         bound[..., 1] = bound[..., 0]
         if of == "omega":
             return np.asarray(bound)
         kinetic = (I * omega**2).sum(axis=-1) / 2
-        if of == "energy":  # it stays what it was however late the state is
+        # it stays what it was however late the state is
+        if of == "energy":
             return np.asarray(2 * FEW * (kinetic + np.abs(mgl)) + I[..., 0] * level * FEW * swing)
-        size = np.sqrt(np.square(I * omega).sum(axis=-1))
-        error = turned * size + np.sqrt(np.square(I * bound).sum(axis=-1))
+        size = quaternion.length(I * omega)[..., 0]
+        error = turned * size + quaternion.length(I * bound)[..., 0]
         return np.asarray(error[..., None] + np.zeros(3))
 
     @property
@@ -376,7 +377,7 @@ class TopRotation:
         runs = sum(np.abs(x) for x in phases) + np.abs(self.extra) * way
         turned = begin + 4 * self.rate * way + 3 * runs
         if len(self.simple):
-            spin, nod = (np.sqrt(np.square(x).sum(axis=-1))[:, None] for x in (self.spin, self.precession))
+            spin, nod = (quaternion.length(x) for x in (self.spin, self.precession))
             late[self.simple] = 4 * way
             runs[self.simple] = (spin + nod) * way
             turned[self.simple] = 4 * (spin + nod) * way

@@ -20,10 +20,12 @@ def constants(I1: float, I3: float, mgl: float, omega: Array, q: Array) -> dict[
         w1, w2, w3 = map(Decimal, omega.tolist())
         w, x, y, z = map(Decimal, q.tolist())
         norm = w * w + x * x + y * y + z * z
-        up, down = (w * w + z * z) / norm, (x * x + y * y) / norm  # (1 ± u)/2
+        # (1 ± u)/2
+        up, down = (w * w + z * z) / norm, (x * x + y * y) / norm
         g1, g2 = 2 * (x * z - w * y) / norm, 2 * (y * z + w * x) / norm
         across = A * (w1 * g1 + w2 * g2)
-        plus, minus = across + 2 * C * w3 * up, across - 2 * C * w3 * down  # Lz ± L3
+        # Lz ± L3
+        plus, minus = across + 2 * C * w3 * up, across - 2 * C * w3 * down
         swing = w1 * w1 + w2 * w2
         u = up - down
         still = swing == 0 and (up == 0 or down == 0)
@@ -50,7 +52,8 @@ def constants(I1: float, I3: float, mgl: float, omega: Array, q: Array) -> dict[
                 beyond = Decimal(0)
         u1, u2, u3 = above - 1, 1 - below, 1 + beyond
         span, wide = u2 - u1, u3 - u1
-        if span < tiny:  # steady precession
+        # steady precession
+        if span < tiny:
             span = Decimal(0)
         m, m1 = span / wide, (below + beyond) / wide
         rate = (a * wide / (2 * A)).sqrt()
@@ -92,7 +95,8 @@ def _phase(
             line = push * m / (scale * wide)
     n = float(wide / least) if least and wide < least * Decimal(10) ** 290 else 1e290 if wide else 0.0
     g = 1e200 if n >= 1e290 else float(((1 + wide / least) * (1 + inverse)).sqrt()) if least else 1.0
-    if not wide and not least:  # on the way to the sleeping position β keeps its direction
+    # on the way to the sleeping position β keeps its direction
+    if not wide and not least:
         arc = Decimal(0)
     return {
         f"n_{name}": n,

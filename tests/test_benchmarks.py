@@ -116,6 +116,7 @@ def test_bodies() -> None:
     assert errors(found, "parallel axes, twice")[0] > 1e-6
 
 
+@pytest.mark.slow
 def test_rotation() -> None:
     found = of("rotation")
     for (work, method), ms in found.items():
@@ -135,11 +136,13 @@ def test_rotation() -> None:
         assert tight <= 1e-9
 
 
+@pytest.mark.slow
 def test_commands() -> None:
     found = of("commands")
     assert all(ms[0].ratio is not None and ms[0].floor for ms in found.values())
 
 
+@pytest.mark.slow
 def test_the_command_and_its_page(benchmarks: Benchmarks, tmp_path: Path) -> None:
     (tmp_path / "page.md").write_text("# Here\n<!-- bench:rotors -->\nold\n<!-- end -->\nkept\n")
     done = benchmarks(
@@ -195,6 +198,7 @@ def test_an_unknown_domain(benchmarks: Benchmarks) -> None:
     assert "did you mean 'rotors'?" in done.stderr
 
 
+@pytest.mark.slow
 def test_campaigns_and_their_table(benchmarks: Benchmarks, tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- bench:stress -->\n<!-- end -->\nafter\n")
@@ -214,6 +218,7 @@ def test_campaigns_and_their_table(benchmarks: Benchmarks, tmp_path: Path) -> No
     assert again["worst_error_over_estimate"] == found[0]["worst_error_over_estimate"]
 
 
+@pytest.mark.slow
 def test_damaged_inputs(benchmarks: Benchmarks) -> None:
     done = benchmarks("fuzz", "24", "--seed", "7", "--workers", "2", "--json")
     assert done.returncode == 0, done.stderr
@@ -256,6 +261,7 @@ def case(seed):
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="limits as on Linux")
+@pytest.mark.slow
 def test_limits_are_held_from_outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A loop in compiled code, more than 1 GiB, a crash, an endless wait: each a fault, and the run goes on."""
     from importlib import import_module

@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 
 from balancing import (
+    LogBalance,
     Readings,
     correct,
     error_budget,
     index_balancing,
     influence_from_amplitudes,
+    joint_fit,
     least_squares,
     minimax,
     place,
+    suggest_run,
     trial_effect,
 )
 from rigidbody3d import (
@@ -43,6 +46,8 @@ def made(x: float) -> dict[str, object]:
     body = compose(Body.of("rod", [x, 2.0], center=[[0, 0, 1], [0.1, 0, 2]], length=1.0))
     free, top = FreeBody([1, 2, 3], [x, 0.1, 0.5]), Top([1, 1, 0.5], 1.0, [0.1, x, 3.0], [0.9, 0.1, 0.2, 0.3])
     motion = Motion(TENSOR, [0, x, 12.0], frame_omega=[0, 4.0, 0], mass=2.0, acceleration=[1, 0, 0])
+    fit = joint_fit([[5], [x], [3j], [4]], [[0], [1], [1j], [0.5]])
+    log = LogBalance(fit, least_squares(fit.influence, fit.initial).corrections, fit.scatter())
     many = Motion(TENSOR, np.linspace(0, x, 3000).reshape(1000, 3))
     return {
         "correct": correct([0.27 * x, 0.3j], [0.02, 0.065], [0.0, 0.09]),
@@ -54,6 +59,10 @@ def made(x: float) -> dict[str, object]:
         "amplitudes": influence_from_amplitudes([6.1 * x], [[7.7], [3.2], [10.3]], np.exp([0, 2j, 4j])),
         "placement": place(0.0835 * x, [0.3, 1.2, 4.0]),
         "readings": Readings(np.array([x + 1j]), 0.01, 0.02, influence=np.array([[1j]])),
+        "log": log.fit,
+        "log errors": log.errors,
+        "log balance": log,
+        "next run": suggest_run(log, 1.0),
         "trial effect": trial_effect([x, 1j], [2, 3]),
         "index": index_balancing([5 + 1j * x, 1 - 1j]),
         "budget": error_budget(100.0, random=[x, 4.0]),
@@ -100,6 +109,12 @@ def test_results_of_the_same_numbers_are_equal(name: str) -> None:
     assert HERE[name] != 3
     with pytest.raises(TypeError, match="unhashable"):
         hash(HERE[name])
+
+
+def test_a_named_tuple_is_the_plain_one_of_the_same_values() -> None:
+    assert HERE["cones"] == tuple(HERE["cones"])  # type: ignore[arg-type]
+    assert HERE["wrench"] == ([-2, 0, 0], HERE["wrench"][1])  # type: ignore[index]
+    assert HERE["wrench"] != ([-2, 0, 0],)
 
 
 @pytest.mark.parametrize("name", HERE)

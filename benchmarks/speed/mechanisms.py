@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from benchmarks.scenes import chain, four_bar, klann, sweep
 from benchmarks.speed.measure import Measurement, around, measured, peak, worst
 from benchmarks.truth import reference
-from virtualwork.assembly import Assembly
-from virtualwork.assur import Group, plan
-from virtualwork.mechanism import Mechanism
+from virtualwork import Mechanism
+from virtualwork.branch.assembly import Assembly
+from virtualwork.formulas.newton import newton
+from virtualwork.formulas.positions import State
 from virtualwork.motion import Motion
-from virtualwork.newton import newton
-from virtualwork.state import State
+from virtualwork.plan.order import plan
+from virtualwork.plan.steps import Group
 
 Real = NDArray[np.float64]
 
@@ -153,7 +154,7 @@ def all_loops(mechanism: Mechanism) -> Callable[[Real, Real, int], Real]:
         state = State([angles], many=True)
         for step in order.steps:
             if isinstance(step, Group):
-                return newton(step, state, order, start, mechanism.size, limit=steps)[0]
+                return newton(step, state, start, mechanism.size, limit=steps)[0]
             run([step], state)
         raise AssertionError("the mechanism has no loop")
 

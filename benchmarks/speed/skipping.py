@@ -14,13 +14,10 @@ from numpy.typing import NDArray
 
 from benchmarks.scenes import loaded_klann
 from benchmarks.speed.measure import Measurement, measured, seconds
-from virtualwork import state
-from virtualwork.formulas import closed_forms as dyads
-from virtualwork.formulas import load_paths as bearing
-from virtualwork.formulas import loads
-from virtualwork.formulas import quantities as sums
+from virtualwork import Mechanism
+from virtualwork.formulas import closed_forms, load_paths, loads, positions, quantities
+from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import Reactions
-from virtualwork.mechanism import Mechanism
 from virtualwork.motion import Motion
 
 Real = NDArray[np.float64]
@@ -41,19 +38,21 @@ PINS = (
 def kernels() -> set[CodeType]:
     """Return the functions that do the work: closed forms, placements, derivative steps, loads, joint forces."""
     found: list[Any] = [
-        dyads.two_angles,
-        dyads.angle_and_slide,
-        dyads.turning_slide,
-        dyads.two_slides,
-        state.place,
-        state.Jets.step,
+        closed_forms.two_angles,
+        closed_forms.angle_and_slide,
+        closed_forms.turning_slide,
+        closed_forms.two_slides,
+        positions.run,
+        Rates.advance,
         Reactions.on_side,
     ]
     kinds = [
-        kind for module in (loads, sums, bearing) for kind in vars(module).values() if isinstance(kind, type)
+        kind
+        for module in (loads, quantities, load_paths)
+        for kind in vars(module).values()
+        if isinstance(kind, type)
     ]
-    found += [kind.value for kind in kinds if issubclass(kind, loads.Load)]
-    found += [kind.form for kind in kinds if issubclass(kind, sums.Row)]
+    found += [kind.form for kind in kinds if issubclass(kind, loads.Load | quantities.Quantity)]
     return {function.__code__ for function in found}
 
 

@@ -14,8 +14,8 @@ from benchmarks.stress.pairs import Pairs
 from benchmarks.stress.random_linkages import four_bar, geared_five_bar, slider_crank, triad, turning_block
 from benchmarks.truth.mechanism import DIGITS, Exact
 from virtualwork import Mechanism, MechanismError
+from virtualwork.formulas.positions import SWEEP
 from virtualwork.motion import Motion
-from virtualwork.state import SWEEP
 
 Generator = np.random.Generator
 FAR = 0.1  # rad: a branch that leaves the computed pose by more is another one

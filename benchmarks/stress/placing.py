@@ -107,8 +107,9 @@ def _vector(size: str, phase: str) -> Any:
 
 def _wrapped(rng: np.random.Generator) -> Pairs:
     """Single-plane balancing from a written table to the columns of the command."""
-    from cli.field_job import Field, Wanted
-    from cli.field_runs import read_runs
+    from cli.field.columns import corrections
+    from cli.field.read import read_runs
+    from cli.field.solve import FieldBalancing, Request
 
     v0, t, v1 = _written(rng), _written(rng), _written(rng)
     if rng.random() < 0.4:  # a trial run that hardly differs from the initial one
@@ -123,9 +124,9 @@ def _wrapped(rng: np.random.Generator) -> Pairs:
         path = Path(folder) / "runs.csv"
         path.write_text("\n".join(rows) + "\n")
         runs = read_runs(str(path), lagging=False, phaseless=False, stored_unit=None)
-        shown = Field(runs, Wanted()).shown()
-    size, angle = float(shown.columns["mass_g"][0]), float(shown.columns["angle_deg"][0])
-    bound = shown.errors()
+        columns = {c.header: c for c in corrections(FieldBalancing(runs, Request()), []).columns}
+    size, angle = (float(str(columns[name].values[0])) for name in ("mass_g", "angle_deg"))
+    bound = {name: column.error() for name, column in columns.items() if column.error is not None}
     with mp.workdps(DIGITS):
         a, b = _vector(*v0), _vector(*v1)
         if a == b:

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from virtualwork import Guess, Input, Link, Mechanism
-from virtualwork.mechanism import Gear, Guide
+from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
 
 Generator = np.random.Generator
 

@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork import Guess, Input, Link, Mechanism
+from virtualwork import GROUND, Gear, Guess, Guide, Input, Link, Mechanism
 from virtualwork.describe.errors import MechanismError
-from virtualwork.mechanism import GROUND, Gear, Guide
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

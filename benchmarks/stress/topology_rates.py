@@ -9,7 +9,7 @@ import mpmath as mp
 import numpy as np
 
 from benchmarks.stress.topologies import Topology, evaluate, generate, regularity, rows
-from virtualwork.mechanism import GROUND
+from virtualwork import GROUND
 
 DIGITS = 40
 ORDER = 2  # position, velocity, acceleration
@@ -120,7 +120,7 @@ def _size(error: Any) -> float:
     return float(abs(error)) if abs(error) > mp.mpf(10) ** (8 - DIGITS) else 0.0
 
 
-def _rates(rng: np.random.Generator) -> list[tuple[float, float]]:
+def rates(rng: np.random.Generator) -> list[tuple[float, float]]:
     """Positions, rates and second rates of every link and point of one mechanism, against their estimates."""
     t = generate(int(rng.integers(1 << 31)))
     if regularity(t) <= 1e-3:
@@ -157,6 +157,6 @@ def _rates(rng: np.random.Generator) -> list[tuple[float, float]]:
 CAMPAIGNS = {
     "any topology": (
         "links, slots, prisms and gears joined at random, at the pose they were drawn in",
-        _rates,
+        rates,
     ),
 }

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 import mpmath as mp
 import numpy as np
 
-from virtualwork.assur import direction
-from virtualwork.mechanism import GROUND
+from virtualwork import GROUND
+from virtualwork.plan.order import direction
 
 if TYPE_CHECKING:
-    from virtualwork.mechanism import Guide, Mechanism
+    from virtualwork import Guide
+    from virtualwork.describe.description import Description
     from virtualwork.motion import Motion
 
 DIGITS = 50
@@ -40,7 +41,7 @@ class Exact:
     """
 
     def __init__(self, motion: Motion, i: int = 0, order: int = 2, inputs: Series | None = None) -> None:
-        self.m: Mechanism = motion.mechanism
+        self.m: Description = motion.mechanism
         self.order = order
         self.links = list(self.m.links)
         with mp.workdps(DIGITS):
@@ -53,7 +54,7 @@ class Exact:
 
     # --- coordinates ----------------------------------------------------------------------------------------------
     def _start(self, motion: Motion, i: int, inputs: Series | None) -> None:
-        rates = [[np.broadcast_to(r, motion.n)[i] for r in of] for of in motion._rates]
+        rates = [[np.broadcast_to(r, motion.n)[i] for r in of] for of in motion.poses.rates]
         self.drive: list[Series] = []
         for j, _ in enumerate(self.m.inputs):
             series = [mp.mpf(float(motion.inputs[i, j])) if inputs is None else inputs[j]]

@@ -16,7 +16,7 @@ from cli.show.columns import Column, Table
 from rigidbody3d.inertia import Principal
 
 if TYPE_CHECKING:
-    from cli.show.columns import Cell, Document, Json
+    from cli.show.columns import Document, Json
 
 
 class Quantity(NamedTuple):
@@ -108,19 +108,19 @@ def axes(found: MovingBody) -> Table:
     corrections = found.corrections
     below = len(corrections)
 
-    def filled(value: ArrayLike, rest: Cell) -> list[Cell]:
+    def filled(value: ArrayLike) -> list[float | None]:
         numbers = _numbers(value)
-        return [*numbers, *[rest] * (3 - len(numbers) + below)]
+        return [*numbers, *[None] * (3 - len(numbers) + below)]
 
-    def error(q: Quantity) -> list[Cell]:
-        return filled(q.error(), 0.0)
+    def error(q: Quantity) -> list[float]:
+        return [bound or 0.0 for bound in filled(q.error())]
 
-    def of_correction(name: str) -> list[Cell]:
+    def of_correction(name: str) -> list[float]:
         return [0.0, 0.0, 0.0, *(getattr(bound, name) for bound in found.correction_errors)]
 
     columns = [Column("axis", "", [*"xyz", *(c.plane for c in corrections)])]
     for q in _quantities(found):
-        columns.append(Column(q.name, q.unit, filled(q.value, None), partial(error, q)))
+        columns.append(Column(q.name, q.unit, filled(q.value), partial(error, q)))
     if corrections:
         _, z, radius, *amounts = zip(*corrections, strict=True)
         columns.append(Column("correction_z", "m", [None, None, None, *z]))
@@ -137,9 +137,9 @@ def axes(found: MovingBody) -> Table:
 def quantities(found: MovingBody) -> Table:
     """The terminal's table: a row for each quantity, then mass and angle of each correction."""
 
-    def laid(value: ArrayLike, rest: Cell) -> list[Cell]:
+    def laid(value: ArrayLike) -> list[float | None]:
         numbers = _numbers(value)
-        return [*numbers, rest, rest, rest] if len(numbers) == 1 else [rest, *numbers]
+        return [*numbers, None, None, None] if len(numbers) == 1 else [None, *numbers]
 
     def of_correction(i: int, name: str) -> float:
         return float(getattr(found.correction_errors[i], name))
@@ -148,10 +148,10 @@ def quantities(found: MovingBody) -> Table:
     for i, c in enumerate(found.corrections):
         rows.append(Quantity(f"plane {c.plane}: mass", "kg", c.mass, partial(of_correction, i, "mass")))
         rows.append(Quantity(f"plane {c.plane}: angle", "deg", c.angle, partial(of_correction, i, "angle")))
-    values = zip(*(laid(row.value, None) for row in rows), strict=True)
+    values = zip(*(laid(row.value) for row in rows), strict=True)
 
-    def error(k: int) -> list[Cell]:
-        return [laid(row.error(), 0.0)[k] for row in rows]
+    def error(k: int) -> list[float]:
+        return [laid(row.error())[k] or 0.0 for row in rows]
 
     return Table(
         [

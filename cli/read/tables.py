@@ -11,7 +11,8 @@ import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -228,7 +229,7 @@ def _read_small(source: Source, table: Table, plan: _Plan, marker: str) -> None:
             table.numbers[name] = Numbers(source.header[index], unit, values)
 
 
-def _version(package: Any) -> tuple[int, int]:
+def _version(package: ModuleType) -> tuple[int, int]:
     major, minor = package.__version__.split(".")[:2]
     return int(major), int(minor)
 
@@ -238,7 +239,9 @@ def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
     import pandas as pd
 
     # from 3.1 numbers are read to the nearest double without being asked to
-    exact: dict[str, Any] = {} if _version(pd) >= (3, 1) else {"float_precision": "round_trip"}
+    exact: dict[str, Literal["round_trip"]] = (
+        {} if _version(pd) >= (3, 1) else {"float_precision": "round_trip"}
+    )
 
     def read(decimal: str) -> pd.DataFrame:
         return pd.read_csv(

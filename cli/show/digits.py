@@ -29,8 +29,7 @@ def _cut_column(column: Column) -> tuple[Column, int]:
     return replace(column, values=values), sum(error == inf for error in errors)
 
 
-def _cut(value: Cell, error: Cell) -> Cell:
-    assert isinstance(error, float | int)
+def _cut(value: Cell, error: float) -> Cell:
     if error == inf:
         return None
     if isinstance(value, str) or value is None or not value or not error > 0:

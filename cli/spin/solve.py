@@ -15,7 +15,7 @@ from rigidbody3d import cones as cones_of
 from rigidbody3d import sleeping_threshold as threshold_of
 from rigidbody3d import steady_precession as steady_of
 from rigidbody3d.attitude import rotate
-from rigidbody3d.spin import MOST
+from rigidbody3d.integration import MOST
 
 UNASKED = 20_000
 """Steps of an integration that nobody asked for by name: some seconds."""

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.read import options
-from cli.show.shown import Digits, Expect, Json, Output, Plot, Rtol, Text, show
+from cli.show.columns import Result
+from cli.show.output import command
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
+@command
 def run(
     states: Annotated[
         str,
@@ -23,14 +28,7 @@ def run(
     ledger: Annotated[
         bool, typer.Option("--ledger", help="Show the power of every term instead of the unknowns.")
     ] = False,
-    json: Json = False,
-    output: Output = None,
-    plot: Plot = None,
-    expect: Expect = None,
-    rtol: Rtol = 1e-3,
-    text: Text = False,
-    digits: Digits = False,
-) -> None:
+) -> Result:
     """Find the unknown force or torque that balances a table of link states, by virtual power.
 
     STATES has one row per link (and per step): link, mass_*, inertia_*, vx_* vy_* and ax_* ay_* of the centre of
@@ -40,7 +38,23 @@ def run(
     column field.
     """
     g = 0j if gravity is None else options.plane_vector("--gravity", gravity)
-    from cli.work import solve as job
+    from cli.work import columns, words
+    from cli.work.read import read_states
+    from cli.work.solve import WorkBalance
 
-    shown = job.balanced(job.read_states(states), g, ledger=ledger)
-    show(shown, json=json, output=output, plot=plot, expect=expect, rtol=rtol, text=text, digits=digits)
+    table = read_states(states)
+    found = WorkBalance(table, g)
+
+    def figure() -> Figure:
+        from cli.work.picture import draw
+
+        return draw(found)
+
+    tables = {"unknowns": lambda: columns.unknowns(found), "ledger": lambda: columns.ledger(found)}
+    return Result(
+        document=lambda: columns.document(found),
+        tables={"ledger": tables["ledger"]} if ledger else tables,
+        notes=(lambda: "") if ledger else (lambda: words.notes(found)),
+        figure=figure,
+        warnings=[*table.table.warnings, *table.warnings, *found.warnings],
+    )

@@ -7,11 +7,30 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cli.work.read import LOADS
+from cli.work.solve import WorkBalance
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def ledger(labels: Sequence[str], powers: Sequence[float]) -> Figure:
+def draw(found: WorkBalance) -> Figure:
+    """Draw the ledger of one step as bars; of several, each unknown against the step."""
+    steps = found.states.steps
+    if len(steps) == 1:
+        terms = [term for term in found.terms(0) if term.power is not None]
+        several = len(steps[0].fields) > 1
+        labels = [f"{term.link}: {term.kind}" + (f" ({term.field})" if several else "") for term in terms]
+        return _ledger(labels, [term.power or 0.0 for term in terms])
+    series: dict[str, list[float]] = {}
+    for index in range(len(steps)):
+        for _, cell, value in found.unknowns(index):
+            name = f"link {cell.link}, {LOADS[cell.quantity]}"
+            series.setdefault(name, [np.nan] * len(steps))[index] = np.nan if value is None else value
+    return _curves([step.name for step in steps], series)
+
+
+def _ledger(labels: Sequence[str], powers: Sequence[float]) -> Figure:
     """Draw each term's power as a bar, first term on top."""
     from matplotlib.figure import Figure
 
@@ -33,7 +52,7 @@ def ledger(labels: Sequence[str], powers: Sequence[float]) -> Figure:
     return figure
 
 
-def curves(steps: Sequence[str], series: Mapping[str, Sequence[float]]) -> Figure:
+def _curves(steps: Sequence[str], series: Mapping[str, Sequence[float]]) -> Figure:
     """Draw each unknown over the steps, one panel for each."""
     from matplotlib.figure import Figure
 

@@ -104,6 +104,9 @@ def _values(of: object) -> dict[str, object]:
 
 
 def _equal(self: object, other: object) -> bool:
+    if isinstance(self, tuple):
+        # a named tuple is the plain one of the same values
+        return isinstance(other, tuple) and len(self) == len(other) and all(map(alike, self, other))
     if type(self) is not type(other):
         return False
     here, there = _values(self), _values(other)

@@ -144,6 +144,7 @@ def test_extra_columns_are_ignored_and_said(dalembert: Dalembert) -> None:
 
 
 @pytest.mark.parametrize("bad", ["x", "", "nan", "1_0"])
+@pytest.mark.slow
 def test_the_last_of_many_rows_is_named(bad: str, dalembert: Dalembert, tmp_path: Path) -> None:
     rows = 100_000
     (tmp_path / "rotor.csv").write_text("rotor," + HEAD + "7,9,30,60,20\n" * rows + f"8,9,{bad},60,20\n")
@@ -231,6 +232,7 @@ HUGE = ["mass_kg", "radius_mm", "angle_deg", "z_mm"]
 )
 @example(head=HUGE, rows=[["1e308", "1e308", "0", "0"]], delimiter=",", newline="\n")
 @example(head=HUGE, rows=[["1e300", "1e3", "0", "1e300"]], delimiter=",", newline="\n")
+@pytest.mark.slow
 def test_random_tables_never_break_the_command(
     head: list[str],
     rows: list[list[str]],

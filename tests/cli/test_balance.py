@@ -366,6 +366,7 @@ def test_the_exercise_check(dalembert: Dalembert, rotor: Path, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("suffix", ["svg", "png", "pdf"])
+@pytest.mark.slow
 def test_pictures(suffix: str, dalembert: Dalembert, rotor: Path, tmp_path: Path) -> None:
     done = dalembert("balance", rotor, *TWO, "--plot", f"rotor.{suffix}")
     assert done.returncode == 0

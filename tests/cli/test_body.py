@@ -90,6 +90,7 @@ def test_orientation_by_axis_and_turns(body) -> None:
     assert json.loads(body(boxed, "--json").stdout)["inertia_kg_m2"][0][0] == 13.0
 
 
+@pytest.mark.slow
 def test_pictures_are_written(body, tmp_path) -> None:
     assert body(DISK, "--omega", "0,4,12", "--plot", "p.svg").returncode == 0
     assert b"<svg" in (tmp_path / "p.svg").read_bytes()

@@ -40,6 +40,7 @@ def test_trial_masses_and_angles(text: str, mark: str, dalembert: Dalembert) -> 
     assert with_commas.stdout == with_points.stdout
 
 
+@pytest.mark.slow
 def test_a_long_table(dalembert: Dalembert) -> None:
     head, first, second = FAN.splitlines()
     for numbers in ("{};{}", "{};{},5"):  # whole amplitudes and such with a comma

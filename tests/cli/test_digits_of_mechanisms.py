@@ -210,6 +210,7 @@ def test_json_keeps_every_digit(dalembert: Dalembert, four_bar: Path) -> None:
 @pytest.mark.parametrize(
     "name", ["boom/boom", "five-bar/five-bar", "crank-press/press", "scissors-lift/lift", "klann/klann"]
 )
+@pytest.mark.slow
 def test_tables_of_every_kind(dalembert: Dalembert, name: str) -> None:
     """The cut table has the rows, names and marks of the whole one, and numbers that agree with it."""
     from importlib.resources import files

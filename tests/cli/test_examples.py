@@ -21,6 +21,7 @@ def test_the_list_has_one_line_each(dalembert: Dalembert) -> None:
     assert all(len(line) <= 120 for line in lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", names())
 def test_an_example_runs(name: str, dalembert: Dalembert, tmp_path: Path) -> None:
     about = describe(name)
@@ -48,6 +49,7 @@ def test_an_example_runs(name: str, dalembert: Dalembert, tmp_path: Path) -> Non
     assert (tmp_path / written).read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_one_example_after_another_in_one_folder(dalembert: Dalembert) -> None:
     for name in names():
         assert dalembert("examples", name).returncode == 0

@@ -332,6 +332,7 @@ def test_bad_friction_joint(dalembert: Run) -> None:
 
 
 @pytest.mark.parametrize("name", ["crank-press", "scissors-lift", "engine", "toggle-clamp", "desk-lamp"])
+@pytest.mark.slow
 def test_examples_run(dalembert: Run, tmp_path: Path, name: str) -> None:
     shown = dalembert("examples", name).stdout.splitlines()
     command = shown[shown.index("run:") + 1].split()[1:]

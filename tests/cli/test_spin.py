@@ -101,6 +101,7 @@ def test_a_top_of_two_different_moments_is_integrated_and_said_so(spin) -> None:
     assert "no closed form" in done.stderr
 
 
+@pytest.mark.slow
 def test_csv_and_pictures(spin, tmp_path) -> None:
     done = spin(RACKET, "--time", "0:2:1")
     lines = done.stdout.splitlines()

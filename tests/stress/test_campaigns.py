@@ -7,6 +7,8 @@ import pytest
 
 from benchmarks.stress.campaigns import Tally, campaigns, run
 
+pytestmark = pytest.mark.slow
+
 TALLIES: dict[str, Tally] = {}
 
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import time
 
+import pytest
+
 from benchmarks.fuzz.trial import trial
 
 
+@pytest.mark.slow
 def test_damaged_inputs_are_handled() -> None:
     end = time.monotonic() + 12
     faults = []

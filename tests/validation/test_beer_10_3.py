@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.mechanism import Force
+from virtualwork import Force, Guess, Guide, Input, Link, Mechanism
 
 
 def test_hydraulic_lift_table() -> None:

@@ -22,8 +22,8 @@ from virtualwork import (
     second_point,
     sense,
 )
-from virtualwork.check import Check, grashof_class
-from virtualwork.newton import all_at_once
+from virtualwork.study.check import Check, grashof_class
+from virtualwork.study.newton_table import all_at_once
 
 R = math.radians
 EXAMPLES = files("cli") / "examples"

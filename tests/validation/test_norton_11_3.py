@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from virtualwork import Guess, Input, Link, Mechanism
-from virtualwork.mechanism import Force, Torque
+from virtualwork import Force, Guess, Input, Link, Mechanism, Torque
 
 G = 386.0  # in/s²
 

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from virtualwork import Guess, Input, Link, Mechanism
-from virtualwork.mechanism import Force
+from virtualwork import Force, Guess, Input, Link, Mechanism
 
 JOINTS = {
     "A": (-3.74 - 2.41j),

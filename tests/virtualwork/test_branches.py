@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.check import Check
-from virtualwork.track import Track
+from virtualwork.branch.track import Track
+from virtualwork.study.check import Check
 
 TWO_TURNS = np.radians(np.arange(0.0, 721.0))
 

@@ -7,8 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from virtualwork import DescriptionError, Guess, Guide, Input, Link, Mechanism
-from virtualwork.mechanism import Friction, Spring, Torque, TorsionSpring
+from virtualwork import (
+    DescriptionError,
+    Friction,
+    Guess,
+    Guide,
+    Input,
+    Link,
+    Mechanism,
+    Spring,
+    Torque,
+    TorsionSpring,
+)
 from virtualwork.study.counterweights import berkof_lowen, least_squares
 from virtualwork.study.cycle import Cycle
 

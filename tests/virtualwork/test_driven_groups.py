@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
-from virtualwork.assur import direction
+from virtualwork.plan.order import direction
 
 QUARTER = math.pi / 2
 

@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from virtualwork import Gear, Guess, Input, Link, Mechanism
+from virtualwork import Gear, Guess, Input, Link, Mechanism, Motor, Spring, Torque, TorsionSpring
 from virtualwork.formulas.effort import ledger
-from virtualwork.mechanism import Motor, Spring, Torque, TorsionSpring
 
 G = 9.81
 

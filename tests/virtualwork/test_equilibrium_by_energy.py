@@ -10,9 +10,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.mechanism import Force, Spring, Torque, TorsionSpring
-from virtualwork.study.equilibrium import equilibria
+from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque, TorsionSpring, equilibria
 
 G = 9.81
 

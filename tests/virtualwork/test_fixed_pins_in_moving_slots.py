@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.check import Check
-from virtualwork.describe.reader import loads
-from virtualwork.mechanism import Force, Friction
+from virtualwork import Force, Friction, Guess, Guide, Input, Link, Mechanism
+from virtualwork.study.check import Check
 
 TURN = np.radians(np.arange(0.0, 360.0, 7.0))
 GROUND = {"O": (0, 0), "P": (0.3, 0.05)}
@@ -120,9 +118,9 @@ def test_a_file_names_the_ground_as_the_link_of_a_slot():
     on = "rod"
     through = "A"
     """
-    m = loads(text, "file")
+    m = Mechanism.from_toml_text(text, "file")
     assert m.guides[0].link == "ground"
-    assert loads(text.replace('link = "ground"\n', ""), "file").guides == m.guides
+    assert Mechanism.from_toml_text(text.replace('link = "ground"\n', ""), "file").guides == m.guides
     assert math.hypot(0.3 - 0.05, 0.1 * math.sin(math.pi / 3)) == pytest.approx(
         m.motion().slide("P").position[0]
     )

@@ -15,8 +15,20 @@ import numpy as np
 import pytest
 
 from benchmarks.truth.mechanism import Exact
-from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
-from virtualwork.mechanism import GROUND, Force, Motor, Spring, Torque, TorsionSpring
+from virtualwork import (
+    GROUND,
+    Force,
+    Gear,
+    Guess,
+    Guide,
+    Input,
+    Link,
+    Mechanism,
+    Motor,
+    Spring,
+    Torque,
+    TorsionSpring,
+)
 
 KINDS = (
     "four-bar", "slider-crank", "inverted slider-crank", "Watt I", "Stephenson III", "cylinder", "geared five-bar",

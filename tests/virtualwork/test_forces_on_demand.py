@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from virtualwork import Guess, Input, Link, Mechanism
-from virtualwork.formulas.scene import Block
-from virtualwork.mechanism import Motor
+from virtualwork import Guess, Input, Link, Mechanism, Motor
+from virtualwork.formulas.block import Block
 
 SWEEP = np.linspace(0, 2 * np.pi, 361)
 

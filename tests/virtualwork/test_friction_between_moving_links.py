@@ -8,9 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from virtualwork import DescriptionError, Guess, Guide, Input, Link, Mechanism
+from virtualwork import DescriptionError, Friction, Guess, Guide, Input, Link, Mechanism, Torque
 from virtualwork.formulas.effort import ledger
-from virtualwork.mechanism import Friction, Torque
 
 G = 9.81
 

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
-from virtualwork.assur import Group
 from virtualwork.formulas.closed_forms import angle_and_slide, cross, turning_slide, two_angles, two_slides
+from virtualwork.plan.steps import Group
 
 R = math.radians
 
@@ -54,7 +54,7 @@ def test_only_what_is_asked_is_solved_and_never_twice(klann):
 
 
 def test_positions_build_no_jacobian(klann, monkeypatch):
-    import virtualwork.state as state
+    import virtualwork.formulas.rates as state
 
     def never(*_):
         raise AssertionError("a Jacobian was built")
@@ -225,6 +225,6 @@ def test_every_assembly_of_a_group_without_a_closed_form(random_mechanism):
     for a in found:
         state = a.state(m.at)
         for closure in a.merged[1].closures:
-            from virtualwork.state import loop
+            from virtualwork.formulas.positions import loop
 
             assert abs(np.ravel(loop(closure, state))[0]) < 1e-12 * m.size

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Gear, Guess, Input, Link, Mechanism
-from virtualwork.check import Check
+from virtualwork.study.check import Check
 
 
 def change_point_four_bar(dyad: bool) -> Mechanism:

@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
-from virtualwork.mechanism import GROUND, Force, Torque
+from virtualwork import GROUND, Force, Gear, Guess, Guide, Input, Link, Mechanism, Torque
 
 
 def parallelogram(third_crank: bool) -> Mechanism:

@@ -18,10 +18,21 @@ from benchmarks.stress.campaigns import replay
 from benchmarks.stress.groups import compare
 from benchmarks.truth.four_bar import circles, two_rates
 from benchmarks.truth.mechanism import Exact
-from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.mechanism import Force, Friction, Motor, Spring, Torque, TorsionSpring
+from virtualwork import (
+    Force,
+    Friction,
+    Guess,
+    Guide,
+    Input,
+    Link,
+    Mechanism,
+    Motor,
+    Spring,
+    Torque,
+    TorsionSpring,
+    equilibria,
+)
 from virtualwork.study.cycle import Cycle
-from virtualwork.study.equilibrium import equilibria
 from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
 
 EXAMPLES = files("cli") / "examples"

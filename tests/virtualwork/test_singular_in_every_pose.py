@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.check import Check
+from virtualwork.study.check import Check
 
 TURN = np.radians(np.arange(0.0, 361.0, 15.0))
 LENGTH = 0.073

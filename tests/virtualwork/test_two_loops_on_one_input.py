@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from virtualwork import Guess, Input, Link, Mechanism
-from virtualwork.check import Check
 from virtualwork.describe.errors import MechanismError
+from virtualwork.study.check import Check
 
 
 def both() -> Mechanism:

@@ -17,45 +17,40 @@ Joint friction exchanges loads and forces until neither changes; its poses have 
 from __future__ import annotations
 
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from virtualwork.bounds.motion import ENTRIES
+from virtualwork.bounds.motion import ENTRIES, MotionErrors
 from virtualwork.bounds.second_order import grown, inverse
-from virtualwork.formulas.effort import carrier
-from virtualwork.formulas.loads import Follower, InertiaForce, InertiaTorque, SpringEnd, Tabled, TorsionEnd
-from virtualwork.mechanism import GROUND
-from virtualwork.newton import EPS
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from virtualwork.formulas.dynamics import Dynamics
-    from virtualwork.formulas.loads import Load
-    from virtualwork.formulas.reactions import Joint
-    from virtualwork.motion import Motion
-
-    Reals = NDArray[np.float64]
-
-EXTERNAL = ("weight", "inertia force", "inertia torque", "applied force", "applied torque")
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.loads import (
+    EXTERNAL,
+    OWN,
+    Follower,
+    InertiaForce,
+    InertiaTorque,
+    Load,
+    SpringEnd,
+    Tabled,
+    TorsionEnd,
+)
+from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.formulas.statics import Statics
+from virtualwork.plan.joints import Joint
 
 
 class ForceErrors:
-    """Bounds of the rounding errors of forces, under the names of what they bound; each is formed when asked for.
+    """Bounds of the rounding errors of forces, under the names of what they bound; each is formed when asked for."""
 
-    `Dynamics.error_estimate` makes one.
-    """
-
-    def __init__(self, dynamics: Dynamics) -> None:
-        self.dynamics = dynamics
-        self.motion: Motion = dynamics.motion
-        self.mechanism = self.motion.mechanism
-        self.rounding = self.motion.rounding
-        self.scene = dynamics.scene
-        self.n = self.motion.n
+    def __init__(self, dynamics: Dynamics, motion: MotionErrors | None = None) -> None:
+        self.dynamics, self.poses, self.scene = dynamics, dynamics.poses, dynamics.scene
+        self.mechanism = self.poses.mechanism
+        self.motion = motion or MotionErrors(self.poses)
+        self.n = self.poses.n
         self._known: dict[int, tuple[Any, Reals]] = {}
-        self._units: dict[int, Motion] = {}
+        self._units: dict[int, MotionErrors] = {}
 
     # --- loads ------------------------------------------------------------------------------------------------------
     def load(self, load: Load) -> tuple[Any, Reals]:
@@ -63,7 +58,7 @@ class ForceErrors:
         if id(load) not in self._known:
             value = np.zeros(self.n, float if load.path is None else complex)
             for block in self.scene.blocks():
-                found = load.value(block)
+                found = load.form(block)
                 if found is not None:
                     value[block.rows] = found
             with np.errstate(all="ignore"):
@@ -71,7 +66,7 @@ class ForceErrors:
         return self._known[id(load)]
 
     def _error(self, load: Load, size: Reals) -> Reals:
-        r = self.rounding
+        r = self.motion
         own = EPS / 2 * size
         if isinstance(load, InertiaForce):
             return np.asarray(own + load.mass * r.point(load.body, load.place, None, 2))
@@ -83,7 +78,7 @@ class ForceErrors:
             at = np.array([row[0] for row in load.table])
             force = np.array([row[1] for row in load.table])
             steep = float(np.max(np.abs(np.diff(force) / np.diff(at)), initial=0.0))
-            q = np.abs(self.motion.inputs[:, 0])
+            q = np.abs(self.poses.inputs[:, 0])
             read = 2 * EPS * float(np.abs(force).max()) + EPS * steep * (q + np.abs(at).max())
             turning = size * r.rotation(load.body) if load.link_axes else 0.0
             return np.asarray(own + read + turning)
@@ -91,8 +86,7 @@ class ForceErrors:
             return own + self._spring(load)
         if isinstance(load, TorsionEnd):
             s = load.spring
-            assert s is not None
-            formed = 2 * np.pi + abs(s.free_angle) + np.abs(self.motion.inputs).sum(axis=1)
+            formed = 2 * np.pi + abs(s.free_angle) + np.abs(self.poses.inputs).sum(axis=1)
             turned: Reals = own + EPS * s.stiffness * formed
             for body in s.links:
                 turned = turned + s.stiffness * r.rotation(body)
@@ -103,15 +97,13 @@ class ForceErrors:
 
     def _spring(self, load: SpringEnd) -> Reals:
         """Of k(1 − l₀/l)d + c(d·ḋ/l²)d."""
-        s, r = load.spring, self.rounding
-        assert s is not None
-        ends = [self.motion.at(body, z) for body, z in s.between]
+        s, r, p = load.spring, self.motion, self.poses
         moved = sum(r.point(body, z) for body, z in s.between)
-        d = np.abs(ends[1].complex(0) - ends[0].complex(0))
+        d = np.abs(np.subtract(*(p.point_derivative(body, z, 0) for body, z in s.between)))
         slack = s.free_length / d if s.free_length else np.zeros(self.n)
         error: Any = s.stiffness * ((np.abs(1 - slack) + slack) * moved + 4 * EPS * s.free_length)
         if s.damping and self.scene.moves:
-            rate = np.abs(ends[1].complex(1) - ends[0].complex(1))
+            rate = np.abs(np.subtract(*(p.point_derivative(body, z, 1) for body, z in s.between)))
             error = error + s.damping * (
                 3 * rate * moved / d + sum(r.point(b, z, None, 1) for b, z in s.between)
             )
@@ -136,31 +128,28 @@ class ForceErrors:
                 value, error = self.load(load)
                 moved: Any
                 if load.path is None:
-                    moved = unit.angle_derivative(load.body, 1)
-                    lost = unit.rounding.angle(load.body, 1)
+                    moved = unit.poses.angle_derivative(load.body, 1)
+                    lost = unit.angle(load.body, 1)
                 else:
-                    moved = unit.point_derivative(load.body, load.place, 1)
-                    lost = unit.rounding.point(load.body, load.place, None, 1)
+                    moved = unit.poses.point_derivative(load.body, load.place, 1)
+                    lost = unit.point(load.body, load.place, None, 1)
                 out[:, j] += error * np.abs(moved) + np.abs(value) * (lost + EPS / 2 * np.abs(moved))
         return out
 
-    def unit(self, j: int) -> Motion:
-        """The motion at a unit speed of input j alone."""
+    def unit(self, j: int) -> MotionErrors:
+        """The errors of the motion at a unit speed of input j alone."""
         if j not in self._units:
             k = len(self.mechanism.inputs)
-            speed = 1.0 if k == 1 else np.eye(k)[j]
-            rest = 0.0 if k == 1 else np.zeros(k)
-            inputs = self.motion.inputs[:, 0] if k == 1 else self.motion.inputs
-            unit = type(self.motion)(self.motion.assembly, inputs, speed, rest, rest)
-            unit.input_error = self.motion.input_error
-            self._units[j] = unit
+            poses = self.poses.again(self.poses.inputs, [np.eye(k)[j].tolist(), [0.0] * k, [0.0] * k])
+            poses.input_error = self.poses.input_error
+            self._units[j] = MotionErrors(poses)
         return self._units[j]
 
     def _through(self, force: Reals) -> Reals:
-        """Through motors that sit on another body than `on`; see `work.through_carriers`."""
+        """Through motors that sit on another body than `on`; see `effort.through_carriers`."""
         inputs = self.mechanism.inputs
         k = len(inputs)
-        moved = [j for j, e in enumerate(inputs) if not e.is_slide and carrier(self.scene, j) != e.on]
+        moved = [j for j, e in enumerate(inputs) if not e.is_slide and self.mechanism.carrier(j) != e.on]
         if not moved:
             return force
         matrix = np.broadcast_to(np.eye(k), (self.n, k, k)).copy()
@@ -168,9 +157,9 @@ class ForceErrors:
         for i in range(k):
             unit = self.unit(i)
             for j in moved:
-                ends = str(inputs[j].link), carrier(self.scene, j)
-                matrix[:, i, j] = unit.angle_derivative(ends[0], 1) - unit.angle_derivative(ends[1], 1)
-                wrong[:, i, j] = sum(unit.rounding.angle(body, 1) for body in ends)
+                ends = str(inputs[j].link), self.mechanism.carrier(j)
+                matrix[:, i, j] = np.subtract(*(unit.poses.angle_derivative(body, 1) for body in ends))
+                wrong[:, i, j] = sum(unit.angle(body, 1) for body in ends)
         total = force + (wrong @ np.abs(self.dynamics.effort)[..., None])[..., 0]
         return np.asarray((np.abs(inverse(matrix)) @ total[..., None])[..., 0])
 
@@ -178,15 +167,13 @@ class ForceErrors:
     @cached_property
     def _unknowns(self) -> tuple[list[Any], Reals, Reals]:
         """The unknown forces of all links, their sizes and bounds, (n, unknowns); torques divided by the size."""
-        from virtualwork.formulas.statics import Statics
-
         d = self.dynamics
         statics = d.statics or Statics(d.reactions)
         poses = max(1, 4 * ENTRIES // len(statics.unknowns) ** 2)
         if self.n > poses:
             parts = [self._part(slice(i, i + poses))._unknowns for i in range(0, self.n, poses)]
             return statics.unknowns, *(np.concatenate([part[i] for part in parts]) for i in (1, 2))  # type: ignore
-        a, b = statics._system()
+        a, b = statics.system()
         value = d.statics.solved[0] if d.statics is not None else self._gears(statics, a, b)
         known = np.nan_to_num(value)
         found = np.full(value.shape, np.nan)
@@ -199,24 +186,19 @@ class ForceErrors:
                 left = wrong[rows] + EPS / 2 * ((np.abs(a[rows]) @ np.abs(f))[..., 0] + np.abs(b[rows]))
                 left += np.abs((a[rows] @ f)[..., 0] + b[rows])
                 found[rows] = (np.abs(inverse(a[rows])) @ left[..., None])[..., 0]
-            tau = self.rounding.tau.max(axis=1, initial=0.0)
+            tau = self.motion.tau.max(axis=1, initial=0.0)
             found *= grown(tau, 1)[:, None]
         found[~np.isfinite(wrong).all(axis=1) & np.isfinite(value).all(axis=1)] = np.inf
         return statics.unknowns, value, self._settled(found)
 
     def _part(self, rows: slice) -> ForceErrors:
         """The same over some of the poses: the equations of all would not fit into memory."""
-        motion = self.motion
-        part = type(motion)(
-            motion.assembly, motion.inputs[rows] if len(self.mechanism.inputs) > 1 else motion.inputs[rows, 0]
-        )
-        part._rates = [
-            [rate if isinstance(rate, float) else rate[rows] for rate in rates] for rates in motion._rates
-        ]
-        part.input_error = np.broadcast_to(np.asarray(motion.input_error, dtype=float), motion.inputs.shape)[
-            rows
-        ]
-        return part.dynamics.error_estimate()
+        poses = self.poses
+        rates = [[rate if isinstance(rate, float) else rate[rows] for rate in of] for of in poses.rates]
+        part = poses.again(poses.inputs[rows], rates)
+        whole = np.broadcast_to(np.asarray(poses.input_error, dtype=float), poses.inputs.shape)
+        part.input_error = whole[rows]
+        return ForceErrors(Dynamics(part))
 
     def _gears(self, statics: Any, a: Reals, b: Reals) -> Reals:
         """The unknowns with the gears' torques that go best with the others."""
@@ -252,7 +234,7 @@ class ForceErrors:
 
     def _entries(self, statics: Any, known: Reals) -> Reals:
         """|δA||f̂| + |δb|: what wrong places, directions and loads do to each equation, (n, equations)."""
-        m, r, motion = self.mechanism, self.rounding, self.motion
+        m, r, poses = self.mechanism, self.motion, self.poses
         links, size = list(m.links), statics.size
         column = {unknown: i for i, unknown in enumerate(statics.unknowns)}
         equations = 3 * len(links) + 2 * sum(
@@ -279,7 +261,7 @@ class ForceErrors:
             arm = abs(load.place - center[load.body])
             put(load.body, error, arm * (error + np.abs(value) * turned[load.body]))
         for j, entry in enumerate(m.inputs):
-            body = entry.on if entry.is_slide else carrier(self.scene, j)
+            body = entry.on if entry.is_slide else m.carrier(j)
             if body != entry.on:  # the motor's reaction is put there as a load
                 for carrying in {body, entry.on} - {GROUND}:
                     put(carrying, 0.0, self.effort[:, j])
@@ -301,9 +283,8 @@ class ForceErrors:
                 lever = abs(m.links[g.link].points[g.point] - center[g.link])
                 put(g.link, bent, lever * (bent + force * turned[g.link]))
             if g.on != GROUND:
-                through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
-                slide = motion.slide_derivative(joint.guide, 0)
-                reach = abs(complex(through) - center[g.on]) + np.abs(slide)
+                slide = poses.slide_derivative(joint.guide, 0)
+                reach = abs(m.through(g) - center[g.on]) + np.abs(slide)
                 put(g.on, bent, 2 * reach * bent + force * r.slide(joint.guide))
         return out
 
@@ -331,7 +312,7 @@ class ForceErrors:
         unknowns, value, _ = self._unknowns
         normal = np.abs(value[:, unknowns.index(("normal", joint.key, ""))])
         on = self.mechanism.guides[joint.guide].on
-        return np.asarray(self._of(("normal", joint.key, "")) + normal * (self.rounding.rotation(on)))
+        return np.asarray(self._of(("normal", joint.key, "")) + normal * (self.motion.rotation(on)))
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """Of `Dynamics.joint_moment`, (n,)."""
@@ -355,10 +336,10 @@ class ForceErrors:
             if load.path is None:
                 moment += error + EPS * np.abs(value)
                 continue
-            at = np.abs(self.motion.point_derivative(load.body, load.place, 0))
+            at = np.abs(self.poses.point_derivative(load.body, load.place, 0))
             force += error + EPS * np.abs(value)
             moment += at * (error + EPS / 2 * np.abs(value))
-            moment += np.abs(value) * self.rounding.point(load.body, load.place)
+            moment += np.abs(value) * self.motion.point(load.body, load.place)
         return self._settled(force), self._settled(moment)
 
     def applied(self, link: str) -> tuple[Reals, Reals]:
@@ -366,15 +347,15 @@ class ForceErrors:
         force, moment = np.zeros(self.n), np.zeros(self.n)
         center = self.scene.rigid[link].center
         for load in self.scene.loads:
-            if load.body != link or load.kind in ("weight", "inertia force", "inertia torque"):
+            if load.body != link or load.kind in OWN:
                 continue
             value, error = self.load(load)
             if load.path is None:
                 moment += error
                 continue
             force += error + EPS / 2 * np.abs(value)
-            moment += abs(load.place - center) * (error + np.abs(value) * self.rounding.rotation(link))
+            moment += abs(load.place - center) * (error + np.abs(value) * self.motion.rotation(link))
         return self._settled(force), self._settled(moment)
 
     def _settled(self, bounds: Reals) -> Reals:
-        return np.full_like(bounds, np.inf) if self.scene.rubs else bounds
+        return np.full_like(bounds, np.inf) if self.scene.friction else bounds

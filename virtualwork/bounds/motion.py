@@ -19,51 +19,42 @@ from __future__ import annotations
 
 from functools import cached_property
 from math import comb
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from virtualwork.bounds.second_order import Sizes, grown, inverse, kept, sum_of, value_of
-from virtualwork.mechanism import GROUND
-from virtualwork.newton import EPS
-from virtualwork.plan.steps import Angle, Group, Place, Slide, Term, Turn, combined
-from virtualwork.state import Jets, State
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.positions import State
+from virtualwork.formulas.rates import Rates
+from virtualwork.plan.steps import Angle, Closure, Group, Place, Slide, Term, Turn, combined
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+# roundings that a term collects, at worst, on its way into a sum: e^{iθ}, z·e^{iθ}, the sum
+ROUNDINGS = 0.5
+# so many entries of one matrix over all poses are worked on at once
+ENTRIES = 1 << 21
 
-    from virtualwork.motion import Motion
-    from virtualwork.plan.steps import Closure
-
-    Reals = NDArray[np.float64]
-    Complexes = NDArray[np.complex128]
-
-ROUNDINGS = 0.5  # roundings that a term collects, at worst, on its way into a sum: e^{iθ}, z·e^{iθ}, the sum
-FLOOR = (
-    1e-13  # a singular value is not taken for smaller: the second order decides there, and does not see it
-)
-ENTRIES = 1 << 21  # so many entries of one matrix over all poses are worked on at once
-
-Chain = tuple[
-    tuple[Term, ...], tuple[str, ...]
-]  # a point from the ground: its terms, and the points on the way
+# a point from the ground: its terms, and the points on the way
+Route = tuple[tuple[Term, ...], tuple[str, ...]]
 
 
-class Rounding:
-    """Bounds of the rounding errors of one motion; each is formed when first asked for. `Motion.rounding` makes one."""
+class MotionErrors:
+    """Bounds of the rounding errors of one motion; each is formed when first asked for."""
 
-    def __init__(self, motion: Motion) -> None:
-        self.motion = motion
-        self.plan = motion.assembly.plan
-        self.n = motion.n
-        self.size = motion.mechanism.size
+    def __init__(self, poses: Poses) -> None:
+        self.poses, self.plan = poses, poses.plan
+        self.n = poses.n
+        self.size = poses.mechanism.size
         self.groups: tuple[Group, ...] = self.plan.groups
         self.angles = [body for g in self.groups for body in g.angles]
         self.slides = [s for g in self.groups for s in g.slides]
         self.share: dict[str, dict[int, float]] = {GROUND: {}}  # ∂θ_body/∂x
-        self.chains: dict[str | None, Chain] = {None: ((), ())}
+        self.routes: dict[str | None, Route] = {None: ((), ())}
         self.ties: list[Turn] = []
-        self.given: Reals = np.broadcast_to(np.asarray(motion.input_error, dtype=float), motion.inputs.shape)
+        self.given: Reals = np.broadcast_to(np.asarray(poses.input_error, dtype=float), poses.inputs.shape)
         self.driven = {step.guide: step.input for step in self.plan.steps if isinstance(step, Slide)}
         for step in self.plan.steps:
             if isinstance(step, Turn):
@@ -74,8 +65,8 @@ class Rounding:
                 for tie in step.ties:
                     self._tie(tie)
             elif isinstance(step, Place):
-                terms, nodes = self.chains[step.base]
-                self.chains[step.node] = combined((*terms, *step.terms)), (*nodes, step.node)
+                terms, nodes = self.routes[step.base]
+                self.routes[step.node] = combined((*terms, *step.terms)), (*nodes, step.node)
         self.closures = [closure for g in self.groups for closure in g.closures]
         self.loops = [self._whole(closure) for closure in self.closures]
         self._solved: list[Reals] = []
@@ -89,9 +80,9 @@ class Rounding:
         self.share[tie.body] = total
         self.ties.append(tie)
 
-    def _whole(self, closure: Closure) -> Chain:
+    def _whole(self, closure: Closure) -> Route:
         """A loop from the ground, and the points that bring a rounding of their own into it."""
-        (first, there), (last, back) = self.chains[closure.start], self.chains[closure.end]
+        (first, there), (last, back) = self.routes[closure.start], self.routes[closure.end]
         nodes = set(there) ^ set(back) | {node for node in (closure.start, closure.end) if node is not None}
         negative = tuple(Term(-t.z, t.body, t.slide) for t in last)
         return combined((*first, *closure.terms, *negative)), tuple(sorted(nodes))
@@ -100,40 +91,40 @@ class Rounding:
     @cached_property
     def _state(self) -> State:
         """Rotations of length 1 and slides over all poses."""
-        motion = self.motion
-        motion._solve([key for s in self.plan.steps for key in self.plan.writes(s)], 0)
-        states = motion._states()
-        found = State([motion.inputs[:, j] for j in range(motion.inputs.shape[1])], many=True)
+        poses = self.poses
+        poses.solve([key for s in self.plan.steps for key in self.plan.writes(s)], 0)
+        states = poses.states()
+        found = State([poses.inputs[:, j] for j in range(poses.inputs.shape[1])], many=True)
         self._length: dict[str, Any] = {GROUND: 0.0}
         self._unwound: dict[str, Any] = {GROUND: 0.0}
         for body in self.share:
             if body == GROUND:
                 continue
-            e = motion._join([st.turn[body] for st in states], complex)
+            e = poses.join([st.turn[body] for st in states], complex)
             with np.errstate(all="ignore"):  # a pose that is not assembled has none
                 length = np.abs(e)
                 found.turn[body] = e / length
             self._length[body] = np.abs(length - 1)
             known = all(body in st.angle for st in states)
             self._unwound[body] = np.abs(
-                motion._join([st.angle[body] for st in states], float) if known else np.angle(e)
+                poses.join([st.angle[body] for st in states], float) if known else np.angle(e)
             )
         for guide in states[0].slide if states else ():
-            found.slide[guide] = motion._join([st.slide[guide] for st in states], float)
+            found.slide[guide] = poses.join([st.slide[guide] for st in states], float)
         return found
 
-    def _jets(self, order: int, rows: slice) -> Jets:
-        """The motion's time derivatives over some poses, as jets."""
+    def _rates_of(self, order: int, rows: slice) -> Rates:
+        """The motion's time derivatives over some poses, as rates."""
         st = State([q[rows] for q in self._state.inputs], many=True)
         st.turn = {body: e if body == GROUND else e[rows] for body, e in self._state.turn.items()}
         st.slide = {guide: s[rows] for guide, s in self._state.slide.items()}
-        jets = Jets(self.plan, st, [])
+        rates = Rates(self.plan, st, [])
         for body in self.share:
             if body != GROUND:
-                jets.angle[body] = [self.motion.angle_derivative(body, k)[rows] for k in range(1, order + 1)]
+                rates.angle[body] = [self.poses.angle_derivative(body, k)[rows] for k in range(1, order + 1)]
         for guide in st.slide:
-            jets.slide[guide] = [self.motion.slide_derivative(guide, k)[rows] for k in range(1, order + 1)]
-        return jets
+            rates.slide[guide] = [self.poses.slide_derivative(guide, k)[rows] for k in range(1, order + 1)]
+        return rates
 
     @cached_property
     def _relative(self) -> dict[str, Any]:
@@ -150,14 +141,12 @@ class Rounding:
         plain = len(angle.inputs) == 1 and angle.inputs[0][1] == 1.0
         # in a sweep e^{iθ} is a product of three factors
         error: Any = (
-            1.5 * EPS
-            if angle.inputs and self.motion.swept and len(self.motion.mechanism.inputs) == 1
-            else 0.0
+            1.5 * EPS if angle.inputs and self.poses.swept and len(self.poses.mechanism.inputs) == 1 else 0.0
         )
         for j, k in angle.inputs:
             error = error + abs(k) * self.given[:, j]
-        # the constant of a gear is itself a difference of angles of this size
-        error = error + EPS * abs(angle.const)
+        # the constant is itself a sum of angles of this size
+        error = error + EPS * max(abs(angle.const), angle.size)
         if not plain:
             error = error + EPS * (abs(angle.const) + 2 * sum(abs(k * st.inputs[j]) for j, k in angle.inputs))
         for base, r in angle.bases:
@@ -191,11 +180,11 @@ class Rounding:
 
     def _some(self, order: int, rows: slice) -> list[Reals]:
         """The bounds over some poses, orders 0 … order."""
-        jets = self._jets(order, rows)
-        n = len(jets.st.inputs[0])
+        rates = self._rates_of(order, rows)
+        n = len(rates.st.inputs[0])
         scale = np.array([1 / self.size] * len(self.angles) + [1.0] * len(self.slides))
-        j = [self._jacobian(jets, m, n) * scale for m in range(order + 1)]
-        residual = [self._residual(jets, rows, k, n) for k in range(order + 1)]
+        j = [self._jacobian(rates, m, n) * scale for m in range(order + 1)]
+        residual = [self._residual(rates, rows, k, n) for k in range(order + 1)]
         # a group that has no pose, or no rates, takes none from those before it
         unknown = [self._unknown(j[k], residual[k]) for k in range(order + 1)]
         for matrix in (*j, *residual):
@@ -212,7 +201,7 @@ class Rounding:
             sum((np.abs(a[k][i]) @ residual[i][..., None])[..., 0] for i in range(k + 1)) * scale
             for k in range(order + 1)
         ]
-        high, low = self._second(jets, back, bounds[0], scale)
+        high, low = self._second(rates, back, bounds[0], scale)
         self._tau[rows] = high
         found = [bounds[0] * kept(high, low), *(b * grown(high, k) for k, b in enumerate(bounds[1:], 1))]
         for k, bound in enumerate(found):
@@ -233,35 +222,37 @@ class Rounding:
             out[:, own] |= lost[:, None]
         return out
 
-    def _jacobian(self, jets: Jets, m: int, n: int) -> Reals:
+    def _jacobian(self, rates: Rates, m: int, n: int) -> Reals:
         """The m-th time derivative of J, (n, 2·loops, unknowns)."""
         out = np.zeros((n, 2 * len(self.loops), len(self.angles) + len(self.slides)))
         for i, (terms, _) in enumerate(self.loops):
             for t in terms:
-                turned = 1j * value_of(jets, t, m)
+                turned = 1j * value_of(rates, t, m)
                 for column, r in self.share[t.body].items():
                     out[:, 2 * i, column] += r * np.real(turned)
                     out[:, 2 * i + 1, column] += r * np.imag(turned)
                 if t.slide in self.slides:
                     column = len(self.angles) + self.slides.index(t.slide)
-                    along = value_of(jets, Term(t.z, t.body), m)
+                    along = value_of(rates, Term(t.z, t.body), m)
                     out[:, 2 * i, column] += np.real(along)
                     out[:, 2 * i + 1, column] += np.imag(along)
         return out
 
-    def _residual(self, jets: Jets, rows: slice, k: int, n: int) -> Reals:
+    def _residual(self, rates: Rates, rows: slice, k: int, n: int) -> Reals:
         """The size of what the k-th derivative of each loop leaves, (n, 2·loops): as computed, and its rounding."""
         out = np.empty((n, 2 * len(self.loops)))
         for i, (terms, nodes) in enumerate(self.loops):
-            left = jets.vector(None, terms, k)
-            noise = self._noise(jets, rows, terms, nodes, k)
+            left = rates.vector((None, terms), k)
+            noise = self._noise(rates, rows, terms, nodes, k)
             out[:, 2 * i] = np.abs(np.real(0.0 if left is None else left)) + noise
             out[:, 2 * i + 1] = np.abs(np.imag(0.0 if left is None else left)) + noise
         return out
 
-    def _noise(self, jets: Jets, rows: slice, terms: tuple[Term, ...], nodes: tuple[str, ...], k: int) -> Any:
+    def _noise(
+        self, rates: Rates, rows: slice, terms: tuple[Term, ...], nodes: tuple[str, ...], k: int
+    ) -> Any:
         """The rounding of a sum of terms, and of the points on the way."""
-        sizes = Sizes(jets)
+        sizes = Sizes(rates)
         noise: Any = 0.0
         for t in terms:
             relative = self._relative[t.body]
@@ -269,10 +260,10 @@ class Rounding:
             if t.slide in self.driven:
                 noise = noise + abs(t.z) * sizes.turn(t.body, k) * self.given[rows, self.driven[t.slide]]
         for node in nodes:
-            noise = noise + EPS * np.abs(sum_of(jets, self.chains[node][0], k))
+            noise = noise + EPS * np.abs(sum_of(rates, self.routes[node][0], k))
         return noise
 
-    def _second(self, jets: Jets, back: Reals, first: Reals, scale: Reals) -> tuple[Reals, Reals]:
+    def _second(self, rates: Rates, back: Reals, first: Reals, scale: Reals) -> tuple[Reals, Reals]:
         """The second-order step of every unknown as a share of its first: no less than it is, and no more, (n, unknowns).
 
         No less: all terms of the second order by their sizes. No more: with their signs, for a step in the direction
@@ -288,7 +279,7 @@ class Rounding:
             bent = np.zeros((n, len(self.loops)), complex)
             for i, (terms, _) in enumerate(self.loops):
                 for t in terms:
-                    value, bare = value_of(jets, t, 0), value_of(jets, Term(t.z, t.body), 0)
+                    value, bare = value_of(rates, t, 0), value_of(rates, Term(t.z, t.body), 0)
                     share = self.share[t.body].items()
                     turned = sum((abs(r) if sized else r) * move[:, column] for column, r in share)
                     along: Any = 0.0
@@ -317,12 +308,33 @@ class Rounding:
         if k == 0:
             return np.asarray(self.rotation(body) + EPS / 2 * np.abs(np.angle(self._state.turn[body])))
         total = self._moved(body, k)
-        total += ROUNDINGS * EPS * np.abs(self.motion.angle_derivative(body, k))
-        for tie in self.ties:
-            if tie.body == body:
-                for base, r in tie.angle.bases:
-                    if base != GROUND:
-                        total += EPS * np.abs(r * self.motion.angle_derivative(base, k))
+        total += ROUNDINGS * EPS * np.abs(self.poses.angle_derivative(body, k))
+        return total + self._tied(body, k)
+
+    def _tied(self, body: str, k: int) -> Reals:
+        """The rounding of the k-th rate of an angle that is a sum of others, theirs among it; (n,), else zero."""
+        total = np.zeros(self.n)
+        angle = next((tie.angle for tie in self.ties if tie.body == body), Angle())
+        terms = [(abs(f), np.abs(self.poses.rate(j, k))) for j, f in angle.inputs]
+        terms += [(abs(r), self._sized(base, k)) for base, r in angle.bases if base != GROUND]
+        if not terms or (len(terms) == 1 and terms[0][0] == 1.0 and angle.inputs):
+            return total
+        for f, size in terms:
+            # the factor, its product, the products of the law of motion, and every sum after it
+            total = total + EPS * (1 + k + len(terms)) / 2 * f * size
+        for base, r in angle.bases:
+            total = total + abs(r) * self._tied(base, k)
+        return total
+
+    def _sized(self, body: str, k: int) -> Reals:
+        """The sizes of what the law of motion adds up to the k-th rate of an angle, (n,)."""
+        if len(self.poses.mechanism.inputs) > 1 or k == 1:
+            return np.abs(self.poses.angle_derivative(body, k))
+        v, a = self.poses.rate(0, 1), self.poses.rate(0, 2)
+        weights = [a, v * v] if k == 2 else [self.poses.rate(0, 3), 3 * v * a, v**3]
+        total = np.zeros(self.n)
+        for order, weight in enumerate(weights, 1):
+            total = total + np.abs(self.poses.angle_coefficient(body, order=order) * weight)
         return total
 
     def slide(self, guide: int, order: int = 0) -> Reals:
@@ -330,32 +342,32 @@ class Rounding:
         if guide not in self.slides:
             return np.array(self.given[:, self.driven[guide]]) if order == 0 else np.zeros(self.n)
         found = self.unknowns(order)[:, len(self.angles) + self.slides.index(guide)]
-        return found + EPS * np.abs(self.motion.slide_derivative(guide, order))
+        return found + EPS * np.abs(self.poses.slide_derivative(guide, order))
 
     def point(self, body: str, z: complex, node: str | None = None, order: int = 0) -> Reals:
         """Bound of the error of a point's position (m), velocity, acceleration or jerk, (n,): the length of the error."""
         base, own = (node, ()) if node is not None else self.plan.anchors[body]
         last = () if node is not None else (*own, Term(z, body))
-        terms, nodes = self.chains[base]
+        terms, nodes = self.routes[base]
         terms = combined((*terms, *last))
         with np.errstate(all="ignore"):
             everywhere = slice(0, self.n)
-            jets = self._jets(order, everywhere)
-            total = np.zeros(self.n) + self._noise(jets, everywhere, terms, nodes, order)
+            rates = self._rates_of(order, everywhere)
+            total = np.zeros(self.n) + self._noise(rates, everywhere, terms, nodes, order)
             for t in terms:
                 for j in range(order + 1):
                     c = comb(order, j)
                     if t.body != GROUND:
                         turned = self._moved(t.body, j)
-                        total += c * np.abs(value_of(jets, t, order - j)) * turned
+                        total += c * np.abs(value_of(rates, t, order - j)) * turned
                     if t.slide in self.slides:
-                        bare = value_of(jets, Term(t.z, t.body), order - j)
+                        bare = value_of(rates, Term(t.z, t.body), order - j)
                         total += (
                             c
                             * np.abs(bare)
                             * self.unknowns(j)[:, len(self.angles) + self.slides.index(t.slide)]
                         )
-            out: Reals = total + EPS * np.abs(sum_of(jets, terms, order))
+            out: Reals = total + EPS * np.abs(sum_of(rates, terms, order))
         return out
 
     def rotation(self, body: str) -> Reals:

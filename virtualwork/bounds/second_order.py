@@ -1,4 +1,4 @@
-"""What the estimates of rounding errors are made of: sizes of jets, inverses, and the second order near a limit.
+"""What the estimates of rounding errors are made of: sizes of rates, inverses, and the second order near a limit.
 
 Close to a limit of the input the second order counts. With f = h² − c for the loop, c uncertain by κ, h = √c, and
 τ = κ/2h² the ratio of the second-order step to the first, h^(1−2k) changes by no more than
@@ -12,29 +12,24 @@ order, and of its rates no digit is known.
 from __future__ import annotations
 
 from math import comb
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from virtualwork.mechanism import GROUND
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from virtualwork.plan.steps import Term
-    from virtualwork.state import Jets
-
-    Reals = NDArray[np.float64]
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.rates import Rates
+from virtualwork.plan.steps import Term
 
 # a singular value is not taken for smaller: the second order decides there, and does not see it
 FLOOR = 1e-13
 
 
 class Sizes:
-    """The sizes of jets: every product by the sizes of its factors, every sum without cancellation."""
+    """The sizes of rates: every product by the sizes of its factors, every sum without cancellation."""
 
-    def __init__(self, jets: Jets) -> None:
-        self.jets = jets
+    def __init__(self, rates: Rates) -> None:
+        self.along = rates
         self._turn: dict[str, list[Any]] = {}
 
     def turn(self, body: str, k: int) -> Any:
@@ -44,7 +39,7 @@ class Sizes:
         if body == GROUND:
             return 0.0
         known = self._turn.setdefault(body, [1.0])
-        rates = self.jets.angle[body]
+        rates = self.along.angle[body]
         while len(known) <= k:
             m = len(known)
             known.append(sum(comb(m - 1, j) * np.abs(rates[j]) * known[m - 1 - j] for j in range(m)))
@@ -54,19 +49,19 @@ class Sizes:
         """Of the k-th derivative of z·s·e^{iθ}."""
         if t.slide is None:
             return abs(t.z) * self.turn(t.body, k)
-        s = [self.jets.st.slide[t.slide], *self.jets.slide[t.slide]]
+        s = [self.along.st.slide[t.slide], *self.along.slide[t.slide]]
         return abs(t.z) * sum(comb(k, j) * np.abs(s[j]) * self.turn(t.body, k - j) for j in range(k + 1))
 
 
-def value_of(jets: Jets, t: Term, k: int) -> Any:
+def value_of(rates: Rates, t: Term, k: int) -> Any:
     """The k-th derivative of a term."""
-    value = jets.vector(None, (t,), k)
+    value = rates.vector((None, (t,)), k)
     return 0.0 if value is None else value
 
 
-def sum_of(jets: Jets, terms: tuple[Term, ...], k: int) -> Any:
+def sum_of(rates: Rates, terms: tuple[Term, ...], k: int) -> Any:
     """The k-th derivative of a sum of terms."""
-    value = jets.vector(None, terms, k)
+    value = rates.vector((None, terms), k)
     return 0.0 if value is None else value
 
 

@@ -1,4 +1,4 @@
-"""The tangent through a change point, and every higher derivative there.
+"""A change point: the tangents through it, and every higher derivative there.
 
 Where the Jacobian Φ of a group vanishes while its loops still close on both sides, two branches cross. With the left
 null vector n of Φ, the n-component of the k-th derivative of the loops holds no k-th derivative of the unknowns:
@@ -8,37 +8,68 @@ branches; at k > 2 it is linear in the free (k−1)-th rate. So the branch goes 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import factorial
+from typing import Any
 
 import numpy as np
 
-from virtualwork.newton import stack, stack_rows
+from virtualwork.branch.choice import Along
+from virtualwork.formulas.linear import stack, stack_rows
+from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.formulas.positions import State
+from virtualwork.formulas.rates import Rates
+from virtualwork.plan.steps import Group
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from virtualwork.assur import Group
-    from virtualwork.state import Jets
-
-    Reals = NDArray[np.float64]
+# of the series through a change point
+ORDER = 12
+# share of the series' radius of convergence, within which it replaces the closed form
+REACH = 0.03
 
 
-def branches(group: Group, jets: Callable[[], Jets], order: int) -> list[list[Reals]]:
+@dataclass(frozen=True)
+class ChangePoint:
+    """Where a group's two branches cross: the input, the unknowns there, and their derivatives.
+
+    `turn` and `slide` are the unknowns at the point; `rates[k−1]` their k-th derivatives along the branch taken.
+    """
+
+    group: str
+    input: float
+    turn: tuple[complex, ...]
+    slide: tuple[float, ...]
+    rates: Any
+    reach: float
+    # first rates of the branch not taken
+    other: Any = None
+
+    def unknown(self, delta: Number, order: int) -> Any:
+        """The unknowns' derivatives of one order at a distance from the point (order 0: their change)."""
+        n = len(self.rates)
+        total = np.zeros((*np.shape(delta), len(self.rates[0])))
+        for j in range(n - order, -1, -1):
+            k = order + j
+            if k == 0:
+                continue
+            total = total + np.multiply.outer(delta**j, self.rates[k - 1]) / factorial(j)
+        return total
+
+
+def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[Reals]]:
     """The derivatives [x′, x″, ... x⁽ᵒʳᵈᵉʳ⁾] of a group's unknowns on each branch through a change point.
 
     Parameters
     ----------
-    jets : callable
-        Gives fresh `Jets` at the change point, with everything the group hangs on known to order + 1.
+    start : callable
+        Gives fresh `Rates` at the change point, with everything the group hangs on known to order + 1.
 
     Returns
     -------
     list of branches
         Two where two tangents cross; one where both fall together; none where the tangent is not determined.
     """
-    d = jets()
+    d = start()
     jacobian = stack(d.columns(group), 1)[0]
     if not np.isfinite(jacobian).all():
         return []  # what the group hangs on is not assembled here
@@ -50,13 +81,13 @@ def branches(group: Group, jets: Callable[[], Jets], order: int) -> list[list[Re
         """The solution of Φ·x = −right without a component along the null vector."""
         return np.asarray(vt[:span].T @ ((u[:, :span].T @ -right) / s[:span]))
 
-    def gap(d: Jets, k: int) -> Reals:
+    def gap(d: Rates, k: int) -> Reals:
         return np.asarray(stack_rows(d.right_side(group, k), 1)[0])
 
     base = particular(gap(d, 1))
 
     def second(rate: float) -> float:
-        trial = jets()
+        trial = start()
         trial.right_side(group, 1)
         trial.write(group, 1, list(base + rate * null))
         return float(left @ gap(trial, 2))
@@ -65,7 +96,7 @@ def branches(group: Group, jets: Callable[[], Jets], order: int) -> list[list[Re
     a, b = (plus + minus) / 2 - c, (plus - minus) / 2
     found = []
     for rate in _roots(a, b, c):
-        trial = jets()
+        trial = start()
         trial.right_side(group, 1)
         series = [base + rate * null]
         trial.write(group, 1, list(series[0]))
@@ -96,3 +127,90 @@ def _roots(a: float, b: float, c: float) -> list[float]:
     q = -0.5 * (b + np.copysign(np.sqrt(max(inside, 0.0)), b))
     roots = [q / a, c / q] if q else [0.0, -b / a]
     return [float(r) for r in roots]
+
+
+def through(way: Along, group: Group, q0: float) -> ChangePoint:
+    """The exact branch through a change point.
+
+    Where the links are nearly equal one of the branches turns many times faster than the input: the closed form
+    is then compared with the series closer to the point, until one of the series is the branch.
+    """
+    for span in (0.02, 0.0025, 3e-4, 4e-5):
+        change, miss = _nearest(way, group, q0, span)
+        if miss < 1e-6:
+            break
+    return change
+
+
+def _nearest(way: Along, group: Group, q0: float, span: float) -> tuple[ChangePoint, float]:
+    """The series that the closed form follows within a span around a change point, and how far they are apart."""
+    choice = way.assembly
+    nodes = span * np.cos(np.pi * (np.arange(12) + 0.5) / 12) * way.length / (2 * np.pi)
+    st = State([q0 + nodes], many=True)
+    way.run(choice.needed(choice.plan.writes(group)), st)
+    weights = _at_centre(nodes)
+    turn, slide = [], []
+    for body in group.angles:
+        e = complex(np.sum(weights * st.turn[body]))
+        turn.append(e / abs(e))
+    for g in group.slides:
+        slide.append(float(np.sum(weights * st.slide[g])))
+    before = choice.before(group)
+
+    def start() -> Rates:
+        at = State([q0])
+        way.run(before, at)
+        for j, body in enumerate(group.angles):
+            at.turn[body] = turn[j]
+        for j, g in enumerate(group.slides):
+            at.slide[g] = slide[j]
+        for tie in group.ties:
+            at.turn[tie.body] = at.rotate(tie.angle)
+        d = Rates(choice.plan, at, [[1.0]], way)
+        for k in range(1, ORDER + 2):
+            d.advance(before, k)
+        return d
+
+    try:
+        found = branches(group, start, ORDER)
+    except ZeroDivisionError:
+        # a group that this one hangs on has no direction here
+        found = []
+    best, nearest = None, np.inf
+    probe = int(np.argmax(nodes))
+    for rates in found:
+        change = ChangePoint(group.name, q0, tuple(turn), tuple(slide), np.array(rates), 0.0)
+        move = change.unknown(nodes[probe], 0)
+        miss = (
+            sum(
+                abs(turn[j] * np.exp(1j * move[j]) - st.turn[body][probe])
+                for j, body in enumerate(group.angles)
+            )
+            + sum(
+                abs(slide[j] + move[len(turn) + j] - st.slide[g][probe]) for j, g in enumerate(group.slides)
+            )
+            / choice.mechanism.size
+        )
+        if miss < nearest:
+            best, nearest = rates, miss
+    if best is None or not np.isfinite(best).all():
+        unknown = np.full((ORDER, len(turn) + len(slide)), np.nan)
+        return ChangePoint(group.name, q0, tuple(turn), tuple(slide), unknown, 0.0), np.inf
+    scale = np.array([1.0] * len(turn) + [choice.mechanism.size] * len(slide))
+    terms = [float(np.abs(r / scale).max()) / factorial(k) for k, r in enumerate(best, 1)]
+    radius = (
+        min(t ** (-1 / k) for k, t in enumerate(terms, 1) if t > 0 and k >= 3) if max(terms[2:]) > 0 else 1.0
+    )
+    reach = REACH * min(radius, 1.0 if way.length > 6 else way.length)
+    others = [rates[0] for rates in found if rates is not best]
+    change = ChangePoint(
+        group.name, q0, tuple(turn), tuple(slide), np.array(best), reach, others[0] if others else None
+    )
+    return change, float(nearest)
+
+
+def _at_centre(nodes: Reals) -> Reals:
+    """Weights of polynomial interpolation from the nodes to 0 (barycentric, second form)."""
+    w = np.array([1 / np.prod(x - np.delete(nodes, i)) for i, x in enumerate(nodes)])
+    w = w / -nodes
+    return np.asarray(w / w.sum())

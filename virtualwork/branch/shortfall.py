@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from virtualwork.branch.assembly import Assembly
 from virtualwork.formulas.closed_forms import Gap
-from virtualwork.newton import gaps, newton, stack_rows
+from virtualwork.formulas.linear import stack_rows
+from virtualwork.formulas.newton import gaps, newton
+from virtualwork.formulas.positions import State
 from virtualwork.plan.steps import Group
-from virtualwork.state import State
-
-if TYPE_CHECKING:
-    from virtualwork.assembly import Assembly
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ def shortfall(assembly: Assembly, inputs: tuple[float, ...]) -> Shortfall | None
     >>> found.text(), round(float(np.degrees(found.nearest)), 6)
     ('rod reaches 0.05 m, 0.052 m needed: 0.002 m short', 56.44269)
     """
-    st = State(list(inputs), many=False)
+    st = State(list(inputs))
     track = assembly.track
     if track.active:
         track.cover(inputs[0], inputs[0])
@@ -99,6 +97,6 @@ def _left(assembly: Assembly, group: Group, inputs: tuple[float, ...]) -> Gap | 
     ):
         return None
     start = np.asarray(assembly.starts[group.name], dtype=float)[None]
-    newton(group, many, assembly.plan, start, assembly.mechanism.size)
+    newton(group, many, start, assembly.mechanism.size)
     gap = float(np.linalg.norm(stack_rows(gaps(group, many), 1)))
     return Gap(gap, 0.0, "its loops stay {by} apart where they come nearest")

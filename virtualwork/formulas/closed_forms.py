@@ -5,79 +5,15 @@ an angle and a length (two kinds), two lengths. Each is a pure function of compl
 and the radicand under its root: negative, there is no assembly; zero, the Jacobian is singular. The root itself is
 the Jacobian (up to a constant factor), so that it costs nothing.
 
-`xp` is `ONE` for Python numbers or `MANY` for arrays; there is one source for both.
+`kind` says what the numbers are, Python's or arrays; there is one source for both.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
-
-Number = Any  # complex or float, or an array of them
-
-
-class One:
-    """Root and assembly of complex numbers for a single pose."""
-
-    @staticmethod
-    def sqrt(x: float) -> float:
-        return math.sqrt(x) if x >= 0 else math.nan
-
-    @staticmethod
-    def join(re: float, im: float) -> complex:
-        return complex(re, im)
-
-
-class Many:
-    """The same on arrays of poses."""
-
-    sqrt = staticmethod(np.sqrt)
-
-    @staticmethod
-    def join(re: Number, im: Number) -> Number:
-        shape = np.broadcast_shapes(np.shape(re), np.shape(im))
-        z = np.empty(shape, complex)
-        z.real = re
-        z.imag = im
-        return z
-
-
-class Folded:
-    """Either of them for two assemblies that meet in every pose: the root is zero, and its noise is left out."""
-
-    def __init__(self, engine: One | Many) -> None:
-        self.join = engine.join
-
-    @staticmethod
-    def sqrt(x: Number) -> Number:
-        return 0.0 * x
-
-
-ONE, MANY = One(), Many()
-Engine = One | Many | Folded
-
-
-def square(z: Number) -> Number:
-    """|z|², without the root."""
-    return (z.conjugate() * z).real
-
-
-def cross(a: Number, b: Number) -> Number:
-    """The plane's vector product a_x·b_y − a_y·b_x.
-
-    >>> cross(1 + 0j, 1j)
-    1.0
-    """
-    return (a.conjugate() * b).imag
-
-
-def dot(a: Number, b: Number) -> Number:
-    """The scalar product a_x·b_x + a_y·b_y."""
-    return (a.conjugate() * b).real
+from virtualwork.formulas.numbers import ONE, Kind, Number, cross, square
 
 
 @dataclass(frozen=True)
@@ -128,7 +64,7 @@ def gap_of(kind: str, names: tuple[str, ...], w: complex, v: complex, u: complex
 
 
 def two_angles(
-    w: Number, v1: Number, v2: Number, sign: Number, xp: Engine = ONE
+    w: Number, v1: Number, v2: Number, sign: Number, kind: Kind = ONE
 ) -> tuple[Number, Number, Number]:
     """Solve W + V1·e^{iφ1} + V2·e^{iφ2} = 0 for the two rotations (RRR: two circles cut).
 
@@ -160,13 +96,13 @@ def two_angles(
     radicand = (outer * outer - d2) * (d2 - inner * inner)
     half = 0.5 / d2
     # the apex lies at a − ih from the start: seen from V1, the turn to V2 has the sign asked for
-    t = xp.join((d2 + outer * inner) * half, xp.sqrt(radicand) * (half * -sign))
+    t = kind.join((d2 + outer * inner) * half, kind.sqrt(radicand) * (half * -sign))
     arm = t * w
     return arm * (-1 / v1), (arm - w) * (1 / v2), radicand * (0.25 / (r1 * r2) / (r1 * r2))
 
 
 def angle_and_slide(
-    w: Number, v: Number, u: Number, sign: Number, xp: Engine = ONE
+    w: Number, v: Number, u: Number, sign: Number, kind: Kind = ONE
 ) -> tuple[Number, Number, Number]:
     """Solve W + V·e^{iφ} + s·U = 0 for the rotation and the slide (RRP: a circle and a line, |U| = 1).
 
@@ -187,12 +123,12 @@ def angle_and_slide(
     seen = w * u.conjugate()
     r, y = abs(v), -seen.imag
     radicand = (r - y) * (r + y)
-    x = sign * xp.sqrt(radicand)
-    return xp.join(x, y) * u / v, -seen.real - x, radicand / (r * r)
+    x = sign * kind.sqrt(radicand)
+    return kind.join(x, y) * u / v, -seen.real - x, radicand / (r * r)
 
 
 def turning_slide(
-    w: Number, v: Number, u: Number, sign: Number, length: float, xp: Engine = ONE
+    w: Number, v: Number, u: Number, sign: Number, length: float, kind: Kind = ONE
 ) -> tuple[Number, Number, Number]:
     """Solve W + (V + s·U)·e^{iφ} = 0 for the rotation and the slide that turns with it (RPR, |U| = 1).
 
@@ -212,8 +148,8 @@ def turning_slide(
     seen = v * u.conjugate()
     p, q = seen.real, seen.imag
     radicand = square(w) - q * q
-    x = sign * xp.sqrt(radicand)
-    return -w / (xp.join(x, q) * u), x - p, radicand / (length * length)
+    x = sign * kind.sqrt(radicand)
+    return -w / (kind.join(x, q) * u), x - p, radicand / (length * length)
 
 
 def two_slides(w: Number, u1: Number, u2: Number) -> tuple[Number, Number, Number]:

@@ -9,36 +9,30 @@ whatever Grübler's count says (J. García de Jalón, E. Bayo, Kinematic and Dyn
 from __future__ import annotations
 
 import cmath
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from virtualwork.mechanism import GROUND
+from virtualwork.describe.description import Description
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.positions import State
+from virtualwork.plan.joints import joints, relations
+from virtualwork.plan.steps import Plan
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from virtualwork.mechanism import Mechanism
-    from virtualwork.plan.steps import Plan
-    from virtualwork.state import State
-
-    Reals = NDArray[np.float64]
-
-RANK = 1e-9  # a singular value below this share of the largest is zero
-STEP = (
-    0.05  # how far the pose is moved to tell a freedom from a singular pose: rad, or of the mechanism's size
-)
+# a singular value below this share of the largest is zero
+RANK = 1e-9
+# how far the pose is moved to tell a freedom from a singular pose: rad, or of the mechanism's size
+STEP = 0.05
 
 
-def coordinates(m: Mechanism, plan: Plan, st: State) -> Reals:
+def coordinates(m: Description, plan: Plan, st: State) -> Reals:
     """A pose as θ, x/size, y/size of every link's origin, (3·links,)."""
     found = []
     for link in m.links:
-        base, terms = plan.anchors[link]
-        origin = complex(np.ravel(st.point[base] + st.sum(terms))[0])
+        path = plan.anchors[link]
+        origin = complex(np.ravel(st.at(path))[0])
         turn = complex(np.ravel(st.turn[link])[0])
         found += [float(np.angle(turn)), origin.real / m.size, origin.imag / m.size]
     return np.array(found)
@@ -67,36 +61,40 @@ class Constraints:
     driving: Reals
 
     @classmethod
-    def at(cls, m: Mechanism, x: Reals, phases: Mapping[int, float]) -> Constraints:
+    def at(cls, m: Description, x: Reals, phases: Mapping[int, float]) -> Constraints:
         """At a pose (3·links,); `phases` are the constants of the gears."""
         rows = _Rows(m, x)
-        for pin, bodies in m.pins.items():
-            first = bodies[0]
-            for other in bodies[1:]:
-                for along in (1 + 0j, 1j):
-                    label = f"pin {pin}"
-                    rows.between(label, (first, m.bodies[first][pin]), (other, m.bodies[other][pin]), along)
-        for g in m.guides:
-            label = f"{'slider' if g.is_slider else 'slot'} {g.point}"
-            through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
-            normal = 1j * cmath.exp(1j * g.angle)
-            rows.between(label, (g.link, m.bodies[g.link][g.point]), (g.on, through), normal, on=g.on)
-            if g.turned is not None:
-                rows.turn(label, {g.link: 1.0, g.on: -1.0}, g.angle + g.turned)
-        for i, gear in enumerate(m.gears):
-            rows.turn(f"gear {gear.links[0]}-{gear.links[1]}", gear.shares(), phases.get(i, 0.0))
-        joints = len(rows.labels)
-        for e in m.inputs:
-            if e.link is not None:
-                rows.turn("", {e.link: 1.0, e.on: -1.0}, 0.0)
+        tied = {(r.kind, r.number): r for r in relations(m)}
+
+        def along(label: str, i: int, angle: complex) -> None:
+            """The place of a guide's point along a direction in the axes of its rail."""
+            g = m.guides[i]
+            ends = (g.link, m.bodies[g.link][g.point]), (g.on, m.through(g))
+            rows.between(label, *ends, angle * cmath.exp(1j * g.angle), on=g.on)
+
+        for joint in joints(m):
+            if joint.guide is None:
+                first, *others = joint.bodies
+                for other in others:
+                    ends = (first, m.bodies[first][joint.name]), (other, m.bodies[other][joint.name])
+                    for axis in (1 + 0j, 1j):
+                        rows.between(joint.label, *ends, axis)
+                continue
+            along(joint.label, joint.guide, 1j)
+            if ("guide", joint.guide) in tied:
+                slider = tied["guide", joint.guide]
+                rows.turn(slider.label, slider.shares, slider.right.const)
+        for i in range(len(m.gears)):
+            rows.turn(tied["gear", i].label, tied["gear", i].shares, phases.get(i, 0.0))
+        count = len(rows.labels)
+        for j, e in enumerate(m.inputs):
+            if e.is_slide:
+                along("", m.guide_of(e), 1 + 0j)
             else:
-                g = next(g for g in m.guides if g.point == e.slider)
-                through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
-                along = cmath.exp(1j * g.angle)
-                rows.between("", (g.link, m.bodies[g.link][g.point]), (g.on, through), along, on=g.on)
+                rows.turn("", tied["input", j].shares, 0.0)
         every = np.array(rows.rows).reshape(-1, len(x))
         values = np.array(rows.values)
-        return cls(rows.labels[:joints], values[:joints], every[:joints], every[joints:], values[joints:])
+        return cls(rows.labels[:count], values[:count], every[:count], every[count:], values[count:])
 
     @property
     def driven(self) -> Reals:
@@ -107,7 +105,7 @@ class Constraints:
 class _Rows:
     """Writes down rows."""
 
-    def __init__(self, m: Mechanism, x: Reals) -> None:
+    def __init__(self, m: Description, x: Reals) -> None:
         self.size, self.x = m.size, x
         self.column = {link: 3 * i for i, link in enumerate(m.links)}
         self.labels: list[str] = []
@@ -159,12 +157,12 @@ def dependent(labels: list[str], jacobian: Reals) -> tuple[int, tuple[str, ...]]
     return rank, tuple(dict.fromkeys(found))
 
 
-def hidden_freedom(m: Mechanism, x: Reals) -> tuple[tuple[str, ...], tuple[str, ...]] | None:
+def hidden_freedom(m: Description, x: Reals) -> tuple[tuple[str, ...], tuple[str, ...]] | None:
     """The links that no input holds although the count says so, and the joints and inputs that depend on each other.
 
     Parameters
     ----------
-    m : Mechanism
+    m : Description
     x : array (3·links,)
         A pose, as `coordinates` gives it; roughly is enough.
 
@@ -217,7 +215,7 @@ def _free(jacobian: Reals) -> Reals | None:
 
 
 def _settled(
-    m: Mechanism, x: Reals, phases: Mapping[int, float], driving: Reals | None = None
+    m: Description, x: Reals, phases: Mapping[int, float], driving: Reals | None = None
 ) -> Reals | None:
     """The pose nearby at which all joints close, with the inputs free or given; None where there is none."""
     for _ in range(30):

@@ -4,34 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from virtualwork.describe.errors import DescriptionError
-from virtualwork.formulas.closed_forms import Number, cross
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort, finished, write_effort
-from virtualwork.formulas.load_paths import carried
-from virtualwork.formulas.loads import plus
+from virtualwork.formulas.friction import settle
+from virtualwork.formulas.loads import EXTERNAL, OWN
+from virtualwork.formulas.numbers import Complexes, Number, Reals, cross, plus, xy
+from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.reactions import Reactions
-from virtualwork.formulas.scene import Block, Scene
-from virtualwork.joints import Joint
-from virtualwork.mechanism import GROUND
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from virtualwork.bounds.forces import ForceErrors
-    from virtualwork.formulas.statics import Statics
-    from virtualwork.motion import Motion
-
-    Reals = NDArray[np.float64]
-
-EXTERNAL = ("weight", "inertia force", "inertia torque", "applied force", "applied torque")
+from virtualwork.formulas.scene import Scene
+from virtualwork.formulas.statics import Statics
+from virtualwork.plan.joints import Joint
 
 
 class Dynamics:
-    """The forces of a motion; each is formed when first asked for. `Motion.dynamics` makes one.
+    """The forces of poses; each is formed when first asked for. `Motion.dynamics` is one.
 
     Attributes
     ----------
@@ -41,18 +34,17 @@ class Dynamics:
         How often friction and reactions were exchanged; 0 without friction.
     """
 
-    def __init__(self, motion: Motion) -> None:
-        self.motion = motion
-        self.scene = Scene(motion)
-        self._forces: dict[tuple[str, str], NDArray[np.complex128]] = {}
-        self._errors: ForceErrors | None = None
+    def __init__(self, poses: Poses) -> None:
+        self.poses = poses
+        self.scene = Scene(poses)
+        self._effort: Reals | None = None
+        self._euler: Reals | None = None
+        self._forces: dict[tuple[str, str], Complexes] = {}
 
     @cached_property
     def _settled(self) -> tuple[int, NDArray[np.bool_]]:
-        if not self.scene.rubs:
-            return 0, np.ones(self.motion.n, dtype=bool)
-        from virtualwork.formulas.friction import settle
-
+        if not self.scene.friction:
+            return 0, np.ones(self.poses.n, dtype=bool)
         return settle(self.scene)
 
     @property
@@ -65,15 +57,15 @@ class Dynamics:
         """(n,): poses in which friction locks the mechanism: no reaction balances its own friction."""
         return ~self._settled[1]
 
-    @cached_property
+    @property
     def effort(self) -> Reals:
         """The effort at each input by virtual work, (n, k)."""
-        if self.scene.rubs:
-            _ = self._settled
-        found = effort(self.scene)
-        if self.scene.rubs:
-            found[self.locked] = np.nan
-        return found
+        if self._effort is None:
+            # friction settles first: the loads hang on it
+            _, settled = self._settled
+            self._effort = effort(self.scene)
+            self._effort[~settled] = np.nan
+        return self._effort
 
     @cached_property
     def reactions(self) -> Reactions:
@@ -86,18 +78,22 @@ class Dynamics:
         """All equilibrium equations at once, where the constraints are redundant; else None."""
         if not self.reactions.redundant:
             return None
-        from virtualwork.formulas.statics import Statics
-
         return Statics(self.reactions)
 
-    @cached_property
+    @property
     def newton_euler(self) -> Reals:
         """The effort at each input by Newton and Euler, (n, k): ΣM = 0 of the driven link with its joint forces."""
-        r, inputs = self.reactions, self.motion.mechanism.inputs
-        if self.statics is not None:
-            names = [("force" if entry.is_slide else "torque", str(j), "") for j, entry in enumerate(inputs)]
-            return np.stack([self.statics.get(name) for name in names], axis=1)
-        return np.stack(r.over(*(partial(r.effort, j=j) for j in range(len(inputs)))), axis=1)
+        if self._euler is None:
+            r, inputs = self.reactions, self.poses.mechanism.inputs
+            if self.statics is not None:
+                found = [
+                    self.statics.get(("force" if entry.is_slide else "torque", str(j), ""))
+                    for j, entry in enumerate(inputs)
+                ]
+            else:
+                found = r.over(*(partial(r.effort, j=j) for j in range(len(inputs))))
+            self._euler = np.stack(found, axis=1)
+        return self._euler
 
     def solve(self, sides: Iterable[tuple[Joint, str]] | None = None) -> None:
         """Form effort, both ways, and joint forces in one pass over the poses, instead of each when asked for.
@@ -107,17 +103,17 @@ class Dynamics:
         sides : iterable of (joint, body), optional
             The joint forces; default one side of every joint.
         """
-        r, inputs = self.reactions, self.motion.mechanism.inputs
-        if self.statics is not None or self.scene.rubs or carried(self.scene):
+        r, inputs = self.reactions, self.poses.mechanism.inputs
+        if self.statics is not None or self.scene.friction or self.scene.case.carried:
             return
         if sides is None:
             sides = [(joint, joint.bodies[-1]) for joint in r.joints]
         wanted = [side for side in sides if (side[0].key, side[1]) not in self._forces]
-        n, k = self.motion.n, len(inputs)
+        n, k = self.poses.n, len(inputs)
         work, euler = np.zeros((n, k)), np.zeros((n, k))
 
         def efforts(block: Block) -> None:
-            if "effort" not in self.__dict__:
+            if self._effort is None:
                 write_effort(self.scene, block, work)
             for j in range(k):
                 value = r.effort(block, j)
@@ -130,11 +126,12 @@ class Dynamics:
             self._forces[joint.key, body] = force
         if self.scene.lost is not None:
             euler[self.scene.lost] = np.nan
-        self.__dict__.setdefault("newton_euler", euler)
-        if "effort" not in self.__dict__:
-            self.__dict__["effort"] = finished(self.scene, work)
+        if self._euler is None:
+            self._euler = euler
+        if self._effort is None:
+            self._effort = finished(self.scene, work)
 
-    def joint_force(self, joint: Joint, body: str) -> NDArray[np.complex128]:
+    def joint_force(self, joint: Joint, body: str) -> Complexes:
         """The force of a joint on one of its bodies, (n,) complex; NaN where statics does not determine it."""
         key = joint.key, body
         if key not in self._forces:
@@ -143,24 +140,24 @@ class Dynamics:
             else:
                 form = partial(self.reactions.joint_force, joint=joint, body=body)
                 (self._forces[key],) = self.reactions.over(form, kind=complex)
-            if self.scene.rubs:
+            if self.scene.friction:
                 self._forces[key][self.locked] = np.nan
         return self._forces[key]
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """The moment of a joint on one of its bodies about the joint's point, (n,): a guide's, or a pin's friction."""
         r = self.reactions
-        found = np.zeros(self.motion.n)
+        found = np.zeros(self.poses.n)
         if joint.guide is not None:
-            g = self.motion.mechanism.guides[joint.guide]
+            g = self.poses.mechanism.guides[joint.guide]
             if self.statics is None:
                 (found,) = r.over(partial(r.guide_moment, guide=joint.guide, body=body))
             elif g.is_slider:
                 value = self.statics.get(("moment", joint.key, ""))
                 found = value if body == g.link else -value
-        for load in self.scene.rubs:
+        for load in self.scene.friction:
             if load.path is None and load.joint == joint.key and load.body == body:
-                found = found + r.over(load.value)[0]
+                found = found + r.over(load.form)[0]
         return found
 
     def joints_named(self, name: str) -> list[Joint]:
@@ -185,7 +182,7 @@ class Dynamics:
         total, *others = (self.joint_force(found, on) for found in here)
         for force in others:
             total = total + force
-        return pairs(total)
+        return xy(total)
 
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:
@@ -194,7 +191,7 @@ class Dynamics:
         All that the moving links do to the ground through joints, springs and the drive's own reaction: by
         d'Alembert the sum of their weights, applied loads and inertia loads. No reaction is formed for it.
         """
-        n = self.motion.n
+        n = self.poses.n
         force, moment = np.zeros(n, complex), np.zeros(n)
         loads = [load for load in self.scene.loads if load.kind in EXTERNAL and load.body != GROUND]
 
@@ -202,7 +199,7 @@ class Dynamics:
             f: Number = None
             m: Number = None
             for load in loads:
-                value = block.keep(load)
+                value = block.formed(load)
                 if value is None:
                     continue
                 if load.path is None:
@@ -216,25 +213,22 @@ class Dynamics:
                 moment[block.rows] = m
 
         self.scene.each((), work)
-        out = ~self.motion.assembled
+        out = ~self.poses.assembled
         force[out], moment[out] = np.nan, np.nan
         if self.scene.lost is not None:
             force[self.scene.lost], moment[self.scene.lost] = np.nan, np.nan
-        return pairs(force), moment
+        return xy(force), moment
 
-    def applied(self, link: str) -> tuple[NDArray[np.complex128], Reals]:
+    def applied(self, link: str) -> tuple[Complexes, Reals]:
         """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
-        if self.scene.rubs:
-            _ = self._settled
-        n = self.motion.n
+        _ = self._settled
+        n = self.poses.n
         force, moment = np.zeros(n, complex), np.zeros(n)
         center = self.scene.rigid[link].center
-        loads = [load for load in [*self.scene.loads, *self.scene.rubs] if load.body == link]
-        for block in self.scene.blocks([f"angle:{link}"]):
+        loads = [load for load in self.scene.case.everything if load.body == link and load.kind not in OWN]
+        for block in self.scene.blocks([f"angle:{link}"]) if loads else ():
             for load in loads:
-                value = (
-                    None if load.kind in ("weight", "inertia force", "inertia torque") else block.keep(load)
-                )
+                value = block.formed(load)
                 if value is None:
                     continue
                 if load.path is None:
@@ -246,33 +240,10 @@ class Dynamics:
                     moment[block.rows] += cross(arm, value)
         return force, moment
 
-    def error_estimate(self) -> ForceErrors:
-        """Return bounds of the rounding errors of all forces, under the names of what they bound.
 
-        Dimensions, loads and inputs are taken as exact. With joint friction there are none: infinite.
+class Moving(Protocol):
+    """A motion, as the studies need it."""
 
-        Examples
-        --------
-        A weight of 2·9.81 N on an arm of 0.5 m at 60°:
-
-        >>> from virtualwork.mechanism import Input, Link, Mechanism
-        >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="arm"),
-        ...                 gravity=-9.81j)
-        >>> found = arm.motion(np.pi / 3).dynamics
-        >>> bool(abs(found.effort[0, 0] - 4.905) <= found.error_estimate().effort[0, 0] < 1e-14)
-        True
-        """
-        from virtualwork.bounds.forces import ForceErrors
-
-        if self._errors is None:
-            self._errors = ForceErrors(self)
-        return self._errors
-
-    def blocks(self) -> list[Block]:
-        """The scene's blocks."""
-        return self.scene.blocks()
-
-
-def pairs(z: NDArray[np.complex128]) -> Reals:
-    """x + iy as rows (x, y), without a copy."""
-    return np.ascontiguousarray(z).view(float).reshape(-1, 2)
+    @property
+    def dynamics(self) -> Dynamics:
+        """Its forces, which hold its poses."""

@@ -13,75 +13,23 @@ first, Q_θ = Σ T + Σ (z e^{iθ}) × F, and is −Σ Q_θ κ_j; the ledger tak
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from virtualwork.formulas.closed_forms import Number, dot
-from virtualwork.formulas.loads import Acting, Load, Rub, SpringEnd, TorsionEnd, plus, times
-from virtualwork.formulas.scene import Block, Scene
-from virtualwork.mechanism import GROUND
-from virtualwork.state import BLOCK
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Reals = NDArray[np.float64]
-
-
-def displacement(load: Load, block: Block, j: int) -> Number:
-    """The virtual displacement on which a load does work, for a unit of input j; None where it cannot move.
-
-    Of a spring between two moving points the first end carries the whole relative displacement, the second none:
-    action and reaction are one term. So does the friction of a guide on a moving link, whose displacement is the slide.
-    """
-    if isinstance(load, SpringEnd):
-        assert load.path is not None
-        assert load.spring is not None
-        if not load.first and load.spring.between[0][0] != GROUND:
-            return None
-        return plus(block.coefficient(load.path, j), times(block.coefficient(load.other, j), -1.0))
-    if isinstance(load, TorsionEnd):
-        assert load.spring is not None
-        a, b = load.spring.links
-        if load.sign < 0 and a != GROUND:
-            return None
-        turn = plus(block.turning(a, j), times(block.turning(b, j), -1.0))
-        return times(turn, load.sign)
-    if isinstance(load, Rub) and load.guide is not None and _rail(load, block) != GROUND:
-        if load.sign < 0:
-            return None
-        along = block.scene.plan.directions[load.guide] * block.st.turn[_rail(load, block)]
-        return times(block.by[j].slide[load.guide][0], along)
-    if load.path is None:
-        return block.turning(load.body, j)
-    return block.coefficient(load.path, j)
-
-
-def _rail(load: Rub, block: Block) -> str:
-    """The body that carries the guide in which a load rubs."""
-    assert load.guide is not None
-    return block.scene.mechanism.guides[load.guide].on
-
-
-def power(load: Load, block: Block, j: int) -> Number:
-    """The virtual work of a load for a unit of input j, or None: it is not evaluated where nothing moves."""
-    moved = displacement(load, block, j)
-    if moved is None:
-        return None
-    value = block.keep(load)
-    if value is None:
-        return None
-    return value * moved if load.path is None else dot(value, moved)
+from virtualwork.formulas.block import Block
+from virtualwork.formulas.numbers import Number, Reals, plus, times
+from virtualwork.formulas.positions import BLOCK
+from virtualwork.formulas.scene import Scene
 
 
 def effort(scene: Scene) -> Reals:
     """The effort at each input by virtual work, (n, k): N·m at a turning input, N at a slide."""
-    out = np.zeros((scene.motion.n, len(scene.mechanism.inputs)))
+    out = np.zeros((scene.poses.n, len(scene.mechanism.inputs)))
 
     def work(block: Block) -> None:
         write_effort(scene, block, out)
-        if scene.motion.n > BLOCK:
+        if scene.poses.n > BLOCK:
             block.forget(lasting=True)
 
     scene.each((), work)
@@ -90,13 +38,13 @@ def effort(scene: Scene) -> Reals:
 
 def write_effort(scene: Scene, block: Block, out: Reals) -> None:
     """The generalized forces over one block."""
-    bearing = scene.bearing
+    paths = scene.paths
     for j in range(out.shape[1]):
         total: Number = None
-        for body, guide, load in bearing.working:
+        for body, guide, load in paths.working:
             moved = block.by[j].slide[guide][0] if body is None else block.turning(body, j)
             if moved is not None:  # what cannot move is not evaluated
-                value = bearing.value(block, load)
+                value = paths.value(block, load)
                 total = plus(total, value if isinstance(moved, float) and moved == 1 else times(value, moved))
         if total is not None:
             np.negative(total, out=out[block.rows, j])
@@ -128,29 +76,23 @@ def _singular(scene: Scene, block: Block, j: int) -> Any:
     return found
 
 
-def carrier(scene: Scene | Acting, j: int) -> str:
-    """The body that feels the reaction of input j's torque: the carrier of its motor, else what it is driven on."""
-    entry = scene.mechanism.inputs[j]
-    return next((m.carrier for m in scene.mechanism.motors if m.drives == entry.link), entry.on)
-
-
 def through_carriers(scene: Scene, force: Reals) -> Reals:
     """Turn generalized forces at the inputs into motor torques, where a motor sits on another body than `on`.
 
-    A motor's torque T acts on the driven link and −T on its carrier (000 §2.3), so Σ_j T_j ∂(θ_driven − θ_carrier)_j/∂q_i
+    A motor's torque T acts on the driven link and −T on its carrier (Ibrahim §2.3), so Σ_j T_j ∂(θ_driven − θ_carrier)_j/∂q_i
     is the generalized force i.
     """
     inputs = scene.mechanism.inputs
     k = len(inputs)
-    moved = [j for j, e in enumerate(inputs) if not e.is_slide and carrier(scene, j) != e.on]
+    moved = [j for j, e in enumerate(inputs) if not e.is_slide and scene.mechanism.carrier(j) != e.on]
     if not moved:
         return force
-    motion = scene.motion
-    matrix = np.broadcast_to(np.eye(k), (motion.n, k, k)).copy()
+    poses = scene.poses
+    matrix = np.broadcast_to(np.eye(k), (poses.n, k, k)).copy()
     for j in moved:
         for i in range(k):
-            driven = motion.angle_coefficient(str(inputs[j].link), i)
-            matrix[:, i, j] = driven - motion.angle_coefficient(carrier(scene, j), i)
+            driven = poses.angle_coefficient(str(inputs[j].link), i)
+            matrix[:, i, j] = driven - poses.angle_coefficient(scene.mechanism.carrier(j), i)
     if k == 1:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(force / matrix[:, 0])
@@ -177,28 +119,15 @@ def ledger(scene: Scene, j: int = 0) -> tuple[dict[str, Reals], list[str], list[
     works: dict[str, Reals] = {}
     workless: list[str] = []
     for block in scene.blocks():
-        for load in [*scene.loads, *scene.rubs]:
-            value = power(load, block, j)
+        for load in scene.case.everything:
+            value = load.power(block, j)
             if value is None:
-                if (
-                    displacement(load, block, j) is None
-                    and load.name not in workless
-                    and not _reaction_end(load)
-                ):
+                if load.displacement(block, j) is None and load.name not in workless and load.carries:
                     workless.append(load.name)
                 continue
-            known = works.setdefault(load.name, np.zeros(scene.motion.n))
+            known = works.setdefault(load.name, np.zeros(scene.poses.n))
             known[block.rows] += value
     return works, [name for name in workless if name not in works], absent(scene)
-
-
-def _reaction_end(load: Load) -> bool:
-    """Whether a load is the second side of a pair whose work its first side carries."""
-    return (
-        (isinstance(load, SpringEnd) and not load.first)
-        or (isinstance(load, TorsionEnd) and load.sign < 0)
-        or (isinstance(load, Rub) and load.guide is not None and load.sign < 0)
-    )
 
 
 def absent(scene: Scene) -> list[str]:

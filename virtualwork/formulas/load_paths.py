@@ -1,4 +1,4 @@
-"""What bears on what: from the loads on the links to the loops, the joints and the inputs, as sums of rows.
+"""What bears on what: from the loads on the links to the loops, the joints and the inputs, as combinations of quantities.
 
 The order of solution places every body by one joint of a tree and closes loops at the others. A force at
 P = P[base] + Σ z·s·e^{iθ} bears on the base as it is, on each angle with its lever, (z s e^{iθ}) × F, on each slide
@@ -13,8 +13,8 @@ inertia about the point it hangs on, times α, and its mass times that point's a
 
   the group's own small Jacobian transposed, already formed for the velocities. Q_x gathers the loads and loop forces
   of all that hangs on the group, which is why groups are taken in reverse.
-- The other joints follow from ΣF = 0 of one body or one pin after the other (000 §2.2, d'Alembert), torques from
-  ΣM = 0 (000 §2.3).
+- The other joints follow from ΣF = 0 of one body or one pin after the other (Ibrahim §2.2, d'Alembert), torques from
+  ΣM = 0 (Ibrahim §2.3).
 """
 
 from __future__ import annotations
@@ -22,66 +22,57 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from virtualwork.formulas.closed_forms import Number
-from virtualwork.formulas.effort import carrier
-from virtualwork.formulas.loads import Acting, Rub
-from virtualwork.formulas.quantities import Passed, Row, Sum, in_order
-from virtualwork.joints import Order, Side
-from virtualwork.mechanism import GROUND
-from virtualwork.newton import stack
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.block import Block
+from virtualwork.formulas.linear import stack
+from virtualwork.formulas.load_case import LoadCase
+from virtualwork.formulas.numbers import PARALLEL, Number
+from virtualwork.formulas.quantities import Combination, Quantity, Transmitted, in_order
+from virtualwork.plan.joint_forces import Order, Side
 from virtualwork.plan.steps import Group, Place, Term, Turn
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+# lever (None: the point itself), sign, source of the force
+Hung = tuple[Term | None, float, tuple[str, Any]]
 
-    from virtualwork.formulas.scene import Block, Scene
-
-    Reals = NDArray[np.float64]
-    Hung = tuple[
-        Term | None, float, tuple[str, Any]
-    ]  # lever (None: the point itself), sign, source of the force
-
-LONG = 4  # a sum on its way down a chain of links is formed where it has more rows than this, and is one row from there
-DEEP = 20  # groups; forming a row of one calls for that of the next, some ten calls deep for each
-PARALLEL = (
-    1e-11  # sine of the angle between two columns below which the joint forces have no digit left that counts
-)
+# a combination on its way down a chain of links is formed where it has more quantities than this, and is one from there
+LONG = 4
+# groups; forming a quantity of one calls for that of the next, some ten calls deep for each
+DEEP = 20
 
 
-class Bearing:
+class LoadPaths:
     """The loads of a mechanism on its tree, its loops and its joints; made once for an assembly."""
 
-    def __init__(self, acting: Acting) -> None:
-        self.acting, self.rows = acting, acting.rows
-        self.mechanism, self.plan = acting.mechanism, acting.plan
+    def __init__(self, case: LoadCase) -> None:
+        self.case, self.quantities = case, case.quantities
+        self.mechanism, self.plan = case.mechanism, case.plan
         self.order = Order(self.mechanism, self.plan)
         self._deep = len(self.plan.groups) > DEEP
-        self._known: dict[Any, Sum] = {}
-        self._on_group: dict[str, list[Sum]] = {}
-        self._first: dict[Row, list[Row]] = {}
-        self._sides: dict[Side, Sum] = {}
+        self._known: dict[Any, Combination] = {}
+        self._on_group: dict[str, list[Combination]] = {}
+        self._first: dict[Quantity, list[Quantity]] = {}
+        self._sides: dict[Side, Combination] = {}
         self._hung: dict[str, list[Hung]] = {}
         self._tied: dict[str, list[tuple[str, float]]] = {}
         self._hang()
-        for step in reversed(
-            self.plan.steps
-        ):  # from the last link inward, or long chains would nest the calls
+        # from the last link inward, or long chains would nest the calls
+        for step in reversed(self.plan.steps):
             if isinstance(step, Place):
                 self.node(step.node)
                 self.node(step.node, free=True)
 
-    def value(self, block: Block, terms: Sum) -> Number:
+    def value(self, block: Block, terms: Combination) -> Number:
         """The array of a sum over a block; what a long chain of links passes on is formed from its far end."""
         if self._deep:
             for row in terms:
                 if row is not None and row not in self._first:
-                    self._first[row] = [part for part in in_order(row) if part.lasting]
+                    self._first[row] = [part for part in in_order(row) if part.lasts]
                 for part in self._first[row] if row is not None else ():
-                    block.row(part)
+                    block.formed(part)
         return terms.value(block)
 
     # --- the tree ---------------------------------------------------------------------------------------------
@@ -103,11 +94,10 @@ class Bearing:
                 if t.slide is not None:
                     self._hung.setdefault(f"slide:{t.slide}", []).append((t, 1.0, source))
 
-        for load in self.acting.everything:
+        for load in self.case.everything:
             if load.path is not None and load.body != GROUND:
                 # what rubs on a rail acts where the pin stands, but on the rail, which does not slide with the pin
-                rail = isinstance(load, Rub) and load.guide is not None and load.sign < 0
-                along = self.acting.path(load.body, load.place)[1] if rail else None
+                along = None if load.rail is None else self.case.path(load.body, load.place)[1]
                 bear(*load.path, ("load", load), along)
         for step in self.plan.steps:
             ties = step.ties if isinstance(step, Group) else (step,) if isinstance(step, Turn) else ()
@@ -123,143 +113,147 @@ class Bearing:
                     if closure.end is not None:
                         self._hung.setdefault(f"point:{closure.end}", []).append((None, -1.0, source))
 
-    def _source(self, source: tuple[str, Any], free: bool) -> Sum:
+    def _source(self, source: tuple[str, Any], free: bool) -> Combination:
         kind, of = source
         if kind == "load":
-            return of.sum(self.acting)  # type: ignore[no-any-return]
+            return of.combination(self.quantities)  # type: ignore[no-any-return]
         if kind == "point":
             return self.node(of, free=free)
-        return Sum() if free else Sum({self.multiplier(*of): 1.0})
+        return Combination() if free else Combination({self.multiplier(*of): 1.0})
 
-    def node(self, node: str, *, free: bool = False) -> Sum:
+    def node(self, node: str, *, free: bool = False) -> Combination:
         """The force that bears on a point; `free`: of the loads alone, as if every loop were open."""
         key = node, free
         if key not in self._known:
-            total = Sum()
+            total = Combination()
             for _, sign, source in self._hung.get(f"point:{node}", ()):
                 total.add(self._source(source, free), sign)
-            self._known[key] = Sum({self.rows(Passed, total): 1.0}) if len(total) > LONG else total
+            self._known[key] = (
+                Combination({self.quantities(Transmitted, total): 1.0}) if len(total) > LONG else total
+            )
         return self._known[key]
 
-    def own(self, key: str, without: Group | None = None, *, free: bool = False) -> Sum:
+    def own(self, key: str, without: Group | None = None, *, free: bool = False) -> Combination:
         """Q of an angle or a slide, N·m or N: `without` the loops of one group, or `free` of all.
 
         What bears on angles tied to this one is not in it.
         """
         known = key, without and without.name, free
         if known not in self._known:
-            levers: dict[tuple[str, int | None], Sum] = {}
+            levers: dict[tuple[str, int | None], Combination] = {}
             along = key.startswith("slide:")
             for t, _, source in self._hung.get(key, ()):
                 if t is None or (source[0] == "loop" and source[1][0] is without):
                     continue
-                force = levers.setdefault((t.body, None if along else t.slide), Sum())
+                force = levers.setdefault((t.body, None if along else t.slide), Combination())
                 force.add(self._source(source, free), t.z.conjugate())
-            total = Sum() if along else self.torque(key.removeprefix("angle:"), free=free)
+            total = Combination() if along else self.torque(key.removeprefix("angle:"), free=free)
             for (body, slide), force in levers.items():
-                total.add(self.rows.lever(body, slide, force, along))
-            self._known[known] = self.rows.total(total)
+                total.add(self.quantities.lever(body, slide, force, along))
+            self._known[known] = self.quantities.total(total)
         return self._known[known]
 
-    def bearing(self, key: str, without: Group) -> Sum:
+    def with_ties(self, key: str, without: Group) -> Combination:
         """Q of an angle or a slide, of all that is tied to it too, `without` the loops of one group."""
-        total = Sum(self.own(key, without))
+        total = Combination(self.own(key, without))
         for body, r in self._tied.get(key, ()):
-            total.add(self.bearing(f"angle:{body}", without), r)
+            total.add(self.with_ties(f"angle:{body}", without), r)
         return total
 
-    def on_group(self, group: Group) -> list[Sum]:
+    def on_group(self, group: Group) -> list[Combination]:
         """Q of each unknown of a group, angles and then slides, without its own loops."""
         if group.name not in self._on_group:
             keys = [*(f"angle:{a}" for a in group.angles), *(f"slide:{s}" for s in group.slides)]
-            self._on_group[group.name] = [self.bearing(key, group) for key in keys]
+            self._on_group[group.name] = [self.with_ties(key, group) for key in keys]
         return self._on_group[group.name]
 
     @cached_property
-    def working(self) -> list[tuple[str | None, int, Sum]]:
+    def working(self) -> list[tuple[str | None, int, Combination]]:
         """Q of the loads alone for each body's angle and each slide on which any bears: (body, or None, guide, Q)."""
         bodies = [(body, -1, self.own(f"angle:{body}", free=True)) for body in self.mechanism.links]
         slides = [(None, g, self.own(f"slide:{g}", free=True)) for g in range(len(self.mechanism.guides))]
         return [entry for entry in (*bodies, *slides) if entry[2]]
 
     # --- one body -----------------------------------------------------------------------------------------------
-    def force(self, body: str) -> Sum:
+    def force(self, body: str) -> Combination:
         """The sum of the forces on a body."""
-        total = Sum()
-        for load in self.acting.everything:
+        total = Combination()
+        for load in self.case.everything:
             if load.body == body and load.path is not None:
-                total.add(load.sum(self.acting))
+                total.add(load.combination(self.quantities))
         return total
 
-    def torque(self, body: str, *, free: bool = False) -> Sum:
+    def torque(self, body: str, *, free: bool = False) -> Combination:
         """The sum of the torques on a body, without what its forces' levers make; `free` of the motors it carries."""
-        total = Sum()
-        for load in self.acting.everything:
+        total = Combination()
+        for load in self.case.everything:
             if load.body == body and load.path is None:
-                total.add(load.sum(self.acting))
-        for carrying, j, sign in () if free else carried(self.acting):
+                total.add(load.combination(self.quantities))
+        for carrying, j, sign in () if free else self.case.carried:
             if carrying == body:
-                total.add(Sum({self.rows(Carried, j): sign}))
+                total.add(Combination({self.quantities(Carried, j): sign}))
         return total
 
     def moment(
-        self, body: str, about: complex, sides: Iterable[tuple[complex, int | None, complex, Sum]] = ()
-    ) -> Sum:
+        self,
+        body: str,
+        about: complex,
+        sides: Iterable[tuple[complex, int | None, complex, Combination]] = (),
+    ) -> Combination:
         """The moment on a body about a point of its own, of its loads and of further forces at its points.
 
         `sides`: (place z, guide or None, direction d, force): at z, or at z + d·s of a guide.
         """
-        levers: dict[int | None, Sum] = {}
+        levers: dict[int | None, Combination] = {}
 
-        def at(place: complex, slide: int | None, direction: complex, force: Sum) -> None:
-            levers.setdefault(None, Sum()).add(force, (place - about).conjugate())
+        def at(place: complex, slide: int | None, direction: complex, force: Combination) -> None:
+            levers.setdefault(None, Combination()).add(force, (place - about).conjugate())
             if slide is not None:
-                levers.setdefault(slide, Sum()).add(force, direction.conjugate())
+                levers.setdefault(slide, Combination()).add(force, direction.conjugate())
 
-        for load in self.acting.everything:
+        for load in self.case.everything:
             if load.body == body and load.path is not None:
-                slide = load.guide if isinstance(load, Rub) and load.sign < 0 else None
-                direction = 0j if slide is None else self.plan.directions[slide]
-                at(load.place, slide, direction, load.sum(self.acting))
+                direction = 0j if load.rail is None else self.plan.directions[load.rail]
+                at(load.place, load.rail, direction, load.combination(self.quantities))
         for entry in sides:
             at(*entry)
         total = self.torque(body)
         for slide, force in levers.items():
-            total.add(self.rows.lever(body, slide, force))
+            total.add(self.quantities.lever(body, slide, force))
         return total
 
     # --- joints -------------------------------------------------------------------------------------------------
-    def multiplier(self, group: Group, loop: int) -> Row:
+    def multiplier(self, group: Group, loop: int) -> Quantity:
         """λ of a loop, as a row."""
         key = "loop", group.name, loop
         if key not in self._known:
-            solved = self.rows(Solved, self, group)
-            self._known[key] = Sum({self.rows(Multiplier, solved, loop): 1.0})
+            solved = self.quantities(Solved, self, group)
+            self._known[key] = Combination({self.quantities(Multiplier, solved, loop): 1.0})
         return next(iter(self._known[key]))  # type: ignore[return-value]
 
-    def side(self, side: Side) -> Sum:
+    def side(self, side: Side) -> Combination:
         """The force of a joint on a body: the reaction of one that is known, or a row of its own."""
         if side not in self._sides:
             self._sides[side] = self._side(side)
         return self._sides[side]
 
-    def _side(self, side: Side) -> Sum:
+    def _side(self, side: Side) -> Combination:
         joint, body = side
         if body == GROUND:
-            total = Sum()
+            total = Combination()
             for other in self.order.by_key[joint].bodies:
                 if other != GROUND:
                     total.add(self.side((joint, other)), -1.0)
             return total
         kind, of = self.order.recipes[side]
         if kind == "loop":
-            return Sum({self.multiplier(*of): 1.0})
+            return Combination({self.multiplier(*of): 1.0})
         bodies = self.order.by_key[joint].bodies
         if kind == "joint" and len(bodies) == 2:
             return self.side((joint, bodies[0] if bodies[1] == body else bodies[1])).times(-1.0)
-        return Sum({self.rows(SideForce, self, side): 1.0})
+        return Combination({self.quantities(SideForce, self, side): 1.0})
 
-    def balance(self, side: Side) -> Sum:
+    def balance(self, side: Side) -> Combination:
         """The force of a joint on a body from ΣF = 0 of the body or of the pin."""
         key = "balance", side
         if key in self._known:
@@ -270,7 +264,7 @@ class Bearing:
             total = self.force(body)
             others = [s for s in self.order.sides[body] if s != side]
         else:
-            total = Sum()
+            total = Combination()
             others = [(joint, other) for other in self.order.by_key[joint].bodies if other != body]
         for other in others:
             total.add(self.side(other))
@@ -287,18 +281,16 @@ class Bearing:
         guide = self.mechanism.guides[g]
         if body == guide.link:
             return points[guide.point], None, 0j
-        through = guide.through
-        z = points[through] if isinstance(through, str) else through
-        return complex(z), g, self.plan.directions[g]
+        return complex(self.mechanism.through(guide)), g, self.plan.directions[g]
 
-    def rest(self, body: str) -> Sum:
+    def rest(self, body: str) -> Combination:
         """ΣM of a body's loads and joint forces: what torques must balance.
 
         About the joint whose force was found last, from ΣF = 0, so that this force has no lever.
         """
         key = "rest", body
         if key not in self._known:
-            about = self.acting.rigid[body].center
+            about = self.case.rigid[body].center
             sides = self.order.sides[body]
             for side in sides:
                 z, guide, _ = self.place(side)
@@ -306,14 +298,14 @@ class Bearing:
                     about, sides = z, [s for s in sides if s != side]
                     break
             acts = [(*self.place(side), self.side(side)) for side in sides]
-            self._known[key] = self.rows.total(self.moment(body, about, acts))
+            self._known[key] = self.quantities.total(self.moment(body, about, acts))
         return self._known[key]
 
-    def couple(self, kind: str, i: int) -> Sum:
+    def couple(self, kind: str, i: int) -> Combination:
         """The torque of a guide, a gear or an input, from the bodies' ΣM = 0."""
         key = "couple", kind, i
         if key not in self._known:
-            total = Sum()
+            total = Combination()
             for body, factor in self.order.couple(kind, i).items():
                 total.add(self.rest(body), -factor)
             self._known[key] = total
@@ -321,21 +313,22 @@ class Bearing:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved(Row):
+class Solved(Quantity):
     """The forces λ at the loop joints of a group: its Jacobian, transposed, solved for what bears on its unknowns."""
 
-    bearing: Bearing
+    paths: LoadPaths
     group: Group
-    lasting = True
+    lasts = True
 
-    def reads(self) -> Iterable[Row | None]:
-        return [row for load in self.bearing.on_group(self.group) for row in load]
+    def reads(self) -> Iterable[Quantity | None]:
+        return [row for load in self.paths.on_group(self.group) for row in load]
 
     def form(self, block: Block) -> tuple[float, Number]:
         group = self.group
-        block.scene.formed.add(group.name)
-        loads = [load.value(block) for load in self.bearing.on_group(self.group)]
-        if group.name in block.st.folded:  # singular in every pose: it may be under stress without any load
+        block.setting.formed.add(group.name)
+        loads = [load.value(block) for load in self.paths.on_group(self.group)]
+        if group.name in block.st.folded:
+            # singular in every pose: it may be under stress without any load
             nothing = np.full(np.shape(block.st.inputs[0]), complex(np.nan, np.nan))[()]
             return 1.0, [nothing] * len(group.closures)
         if all(load is None for load in loads):
@@ -345,7 +338,7 @@ class Solved(Row):
             return 1.0, _transposed(cols, loads, block)
         (c1, c2), (q1, q2) = cols[0], loads
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            inverse = _regular(block.by[0].inverse(group), c1, c2)
+            inverse = block.st.kind.regular(block.by[0].inverse(group), c1, c2)
             # λ = i (c2 q1 − c1 q2)/(c1 × c2)
             if q1 is None:
                 total = c1 * (q2 * -inverse)
@@ -356,70 +349,46 @@ class Solved(Row):
 
 
 @dataclass(frozen=True, eq=False)
-class Multiplier(Row):
+class Multiplier(Quantity):
     """The force λ at one loop joint of a group."""
 
-    solved: Row
+    solved: Quantity
     loop: int
 
     def form(self, block: Block) -> tuple[float, Number]:
-        return 1.0, block.row(self.solved)[1][self.loop]
+        return 1.0, block.formed(self.solved)[1][self.loop]
 
-    def reads(self) -> Iterable[Row | None]:
+    def reads(self) -> Iterable[Quantity | None]:
         return (self.solved,)
 
 
 @dataclass(frozen=True, eq=False)
-class SideForce(Row):
+class SideForce(Quantity):
     """The force of a joint on a body from ΣF = 0."""
 
-    bearing: Bearing
+    paths: LoadPaths
     side: Side
-    lasting = True
+    lasts = True
 
     def form(self, block: Block) -> tuple[float, Number]:
         joint, body = self.side
-        block.scene.formed.add(f"{joint} on {body}")
-        return 1.0, self.bearing.balance(self.side).value(block)
+        block.setting.formed.add(f"{joint} on {body}")
+        return 1.0, self.paths.balance(self.side).value(block)
 
-    def reads(self) -> Iterable[Row | None]:
-        return self.bearing.balance(self.side)
+    def reads(self) -> Iterable[Quantity | None]:
+        return self.paths.balance(self.side)
 
 
 @dataclass(frozen=True, eq=False)
-class Carried(Row):
+class Carried(Quantity):
     """The torque of input j's motor, where it sits on another body than `on`."""
 
     input: int
 
     def form(self, block: Block) -> tuple[float, Number]:
-        torque = block.scene.drive[:, self.input]
+        assert block.setting.drive is not None
+        torque = block.setting.drive[:, self.input]
         return 1.0, torque[block.rows] if block.st.many else float(torque[0])
-
-
-def carried(scene: Scene | Acting) -> list[tuple[str, int, float]]:
-    """Torques of motors that sit on another body than `on`, (body, input, sign): what moves their reaction there.
-
-    The input's own torque acts between the driven link and `on`; with +T on `on` and −T on the carrier added, the
-    motor acts between the driven link and its carrier (000 §2.3).
-    """
-    found = []
-    for j, entry in enumerate(scene.mechanism.inputs):
-        body = entry.on if entry.is_slide else carrier(scene, j)
-        if body != entry.on:
-            found += [(body, j, -1.0), (entry.on, j, 1.0)]
-    return [entry for entry in found if entry[0] != GROUND]
-
-
-def _regular(inverse: Number, c1: Number, c2: Number) -> Number:
-    """1/(c1 × c2); NaN where two columns are parallel to rounding, for the joint forces have no value there."""
-    # the norms over the block are above the largest entry: in most blocks they say that no pose is near
-    bound = np.vdot(inverse, inverse).real * np.vdot(c1, c1).real * np.vdot(c2, c2).real
-    if bound < 1 / PARALLEL**2:
-        return inverse
-    if np.ndim(inverse) == 0:
-        return float("nan")
-    return np.where(np.abs(inverse) * (np.abs(c1) * np.abs(c2)) < 1 / PARALLEL, inverse, np.nan)
 
 
 def _transposed(cols: list[list[Number]], loads: list[Number], block: Block) -> list[Number]:

@@ -1,73 +1,70 @@
-"""Forces and torques as sums of rows with constant coefficients, added before any pose is looked at.
+"""Forces and torques as combinations of quantities with constant coefficients, added before any pose is looked at.
 
 But for springs and friction, a force on a link is a fixed combination of a few vectors: of 1 (a weight), of e^{iθ} (a
 force that turns with its link), of second derivatives (−m·a_G = −m Σ z (e^{iθ})″) and of other joint forces. Such
-vectors are the rows; a `Sum` holds their coefficients, which hang on the mechanism alone. Sums are added and weighed
-as numbers, once for each mechanism. An array over the poses is formed of a row or a sum when its value is asked for,
-and never twice.
+vectors are the quantities; a `Combination` holds their coefficients, which hang on the mechanism alone. Combinations
+are added and weighed as numbers, once for each mechanism. An array over the poses is formed of a quantity or a
+combination when its value is asked for, and never twice.
 """
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from virtualwork.formulas.closed_forms import Number
-from virtualwork.mechanism import GROUND
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.block import Block, Formed
+from virtualwork.formulas.numbers import Number
+from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Term
 
-if TYPE_CHECKING:
-    from virtualwork.formulas.loads import Load
-    from virtualwork.formulas.scene import Block
-    from virtualwork.state import Jets
 
+class Quantity:
+    """A vector (complex) or a number (real) at each pose; two quantities are the same only if they are one object."""
 
-class Row:
-    """A vector (complex) or a number (real) at each pose; two rows are the same only if they are one object."""
-
-    lasting = False
+    lasts = False
     """Whether its array is kept over a long sweep, for others that ask later."""
 
     def form(self, block: Block) -> tuple[float, Number]:
         """A factor and an array over a block of poses; None for an array of zeros."""
         raise NotImplementedError
 
-    def reads(self) -> Iterable[Row | None]:
-        """The rows it is made of."""
+    def reads(self) -> Iterable[Quantity | None]:
+        """The quantities it is made of."""
         return ()
 
 
-class Sum(dict[Row | None, Any]):
-    """Σ coefficient·row; the row None is the constant 1.
+class Combination(dict[Quantity | None, Any]):
+    """Σ coefficient·quantity; the quantity None is the constant 1.
 
-    >>> force = Sum({None: 3 - 2j})
-    >>> force.add(Sum({None: 1j}), 2)
+    >>> force = Combination({None: 3 - 2j})
+    >>> force.add(Combination({None: 1j}), 2)
     >>> force
     {None: (3+0j)}
     """
 
-    def add(self, other: Sum, factor: complex = 1.0) -> None:
-        """Add a sum, times a factor; what cancels is gone."""
-        for row, c in other.items():
-            total = self.get(row, 0.0) + factor * c
+    def add(self, other: Combination, factor: complex = 1.0) -> None:
+        """Add another, times a factor; what cancels is gone."""
+        for quantity, c in other.items():
+            total = self.get(quantity, 0.0) + factor * c
             if total:
-                self[row] = total
+                self[quantity] = total
             else:
-                self.pop(row, None)
+                self.pop(quantity, None)
 
-    def times(self, factor: complex) -> Sum:
-        """The sum times a factor."""
-        return Sum({row: factor * c for row, c in self.items()})
+    def times(self, factor: complex) -> Combination:
+        """The combination times a factor."""
+        return Combination({quantity: factor * c for quantity, c in self.items()})
 
     def value(self, block: Block) -> Number:
         """Its array over a block, or one number where it is the same at every pose; None where it is zero."""
         total: Number = None
-        for row, c in self.items():
-            if row is None:
+        for quantity, c in self.items():
+            if quantity is None:
                 part = c
             else:
-                factor, v = block.row(row)
+                factor, v = block.formed(quantity)
                 if v is None:
                     continue
                 c = c * factor
@@ -80,7 +77,7 @@ class Sum(dict[Row | None, Any]):
 
 
 @dataclass(frozen=True, eq=False)
-class Turned(Row):
+class Turned(Quantity):
     """s·e^{iθ} of a body, with the slide s of a guide or without."""
 
     body: str
@@ -92,23 +89,23 @@ class Turned(Row):
 
 
 @dataclass(frozen=True, eq=False)
-class SecondRate(Row):
+class SecondRate(Quantity):
     """The second derivative in time: of s·e^{iθ}, of a point (`node`), or of a body's angle."""
 
     kind: str
     name: str
     slide: int | None = None
 
-    def derivative(self, jets: Jets, k: int) -> Number:
-        """Its k-th derivative along the jets."""
+    def derivative(self, rates: Rates, k: int) -> Number:
+        """Its k-th derivative along the rates."""
         if self.kind == "node":
-            return jets.point[self.name][k - 1]
+            return rates.point[self.name][k - 1]
         if self.kind == "angle":
-            return jets.angle[self.name][k - 1]
+            return rates.angle[self.name][k - 1]
         return (
-            jets.turn(self.name, k)
+            rates.turn(self.name, k)
             if self.slide is None
-            else jets.vector(None, (Term(1.0, self.name, self.slide),), k)
+            else rates.vector((None, (Term(1.0, self.name, self.slide),)), k)
         )
 
     def form(self, block: Block) -> tuple[float, Number]:
@@ -116,37 +113,37 @@ class SecondRate(Row):
 
 
 @dataclass(frozen=True, eq=False)
-class Given(Row):
-    """A load that is no combination of other rows: of a spring, of friction, of a table."""
+class Given(Quantity):
+    """A load that is no combination of other quantities: of a spring, of friction, of a table."""
 
-    load: Load
+    load: Formed
 
     def form(self, block: Block) -> tuple[float, Number]:
-        return 1.0, block.keep(self.load)
+        return 1.0, block.formed(self.load)
 
 
 @dataclass(frozen=True, eq=False)
-class Total(Row):
-    """A sum whose array more than one other sum reads."""
+class Total(Quantity):
+    """A combination whose array more than one other reads."""
 
-    sum: Sum
+    of: Combination
 
     def form(self, block: Block) -> tuple[float, Number]:
-        return 1.0, self.sum.value(block)
+        return 1.0, self.of.value(block)
 
-    def reads(self) -> Iterable[Row | None]:
-        return self.sum
+    def reads(self) -> Iterable[Quantity | None]:
+        return self.of
 
 
 @dataclass(frozen=True, eq=False)
-class Passed(Total):
+class Transmitted(Total):
     """What a chain of links passes down: each of its joints reads it."""
 
-    lasting = True
+    lasts = True
 
 
 @dataclass(frozen=True, eq=False)
-class Lever(Row):
+class Lever(Quantity):
     """What a force does for a unit turn of a body, (s e^{iθ}) × F, or (`along`) for a unit of its slide, e^{iθ}·F.
 
     The lever's constant z in the body's axes is taken into the force: (z e) × F = e × (z̄ F).
@@ -154,7 +151,7 @@ class Lever(Row):
 
     body: str
     slide: int | None
-    force: Sum
+    force: Combination
     along: bool = False
 
     def form(self, block: Block) -> tuple[float, Number]:
@@ -167,62 +164,62 @@ class Lever(Row):
         work = e.conjugate() * force
         return 1.0, work.real if self.along else work.imag
 
-    def reads(self) -> Iterable[Row | None]:
+    def reads(self) -> Iterable[Quantity | None]:
         return self.force
 
 
-class Rows:
-    """Makes each row once: what is made of the same is the same row."""
+class Quantities:
+    """Makes each quantity once: what is made of the same is the same quantity."""
 
     def __init__(self) -> None:
-        self._made: dict[Hashable, Row] = {}
+        self._made: dict[Hashable, Quantity] = {}
 
-    def __call__(self, kind: type[Row], *of: Any) -> Row:
-        """The row of a kind."""
-        key = (kind, *(frozenset(x.items()) if isinstance(x, Sum) else x for x in of))
+    def __call__(self, kind: type[Quantity], *of: Any) -> Quantity:
+        """The quantity of a kind."""
+        key = (kind, *(frozenset(x.items()) if isinstance(x, Combination) else x for x in of))
         if key not in self._made:
             self._made[key] = kind(*of)
         return self._made[key]
 
-    def second(self, kind: str, name: str, slide: int | None = None) -> Row:
-        """The row of a second derivative in time."""
+    def second(self, kind: str, name: str, slide: int | None = None) -> Quantity:
+        """The quantity of a second derivative in time."""
         return self(SecondRate, kind, name, slide)
 
-    def total(self, terms: Sum) -> Sum:
-        """A sum that is formed once for all who read it."""
+    def total(self, terms: Combination) -> Combination:
+        """A combination that is formed once for all who read it."""
         if len(terms) < 2 and (None in terms or not terms):
             return terms
-        return terms if list(terms.values()) == [1.0] else Sum({self(Total, terms): 1.0})
+        return terms if list(terms.values()) == [1.0] else Combination({self(Total, terms): 1.0})
 
-    def lever(self, body: str, slide: int | None, force: Sum, along: bool = False) -> Sum:
-        """The work of a force for a unit turn, or a unit of the slide, as a sum of real rows.
+    def lever(self, body: str, slide: int | None, force: Combination, along: bool = False) -> Combination:
+        """The work of a force for a unit turn, or a unit of the slide, as a combination of real quantities.
 
         Of the force's part in the body's own (e^{iθ})″ = (iα − ω²)e^{iθ} only α is left, e × (e)″ = α: this turns
         I_G·α into (I_G + m|z|²)·α, the inertia about the point the body hangs on (Steiner).
         """
-        rest, found = Sum(force), Sum()
+        rest, found = Combination(force), Combination()
         if slide is None and not along and body != GROUND:
             second, bare = self.second("turn", body), self(Turned, body, None)
             c = complex(rest.get(second, 0.0))
             if c and not c.imag:
                 del rest[second]
-                found.add(Sum({self.second("angle", body): c.real}))
+                found.add(Combination({self.second("angle", body): c.real}))
             c = complex(rest.pop(bare, 0.0))
             if c.imag:
-                found.add(Sum({None: c.imag}))
+                found.add(Combination({None: c.imag}))
         if rest:
-            found.add(Sum({self(Lever, body, slide, rest, along): 1.0}))
+            found.add(Combination({self(Lever, body, slide, rest, along): 1.0}))
         return found
 
 
-def in_order(row: Row) -> list[Row]:
-    """The rows that a row is made of, each after those it is made of itself, and the row last.
+def in_order(quantity: Quantity) -> list[Quantity]:
+    """The quantities that one is made of, each after those it is made of itself, and that one last.
 
     Forming them so keeps the chain of calls short, however long the chain of links.
     """
-    done: set[Row] = set()
-    found: list[Row] = []
-    stack: list[tuple[Row, bool]] = [(row, False)]
+    done: set[Quantity] = set()
+    found: list[Quantity] = []
+    stack: list[tuple[Quantity, bool]] = [(quantity, False)]
     while stack:
         here, open_ = stack.pop()
         if open_:

@@ -1,28 +1,25 @@
 """Joint forces by Newton and Euler over the poses of a motion, each formed when it is asked for.
 
-How they follow from each other is worked out once for a mechanism (`bearing`); here the sums become arrays.
+How they follow from each other is worked out once for a mechanism (`load_paths`); here the combinations become arrays.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from virtualwork.formulas.closed_forms import Number, dot
-from virtualwork.formulas.load_paths import carried
-from virtualwork.formulas.loads import path_reads, plus, times
-from virtualwork.formulas.scene import Block, Scene
-from virtualwork.joints import Joint, Side
-from virtualwork.mechanism import GROUND
-from virtualwork.state import BLOCK
-
-if TYPE_CHECKING:
-    from virtualwork.mechanism import Mechanism
-
-__all__ = ["Joint", "Reactions"]
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.block import Block
+from virtualwork.formulas.effort import effort
+from virtualwork.formulas.numbers import Number, dot, minus, plus
+from virtualwork.formulas.positions import BLOCK
+from virtualwork.formulas.scene import Scene
+from virtualwork.plan.joint_forces import Side
+from virtualwork.plan.joints import Joint
+from virtualwork.plan.steps import path_reads
 
 
 class Reactions:
@@ -30,10 +27,10 @@ class Reactions:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.bearing = scene.bearing
-        self.order = self.bearing.order
+        self.paths = scene.paths
+        self.order = self.paths.order
         self.plan = scene.plan
-        self.mechanism: Mechanism = scene.mechanism
+        self.mechanism = scene.mechanism
         self.joints, self.by_key = self.order.joints, self.order.by_key
 
     @property
@@ -49,22 +46,22 @@ class Reactions:
     # --- values over one block ------------------------------------------------------------------------------------
     def force(self, block: Block, body: str) -> Number:
         """The sum of the loads on a body."""
-        return self.bearing.force(body).value(block)
+        return self.paths.force(body).value(block)
 
     def moment(self, block: Block, body: str) -> Number:
         """The moment of the loads on a body about its centre of mass."""
-        return self.bearing.moment(body, self.scene.rigid[body].center).value(block)
+        return self.paths.moment(body, self.scene.rigid[body].center).value(block)
 
     def on_side(self, block: Block, side: Side) -> Number:
         """The force of a joint on a body, complex; None where it is zero throughout."""
         joint, body = side
         self.formed.add(f"{joint} on {body}")
-        return self.bearing.value(block, self.bearing.side(side))
+        return self.paths.value(block, self.paths.side(side))
 
     def place(self, block: Block, side: Side) -> Number:
         """Where a joint's force acts, from the body's centre of mass, in ground axes."""
         body = side[1]
-        z, guide, direction = self.bearing.place(side)
+        z, guide, direction = self.paths.place(side)
         z -= self.scene.rigid[body].center
         return (z if guide is None else z + direction * block.st.slide[guide]) * block.st.turn[body]
 
@@ -74,7 +71,7 @@ class Reactions:
         """What the places of all joints hang on."""
         keys: set[str] = set()
         for body in self.mechanism.links:
-            keys |= path_reads(self.scene.path(body, self.scene.rigid[body].center)) | {f"angle:{body}"}
+            keys |= path_reads(self.scene.case.path(body, self.scene.rigid[body].center)) | {f"angle:{body}"}
         for i in range(len(self.mechanism.guides)):
             keys.add(f"slide:{i}")
         for group in self.plan.groups:
@@ -83,7 +80,13 @@ class Reactions:
 
     def blocks(self) -> list[Block]:
         """The scene's blocks, with what all joints' places hang on."""
+        self._drive()
         return self.scene.blocks(self.keys)
+
+    def _drive(self) -> None:
+        """Form the efforts of carried motors over all poses, before the blocks are solved one by one."""
+        if self.scene.case.carried and self.scene.setting.drive is None:
+            self.scene.setting.drive = effort(self.scene)
 
     def over(
         self,
@@ -95,9 +98,8 @@ class Reactions:
 
         `also` is called with each block while what they are made of is there.
         """
-        if carried(self.scene):
-            _ = self.scene.drive  # over all poses, before the blocks are solved one by one
-        n = self.scene.motion.n
+        self._drive()
+        n = self.scene.poses.n
         found: list[Any] = [np.empty(n, dtype=kind) for _ in forms]
 
         def work(block: Block) -> None:
@@ -106,7 +108,8 @@ class Reactions:
                 out[block.rows] = 0.0 if value is None else value
             if also is not None:
                 also(block)
-            if n > BLOCK:  # over a long sweep what the quantities were made of is not kept
+            if n > BLOCK:
+                # over a long sweep what the quantities were made of is not kept
                 block.forget(lasting=True)
 
         self.scene.each(self.keys, work)
@@ -117,27 +120,27 @@ class Reactions:
 
     def joint_force(self, block: Block, joint: Joint, body: str) -> Number:
         """The force of a joint on a body over a block, without the force of an input that drives it."""
-        value = plus(self.on_side(block, (joint.key, body)), self._rubbed(block, joint, body))
-        if joint.guide is not None and value is not None and self._driving(joint.guide) is not None:
+        value = plus(self.on_side(block, (joint.key, body)), self.rubbed(block, joint, body))
+        if (
+            joint.guide is not None
+            and value is not None
+            and self.mechanism.driver_of(joint.guide) is not None
+        ):
             rail = self.rail(block, joint.guide)
             value = value - dot(value, rail) * rail
         return value
 
-    def _rubbed(self, block: Block, joint: Joint, body: str) -> Number:
+    def rubbed(self, block: Block, joint: Joint, body: str) -> Number:
         """The friction force along a guide belongs to its reaction."""
         total: Number = None
-        for load in self.scene.rubs:
+        for load in self.scene.friction:
             if load.path is None or load.joint != joint.key:
                 continue
             if body == GROUND:  # no load stands there: it feels the reverse of the other body's
-                total = plus(total, times(load.value(block), -1.0))
+                total = minus(total, load.form(block))
             elif load.body == body:
-                total = plus(total, load.value(block))
+                total = plus(total, load.form(block))
         return total
-
-    def _driving(self, guide: int) -> int | None:
-        point = self.mechanism.guides[guide].point
-        return next((j for j, e in enumerate(self.mechanism.inputs) if e.slider == point), None)
 
     def rail(self, block: Block, guide: int | None) -> Number:
         """The direction of a guide, a unit vector."""
@@ -151,14 +154,14 @@ class Reactions:
         g = self.mechanism.guides[guide]
         if not g.is_slider:
             return None
-        couple = self.bearing.couple("guide", guide)
-        return self.bearing.value(block, couple if body == g.link else couple.times(-1.0))
+        couple = self.paths.couple("guide", guide)
+        return self.paths.value(block, couple if body == g.link else couple.times(-1.0))
 
     def effort(self, block: Block, j: int) -> Number:
         """The effort at input j by Newton and Euler: ΣM = 0 of the driven link, or the force along the slide."""
         entry = self.mechanism.inputs[j]
         if not entry.is_slide:
-            return self.bearing.value(block, self.bearing.couple("input", j))
-        guide = next(i for i, g in enumerate(self.mechanism.guides) if g.point == entry.slider)
+            return self.paths.value(block, self.paths.couple("input", j))
+        guide = self.mechanism.guide_of(entry)
         value = self.on_side(block, (f"guide:{guide}", self.mechanism.guides[guide].link))
         return None if value is None else dot(value, self.rail(block, guide))

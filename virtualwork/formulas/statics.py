@@ -9,26 +9,21 @@ least norm.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from virtualwork.formulas.closed_forms import cross
-from virtualwork.mechanism import GROUND
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.numbers import Reals, cross
+from virtualwork.formulas.reactions import Reactions
+from virtualwork.plan.joints import Joint
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+# ("fx" or "fy", joint, body), ("normal", joint, ""), ("moment", joint, ""), ("gear", number, ""), ...
+Column = tuple[str, str, str]
 
-    from virtualwork.formulas.reactions import Reactions
-    from virtualwork.joints import Joint
-    from virtualwork.mechanism import Mechanism
-
-    Reals = NDArray[np.float64]
-    Column = tuple[
-        str, str, str
-    ]  # ("fx" or "fy", joint, body), ("normal"/"along", joint, ""), ("moment", joint, ""), ...
-
-NULL = 1e-9  # a singular value below this share of the largest, lengths scaled by the mechanism's size
+# a singular value below this share of the largest is none, lengths scaled by the mechanism's size
+NULL = 1e-9
 
 
 class Statics:
@@ -44,9 +39,8 @@ class Statics:
 
     def __init__(self, reactions: Reactions) -> None:
         self.reactions = reactions
-        mechanism: Mechanism = reactions.scene.mechanism
-        self.mechanism = mechanism
-        self.n = reactions.scene.motion.n
+        self.mechanism = mechanism = reactions.scene.mechanism
+        self.n = reactions.scene.poses.n
         self.size: float = mechanism.size
         self.unknowns: list[Any] = self._unknowns()
 
@@ -69,10 +63,10 @@ class Statics:
             found.append(("force" if entry.is_slide else "torque", str(j), ""))
         return found
 
-    def _system(self) -> tuple[Reals, Reals]:
+    def system(self) -> tuple[Reals, Reals]:
         """A (n, equations, unknowns) and b (n, equations); moments and torques are divided by the size."""
         r = self.reactions
-        m: Mechanism = self.mechanism
+        m = self.mechanism
         links = list(m.links)
         free_pins = [joint for joint in r.joints if joint.guide is None and GROUND not in joint.bodies]
         rows = 3 * len(links) + 2 * len(free_pins)
@@ -118,7 +112,7 @@ class Statics:
                     put(body, column["normal", joint.key, ""], sign * 1j * rail, arm)
                     if g.is_slider:
                         turn(body, column["moment", joint.key, ""], sign)
-                    j = r._driving(joint.guide)
+                    j = m.driver_of(joint.guide)
                     if j is not None:
                         put(body, column["force", str(j), ""], sign * rail, arm)
             for i, gear in enumerate(m.gears):
@@ -138,7 +132,7 @@ class Statics:
     @cached_property
     def solved(self) -> tuple[Reals, Reals]:
         """The unknowns (n, u) and their null vectors (n, u, u)."""
-        a, b = self._system()
+        a, b = self.system()
         u = len(self.unknowns)
         good: Any = np.isfinite(a).all(axis=(1, 2)) & np.isfinite(b).all(axis=1)
         value, null = np.full((self.n, u), np.nan), np.zeros((self.n, u, u))
@@ -176,7 +170,7 @@ class Statics:
         r = self.reactions
         rail, rub = r.over(
             lambda block: r.rail(block, joint.guide),
-            lambda block: r._rubbed(block, joint, body),
+            lambda block: r.rubbed(block, joint, body),
             kind=complex,
         )
         sign = 1.0 if body == self.mechanism.guides[joint.guide].link else -1.0

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from virtualwork.describe.description import Description
 from virtualwork.describe.errors import MobilityError
-from virtualwork.mechanism import GROUND
-
-if TYPE_CHECKING:
-    from virtualwork.mechanism import Mechanism
-
-# ("angle", link), ("x", link), ("y", link), ("px", pin), ("py", pin), ("slide", guide)
-Variable = tuple[str, str]
+from virtualwork.describe.parts import GROUND
+from virtualwork.plan.joints import guide_label, relations
+from virtualwork.plan.steps import Blocks, Variable
 
 
 @dataclass(frozen=True)
@@ -24,16 +20,7 @@ class Equation:
     is_input: bool = False
 
 
-@dataclass(frozen=True)
-class Blocks:
-    """The irreducible blocks of coordinates in their order of solution, and the redundant equations."""
-
-    order: tuple[tuple[Variable, ...], ...]
-    redundant: tuple[str, ...]
-    mobility: int  # Grübler's: coordinates less equations of joints
-
-
-def equations(m: Mechanism) -> tuple[list[Variable], list[Equation]]:
+def equations(m: Description) -> tuple[list[Variable], list[Equation]]:
     """The coordinates of a mechanism and the scalar equations of its inputs and joints."""
     variables: list[Variable] = []
     for link in m.links:
@@ -46,21 +33,12 @@ def equations(m: Mechanism) -> tuple[list[Variable], list[Equation]]:
     def body(name: str, axis: str) -> tuple[Variable, ...]:
         return () if name == GROUND else ((axis, name), ("angle", name))
 
-    def turn(*names: str) -> tuple[Variable, ...]:
-        return tuple(("angle", name) for name in names if name != GROUND)
-
-    rows: list[Equation] = []
-    for e in m.inputs:
-        if e.slider is not None:
-            guide = next(i for i, g in enumerate(m.guides) if g.point == e.slider)
-            rows.append(Equation(f"input {e.name}", (("slide", str(guide)),), True))
-        else:
-            rows.append(Equation(f"input {e.name}", turn(str(e.link), e.on), True))
-    for g in m.guides:
-        if g.is_slider:
-            rows.append(Equation(f"slider {g.point}", turn(g.link, g.on)))
-    for gear in m.gears:
-        rows.append(Equation(f"gear {gear.links[0]}-{gear.links[1]}", turn(*gear.shares())))
+    rows = [
+        Equation(f"input {e.name}", (("slide", str(m.guide_of(e))),), True) for e in m.inputs if e.is_slide
+    ]
+    for relation in relations(m):
+        angles = tuple(("angle", body) for body in relation.shares if body != GROUND)
+        rows.append(Equation(relation.label, angles, relation.kind == "input"))
     for pin, bodies in m.pins.items():
         for name in bodies:
             if name != GROUND:
@@ -70,11 +48,11 @@ def equations(m: Mechanism) -> tuple[list[Variable], list[Equation]]:
     for i, g in enumerate(m.guides):
         for axis in "xy":
             held = body(g.link, axis) + body(g.on, axis) + (("slide", str(i)),)
-            rows.append(Equation(f"{'slider' if g.is_slider else 'slot'} {g.point}", held))
+            rows.append(Equation(guide_label(m, i), held))
     return variables, rows
 
 
-def decompose(m: Mechanism) -> Blocks:
+def decompose(m: Description) -> Blocks:
     """Split the coordinates of a mechanism into irreducible blocks, in their order of solution.
 
     Raises
@@ -131,7 +109,7 @@ def _match(rows: list[Equation]) -> dict[Variable, int]:
 
 
 def _refuse_free(
-    m: Mechanism,
+    m: Description,
     variables: list[Variable],
     rows: list[Equation],
     of_variable: dict[Variable, int],

@@ -17,8 +17,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from virtualwork.mechanism import GROUND
-from virtualwork.plan.graph import Blocks
+from virtualwork.describe.parts import GROUND
+
+# ("angle", link), ("x", link), ("y", link), ("px", pin), ("py", pin), ("slide", guide)
+Variable = tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,15 @@ class Term:
     z: complex
     body: str
     slide: int | None = None
+
+
+# where a point lies: P[base] + Σ terms; base None is the ground's origin
+Path = tuple[str | None, tuple[Term, ...]]
+
+
+def path_reads(path: Path) -> set[str]:
+    """What a point hangs on: `angle:BODY`, `slide:GUIDE`, `point:NODE`."""
+    return _term_reads(path[1]) | _node(path[0])
 
 
 @dataclass(frozen=True)
@@ -41,6 +52,8 @@ class Angle:
     inputs: tuple[tuple[int, float], ...] = ()
     bases: tuple[tuple[str, float], ...] = ()
     gears: tuple[tuple[int, float], ...] = ()
+    # of what was added up to const: its rounding is so many times the unit's
+    size: float = field(default=0.0, compare=False)
 
     def at(self, inputs: tuple[float, ...]) -> float | None:
         """The angle at given inputs, or None where it hangs on other angles."""
@@ -113,6 +126,16 @@ class Group:
 
 
 Step = Turn | Slide | Place | Group
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """The irreducible blocks of coordinates in their order of solution, and the redundant equations."""
+
+    order: tuple[tuple[Variable, ...], ...]
+    redundant: tuple[str, ...]
+    # Grübler's: coordinates less equations of joints
+    mobility: int
 
 
 @dataclass(frozen=True)

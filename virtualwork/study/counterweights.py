@@ -7,23 +7,17 @@ radius u (complex, in the link's axes) adds the shaking force −u·d²(e^{iθ})
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from virtualwork.describe.description import Description
 from virtualwork.describe.errors import DescriptionError
-from virtualwork.mechanism import GROUND
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from virtualwork.mechanism import Mechanism
-    from virtualwork.motion import Motion
-
-    Complexes = NDArray[np.complex128]
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.dynamics import Moving
+from virtualwork.formulas.numbers import Complexes
 
 
-def pivot(mechanism: Mechanism, link: str) -> complex:
+def pivot(mechanism: Description, link: str) -> complex:
     """The point of a link that is pinned to the ground.
 
     Raises
@@ -41,7 +35,7 @@ def pivot(mechanism: Mechanism, link: str) -> complex:
     )
 
 
-def least_squares(motion: Motion, links: Sequence[str]) -> tuple[dict[str, complex], Complexes, Complexes]:
+def least_squares(motion: Moving, links: Sequence[str]) -> tuple[dict[str, complex], Complexes, Complexes]:
     """Return the counterweights on links with a fixed pivot that leave the least RMS shaking force of inertia.
 
     Parameters
@@ -62,23 +56,23 @@ def least_squares(motion: Motion, links: Sequence[str]) -> tuple[dict[str, compl
     Solved by orthogonal factors, never by normal equations. Where two links turn alike (a parallelogram's cranks)
     only the sum of their counterweights counts: that is an error and names them.
     """
-    scene = motion.dynamics.scene
+    scene, poses = motion.dynamics.scene, motion.dynamics.poses
     if not scene.moves:
         raise DescriptionError("counterweights: the speed is zero: expected a motion that shakes")
-    before = np.zeros(motion.n, complex)
+    before = np.zeros(poses.n, complex)
     for block in scene.blocks():
         for load in scene.loads:
             if load.kind == "inertia force":
-                value = block.keep(load)
+                value = block.formed(load)
                 if value is not None:
                     before[block.rows] += value
     columns = []
     for link in links:
-        z = pivot(motion.mechanism, link)
+        z = pivot(poses.mechanism, link)
         # of two points a metre apart on the link, about a fixed pivot: −d²(e^{iθ})/dt²
-        columns.append(-motion.at(link, z + 1.0).complex(2))
+        columns.append(-poses.point_derivative(link, z + 1.0, 2))
     matrix = np.stack(columns, axis=1)
-    rows = np.isfinite(before) & np.isfinite(matrix).all(axis=1) & motion.assembled
+    rows = np.isfinite(before) & np.isfinite(matrix).all(axis=1) & poses.assembled
     size = np.linalg.norm(matrix[rows], axis=0)
     u, s, vh = np.linalg.svd(matrix[rows] / size, full_matrices=False)
     if not s[-1] > 1e-10 * s[0]:
@@ -92,7 +86,7 @@ def least_squares(motion: Motion, links: Sequence[str]) -> tuple[dict[str, compl
     return dict(zip(links, (complex(w) for w in weights), strict=True)), before, after
 
 
-def berkof_lowen(mechanism: Mechanism, crank: str, coupler: str, rocker: str) -> dict[str, complex]:
+def berkof_lowen(mechanism: Description, crank: str, coupler: str, rocker: str) -> dict[str, complex]:
     """Return the counterweights on crank and rocker that balance a four-bar's shaking force completely.
 
     R. S. Berkof and G. G. Lowen (J. Eng. Ind. 91, 1969, 21): the common centre of mass rests where, by the loop
@@ -105,7 +99,7 @@ def berkof_lowen(mechanism: Mechanism, crank: str, coupler: str, rocker: str) ->
 
     Examples
     --------
-    >>> from virtualwork.mechanism import Link, Mechanism
+    >>> from virtualwork import Link, Mechanism
     >>> four = Mechanism({"A": 0j, "D": 4}, {"crank": Link({"A": 0j, "B": 1}, mass=1, center=0.5),
     ...     "coupler": Link({"B": 0j, "C": 3}, mass=3, center=1), "rocker": Link({"D": 0j, "C": 2}, mass=2, center=1)})
     >>> berkof_lowen(four, "crank", "coupler", "rocker")

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from virtualwork.formulas.closed_forms import Number, dot
-from virtualwork.formulas.effort import displacement, power
-from virtualwork.formulas.loads import SpringEnd, TorsionEnd, path_reads, plus, times
-from virtualwork.formulas.scene import Block
-from virtualwork.study.equilibrium import potential_of
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from virtualwork.motion import Motion
-
-    Reals = NDArray[np.float64]
+from virtualwork.bounds.forces import ForceErrors
+from virtualwork.formulas.dynamics import Moving
+from virtualwork.formulas.loads import OWN
+from virtualwork.formulas.numbers import Reals, minus, plus
+from virtualwork.formulas.poses import Poses
+from virtualwork.plan.steps import path_reads
 
 
 @dataclass(frozen=True)
@@ -33,17 +27,22 @@ class Cycle:
         converges faster than any power of the step; else by a cubic spline.
     """
 
-    motion: Motion
+    motion: Moving
+
+    @property
+    def poses(self) -> Poses:
+        """The poses of the sweep."""
+        return self.motion.dynamics.poses
 
     @cached_property
     def input(self) -> Reals:
         """The input, (n,)."""
-        return self.motion.inputs[:, 0]
+        return self.poses.inputs[:, 0]
 
     @cached_property
     def effort(self) -> Reals:
         """The effort by virtual work, (n,)."""
-        return self.motion.effort
+        return self.motion.dynamics.effort[:, 0]
 
     @cached_property
     def whole(self) -> bool:
@@ -54,7 +53,7 @@ class Cycle:
         even = np.abs(steps - steps.mean()).max() <= 1e-9 * abs(steps.mean())
         back = abs(self.effort[-1] - self.effort[0]) <= 1e-9 * np.abs(self.effort).max()
         return bool(
-            not self.motion.mechanism.inputs[0].is_slide
+            not self.poses.mechanism.inputs[0].is_slide
             and abs(turns - round(turns)) < 1e-9
             and round(turns) != 0
             and even
@@ -110,7 +109,7 @@ class Cycle:
         They follow from those of the effort at the poses; what the sum or spline between the poses leaves out of an
         integral is no rounding, and not among them.
         """
-        error, size = self.motion.dynamics.error_estimate().effort[:, 0], np.abs(self.effort)
+        error, size = ForceErrors(self.motion.dynamics).effort[:, 0], np.abs(self.effort)
         last = float(np.finfo(float).eps) * (2 + np.log2(len(size)))  # of a pairwise sum
         q = np.abs(self.input - self.input[0])
         # the weights of a spline exceed those of the trapezoidal rule by less than a half
@@ -129,8 +128,8 @@ class Cycle:
     def energy(self) -> tuple[Reals, Reals]:
         """Kinetic energy and potential of weights and springs at each pose, (n,) J."""
         scene = self.motion.dynamics.scene
-        kinetic, potential = np.zeros(self.motion.n), np.zeros(self.motion.n)
-        centers = {body: scene.path(body, r.center) for body, r in scene.rigid.items() if r.mass}
+        kinetic, potential = np.zeros(self.poses.n), np.zeros(self.poses.n)
+        centers = {body: scene.case.path(body, r.center) for body, r in scene.rigid.items() if r.mass}
         keys: set[str] = set()
         for path in centers.values():
             keys |= path_reads(path)
@@ -144,8 +143,8 @@ class Cycle:
             if total is not None:
                 kinetic[block.rows] = total
             for load in scene.loads:
-                if load.kind == "weight" or isinstance(load, SpringEnd | TorsionEnd):
-                    value = potential_of(load, block)
+                if load.stores:
+                    value = load.potential(block)
                     if value is not None:
                         potential[block.rows] += value
         return kinetic, potential
@@ -157,15 +156,15 @@ class Cycle:
         Work in, plus the work of applied loads, dampers and friction, less the gain in kinetic energy and potential.
         None where the input's acceleration is not zero: the poses of such a sweep are no history.
         """
-        if any(np.any(rate) for rate in self.motion._rates[1]) or np.ndim(self.motion._rates[0][0]):
+        if any(np.any(rate) for rate in self.poses.rates[1]) or np.ndim(self.poses.rates[0][0]):
             return None
         scene = self.motion.dynamics.scene
         total = self.effort.copy()
         for block in scene.blocks():
-            for load in [*scene.loads, *scene.rubs]:
-                if load.kind in ("weight", "inertia force", "inertia torque"):
+            for load in scene.case.everything:
+                if load.kind in OWN:
                     continue
-                value = plus(power(load, block, 0), times(_elastic(load, block), -1.0))
+                value = minus(load.power(block, 0), load.elastic(block))
                 if value is not None:
                     total[block.rows] += value
         kinetic, potential = self.energy
@@ -203,21 +202,7 @@ class Cycle:
         ValueError
             Where the input does not turn.
         """
-        speed = float(np.mean(self.motion._rates[0][0]))
+        speed = float(np.mean(self.poses.rates[0][0]))
         if speed == 0:
             raise ValueError("a flywheel needs a speed of the input that is not zero")
         return self.fluctuation / (coefficient * speed * speed)
-
-
-def _elastic(load: Any, block: Block) -> Number:
-    """The part of a spring's work that its potential holds: all of it without a damper."""
-    if not isinstance(load, SpringEnd | TorsionEnd) or load.spring is None or not load.spring.stiffness:
-        return None
-    bare: Any = load.spring
-    undamped: Any = load  # a passing one is not kept by the block, which knows loads by their identity
-    if bare.damping:
-        undamped = replace(undamped, spring=replace(bare, damping=0.0))
-    moved, value = displacement(undamped, block, 0), undamped.value(block)
-    if moved is None or value is None:
-        return None
-    return value * moved if undamped.path is None else dot(value, moved)

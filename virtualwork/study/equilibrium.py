@@ -10,37 +10,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from virtualwork.formulas.closed_forms import Number, dot
-from virtualwork.formulas.effort import power
-from virtualwork.formulas.loads import (
-    Constant,
-    Follower,
-    Load,
-    Path,
-    SpringEnd,
-    Tabled,
-    TorsionEnd,
-    path_reads,
-    plus,
-    times,
-)
-from virtualwork.formulas.scene import Block, Scene
-from virtualwork.mechanism import GROUND
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from virtualwork.mechanism import Mechanism
-    from virtualwork.state import Jets
-
-    Reals = NDArray[np.float64]
+from virtualwork.bounds.forces import ForceErrors
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.numbers import EPS, Number, Reals
+from virtualwork.formulas.poses import Branch, Poses
+from virtualwork.formulas.scene import Scene
+from virtualwork.plan.steps import path_reads
 
 SAMPLES = 1440
-EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -55,7 +38,7 @@ class Equilibrium:
     stable: bool | None
     stiffness: float
     potential: float | None
-    mechanism: Mechanism | None = field(default=None, repr=False, compare=False)
+    assembly: Branch | None = field(default=None, repr=False, compare=False)
 
     def error_estimate(self) -> tuple[float, ...]:
         """Return a bound of the rounding error of each input, rad or m: the error of Q over its slope, |V″⁻¹|·δQ.
@@ -64,16 +47,16 @@ class Equilibrium:
 
         Examples
         --------
-        >>> from virtualwork.mechanism import Input, Link, Mechanism
+        >>> from virtualwork import Input, Link, Mechanism
         >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="bob"),
         ...                      gravity=-9.81j)
-        >>> down = equilibria(pendulum).found[1]
+        >>> down = equilibria(pendulum.assembly).found[1]
         >>> abs(down.inputs[0] - 1.5 * np.pi) < down.error_estimate()[0] < 1e-14
         True
         """
-        assert self.mechanism is not None
-        rest = Rest(self.mechanism, np.array([self.inputs]))
-        error = rest.motion.dynamics.error_estimate().generalized[0]
+        assert self.assembly is not None
+        rest = Rest(self.assembly, np.array([self.inputs]))
+        error = ForceErrors(Dynamics(rest.poses)).generalized[0]
         stiffness = rest.hessian()[0]
         # the search ends where half a bracket, or a step, is below two units in the last digit
         own = 4 * EPS * np.maximum(np.abs(self.inputs), 2 * np.pi / SAMPLES)
@@ -97,94 +80,20 @@ class Equilibria:
     region: bool = False
     loaded: bool = True
 
-
-def _second(load: Load, block: Block, jets: Jets) -> Number:
-    """The derivative of a load's virtual work along the direction of the jets."""
-
-    def vector(path: Path | None, k: int) -> Number:
-        assert path is not None
-        return jets.vector(path[0], path[1], k)
-
-    def angle(body: str, k: int) -> Number:
-        return None if body == GROUND else jets.angle[body][k - 1]
-
-    if isinstance(load, SpringEnd):
-        s = load.spring
-        assert s is not None
-        assert load.path is not None
-        if (not load.first and s.between[0][0] != GROUND) or not s.stiffness:
-            return None
-        d = block.position(load.other) - block.position(load.path)
-        d1 = plus(vector(load.other, 1), times(vector(load.path, 1), -1.0))
-        d2 = plus(vector(load.other, 2), times(vector(load.path, 2), -1.0))
-        if d1 is None:
-            return None
-        share: Number = 1.0
-        turn: Number = 0.0
-        if s.free_length:
-            length = abs(d)
-            share, turn = 1 - s.free_length / length, s.free_length / length**3 * dot(d, d1) ** 2
-        bend = dot(d1, d1) if d2 is None else dot(d1, d1) + dot(d, d2)
-        return -s.stiffness * (share * bend + turn)
-    if isinstance(load, TorsionEnd):
-        t = load.spring
-        assert t is not None
-        if (load.sign < 0 and t.links[0] != GROUND) or not t.stiffness:
-            return None
-        a, b = t.links
-        r1 = plus(angle(b, 1), times(angle(a, 1), -1.0))
-        r2 = plus(angle(b, 2), times(angle(a, 2), -1.0))
-        if r1 is None:
-            return None
-        return -t.stiffness * plus(r1 * r1, times(block.scene.wound(block, t), r2))
-    value = block.keep(load)
-    if value is None:
-        return None
-    if load.path is None:
-        return times(angle(load.body, 2), value)
-    second, first = vector(load.path, 2), vector(load.path, 1)
-    total: Number = None if second is None else dot(value, second)
-    if first is not None and isinstance(load, Follower):
-        turning = angle(load.body, 1)
-        total = plus(total, None if turning is None else dot(1j * value * turning, first))
-    if first is not None and isinstance(load, Tabled):
-        total = plus(total, dot(load.slope(block), first))
-    return total
-
-
-def potential_of(load: Load, block: Block) -> Number:
-    """The potential of a load; NaN for one that has none."""
-    if isinstance(load, SpringEnd):
-        assert load.spring is not None
-        assert load.path is not None
-        if not load.first and load.spring.between[0][0] != GROUND:
-            return None
-        stretch = abs(block.position(load.other) - block.position(load.path)) - load.spring.free_length
-        return 0.5 * load.spring.stiffness * stretch * stretch
-    if isinstance(load, TorsionEnd):
-        assert load.spring is not None
-        if load.sign < 0 and load.spring.links[0] != GROUND:
-            return None
-        angle = block.scene.wound(block, load.spring)
-        return 0.5 * load.spring.stiffness * angle * angle
-    if isinstance(load, Constant) and load.path is not None:
-        return -dot(load.amount, block.position(load.path))
-    if isinstance(load, Constant):
-        known = block.scene.plan.angles[load.body]
-        if known.bases:
-            return np.nan  # a torque on a link whose whole turns are not known
-        return -load.amount * block.st.affine(known)
-    return np.nan
+    def __repr__(self) -> str:
+        if self.everywhere or self.region:
+            return f"Equilibria({'everywhere' if self.everywhere else 'a region'})"
+        words = {True: "stable", False: "unstable", None: "undecided"}
+        return f"Equilibria({', '.join(f'{e.inputs[0]:g} {words[e.stable]}' for e in self.found) or 'none'})"
 
 
 class Rest:
     """Generalized forces, their derivative and the potential of a mechanism at rest at given inputs (n, k)."""
 
-    def __init__(self, mechanism: Mechanism, inputs: Reals) -> None:
-        self.mechanism, self.inputs = mechanism, inputs
-        self.k = inputs.shape[1]
-        self.motion = mechanism.motion(inputs if self.k > 1 else inputs[:, 0], 0.0, 0.0)
-        self.scene = Scene(self.motion, at_rest=True)
+    def __init__(self, assembly: Branch, inputs: Reals) -> None:
+        self.assembly, self.inputs, self.k = assembly, inputs, inputs.shape[1]
+        self.poses = Poses(assembly, inputs if self.k > 1 else inputs[:, 0], 0.0, 0.0)
+        self.scene = Scene(self.poses, at_rest=True)
 
     def force(self) -> tuple[Reals, Reals]:
         """Q and the sum of the sizes of its terms, each (n, k)."""
@@ -193,27 +102,25 @@ class Rest:
         for block in self.scene.blocks():
             for j in range(self.k):
                 for load in self.scene.loads:
-                    value = power(load, block, j)
+                    value = load.power(block, j)
                     if value is not None:
                         total[block.rows, j] += value
                         size[block.rows, j] += np.abs(value)
-        total[np.logical_not(self.motion.assembled)] = np.nan
+        total[np.logical_not(self.poses.assembled)] = np.nan
         return total, size
 
     def along(self, direction: Reals) -> Reals:
         """∂Q/∂q along a direction in the inputs, times the direction: d²(work), (n,)."""
-        motion = (
-            self.motion
-            if self.k == 1
-            else self.mechanism.motion(self.inputs, direction[None] * np.ones((len(self.inputs), 1)), 0.0)
-        )
-        scene = self.scene if self.k == 1 else Scene(motion, at_rest=True)
-        keys = tuple(sorted(scene.reads(scene.loads)))
-        jets = motion._solve(keys, 2)
+        scene = self.scene
+        if self.k > 1:
+            still: list[Number] = [0.0] * self.k
+            scene = Scene(self.poses.again(self.inputs, [direction.tolist(), still, still]), at_rest=True)
+        reads = set().union(*(load.reads() for load in scene.loads)) - {f"angle:{GROUND}"}
+        rates = scene.poses.solve(tuple(sorted(reads)), 2)
         total = np.zeros(len(self.inputs))
         for i, block in enumerate(scene.blocks()):
             for load in scene.loads:
-                value = _second(load, block, jets[i])
+                value = load.second(block, rates[i])
                 if value is not None:
                     total[block.rows] += value
         return total * (direction[0] ** 2 if self.k == 1 else 1.0)
@@ -236,18 +143,18 @@ class Rest:
         keys = {key for load in self.scene.loads if load.path is not None for key in path_reads(load.path)}
         for block in self.scene.blocks(sorted(keys)):
             for load in self.scene.loads:
-                value = potential_of(load, block)
+                value = load.potential(block)
                 if value is not None:
                     total[block.rows] += value
         return total
 
 
-def equilibria(mechanism: Mechanism, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:
+def equilibria(assembly: Branch, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:
     """Return every position in which a mechanism rests under its loads without effort, each stable or not.
 
     Parameters
     ----------
-    mechanism : Mechanism
+    assembly : Description
         With its gravity, constant and follower forces, torques, springs. Dampers and friction do not act at rest.
     spans : array (k, 2), optional
         The range of each input, rad or m. Default: a whole turn; for a slide, two sizes of the mechanism either way.
@@ -262,28 +169,28 @@ def equilibria(mechanism: Mechanism, spans: ArrayLike | None = None, samples: in
     --------
     A pendulum hangs stably and stands unstably.
 
-    >>> from virtualwork.mechanism import Input, Link, Mechanism
+    >>> from virtualwork import Input, Link, Mechanism
     >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="bob"),
     ...                      gravity=-9.81j)
-    >>> [(round(float(np.degrees(e.inputs[0]))), e.stable) for e in equilibria(pendulum).found]
+    >>> [(round(float(np.degrees(e.inputs[0]))), e.stable) for e in equilibria(pendulum.assembly).found]
     [(90, False), (270, True)]
     """
-    k = len(mechanism.inputs)
-    at = np.asarray(mechanism.at, dtype=float)
+    k = len(assembly.mechanism.inputs)
+    at = np.asarray(assembly.mechanism.at, dtype=float)
     if spans is None:
-        slide = np.array([e.is_slide for e in mechanism.inputs])
-        low = np.where(slide, at - 2 * mechanism.size, 0.0)
-        high = np.where(slide, at + 2 * mechanism.size, 2 * np.pi)
+        slide = np.array([e.is_slide for e in assembly.mechanism.inputs])
+        low = np.where(slide, at - 2 * assembly.mechanism.size, 0.0)
+        high = np.where(slide, at + 2 * assembly.mechanism.size, 2 * np.pi)
         ranges = np.stack([low, high], axis=1)
     else:
         ranges = np.asarray(spans, dtype=float).reshape(k, 2)
-    return _one(mechanism, ranges[0], samples) if k == 1 else _many(mechanism, ranges)
+    return _one(assembly, ranges[0], samples) if k == 1 else _many(assembly, ranges)
 
 
-def _one(mechanism: Mechanism, span: Reals, samples: int) -> Equilibria:
-    whole = not mechanism.inputs[0].is_slide and abs(span[1] - span[0] - 2 * np.pi) < 1e-12
+def _one(assembly: Branch, span: Reals, samples: int) -> Equilibria:
+    whole = not assembly.mechanism.inputs[0].is_slide and abs(span[1] - span[0] - 2 * np.pi) < 1e-12
     q = np.linspace(span[0], span[1], samples + 1)
-    rest = Rest(mechanism, q[:, None])
+    rest = Rest(assembly, q[:, None])
     force, size = (values[:, 0] for values in rest.force())
     good = np.isfinite(force)
     if not good.any():
@@ -300,28 +207,28 @@ def _one(mechanism: Mechanism, span: Reals, samples: int) -> Equilibria:
     roots = list(q[tiny & good])
     here = np.flatnonzero(good[:-1] & good[1:] & (sign[:-1] * sign[1:] < 0))
     if len(here):
-        roots += list(_refine(mechanism, q[here], q[here + 1], force[here]))
+        roots += list(_refine(assembly, q[here], q[here + 1], force[here]))
     # a root that the force only touches: its derivative changes sign where it is small
     touch = np.flatnonzero(good[:-1] & good[1:] & (sign[:-1] * sign[1:] > 0) & (slope[:-1] * slope[1:] < 0))
     touch = touch[np.minimum(np.abs(force[touch]), np.abs(force[touch + 1])) < 1e-4 * scale]
     if len(touch):
-        flat = _refine(mechanism, q[touch], q[touch + 1], slope[touch], order=1)
-        value, around = (v[:, 0] for v in Rest(mechanism, flat[:, None]).force())
+        flat = _refine(assembly, q[touch], q[touch + 1], slope[touch], order=1)
+        value, around = (v[:, 0] for v in Rest(assembly, flat[:, None]).force())
         roots += list(flat[np.abs(value) <= 1e-13 * np.maximum(around, scale)])
     roots = sorted(roots)
     if whole and len(roots) > 1 and roots[-1] - roots[0] > 2 * np.pi - 1e-9:
         roots.pop()
-    unit = 1.0 if not mechanism.inputs[0].is_slide else mechanism.size
+    unit = 1.0 if not assembly.mechanism.inputs[0].is_slide else assembly.mechanism.size
     distinct = [root for i, root in enumerate(roots) if i == 0 or root - roots[i - 1] > 1e-8 * unit]
-    return _judged(mechanism, np.array(distinct)[:, None], scale)
+    return _judged(assembly, np.array(distinct)[:, None], scale)
 
 
-def _refine(mechanism: Mechanism, low: Reals, high: Reals, at_low: Reals, order: int = 0) -> Reals:
+def _refine(assembly: Branch, low: Reals, high: Reals, at_low: Reals, order: int = 0) -> Reals:
     """Roots of Q (order 0) or of ∂Q/∂q (order 1) in brackets, all at once: Newton's step where it stays inside."""
     a, b, below = low.copy(), high.copy(), np.sign(at_low)
     x = (a + b) / 2
     for _ in range(80):
-        rest = Rest(mechanism, x[:, None])
+        rest = Rest(assembly, x[:, None])
         value = rest.force()[0][:, 0] if order == 0 else rest.along(np.ones(1))
         left = np.sign(value) == below
         a, b = np.where(left, x, a), np.where(left, b, x)
@@ -337,11 +244,11 @@ def _refine(mechanism: Mechanism, low: Reals, high: Reals, at_low: Reals, order:
     return np.asarray(x)
 
 
-def _judged(mechanism: Mechanism, inputs: Reals, scale: float) -> Equilibria:
+def _judged(assembly: Branch, inputs: Reals, scale: float) -> Equilibria:
     """Stability and potential of the positions found; those that are none (a pole between two signs) are dropped."""
     if not len(inputs):
         return Equilibria(())
-    rest = Rest(mechanism, inputs)
+    rest = Rest(assembly, inputs)
     force, size = rest.force()
     true = (np.abs(force) <= 1e-8 * np.maximum(size, 1e-3 * scale)).all(axis=1)
     hessian, potential = rest.hessian(), rest.potential()
@@ -355,20 +262,20 @@ def _judged(mechanism: Mechanism, inputs: Reals, scale: float) -> Equilibria:
                 None if abs(low) <= small else low > 0,
                 low,
                 float(potential[i]) if np.isfinite(potential[i]) else None,
-                mechanism,
+                assembly,
             )
         )
     return Equilibria(tuple(found))
 
 
-def _many(mechanism: Mechanism, ranges: Reals) -> Equilibria:
+def _many(assembly: Branch, ranges: Reals) -> Equilibria:
     """Several inputs: Newton on Q from a grid of starts, all at once."""
     k = len(ranges)
     per = max(4, round(4000 ** (1 / k)))
     per = min(per, 40)
     axes = [np.linspace(low, high, per, endpoint=False) + (high - low) / (2 * per) for low, high in ranges]
     x = np.array(list(product(*axes)))
-    force, size = Rest(mechanism, x).force()
+    force, size = Rest(assembly, x).force()
     good = np.isfinite(force).all(axis=1)
     if not good.any():
         return Equilibria(())
@@ -381,7 +288,7 @@ def _many(mechanism: Mechanism, ranges: Reals) -> Equilibria:
     x = x[np.argsort(np.abs(force[good]).max(axis=1))[:400]]
     reach = (ranges[:, 1] - ranges[:, 0]) / per
     for _ in range(60):
-        rest = Rest(mechanism, x)
+        rest = Rest(assembly, x)
         force, _ = rest.force()
         stiff = rest.hessian()
         keep = np.isfinite(force).all(axis=1) & np.isfinite(stiff).all(axis=(1, 2))
@@ -393,20 +300,20 @@ def _many(mechanism: Mechanism, ranges: Reals) -> Equilibria:
         x = x + step
         if (np.abs(step) <= 4 * EPS * np.maximum(np.abs(x), reach)).all():
             break
-    force, size = Rest(mechanism, x).force()
+    force, size = Rest(assembly, x).force()
     settled = (np.abs(force) <= 1e-10 * np.maximum(size, 1e-3 * scale)).all(axis=1)
     x = x[settled]
-    turning = np.array([not e.is_slide for e in mechanism.inputs])
+    turning = np.array([not e.is_slide for e in assembly.mechanism.inputs])
     x = np.where(turning, np.mod(x, 2 * np.pi), x)
     x = np.where(turning & (2 * np.pi - x < 1e-9), 0.0, x)
-    unit = np.where(turning, 1.0, mechanism.size)
+    unit = np.where(turning, 1.0, assembly.mechanism.size)
     distinct: list[Any] = []
     for row in x[np.lexsort(np.round(x / unit, 7).T[::-1])] if len(x) else []:
         gaps = [(row - other) / unit for other in distinct]
         gaps = [np.where(turning, np.abs(np.angle(np.exp(1j * gap))), np.abs(gap)) for gap in gaps]
         if not any((gap < 1e-6).all() for gap in gaps):
             distinct.append(row)
-    judged = _judged(mechanism, np.array(distinct).reshape(-1, k), scale)
+    judged = _judged(assembly, np.array(distinct).reshape(-1, k), scale)
     undecided = sum(e.stable is None for e in judged.found)
     # isolated equilibria are few; dozens that no second variation tells apart are points of a continuum
     return Equilibria((), region=True) if undecided > 32 else judged

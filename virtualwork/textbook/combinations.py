@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.assur import direction
-from virtualwork.formulas.closed_forms import MANY, angle_and_slide, two_columns
+from virtualwork.formulas.closed_forms import angle_and_slide, two_columns
+from virtualwork.formulas.numbers import MANY
+from virtualwork.plan.order import direction
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

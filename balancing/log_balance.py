@@ -1,0 +1,163 @@
+"""Corrections from a log of runs, and how sure they are: of themselves, of what they leave, of the next reading."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from balancing.propagation import components, response
+from balancing.run_log import Errors, JointFit
+from dalembert.arithmetic.records import numbers, record
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def region_factor(probability: float, degrees_of_freedom: ArrayLike, dimensions: int = 2) -> Real:
+    """Return k of the region δᵀV⁻¹δ ≤ k² that holds the true value with this probability.
+
+    V is the covariance as estimated with ν complex, 2ν real degrees of freedom, and k² = n F(n, 2ν) with n the real
+    dimensions (Seber and Lee, section 5.1); χ² where ν is inf, NaN where it is 0.
+
+    >>> region_factor(0.95, [1, 4, np.inf]).round(3)
+    array([6.164, 2.986, 2.448])
+    """
+    from scipy.special import fdtri, gammaincinv
+
+    nu = np.asarray(degrees_of_freedom, dtype=float)
+    known = np.isinf(nu)
+    real = np.where(known | ~(nu > 0), 1.0, 2 * nu)
+    square = np.where(
+        known, 2 * gammaincinv(dimensions / 2, probability), dimensions * fdtri(dimensions, real, probability)
+    )
+    return np.asarray(np.sqrt(np.where(nu > 0, square, np.nan)))
+
+
+@record
+@dataclass(frozen=True, eq=False, repr=False)
+class LogBalance:
+    """Corrections of a rotor whose log was fitted, and their doubt.
+
+    Examples
+    --------
+    >>> from balancing import joint_fit, least_squares
+    >>> on = np.array([[0], [1], [1j], [-1]])
+    >>> fit = joint_fit(5 + 2 * on + 0.1 * np.array([[1], [-1], [0], [1]]), on)
+    >>> found = LogBalance(fit, least_squares(fit.influence, fit.initial).corrections, fit.scatter())
+    >>> found.corrections.round(3), found.deviations[0].round(3)
+    (array([-2.608+0.003j]), array([0.049]))
+    """
+
+    fit: JointFit
+    corrections: Complex
+    """What is to be ADDED to the rotor without masses, (..., p), by least squares."""
+    errors: Errors
+    weights: Real | None = None
+    """Those of the channels in the least squares of the corrections, (..., s)."""
+    along: Complex | None = None
+    """The directions of the corrections as given out, where they are not these ones', (..., p)."""
+
+    def __repr__(self) -> str:
+        w, errors = numbers(self.corrections), numbers(self.errors.degrees_of_freedom)
+        return f"LogBalance(corrections={w}, residual={numbers(self.residual)}, degrees_of_freedom={errors})"
+
+    @cached_property
+    def residual(self) -> Complex:
+        """The fitted vibration with the corrections on, (..., s); 0 within rounding."""
+        left = self.fit.fitted(self.corrections[..., None, :])[..., 0, :]
+        noise = np.abs(self.fit.initial) + np.matvec(np.abs(self.fit.influence), np.abs(self.corrections))
+        return np.asarray(np.where(np.abs(left) > 1e-15 * noise, left, 0.0))
+
+    def _by_channel(self) -> tuple[Complex, Real, Real]:
+        """Direction and deviations of the readings of each channel, (..., s, r) each."""
+        errors = self.errors
+        along, across = np.swapaxes(errors.along, -1, -2), np.swapaxes(errors.across, -1, -2)
+        return np.swapaxes(errors.unit, -1, -2), along, across
+
+    def _each(self) -> tuple[Complex, Real, Real]:
+        """The same of all readings in one row, (..., s·r) each."""
+        unit, along, across = self._by_channel()
+        flat = (*unit.shape[:-2], -1)
+        return unit.reshape(flat), along.reshape(flat), across.reshape(flat)
+
+    @cached_property
+    def covariance(self) -> Real:
+        """Of each correction along itself (its size) and across (its angle), (..., p, 2, 2), kg²."""
+        fit = self.fit
+        weights = np.ones(fit.initial.shape) if self.weights is None else self.weights
+        left = fit.fitted(self.corrections[..., None, :])[..., 0, :]
+        linear, antilinear = response(fit.influence, self.corrections, left, weights)
+        # θ = gain y: from the unknowns of each channel to its readings
+        by_channel = np.moveaxis(linear, -3, -2), np.moveaxis(antilinear, -3, -2)
+        of_readings = (
+            np.moveaxis(part @ gain, -3, -2)
+            for part, gain in zip(by_channel, (fit.gain, fit.gain.conj()), strict=True)
+        )
+        flat = [part.reshape(*part.shape[:-2], -1) for part in of_readings]
+        along = self.corrections if self.along is None else self.along
+        return components(flat[0], flat[1], along, *self._each())
+
+    @property
+    def deviations(self) -> tuple[Real, Real]:
+        """Standard deviations of each correction's size, kg, and across it, kg, (..., p) each."""
+        return np.sqrt(self.covariance[..., 0, 0]), np.sqrt(self.covariance[..., 1, 1])
+
+    def region(self, probability: float = 0.95) -> Real:
+        """Return the ellipse of each correction that holds the true one with this probability, (..., p, 2, 2).
+
+        Its columns are the semi-axes, kg, in the coordinates along the correction and across it.
+        """
+        size, axes = np.linalg.eigh(self.covariance)
+        k = region_factor(probability, self.errors.degrees_of_freedom)[..., None, None]
+        return np.asarray(axes * (k * np.sqrt(np.maximum(size, 0.0)))[..., None, :])
+
+    def vibration_deviation(self, masses: ArrayLike, *, reading: bool = False) -> Real:
+        """Standard deviation of the fitted vibration's amplitude with these masses on, (..., p) -> (..., s).
+
+        With `reading` the scatter of one more reading is included: that of the mean weight, or of the errors stated.
+        """
+        w = np.asarray(masses, dtype=complex)
+        value = self.fit.fitted(w[..., None, :])[..., 0, :]
+        rows = np.concatenate([np.ones((*w.shape[:-1], 1), dtype=complex), w], axis=-1)
+        gain = np.vecmat(rows[..., None, :].conj(), self.fit.gain)
+        covariance = components(gain[..., None, :], None, value[..., None], *self._by_channel())
+        variance = covariance[..., 0, 0, 0]
+        return np.asarray(np.sqrt(variance + self._own(value) if reading else variance))
+
+    def _own(self, value: Complex) -> Real:
+        """Variance of a reading of this value, of one component, (..., s)."""
+        read = self.fit.present
+        if np.isinf(self.errors.degrees_of_freedom).all():
+            # errors relative to the amplitude: those of a reading of this size
+            size = np.where(read, np.abs(self.fit.readings), 0.0).max(axis=-2)
+            share = np.max(self.errors.along, axis=-2) / np.where(size > 0, size, 1.0)
+            return np.asarray(np.square(share * np.abs(value)))
+        square = np.where(read, np.square(self.errors.along), 0.0)
+        return np.asarray(square.sum(axis=-2) / read.sum(axis=-2))
+
+    def probability_within(self, limit: ArrayLike) -> Real:
+        """Probability that the corrections as given leave each channel's true vibration within a limit, (..., s).
+
+        The true vibration is x + σ√q z with z a circular normal vector and σ known to its degrees of freedom: the
+        noncentral χ² of |·|², averaged over σ (Gauss-Legendre in its probability).
+        """
+        from scipy.special import chndtr, gammaincinv
+
+        ceiling = np.broadcast_to(np.asarray(limit, dtype=float), self.residual.shape)
+        variance = np.square(self.vibration_deviation(self.corrections))
+        nu = np.broadcast_to(self.errors.degrees_of_freedom[..., None], variance.shape)
+        node, share = np.polynomial.legendre.leggauss(80)
+        node, share = (node + 1) / 2, share / 2
+        known = np.isinf(nu)
+        real = np.where(known | ~(nu > 0), 1.0, nu)[..., None]
+        ratio = np.where(known[..., None], 1.0, real / gammaincinv(real, node))
+        true = np.maximum(variance[..., None] * ratio, np.finfo(float).tiny)
+        within = chndtr(
+            np.square(ceiling)[..., None] / true, 2.0, np.square(np.abs(self.residual))[..., None] / true
+        )
+        sure = (np.abs(self.residual) <= ceiling).astype(float)
+        found = np.where(variance > 0, within @ share, sure)
+        return np.asarray(np.where(nu > 0, found, np.nan))

@@ -1,0 +1,262 @@
+"""A log of runs fitted all at once: initial vibration and influence coefficients are unknown together.
+
+For each sensor and operating state (one channel) the reading of run j, with the masses w on the rotor, is
+
+    y_j = x₀ + Σ_p α_p w_jp + ε_j,
+
+linear in the unknowns θ = (x₀, α). Every run has its error, the initial one too: weighted least squares of complex
+numbers (Goodman 1964; Seber and Lee, Linear Regression Analysis, 2nd ed., ch. 3 and 10), by QR. The errors ε are
+circular, E|ε|² = σ²/weight, of one σ for all channels of a machine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from balancing.dependence import threshold
+from balancing.qr import factors
+from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.records import record
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Undetermined(ValueError):
+    """The runs do not determine x₀ and α: `combination` (1 + p,) of them leaves no trace, x₀ first; `case` says where."""
+
+    def __init__(self, message: str, combination: Complex, case: tuple[int, ...] = ()) -> None:
+        self.combination = combination
+        self.case = case
+        super().__init__(message)
+
+
+@record
+@dataclass(frozen=True, eq=False, repr=False)
+class Errors:
+    """Standard deviations of readings, independent of one another: along the direction `unit` and across it."""
+
+    unit: Complex
+    """(..., r, s), size 1."""
+    along: Real
+    across: Real
+    degrees_of_freedom: Real
+    """Complex, of the estimate they are; inf where they are known. (...)"""
+
+
+@record
+@dataclass(frozen=True, eq=False, repr=False)
+class JointFit:
+    """Initial vibration and influence coefficients of every channel; see `joint_fit`."""
+
+    readings: Complex
+    """(..., r, s); NaN where a run lacks a channel."""
+    masses: Complex
+    """What was ON the rotor, (..., r, p)."""
+    weights: Real | None
+    """(..., r, s)."""
+    unknowns: Complex
+    """θ = (x₀, α), (..., s, 1 + p)."""
+    gain: Complex
+    """θ = gain y, (..., s, 1 + p, r); 0 where a reading is missing."""
+    leverage: Real
+    """h, how far a reading is its own fitted value, in [0, 1], (..., r, s)."""
+
+    @property
+    def initial(self) -> Complex:
+        """x₀, the vibration without masses, (..., s)."""
+        return self.unknowns[..., 0]
+
+    @property
+    def influence(self) -> Complex:
+        """α, (..., s, p), amplitude per kg."""
+        return self.unknowns[..., 1:]
+
+    @cached_property
+    def present(self) -> NDArray[np.bool_]:
+        """Which channels were read in which run, with a weight, (..., r, s)."""
+        read = np.isfinite(self.readings)
+        return read if self.weights is None else read & (self.weights > 0)
+
+    @cached_property
+    def residuals(self) -> Complex:
+        """Reading less fitted value, (..., r, s); NaN where there is no reading, 0 within rounding."""
+        left = self.readings - self.fitted(self.masses)
+        size = np.abs(_rows(self.masses)) @ np.swapaxes(np.abs(self.unknowns), -1, -2)
+        noise = 16 * EPS * (np.abs(self.readings) + size)
+        return np.asarray(np.where(np.abs(left) <= noise, 0.0, left))
+
+    def fitted(self, masses: ArrayLike) -> Complex:
+        """Return the vibration with these masses on, (..., k, p) -> (..., k, s)."""
+        rows = _rows(np.asarray(masses, dtype=complex))
+        return np.asarray(rows @ np.swapaxes(self.unknowns, -1, -2))
+
+    @cached_property
+    def degrees_of_freedom(self) -> NDArray[np.intp]:
+        """ν: complex readings less complex unknowns, (...)."""
+        unknowns = self.unknowns.shape[-2] * self.unknowns.shape[-1]
+        return np.asarray(self.present.sum(axis=(-2, -1)) - unknowns)
+
+    @cached_property
+    def sum_of_squares(self) -> Real:
+        """Σ weight·|residual|², (...)."""
+        square = np.square(np.abs(np.where(self.present, self.residuals, 0.0)))
+        return np.asarray((square if self.weights is None else self.weights * square).sum(axis=(-2, -1)))
+
+    @cached_property
+    def residual_sd(self) -> Real:
+        """s = √(Σ weight·|residual|²/ν), (...); NaN where no degree of freedom is left."""
+        left = np.asarray(self.degrees_of_freedom, dtype=float)
+        return np.asarray(np.sqrt(self.sum_of_squares / np.where(left > 0, left, np.nan)))
+
+    @cached_property
+    def standardized(self) -> Real:
+        """|residual|/(s √(1 - h)), the internally studentised residual, (..., r, s); NaN where there is none.
+
+        Where h is 1 the reading alone determines an unknown and has no residual.
+        """
+        free = np.where(self.leverage < 1 - 1e-9, 1 - self.leverage, np.nan)
+        root = 1.0 if self.weights is None else np.sqrt(self.weights)
+        sd = self.residual_sd[..., None, None]
+        size = np.abs(self.residuals) * root
+        return np.asarray(np.where(size > 0, size / np.where(sd > 0, sd, np.nan), 0.0 * sd) / np.sqrt(free))
+
+    def scatter(self) -> Errors:
+        """Return the errors of readings as the residuals show them: s/√2 in each component."""
+        each = np.broadcast_to(self.residual_sd[..., None, None] / np.sqrt(2), self.readings.shape)
+        if self.weights is not None:
+            each = np.where(self.present, each / np.sqrt(np.where(self.present, self.weights, 1.0)), 0.0)
+        ones = np.ones(self.readings.shape, dtype=complex)
+        return Errors(ones, each, each, np.asarray(self.degrees_of_freedom, dtype=float))
+
+    def stated(self, amplitude: float, phase: float) -> Errors:
+        """Return errors that are known: relative ones of the amplitude, and those of the phase in rad."""
+        size = np.abs(np.where(self.present, self.readings, 0.0))
+        unit = np.where(size > 0, self.readings / np.where(size > 0, size, 1.0), 1.0)
+        known = np.full(self.readings.shape[:-2], np.inf)
+        return Errors(unit, amplitude * size, phase * size, known)
+
+
+def joint_fit(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None = None) -> JointFit:
+    """Fit initial vibration and influence coefficients of all channels to all runs at once.
+
+    Parameters
+    ----------
+    readings
+        Vibration, complex (..., r, s): runs and channels (a sensor in an operating state or at a speed). NaN where a
+        run lacks the channel. A channel that was read twice in a run takes two rows of equal masses.
+    masses
+        What was ON the rotor in each run, complex (..., r, p), kg. No run need be without masses.
+    weights
+        One over the readings' variances, in any common unit, (..., r, s). Default 1 each.
+
+    Returns
+    -------
+    JointFit
+        `.initial` (..., s), `.influence` (..., s, p), `.residuals` (..., r, s), `.residual_sd`,
+        `.degrees_of_freedom` (...).
+
+    Raises
+    ------
+    Undetermined
+        The runs do not determine every unknown of a channel; what leaves no trace is named.
+    ValueError
+        Infinite, or shapes that do not fit.
+
+    Notes
+    -----
+    Channels are independent of one another, and each is a QR of its rows (1, w_j), columns scaled by powers of two and
+    rows in the order of their size (`balancing.qr`); the normal equations are never formed. Leading axes are machines
+    of like shape, all solved in one go.
+
+    Examples
+    --------
+    Three runs of one sensor, none of them without a mass: 80 µm at 40°, 2 µm/kg at 150°.
+
+    >>> at = lambda size, degrees: size * np.exp(1j * np.radians(degrees))
+    >>> on = np.array([[at(10, -90)], [at(30, -60)], [at(20, 100)]])
+    >>> fit = joint_fit(at(80, 40) + at(2, 150) * on, on)
+    >>> np.abs(fit.initial).round(9), np.abs(fit.influence).round(9), int(fit.degrees_of_freedom)
+    (array([80.]), array([[2.]]), 1)
+    """
+    y = np.asarray(readings, dtype=complex)
+    t = np.asarray(masses, dtype=complex)
+    if y.ndim < 2 or t.ndim < 2 or y.shape[:-1] != t.shape[:-1] or 0 in y.shape[-2:]:
+        raise ValueError(f"shapes do not fit: readings {y.shape}, masses {t.shape}")
+    if np.isinf(y).any() or not np.isfinite(t).all():
+        raise ValueError("masses must be finite, and readings finite or NaN")
+    present = np.isfinite(y)
+    rows = _rows(t)[..., None, :, :]
+    root: Real | None = None
+    w: Real | None = None
+    if weights is not None:
+        w = np.broadcast_to(np.asarray(weights, dtype=float), y.shape)
+        if not ((w >= 0) & (w < np.inf)).all():
+            raise ValueError("weights must be finite and not negative")
+        root = np.sqrt(w) * present
+    elif not present.all():
+        root = present.astype(float)
+    b = np.swapaxes(np.where(present, y, 0.0), -1, -2)
+    if root is not None:
+        # where nothing is missing one QR serves all channels
+        root = np.swapaxes(root, -1, -2)
+        rows, b = root[..., None] * rows, root * b
+    if rows.shape[-2] < rows.shape[-1]:
+        _require(rows[..., :1, :], rows)
+    q, r, scale = factors(rows)
+    _require(r, rows)
+    back = np.swapaxes(q, -1, -2).conj()
+    unknowns = scale * np.linalg.solve(r, np.matvec(back, b)[..., None])[..., 0]
+    gain = scale[..., None] * np.linalg.solve(r, back)
+    leverage = np.square(np.abs(q)).sum(axis=-1)
+    if root is not None:
+        gain = gain * root[..., None, :]
+    gain = np.broadcast_to(gain, (*unknowns.shape, y.shape[-2]))
+    leverage = np.swapaxes(np.broadcast_to(leverage, b.shape), -1, -2)
+    return JointFit(y, t, w, np.asarray(unknowns + 0.0), gain, leverage)
+
+
+def determined(masses: ArrayLike, present: ArrayLike) -> NDArray[np.bool_]:
+    """Tell which channels (..., s) are determined by the runs (..., r, s) in which they were read.
+
+    >>> determined([[0], [1], [2]], [[True, True], [True, False], [True, False]])
+    array([ True, False])
+    """
+    t, read = np.asarray(masses, dtype=complex), np.asarray(present, dtype=bool)
+    rows = np.swapaxes(read, -1, -2)[..., None] * _rows(t)[..., None, :, :]
+    if rows.shape[-2] < rows.shape[-1]:
+        return np.zeros(rows.shape[:-2], dtype=bool)
+    return _seen(factors(rows)[1], rows.shape[-2])
+
+
+def _rows(masses: Complex) -> Complex:
+    """Return the rows (1, w) of the design, (..., r, 1 + p)."""
+    return np.concatenate([np.ones((*masses.shape[:-1], 1), dtype=complex), masses], axis=-1)
+
+
+def _seen(r: Complex, rows: int) -> NDArray[np.bool_]:
+    sigma = np.linalg.svd(r, compute_uv=False)
+    return np.asarray(sigma[..., -1] > threshold(rows, r.shape[-1]) * sigma[..., 0])
+
+
+def _require(r: Complex, rows: Complex) -> None:
+    """Raise Undetermined where a channel's rows do not determine its unknowns."""
+    few = rows.shape[-2] < rows.shape[-1]
+    seen = np.zeros(r.shape[:-2], dtype=bool) if few else _seen(r, rows.shape[-2])
+    if seen.all():
+        return
+    case = tuple(int(i) for i in np.argwhere(~seen)[0])
+    mine = rows[case]
+    size = np.linalg.norm(mine, axis=0)
+    size = np.where(size > 0, size, size.max() or 1.0)
+    combination = np.linalg.svd(mine / size)[2][-1].conj() / size
+    combination = combination / combination[np.argmax(np.abs(combination) * size)]
+    told = [
+        "the initial vibration" if k == 0 else f"the coefficient of plane {k - 1}"
+        for k in np.flatnonzero(np.abs(combination) * size > 1e-6 * np.abs(combination * size).max())
+    ]
+    raise Undetermined(f"the runs do not determine {' and '.join(told)}", combination, case)

@@ -1,0 +1,1 @@
+"""`dalembert field`: rotors whose vibration was measured, with trial masses."""

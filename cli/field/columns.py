@@ -1,0 +1,187 @@
+"""The corrections of measured rotors as columns, their influence coefficients, and the JSON document."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cli.field.runs import Real
+from cli.field.solve import FieldBalancing
+from cli.read.rounding import angle_error, size_error
+from cli.read.units import degrees, from_si, to_si
+from cli.show.columns import Column, Table
+
+if TYPE_CHECKING:
+    from cli.show.columns import Document
+
+
+def corrections(found: FieldBalancing, warnings: list[str]) -> Table:
+    """One row per rotor and plane. A correction whose error has no bound stays whole, and `warnings` says why."""
+    per, unit = found.runs.per, found.runs.mass_unit
+    flat = found.rows([solved.corrections for solved in found.solved])
+    rotor, plane, group = (row.tolist() for row in found.keys)
+
+    @cache
+    def bounds() -> list[Real]:
+        from cli.field.rounding import correction_errors
+
+        return [correction_errors(found, solved, warnings) for solved in found.solved]
+
+    def size() -> Real:
+        return from_si(size_error(flat, found.rows(bounds())), per, unit)
+
+    def angle() -> Real:
+        return angle_error(flat, found.rows(bounds()), degrees(flat))
+
+    columns = [
+        Column("rotor", "", [found.runs.rotors[r] for r in rotor]),
+        Column("plane", "", [found.solved[k].planes[p] for k, p in zip(group, plane, strict=True)]),
+        Column(per, unit, found.amount(np.abs(flat)), size),
+        Column("angle", "deg", degrees(flat), angle),
+    ]
+    if found.uncertain:
+        pairs = [
+            found.uncertainty(solved) or (np.full(solved.corrections.shape, np.nan),) * 2
+            for solved in found.solved
+        ]
+        along, across = (found.rows([pair[k] for pair in pairs]) for k in (0, 1))
+
+        def share(of: Real) -> Real:
+            from cli.field.rounding import uncertainty_share
+
+            pairs = zip(found.solved, bounds(), strict=True)
+            return found.rows([uncertainty_share(found, *pair) for pair in pairs]) * np.nan_to_num(of)
+
+        columns += [
+            Column(f"{per}_uncertainty", unit, found.amount(along), lambda: share(found.amount(along))),
+            Column("angle_uncertainty", "deg", across, lambda: share(across)),
+        ]
+    return Table(columns, keys=("rotor", "plane"))
+
+
+def coefficients(found: FieldBalancing) -> Table:
+    """The influence coefficients, as --save-influence stores them."""
+    rows = []
+    per, unit = found.runs.per, found.runs.mass_unit
+    for rotor, solved, i in found.each():
+        for s, channel in enumerate(solved.group.channels):
+            speed = None
+            if channel.speed is not None and channel.speed_given is not None:
+                rpm = found.runs.speed_unit == "rpm"
+                speed = channel.speed_given if rpm else from_si(channel.speed, "speed", "rpm")
+            for plane, a in zip(solved.planes, solved.alpha[i, s].tolist(), strict=True):
+                size = to_si(abs(a), per, unit)
+                rows.append(
+                    (rotor, channel.sensor, speed, plane, size, degrees(a), found.runs.amplitude_unit)
+                )
+    units = {"speed": "rpm", "magnitude_per": unit, "phase": "deg"}
+    names = ("rotor", "sensor", "speed", "plane", "magnitude_per", "phase", "amplitude_unit")
+    columns = [
+        Column(name, units.get(name, ""), values)
+        for name, values in zip(names, zip(*rows, strict=True), strict=True)
+    ]
+    return Table(columns if found.several else columns[1:])
+
+
+def document(found: FieldBalancing) -> Document:
+    """The JSON document."""
+    documents: list[Document] = []
+    suffix = "kg" if found.runs.per == "mass" else "kg_m"
+    key = found.runs.per
+    for rotor, (_, solved, i) in zip(found.runs.rotors, found.each(), strict=True):
+        group = solved.group
+        spreads = found.uncertainty(solved)
+        corrections: list[Document] = []
+        for p, plane in enumerate(solved.planes):
+            w = solved.corrections[i, p]
+            entry: Document = {"plane": plane, f"{key}_{suffix}": abs(w), "angle_deg": float(degrees(w))}
+            entry[f"{key}_uncertainty_{suffix}"] = None if spreads is None else _number(spreads[0][i, p])
+            entry["angle_uncertainty_deg"] = None if spreads is None else _number(spreads[1][i, p])
+            if found.request.places is not None:
+                entry["split"] = [
+                    {"position": name, "angle_deg": angle, f"{key}_{suffix}": part}
+                    for name, angle, part in found.split(w)
+                ]
+            corrections.append(entry)
+        residual = solved.residual[i]
+        size = np.abs(residual)
+        largest = float(size.max())
+        document: Document = {
+            "rotor": rotor,
+            "influence": [
+                {
+                    "sensor": channel.sensor,
+                    "speed_rad_s": channel.speed,
+                    "plane": plane,
+                    f"magnitude_per_{suffix}": abs(solved.alpha[i, s, p]),
+                    "phase_deg": float(degrees(solved.alpha[i, s, p])),
+                }
+                for s, channel in enumerate(group.channels)
+                for p, plane in enumerate(solved.planes)
+            ],
+            "condition_number": _number(solved.condition[i]),
+            "corrections": corrections,
+            "residual": [
+                {
+                    "sensor": channel.sensor,
+                    "speed_rad_s": channel.speed,
+                    "amplitude": abs(residual[s]),
+                    "phase_deg": None if found.request.four_run else float(degrees(residual[s])),
+                }
+                for s, channel in enumerate(group.channels)
+            ],
+            "residual_rms": largest * float(np.sqrt(np.square(size / largest).mean())) if largest else 0.0,
+            "residual_max": largest,
+            "initial_max": float(np.abs(solved.initial[i]).max()),
+            "objective": found.request.objective,
+        }
+        if solved.bound is not None:
+            document["residual_bound"] = float(solved.bound[i])
+        if solved.residual_95 is not None:
+            document["residual_max_95"] = float(solved.residual_95[i])
+        if group.repeats:
+            document["repeats"] = {
+                "readings": int(group.counts[group.counts > 1].sum()),
+                "degrees_of_freedom": group.repeats,
+                "reading_sd": float(group.reading_sd[i]),
+            }
+        if solved.fits:
+            document["misfit"] = [
+                {"sensor": channel.sensor, "amplitude": float(misfit)}
+                for channel, misfit in zip(group.channels, solved.fits[i].misfit, strict=True)
+            ]
+            others = [-v / a for v, a in zip(group.initial[i], solved.fits[i].other, strict=True) if a == a]
+            document["alternatives"] = [
+                {"plane": solved.planes[0], f"{key}_{suffix}": abs(w), "angle_deg": float(degrees(w))}
+                for w in others
+            ]
+        if found.request.tolerance is not None:
+            document["tolerance"] = {
+                "grade": found.request.tolerance.grade,
+                "permissible_kg_m": found.request.tolerance.permissible,
+                "planes": [
+                    {
+                        "plane": plane,
+                        "permissible_kg_m": share,
+                        "initial_kg_m": _number(before),
+                        "within": before <= share if np.isfinite(before) else None,
+                    }
+                    for plane, share, before in found.verdicts(solved, i)
+                ],
+            }
+        documents.append(document)
+    return {
+        "correction": "add",
+        "state": "as it stands" if found.request.from_here else "initial",
+        "convention": found.request.conventions,
+        "rotors": documents,
+        "amplitude_unit": found.runs.amplitude_unit,
+    }
+
+
+def _number(value: float) -> float | None:
+    """Return a finite number, or None."""
+    number = float(value)
+    return number if np.isfinite(number) else None

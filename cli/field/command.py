@@ -1,0 +1,222 @@
+"""`dalembert field`: rotors whose vibration was measured, with trial masses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.read import options
+from cli.show.columns import Result
+from cli.show.output import command, suffix_among
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cli.field.solve import FieldBalancing
+
+
+@command
+def run(
+    runs: Annotated[
+        str | None,
+        typer.Argument(metavar="RUNS", help="CSV of runs; - is standard input.", show_default=False),
+    ] = None,
+    influence: Annotated[
+        str | None,
+        typer.Option(metavar="COEFFICIENTS.csv", help="Stored coefficients in place of trial runs."),
+    ] = None,
+    save_influence: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.csv", help="Store the coefficients.", callback=suffix_among(".csv")),
+    ] = None,
+    objective: Annotated[str, typer.Option(help="least-squares or minimax.")] = "least-squares",
+    max_mass: Annotated[
+        list[str] | None,
+        typer.Option(metavar="[PLANE=]MASS", help="Limit of each correction (5g), or of one plane's (A=5g)."),
+    ] = None,
+    max_residual: Annotated[
+        str | None, typer.Option(metavar="AMPLITUDE", help="No residual beyond this, such as 76um.")
+    ] = None,
+    from_here: Annotated[
+        bool, typer.Option("--from-here", help="What to add to the rotor as it stands, kept trial masses on.")
+    ] = False,
+    runout: Annotated[
+        str | None, typer.Option(metavar="FILE.csv", help="Run-out vectors: sensor, amplitude_*, phase_deg.")
+    ] = None,
+    reading_error: Annotated[
+        str | None,
+        typer.Option(
+            metavar="2%,2deg", help="Standard deviations of amplitude and phase: adds uncertainties."
+        ),
+    ] = None,
+    monte_carlo: Annotated[
+        int,
+        typer.Option(metavar="N", min=0, max=100_000, help="Uncertainties from N drawn sets of readings."),
+    ] = 0,
+    method: Annotated[
+        str, typer.Option(help="influence, or four-run: amplitudes only, one plane.")
+    ] = "influence",
+    ridge: Annotated[
+        float, typer.Option(min=0.0, help="Damp the corrections of nearly dependent planes, such as 0.1.")
+    ] = 0.0,
+    phase_lag: Annotated[bool, typer.Option("--phase-lag", help="The instrument's phase lags.")] = False,
+    rotation: Annotated[
+        str | None,
+        typer.Option(help="ccw or cw, seen against +z: phases lead in that sense, mass angles are ccw."),
+    ] = None,
+    grade: Annotated[
+        str | None, typer.Option(help="Balance quality grade of ISO 21940-11, such as G6.3.")
+    ] = None,
+    speed: Annotated[str | None, typer.Option(help="Highest service speed, such as 3000rpm.")] = None,
+    rotor_mass: Annotated[
+        str | None, typer.Option(metavar="MASS", help="Mass of the rotor, such as 120kg.")
+    ] = None,
+    permissible: Annotated[
+        str | None,
+        typer.Option(metavar="UNBALANCE", help="Permissible residual unbalance in place of a grade."),
+    ] = None,
+    radius: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Radius of the trial masses: for the tolerance.")
+    ] = None,
+    suggest_trial: Annotated[
+        bool,
+        typer.Option(
+            "--suggest-trial",
+            help="Suggest a trial mass for --rotor-mass, --speed, --radius and --planes; no RUNS.",
+        ),
+    ] = False,
+    planes: Annotated[int, typer.Option(min=1, help="Number of planes, for --suggest-trial.")] = 1,
+    blades: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=options.PLACES, help="Split the corrections onto so many places, evenly spaced."
+        ),
+    ] = None,
+    positions: Annotated[
+        str | None, typer.Option(metavar="ANGLES", help="Split them onto these places: 0deg,30deg,60deg.")
+    ] = None,
+    first: Annotated[str, typer.Option(metavar="ANGLE", help="Angle of the first of --blades.")] = "0deg",
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.html", help="Write a report to print.", callback=suffix_among(".html", ".htm")
+        ),
+    ] = None,
+) -> Result:
+    """Balance rotors from measured vibration and trial masses (influence coefficients).
+
+    RUNS has a row for each run and sensor: run, sensor, amplitude_*, phase_deg, trial_plane, trial_mass_* (or
+    trial_unbalance_*), trial_angle_deg, these three empty in the initial run; if wanted rotor, speed_*, weight
+    and trial_kept (yes: the trial mass stays on in all later runs). Several trial masses in one run are joined
+    by ';'. Phase and mass angle are counted in one common sense. amplitude_um_pp, _pk, _rms tell how it is read.
+    """
+    if objective not in ("least-squares", "minimax"):
+        raise options.bad("--objective", f"'{objective}': expected least-squares or minimax")
+    if method not in ("influence", "four-run"):
+        raise options.bad("--method", f"'{method}': expected influence or four-run")
+    if rotation not in (None, "ccw", "cw"):
+        raise options.bad("--rotation", f"'{rotation}': expected ccw or cw")
+    if not ridge < float("inf"):
+        raise options.bad("--ridge", "expected a finite number")
+    if ridge and (objective == "minimax" or max_mass or max_residual is not None):
+        raise options.bad("--ridge", "goes with the least-squares objective without limits")
+    four_run = method == "four-run"
+    if four_run:
+        needs_phase = {
+            "--influence": influence,
+            "--runout": runout,
+            "--reading-error": reading_error,
+            "--phase-lag": phase_lag,
+            "--rotation": rotation,
+        }
+        for flag in (flag for flag, given in needs_phase.items() if given):
+            raise options.bad(flag, "has no meaning with --method four-run, which uses no phase")
+    if influence is not None and from_here:
+        raise options.bad("--from-here", "has no meaning with --influence: there are no trial masses")
+    if monte_carlo and reading_error is None:
+        raise options.bad("--monte-carlo", "needs --reading-error")
+    arm = options.quantity("--radius", radius, "length", positive=True)
+    if suggest_trial:
+        if runs is not None:
+            raise options.bad("--suggest-trial", "is for the time before the first run: expected no RUNS")
+        from cli.field.trial import suggestion
+
+        return suggestion(rotor_mass, speed, arm, planes)
+    if runs is None:
+        raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
+
+    from cli.field import request as asked
+    from cli.field.files import read_runout, read_stored
+    from cli.field.read import read_runs
+    from cli.field.solve import FieldBalancing, Request
+    from cli.read.tolerance import tolerance_of
+
+    error = asked.reading_error(reading_error)
+    tolerance = tolerance_of(grade, speed, rotor_mass, permissible, None)
+    limits = asked.limits(max_mass or [])
+    ceiling = options.with_unit("--max-residual", max_residual, "amplitude", positive=True)
+    # a phase that lags, or a shaft that turns clockwise, turns the sense of the phase against the mass angles
+    against = phase_lag != (rotation == "cw")
+    stored = read_stored(influence) if influence is not None else None
+    stored_unit = None if stored is None else stored.unit
+    measured = read_runs(runs, lagging=against, phaseless=four_run, stored_unit=stored_unit)
+    if stored is not None:
+        measured.warnings += stored.table.warnings
+    if tolerance is not None and measured.per == "mass" and arm is None:
+        raise options.bad(
+            "--radius", "the tolerance is of unbalances: expected the radius of the trial masses"
+        )
+    request = Request(
+        objective=objective,
+        max_mass=asked.limits_in(limits, measured),
+        max_residual=None if ceiling is None else asked.ceiling_in(ceiling, measured),
+        from_here=from_here,
+        runout={} if runout is None else read_runout(runout, measured, lagging=against),
+        reading_error=error,
+        monte_carlo=monte_carlo,
+        four_run=four_run,
+        ridge=ridge,
+        tolerance=tolerance,
+        radius=arm,
+        conventions=asked.conventions(method, phase_lag, rotation),
+        places=options.places(positions, blades, first),
+    )
+    found = FieldBalancing(measured, request, stored)
+    return _result(found, "standard input" if runs == "-" else Path(runs).name, save_influence, report)
+
+
+def _result(found: FieldBalancing, source: str, save_influence: Path | None, report: Path | None) -> Result:
+    from cli.field import columns, remarks, words
+    from cli.show.text import csv_text
+
+    warnings = remarks.warnings(found)
+
+    def figure() -> Figure:
+        from cli.field.picture import draw
+
+        return draw(found, range(min(len(found.runs.rotors), 3)))
+
+    def page() -> bytes:
+        from cli.field.report import html
+
+        return html(found, source, warnings)
+
+    beside = {}
+    if save_influence is not None:
+        beside[save_influence] = lambda: csv_text(columns.coefficients(found).cells).encode()
+    if report is not None:
+        beside[report] = page
+    return Result(
+        document=lambda: columns.document(found),
+        tables={
+            "corrections": lambda: columns.corrections(found, warnings),
+            "influence": lambda: columns.coefficients(found),
+        },
+        notes=lambda: words.notes(found),
+        afterword=lambda: words.afterword(found),
+        figure=figure,
+        beside=beside,
+        warnings=warnings,
+    )

@@ -1,0 +1,91 @@
+"""The digits of field balancing that hold against rounding: from the readings as written to the corrections."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from balancing import Balance, condition_number, influence_error
+from cli.field.runs import Real
+from cli.field.solve import FieldBalancing, Solved
+from cli.read.rounding import EPS
+from cli.read.units import to_si
+
+
+def coefficient_errors(found: FieldBalancing, solved: Solved) -> Real:
+    """Bound the errors of the influence coefficients, (g, s, p)."""
+    group = solved.group
+    if found.stored is not None:
+        phase = found.stored.table.require("phase", "angle")
+        turn = float(np.abs(to_si(phase.values, "angle", phase.unit)).max())
+        return np.asarray(EPS * (6 + turn / 2) * np.abs(solved.alpha))
+    initial, runs, on = group.errors()
+    if solved.fits:
+        # relative errors of amplitudes and masses: what is written with many digits is rounded once
+        share = [float((e / np.abs(t)).max()) for e, t in zip(on[..., 0], group.on[..., 0], strict=True)]
+        return np.stack(
+            [fit.error_estimate(data_error=s) for fit, s in zip(solved.fits, share, strict=True)]
+        )[..., None]
+    return influence_error(group.initial, group.runs, group.on, reading_error=(initial, runs), mass_error=on)
+
+
+def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]) -> Real:
+    """Bound the errors of the corrections, (g, p), SI; NaN where they cannot be bounded."""
+    request, group = found.request, solved.group
+    of_alpha = coefficient_errors(found, solved)
+    initial, _, on = group.errors()
+    runout = np.array([abs(request.runout.get(channel.sensor, 0)) for channel in group.channels])
+    here = solved.initial + np.matvec(solved.alpha, solved.standing)
+    of_here = initial + 8 * EPS * (runout + np.abs(solved.initial))
+    if solved.standing.any():
+        size = np.abs(solved.standing)
+        of_standing = on.max(axis=1) + 4 * EPS * size
+        of_here = of_here + np.matvec(of_alpha, size) + np.matvec(np.abs(solved.alpha), of_standing)
+    whole = Balance(solved.alpha, here, solved.corrections, group.weights, ridge=request.ridge)
+    limit = found.limits(solved.planes)
+    if request.objective == "least-squares" and limit is None and request.max_residual is None:
+        return whole.error_estimate(influence_error=of_alpha, initial_error=of_here)
+    ceiling = None
+    if request.max_residual is not None and request.objective == "least-squares":
+        ceiling = np.full(here.shape[-1], request.max_residual)
+    bounds = []
+    for i in range(len(here)):
+        one = replace(
+            whole,
+            influence=solved.alpha[i],
+            initial=here[i],
+            corrections=solved.corrections[i],
+            weights=None if group.weights is None else group.weights[i],
+            bound=None if solved.bound is None else float(solved.bound[i]),
+            max_mass=limit,
+            max_residual=ceiling,
+        )
+        bounds.append(one.error_estimate(influence_error=of_alpha[i], initial_error=of_here[i]))
+        if one.error_reason:
+            warnings.append(
+                f"{found.of(group, i)}--digits: the corrections are given in full, for no bound of their error is known: "
+                f"{one.error_reason}"
+            )
+    return np.where(np.isfinite(bounds), bounds, np.nan)
+
+
+def uncertainty_share(found: FieldBalancing, solved: Solved, bound: Real) -> Real:
+    """Bound the relative errors of the uncertainties, (g, p).
+
+    To first order: the pseudo-inverses of coefficients and trial masses are right to their condition numbers times
+    the relative errors of what they are of, and the corrections they are for to their own.
+    """
+    of_alpha = np.linalg.norm(coefficient_errors(found, solved), axis=-2)
+    norms = np.linalg.norm(solved.alpha, axis=-2)
+    relative = 8 * EPS + (of_alpha / np.where(norms > 0, norms, 1.0)).max(axis=-1)
+    share = condition_number(solved.alpha, solved.group.weights) * relative
+    if found.stored is None:
+        share = share + 8 * EPS * condition_number(solved.group.on)
+    # the scatter of repeats is a difference of readings
+    sd = solved.group.reading_sd
+    of_scatter = EPS * 8 * np.abs(solved.group.initial).max(axis=1) / np.where(sd > 0, sd, 1.0)
+    share = share + np.where(sd > 0, of_scatter, 0.0)
+    size = np.abs(solved.corrections)
+    own = np.where(size > 0, bound / np.where(size > 0, size, 1.0), 0.0)
+    return np.asarray(4 * share[:, None] + own)

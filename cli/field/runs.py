@@ -1,0 +1,123 @@
+"""Runs as arrays: rotors that were measured in the same way, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.read.tables import Table
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A sensor at a speed (rad/s; None where the table names none)."""
+
+    sensor: str
+    speed: float | None
+    speed_given: float | None = None
+
+    def __str__(self) -> str:
+        return self.sensor if self.speed_given is None else f"{self.sensor} at {self.speed_given:g}"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A trial run: its name, and the (plane, row) of the masses that were put on for it."""
+
+    run: str
+    masses: list[tuple[int, int, int]]
+    """(plane, row of the rotor, place in the cell) of each mass."""
+    kept: bool
+
+
+@dataclass
+class Group:
+    """Rotors that were measured in the same way."""
+
+    rotors: Rows
+    """Their numbers, (g,)."""
+    channels: list[Channel]
+    planes: list[str]
+    trials: list[Trial]
+    initial: Complex
+    """(g, s), as read, in the table's amplitude unit."""
+    runs: Complex
+    """(g, r, s)."""
+    on: Complex
+    """What was on the rotor in each trial run, (g, r, p), SI."""
+    added: Complex
+    """What was put on for each trial run, (g, r, p), SI."""
+    kept: Complex
+    """What stays on after the last run, (g, p), SI."""
+    base: list[int]
+    """For each trial run the run it is compared with: -1 is the initial run."""
+    weights: Real | None
+    counts: Rows
+    """How often each sensor was read in the initial and in each trial run, (1 + r, s)."""
+    scatter: Real
+    """Σ|reading - mean|² of the repeats, (g, 1 + r, s)."""
+    errors: Callable[[], tuple[Real, Real, Real]]
+    """Bounds of the errors of `initial`, `runs` and `on` against the decimals of the table; worked out when asked for."""
+
+    @property
+    def repeats(self) -> int:
+        """Complex degrees of freedom of the repeats: readings less means."""
+        return int((self.counts - 1).sum())
+
+    @cached_property
+    def reading_sd(self) -> Real:
+        """Standard deviation of one reading as the repeats show it, √(Σ|reading - mean|²/degrees of freedom), (g,)."""
+        sd = np.sqrt(self.scatter.sum(axis=(1, 2)) / max(self.repeats, 1))
+        # what lies in the rounding of the mean is agreement
+        largest = np.maximum(
+            np.abs(self.initial).max(axis=1), np.abs(self.runs).max(axis=(1, 2), initial=0.0)
+        )
+        return np.where(sd > 1e-14 * largest, sd, 0.0)
+
+    @cached_property
+    def contradictory(self) -> NDArray[np.bool_]:
+        """Where repeats lie as far apart as a trial mass should move the vibration, 30 % of it, (g, 1 + r, s)."""
+        means = np.concatenate([self.initial[:, None], self.runs], axis=1)
+        spread = self.scatter / self.counts
+        largest = np.sqrt((np.square(np.abs(means)) + spread).max(axis=1, keepdims=True))
+        return np.asarray(np.sqrt(spread) > 0.15 * largest)
+
+    @cached_property
+    def mean_error(self) -> Real:
+        """Standard deviation of each component of each mean as the repeats show it, (g, 1 + r, s).
+
+        One estimate serves all readings; where repeats contradict each other their own holds if it is larger.
+        """
+        pooled = np.square(self.reading_sd)[:, None, None]
+        own = np.where(self.contradictory, self.scatter / np.maximum(self.counts - 1, 1), 0.0)
+        return np.asarray(np.sqrt(np.maximum(pooled, own) / (2 * self.counts)))
+
+
+@dataclass
+class Runs:
+    """A table of runs."""
+
+    table: Table
+    rotors: list[str]
+    groups: list[Group]
+    amplitude_unit: str
+    per: str
+    """`mass` or `unbalance`: what the trials are."""
+    mass_unit: str
+    speed_unit: str
+    warnings: list[str] = field(default_factory=list)
+
+
+def apart(one: float | None, other: float) -> float:
+    """How far two speeds are apart, relatively; 0 where either is not known."""
+    if one is None or other != other or one == other:
+        return 0.0
+    return abs(one - other) / max(abs(one), abs(other))

@@ -1,0 +1,436 @@
+"""From measured runs to corrections, with their uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing import (
+    AmplitudeFit,
+    Balance,
+    DependentPlanes,
+    DependentTrials,
+    Infeasible,
+    Readings,
+    condition_number,
+    influence_coefficients,
+    influence_from_amplitudes,
+    initial_unbalance,
+    least_squares,
+    minimax,
+    place,
+    spread,
+    unseen,
+)
+from cli.errors import DataError
+from cli.field.files import Stored
+from cli.field.refusals import planes_say, trials_say
+from cli.field.runs import Complex, Group, Real, Runs
+from cli.read.options import bad
+from cli.read.tolerance import Tolerance
+from cli.read.units import Scaled, from_si
+
+Value = TypeVar("Value", np.float64, np.complex128)
+
+SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
+MANY = 200  # rotors whose uncertainties are worked out unasked
+SHOWN = 5  # of so many rotors the same is said, of the others together
+UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the options ask for."""
+
+    objective: str = "least-squares"
+    max_mass: dict[str, float] = field(default_factory=dict)
+    """Limit of each plane, SI; the key "" is for all."""
+    max_residual: float | None = None
+    """In the table's amplitude unit."""
+    from_here: bool = False
+    runout: dict[str, complex] = field(default_factory=dict)
+    reading_error: tuple[float, float] | None = None
+    """Relative, rad."""
+    monte_carlo: int = 0
+    four_run: bool = False
+    ridge: float = 0.0
+    tolerance: Tolerance | None = None
+    radius: float | None = None
+    conventions: str = ""
+    places: list[float] | None = None
+    """Where masses can go, degrees: the corrections are split onto them."""
+
+
+class Verdict(NamedTuple):
+    """A plane's permissible and initial unbalance, kg·m; NaN where the readings do not determine it."""
+
+    plane: str
+    permissible: float
+    initial: float
+
+
+@dataclass
+class Solved:
+    """A group's result."""
+
+    group: Group
+    planes: list[str]
+    alpha: Complex
+    initial: Complex
+    """(g, s), run-out off."""
+    corrections: Complex
+    """(g, p), as given out (from here, where that was asked for)."""
+    standing: Complex
+    """(g, p): what of the trial masses is on the rotor where the corrections start from."""
+    residual: Complex
+    condition: Real
+    bound: Real | None
+    covariance: Real | None = None
+    residual_95: Real | None = None
+    fits: list[AmplitudeFit] = field(default_factory=list)
+    unbalance: Complex | None = None
+    """(g, p): the rotor's own in its initial state; NaN where the readings do not determine it."""
+
+    @property
+    def total(self) -> Complex:
+        """What is added to the rotor in its initial state, (g, p)."""
+        return self.corrections + self.standing
+
+
+class FieldBalancing:
+    """The corrections of every rotor of a table of runs."""
+
+    def __init__(self, runs: Runs, request: Request, stored: Stored | None = None) -> None:
+        self.runs, self.request, self.stored = runs, request, stored
+        self.warnings: list[str] = []
+        self.several = len(runs.rotors) > 1
+        self.solved = [self._solve(group) for group in runs.groups]
+        self.place: list[tuple[int, int]] = [(0, 0)] * len(runs.rotors)
+        for k, group in enumerate(runs.groups):
+            for i, rotor in enumerate(group.rotors.tolist()):
+                self.place[rotor] = (k, i)
+
+    # -- solving -------------------------------------------------------------------------------------------
+
+    def of(self, group: Group, i: int = 0) -> str:
+        """Return what a sentence about a rotor begins with, where there are several."""
+        return f"rotor {self.runs.rotors[group.rotors[i]]}: " if self.several else ""
+
+    def _solve(self, group: Group) -> Solved:
+        request = self.request
+        runout = np.array(
+            [request.runout.get(channel.sensor, 0) for channel in group.channels], dtype=complex
+        )
+        initial = group.initial - runout
+        planes, fits = group.planes, []
+        if self.stored is not None:
+            matrices = []
+            for rotor in group.rotors:
+                planes, matrix = self.stored.matrix(self.runs.rotors[rotor], group.channels, self.runs)
+                matrices.append(matrix)
+                if "rotor" not in self.stored.table.texts:
+                    break
+            alpha = np.broadcast_to(np.stack(matrices), (len(group.rotors), *matrices[0].shape))
+        elif request.four_run:
+            fits = self._amplitudes(group)
+            alpha = np.stack([fit.influence for fit in fits])[..., None]
+        else:
+            try:
+                alpha = influence_coefficients(group.initial, group.runs, group.on)
+            except DependentTrials as error:
+                raise DataError(self.of(group, *error.case) + trials_say(group, error)) from None
+        standing = np.zeros((len(group.rotors), len(planes)), dtype=complex)
+        if request.from_here and self.stored is None:
+            standing = group.kept
+            if not standing.any():
+                self.warn(
+                    "--from-here: no trial mass is kept on the rotor, so that it stands as in the initial run"
+                )
+        here = initial + np.matvec(alpha, standing) if standing.any() else initial
+        limit = self.limits(planes)
+        corrections, bounds, condition = self._corrections(group, planes, alpha, here, limit)
+        residual = here + np.matvec(alpha, corrections)
+        # below the rounding of its terms a residual is zero
+        noise = np.abs(initial) + np.matvec(np.abs(alpha), np.abs(corrections) + np.abs(standing))
+        residual = np.where(np.abs(residual) > 1e-15 * noise, residual, 0)
+        solved = Solved(
+            group, planes, alpha, initial, corrections, standing, residual, condition, bounds, fits=fits
+        )
+        if request.tolerance is not None:
+            solved.unbalance = initial_unbalance(alpha, initial, group.weights, singular=SINGULAR)
+        limited = bool(request.objective == "minimax" or request.max_mass or request.max_residual is not None)
+        if request.reading_error is not None or self._repeats_tell(group, limited):
+            self._confidence(solved, runout, limited)
+        return solved
+
+    def _repeats_tell(self, group: Group, limited: bool) -> bool:
+        """Whether the scatter of repeats is to give uncertainties that nobody asked for."""
+        if self.request.four_run or not group.reading_sd.any():
+            return False
+        if len(group.rotors) <= (SHOWN if limited else MANY):
+            return True
+        self.warn("uncertainties of so many rotors are worked out with --reading-error alone")
+        return False
+
+    def limits(self, planes: list[str]) -> Real | None:
+        """Return the limit of each plane, SI; None where there is none."""
+        given = self.request.max_mass
+        if not given:
+            return None
+        for name in given:
+            if name and name not in planes:
+                raise bad("--max-mass", f"no plane {name}: expected one of {', '.join(planes)}")
+        limit = np.array([given.get(plane, given.get("", np.inf)) for plane in planes])
+        return limit if np.isfinite(limit).any() else None
+
+    def _corrections(
+        self, group: Group, planes: list[str], alpha: Complex, here: Complex, limit: Real | None
+    ) -> tuple[Complex, Real | None, Real]:
+        """Return the corrections, for minimax the proven bounds, and the condition numbers."""
+        request, weights = self.request, group.weights
+        ceiling = request.max_residual
+        if limit is None and not request.ridge:
+            # the coefficients are differences of readings: what lies in their rounding is no information
+            beyond = np.flatnonzero(~(condition_number(alpha, weights) < SINGULAR))
+            if len(beyond):
+                i = int(beyond[0])
+                unseen_one = unseen(alpha[i], None if weights is None else weights[i])[0]
+                raise DataError(self.of(group, i) + planes_say(planes, unseen_one))
+        if request.objective == "least-squares" and limit is None and ceiling is None:
+            try:
+                fix = least_squares(alpha, here, weights, ridge=request.ridge)
+            except DependentPlanes as error:
+                raise DataError(
+                    self.of(group, *error.case[:1]) + planes_say(planes, error.combination)
+                ) from None
+            return fix.corrections, None, fix.condition_number
+        if request.objective == "minimax":
+            proven = [
+                self._one(group, planes, i, lambda i=i: self._minimax(alpha[i], here[i], limit, weights, i))  # type: ignore[misc]
+                for i in range(len(here))
+            ]
+            return (
+                np.stack([fix.corrections for fix in proven]),
+                np.array([fix.bound for fix in proven], dtype=float),
+                np.array([fix.condition_number for fix in proven]),
+            )
+        # rotors that keep the limits by themselves all at once, the others one by one
+        corrections = np.zeros((len(here), len(planes)), dtype=complex)
+        left = np.arange(len(here))
+        try:
+            free = least_squares(alpha, here, weights)
+            corrections[:] = free.corrections
+            beyond = np.zeros(len(here), dtype=bool)
+            if limit is not None:
+                beyond |= (np.abs(free.corrections) > limit).any(axis=1)
+            if ceiling is not None:
+                beyond |= (np.abs(free.residual) > ceiling).any(axis=1)
+            left = np.flatnonzero(beyond)
+        except DependentPlanes:
+            pass
+        for i in left.tolist():
+            w = None if weights is None else weights[i]
+            corrections[i] = self._one(
+                group,
+                planes,
+                i,
+                lambda i=i, w=w: least_squares(alpha[i], here[i], w, max_mass=limit, max_residual=ceiling),  # type: ignore[misc]
+            ).corrections
+        return corrections, None, condition_number(alpha, weights)
+
+    def _minimax(
+        self, alpha: Complex, here: Complex, limit: Real | None, weights: Real | None, i: int
+    ) -> Balance:
+        """Minimax corrections of one rotor; Infeasible where even they leave more than --max-residual."""
+        fix = minimax(alpha, here, limit, weights=None if weights is None else weights[i])
+        ceiling = self.request.max_residual
+        if ceiling is not None and float(fix.residual_max) > ceiling * (1 + 1e-9):
+            least = (
+                float(minimax(alpha, here, limit).residual_max) if weights is not None else fix.residual_max
+            )
+            if least > ceiling * (1 + 1e-9):
+                raise Infeasible(float(least))
+            self.warn(
+                "with these weights a residual is beyond --max-residual, which without them could be met"
+            )
+        return fix
+
+    def _one(self, group: Group, planes: list[str], i: int, solve: Callable[[], Balance]) -> Balance:
+        """Solve for one rotor; what cannot be done is said with its name."""
+        try:
+            return solve()
+        except DependentPlanes as error:
+            raise DataError(self.of(group, i) + planes_say(planes, error.combination)) from None
+        except Infeasible as error:
+            unit = self.runs.amplitude_unit
+            with_limits = " with the limits of the masses" if self.request.max_mass else ""
+            raise DataError(
+                f"{self.of(group, i)}no corrections{with_limits} leave every residual within {self.request.max_residual:g} "
+                f"{unit}: infeasible; the smallest limit that can be met is {error.smallest:.6g} {unit}"
+            ) from None
+
+    def _amplitudes(self, group: Group) -> list[AmplitudeFit]:
+        """The four-run method, rotor by rotor."""
+        if len(group.planes) != 1:
+            raise DataError(
+                f"{self.of(group)}the four-run method is for one plane, found {', '.join(group.planes)}: with more planes "
+                "the phase must be measured"
+            )
+        fits = []
+        for i in range(len(group.rotors)):
+            try:
+                fit = influence_from_amplitudes(group.initial[i].real, group.runs[i].real, group.on[i, :, 0])
+            except ValueError as error:
+                raise DataError(f"{self.runs.table.file}: {self.of(group, i)}{error}") from None
+            fits.append(fit)
+            unit = self.runs.amplitude_unit
+            for channel, misfit, first in zip(group.channels, fit.misfit, group.initial[i].real, strict=True):
+                text = (
+                    f"{self.of(group, i)}sensor {channel}: the readings are inconsistent: no influence coefficient fits them "
+                    f"better than {misfit:.3g} {unit} (r.m.s.), {misfit / first:.0%} of the initial reading"
+                )
+                if misfit > 0.25 * first:
+                    raise DataError(
+                        f"{self.runs.table.file}: {text}: expected four readings that fit one plane's effect"
+                    )
+                if misfit > 0.05 * first:
+                    self.warn(text)
+        return fits
+
+    def _confidence(self, solved: Solved, runout: Complex, limited: bool) -> None:
+        """Propagate the reading errors, rotor by rotor."""
+        relative, angle = self.request.reading_error or (0.0, 0.0)
+        group, request = solved.group, self.request
+        covariances, residuals = [], []
+        draws = request.monte_carlo or 4000
+        for i in range(len(group.rotors)):
+            readings = Readings(
+                group.initial[i],
+                relative,
+                angle,
+                trials=None if self.stored is not None else group.runs[i],
+                trial_masses=None if self.stored is not None else group.on[i],
+                influence=solved.alpha[i],
+                runout=runout,
+                scatter=group.mean_error[i] if group.reading_sd[i] else None,
+                degrees_of_freedom=group.repeats,
+            )
+            w = None if group.weights is None else group.weights[i]
+            total = solved.total[i]
+            try:
+                if limited:
+                    samples = self._limited_samples(solved, readings, w)
+                    covariances.append(spread(samples, solved.corrections[i]))
+                elif request.monte_carlo:
+                    samples = readings.correction_samples(w, request.ridge, draws) - solved.standing[i]
+                    covariances.append(spread(samples, solved.corrections[i]))
+                else:
+                    covariances.append(
+                        readings.covariance(total, w, request.ridge, along=solved.corrections[i])
+                    )
+            except ValueError:
+                covariances.append(np.full((len(solved.planes), 2, 2), np.nan))
+            left = np.abs(readings.residual_samples(total, draws)).max(axis=1)
+            residuals.append(np.quantile(left, 0.95))
+        solved.covariance, solved.residual_95 = np.stack(covariances), np.array(residuals)
+
+    def _limited_samples(self, solved: Solved, readings: Readings, weights: Real | None) -> Complex:
+        """Draw corrections under limits or of the minimax problem: no formula, each draw is solved."""
+        limit, request = self.limits(solved.planes), self.request
+        samples = []
+        for alpha, v in readings.problem_samples(min(request.monte_carlo or 200, 1000)):
+            standing = solved.standing[0]
+            here = v + alpha @ standing
+            if request.objective == "minimax":
+                samples.append(minimax(alpha, here, limit, weights=weights).corrections)
+            else:
+                samples.append(least_squares(alpha, here, weights, max_mass=limit).corrections)
+        return np.stack(samples)
+
+    def warn(self, text: str) -> None:
+        """Say what was done otherwise than a reader might think, once."""
+        if text not in self.warnings:
+            self.warnings.append(text)
+
+    def verdicts(self, solved: Solved, i: int) -> list[Verdict]:
+        """Return each plane's tolerance; none where no tolerance is asked for."""
+        if self.request.tolerance is None or solved.unbalance is None:
+            return []
+        share = self.request.tolerance.permissible / len(solved.planes)
+        size = self.in_kg_m(solved.unbalance[i]).tolist()
+        return [Verdict(plane, share, u) for plane, u in zip(solved.planes, size, strict=True)]
+
+    def in_kg_m(self, corrections: Complex) -> Real:
+        """Return the unbalances of masses at the trial radius, or of unbalances as they are."""
+        arm = 1.0 if self.runs.per == "unbalance" else self.request.radius or 1.0
+        return np.asarray(np.abs(corrections) * arm)
+
+    @property
+    def unit(self) -> str:
+        """The unit of a correction as people write it."""
+        return self.runs.mass_unit.replace("_", "·")
+
+    def amount(self, value: Scaled) -> Scaled:
+        """Return a correction in the unit of the trial masses."""
+        return from_si(value, self.runs.per, self.runs.mass_unit)
+
+    def split(self, w: complex) -> list[tuple[str, float, float]]:
+        """Split a correction onto the places: name, angle in degrees, amount in SI of each that is used."""
+        if self.request.places is None or w == 0:
+            return []
+        masses = place(complex(w), np.radians(self.request.places)).masses.tolist()
+        return [
+            (str(k + 1), self.request.places[k] % 360.0, mass) for k, mass in enumerate(masses) if mass > 0
+        ]
+
+    # -- rotor by rotor --------------------------------------------------------------------------------------
+
+    def each(self, most: int | None = None) -> Iterator[tuple[str, Solved, int]]:
+        """Yield of each rotor its name as it is shown, its group's result, and its place in that."""
+        for rotor, (k, i) in zip(self.runs.rotors[:most], self.place, strict=False):
+            yield rotor if self.several else "", self.solved[k], i
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether reading errors are known, stated or from repeats."""
+        return any(solved.covariance is not None for solved in self.solved)
+
+    def uncertainty(self, solved: Solved) -> tuple[Real, Real] | None:
+        """Return the standard deviations of size (SI) and angle (degrees; NaN where it is not known), (g, p) each."""
+        if solved.covariance is None:
+            return None
+        size = np.abs(solved.corrections)
+        along = np.sqrt(solved.covariance[..., 0, 0])
+        across = np.sqrt(solved.covariance[..., 1, 1])
+        safe = np.where(size > 0, size, 1.0)
+        angle = np.where(size > 0, np.degrees(across / safe), np.nan)
+        return along, np.where(angle <= UNKNOWN_ANGLE, angle, np.nan)
+
+    @cached_property
+    def _order(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rotor, plane and group of every correction, group by group; and the order of the CSV's rows."""
+        keys = []
+        for k, solved in enumerate(self.solved):
+            g, p = solved.corrections.shape
+            keys.append(
+                np.stack(
+                    [np.repeat(solved.group.rotors, p), np.tile(np.arange(p), g), np.full(g * p, k)],
+                )
+            )
+        joined = np.concatenate(keys, axis=1)
+        return joined, np.lexsort((joined[1], joined[0]))
+
+    @property
+    def keys(self) -> NDArray[np.intp]:
+        """Rotor, plane and group of every row of the CSV."""
+        keys, order = self._order
+        return keys[:, order]
+
+    def rows(self, values: Sequence[NDArray[Value]]) -> NDArray[Value]:
+        """Put values of the groups, (g, p) each, into the CSV's order."""
+        return np.concatenate([value.ravel() for value in values])[self._order[1]]

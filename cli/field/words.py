@@ -1,0 +1,223 @@
+"""What the terminal and the report say of a balancing in the field, in the same order."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cli.field.solve import FieldBalancing, Solved
+from cli.read.units import degrees, from_si, to_si
+from cli.show.text import angle_text, table_text
+
+if TYPE_CHECKING:
+    from cli.show.columns import Cell
+
+    Columns = dict[str, list[Cell]]
+
+FEW = 6  # so many rotors are shown in full
+
+
+def conventions(found: FieldBalancing) -> str:
+    """Say how angles and phases are counted and what the corrections mean."""
+    request = found.request
+    state = (
+        "the rotor as it stands, with the trial masses that were left on it"
+        if request.from_here
+        else "the rotor in its initial state, all trial masses off"
+    )
+    return (
+        f"{request.conventions}\nCorrections: {found.runs.per}{'es' if found.runs.per == 'mass' else 's'} to ADD to {state}, "
+        "at the radius of the trial masses."
+    )
+
+
+def runs_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
+    """The readings: a row for each sensor, amplitude and phase of each run beside each other."""
+    group = solved.group
+    columns: Columns = {"sensor": [str(channel) for channel in group.channels]}
+    for name, values in [("initial", group.initial[i])] + [
+        (f"run {trial.run}", group.runs[i, j]) for j, trial in enumerate(group.trials)
+    ]:
+        columns[f"{name}: {amplitude_unit(found)}"] = [float(abs(value)) for value in values]
+        if not found.request.four_run:
+            columns[f"{name}: phase°"] = [float(degrees(value)) for value in values]
+    return columns
+
+
+def trials_lines(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
+    """What was on the rotor in each trial run, a line each."""
+    lines = []
+    for j, trial in enumerate(solved.group.trials):
+        masses = " + ".join(
+            f"{found.amount(abs(t)):.6g} {found.unit} at {angle_text(degrees(t), '.6g')}° in {plane}"
+            for plane, t in zip(solved.group.planes, solved.group.on[i, j], strict=True)
+            if t
+        )
+        lines.append(f"run {trial.run}: {masses} on{', kept' if trial.kept else ''}")
+    return lines
+
+
+def influence_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
+    """The influence coefficients: a row for each sensor."""
+    columns: Columns = {"sensor": [str(channel) for channel in solved.group.channels]}
+    per = f"{amplitude_unit(found)}/{found.unit}"
+    for p, plane in enumerate(solved.planes):
+        alpha = solved.alpha[i, :, p]
+        columns[f"{plane}: {per}"] = [
+            float(a) for a in to_si(np.abs(alpha), found.runs.per, found.runs.mass_unit)
+        ]
+        columns[f"{plane}: phase°"] = [round(float(a), 2) for a in degrees(alpha)]
+    return columns
+
+
+def correction_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
+    """The corrections with their uncertainty, and the equivalent removal."""
+    w = solved.corrections[i]
+    columns: Columns = {
+        "plane": list(solved.planes),
+        f"ADD {found.unit}": [float(found.amount(abs(c))) for c in w],
+        "at angle°": [float(degrees(c)) for c in w],
+    }
+    spreads = found.uncertainty(solved)
+    if spreads is not None:
+        columns[f"± {found.unit}"] = [_known(found.amount(x)) for x in spreads[0][i]]
+        columns["± angle°"] = [_known(x) for x in spreads[1][i]]
+    columns["or REMOVE at°"] = [float(degrees(-c)) if c else 0.0 for c in w]
+    return columns
+
+
+def split_lines(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
+    """How each correction is split onto the places there are, a line for each plane."""
+    lines = []
+    for p, plane in enumerate(solved.planes):
+        parts = found.split(solved.corrections[i, p])
+        if parts:
+            shares = " + ".join(
+                f"{found.amount(part[2]):.5g} {found.unit} at {part[1]:.5g}° (place {part[0]})"
+                for part in parts
+            )
+            lines.append(f"{plane} split: {shares}")
+    return lines
+
+
+def _known(value: float) -> Cell:
+    return float(value) if np.isfinite(value) else "unknown"
+
+
+def residual_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
+    """Vibration before and after, a row for each sensor."""
+    before, after = solved.initial[i], solved.residual[i]
+    columns: Columns = {
+        "sensor": [str(channel) for channel in solved.group.channels],
+        f"before {amplitude_unit(found)}": [float(abs(v)) for v in before],
+        f"predicted {amplitude_unit(found)}": [float(abs(v)) for v in after],
+    }
+    if not found.request.four_run:
+        columns["phase°"] = [round(float(degrees(v)), 2) for v in after]
+    return columns
+
+
+def amplitude_unit(found: FieldBalancing) -> str:
+    """The amplitude's unit as people write it."""
+    text = found.runs.amplitude_unit
+    tag = ""
+    for suffix, name in (("_pp", " pk-pk"), ("_pk", " pk"), ("_rms", " r.m.s.")):
+        if text.endswith(suffix):
+            text, tag = text[: -len(suffix)], name
+    return text.replace("um", "µm").replace("_s2", "/s²").replace("_s", "/s") + tag
+
+
+def summary(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
+    """The figures of merit, a line each."""
+    after = solved.residual[i]
+    size = np.abs(after)
+    lines = [
+        f"residual: r.m.s. {np.sqrt(np.square(size).mean()):.6g}, largest {size.max():.6g} {amplitude_unit(found)} "
+        f"(before: {np.abs(solved.initial[i]).max():.6g})"
+    ]
+    if solved.bound is not None:
+        lines.append(
+            f"smallest possible largest residual, by the dual problem: {solved.bound[i]:.10g} {amplitude_unit(found)}"
+        )
+    if solved.group.repeats:
+        lines.append(
+            f"repeated readings scatter by {solved.group.reading_sd[i]:.4g} {amplitude_unit(found)} (standard deviation of one reading as a "
+            f"vector, {solved.group.repeats} complex degree{'s' * (solved.group.repeats > 1)} of freedom)"
+        )
+    if solved.residual_95 is not None:
+        known = []
+        if found.request.reading_error is not None:
+            relative, angle = found.request.reading_error
+            known.append(f"of {100 * relative:.3g} % and {np.degrees(angle):.3g}°")
+        if solved.group.reading_sd[i]:
+            known.append(
+                f"{'or ' if known else ''}as the repeats scatter{' where that is more' if known else ''}"
+            )
+        lines.append(
+            f"with reading errors {' '.join(known)} (one standard deviation) the largest residual stays below {solved.residual_95[i]:.4g} {amplitude_unit(found)} in 95 % of cases"
+        )
+    if np.isfinite(solved.condition[i]):
+        lines.append(f"condition number of the scaled coefficients: {solved.condition[i]:.4g}")
+    for channel, misfit in zip(
+        solved.group.channels, solved.fits[i].misfit if solved.fits else (), strict=False
+    ):
+        lines.append(
+            f"sensor {channel}: misfit of the amplitudes {misfit:.3g} {amplitude_unit(found)} (r.m.s.)"
+        )
+    return lines
+
+
+def verdict(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
+    """The ISO verdict, a line for each plane."""
+    tolerance = found.request.tolerance
+    if tolerance is None:
+        return []
+    whole = from_si(tolerance.permissible, "unbalance", "g_mm")
+    lines = [
+        f"tolerance{' ' + tolerance.grade if tolerance.grade else ''}: U_per = {whole:.6g} g·mm, shared equally"
+    ]
+    for plane, share, before in found.verdicts(solved, i):
+        initial = (
+            "not determined"
+            if np.isnan(before)
+            else f"{from_si(before, 'unbalance', 'g_mm'):.6g} g·mm ({'within' if before <= share else 'beyond'})"
+        )
+        lines.append(
+            f"  plane {plane}: permissible {from_si(share, 'unbalance', 'g_mm'):.6g}, initial {initial}"
+        )
+    return lines
+
+
+def notes(found: FieldBalancing) -> str:
+    """Above the terminal's table: conventions, readings, coefficients."""
+    parts = [conventions(found)]
+    for rotor, solved, i in found.each(FEW):
+        name = f"rotor {rotor}: " if rotor else ""
+        parts.append(f"{name}influence coefficients\n" + table_text(influence_table(found, solved, i)))
+    if len(found.runs.rotors) > FEW:
+        parts.append(f"… and {len(found.runs.rotors) - FEW} further rotors\n")
+    return "\n".join(parts) + "\nmaterial to ADD:"
+
+
+def afterword(found: FieldBalancing) -> str:
+    """Below the terminal's table: removal, residual, confidence, verdict."""
+    parts = []
+    for rotor, solved, i in found.each(FEW):
+        name = f"rotor {rotor}: " if rotor else ""
+        removal = ", ".join(
+            f"{plane} at {angle_text(degrees(-w), '.2f')}°"
+            for plane, w in zip(solved.planes, solved.corrections[i], strict=True)
+            if w
+        )
+        lines = [
+            f"{name}or REMOVE the same amounts opposite: {removal}"
+            if removal
+            else f"{name}nothing to correct",
+            "",
+        ]
+        lines[1:1] = [f"{name}{line}" for line in split_lines(found, solved, i)]
+        lines += [f"{name}predicted vibration", table_text(residual_table(found, solved, i)).rstrip("\n"), ""]
+        lines += [*summary(found, solved, i), *verdict(found, solved, i)]
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts)

@@ -1,0 +1,253 @@
+"""`dalembert mechanism`: position, velocity, acceleration and jerk of a planar mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.errors import DataError
+from cli.read import options
+from cli.show.columns import Result
+from cli.show.output import ShowOptions, command, suffix_among
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cli.mechanism.solve import Analysis
+    from cli.mechanism.studies import Request
+    from cli.show.columns import Document, Table
+
+
+@command
+def run(
+    file: Annotated[str, typer.Argument(metavar="FILE.toml", help="The mechanism; - is standard input.")],
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="INPUT", help="A pose, such as 60deg, 20mm or crank=60deg,arm=30deg; repeatable."
+        ),
+    ] = None,
+    sweep: Annotated[
+        str | None,
+        typer.Option(metavar="START:STOP:STEP", help="Such as 0deg:360deg:1deg or 0deg:360deg/3600."),
+    ] = None,
+    inputs: Annotated[
+        str | None,
+        typer.Option(metavar="FILE.csv", help="The inputs as a table: crank_deg, ..., perhaps time_s."),
+    ] = None,
+    only: Annotated[
+        str | None, typer.Option(metavar="NAME,...", help="These links and points; nothing else is computed.")
+    ] = None,
+    order: Annotated[
+        str | None,
+        typer.Option(help="position, velocity, acceleration or jerk (default: what the file's input gives)."),
+    ] = None,
+    branch: Annotated[
+        str | None, typer.Option(metavar="all|NUMBER", help="Every assembly, or one of them.")
+    ] = None,
+    newton: Annotated[
+        bool,
+        typer.Option(
+            "--newton", help="All loops at once by Newton-Raphson from the guess, with its iterates."
+        ),
+    ] = False,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="Mobility, Grashof classes, limits, dead and change points, groups."),
+    ] = False,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="The order of solution, and what was skipped.")
+    ] = False,
+    forces: Annotated[
+        bool, typer.Option("--forces", help="The input's effort, every joint reaction, the shaking force.")
+    ] = False,
+    equilibrium: Annotated[
+        bool,
+        typer.Option("--equilibrium", help="Where the loads balance without effort, and whether stably."),
+    ] = False,
+    flywheel: Annotated[
+        float | None,
+        typer.Option(metavar="COEFFICIENT", help="Inertia for this speed fluctuation, such as 0.02."),
+    ] = None,
+    counterweights: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LINK,...", help="Counterweights on these links that leave the least shaking force."
+        ),
+    ] = None,
+    graph: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME.QUANTITY,...",
+            help="--plot draws these against the input, such as H.x,coupler.omega.",
+        ),
+    ] = None,
+    states: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv",
+            help="Write a row for each pose and link to FILE: what `dalembert work` reads.",
+            callback=suffix_among(".csv"),
+        ),
+    ] = None,
+    *,
+    show: ShowOptions,
+) -> Result:
+    """Solve a planar mechanism: positions, velocities, accelerations, its limits and its assemblies.
+
+    FILE.toml describes ground, links, slots, sliders, gears, input and guess. Without --only the table has a row
+    for each pose and link (what `dalembert work` reads); with --only or --forces a row for each pose. In a pipe
+    --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
+    """
+    from cli.mechanism.read import wanted
+    from cli.mechanism.solve import ORDERS, Analysis, load
+    from cli.mechanism.studies import Request
+
+    if order is not None and order not in ORDERS:
+        raise options.bad("--order", f"'{order}': expected {', '.join(ORDERS)}")
+    if branch is not None and branch != "all" and options.whole(branch) < 1:
+        raise options.bad("--branch", f"'{branch}': expected all, or the number of an assembly")
+    names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
+    if names == []:
+        raise options.bad("--only", "expected names of links or points")
+    if counterweights is not None and not any(name.strip() for name in counterweights.split(",")):
+        raise options.bad("--counterweights", "expected names of links")
+    if flywheel is not None and not 0 < flywheel < float("inf"):
+        raise options.bad("--flywheel", "expected a positive speed fluctuation, such as 0.02")
+    if (flywheel is not None or counterweights is not None) and sweep is None and inputs is None:
+        flag = "--flywheel" if flywheel is not None else "--counterweights"
+        raise options.bad(flag, "expected a cycle too: --sweep, such as --sweep 0deg:360deg:1deg")
+    if graph is not None and show.plot is None:
+        raise options.bad("--graph", "expected --plot FILE too: the picture that the curves are drawn into")
+    request = Request(
+        newton,
+        check,
+        forces,
+        equilibrium,
+        flywheel,
+        counterweights,
+        swept=sweep is not None or inputs is not None,
+    )
+    own = request.tables
+    if show.as_csv and len(own) > 1:
+        raise options.bad(
+            own[1],
+            f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
+        )
+    with _told(file):
+        mechanism = load(file)
+        q = wanted(mechanism, at, sweep, inputs)
+        analysis = Analysis.of(
+            file, mechanism, q, None if order is None else ORDERS.index(order), names, branch
+        )
+        analysis.check_names()
+        others = show.json or show.text or show.plot or show.expect
+        if show.as_csv and not others and own in ([], ["--forces"]) and analysis.is_long:
+            return _long(analysis, forces, states)
+        # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
+        table = not show.json or show.expect is not None or show.output is not None
+        analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces)
+        return _result(analysis, request, states, explain, graph)
+
+
+def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
+    """The table of a long sweep, a block of poses at a time."""
+    from cli.mechanism import columns
+    from cli.mechanism.states import table as link_states
+    from cli.mechanism.stream import Stream
+
+    form = columns.forces if forces else link_states if analysis.only is None else columns.poses
+    stream = Stream(analysis, form, forces)
+    every = Stream(replace(analysis, only=None), link_states)
+    return Result(
+        document=dict,
+        tables={},
+        blocks=stream.tables,
+        beside={} if states is None else {states: lambda: _csv(every.tables())},
+        late_warnings=stream.warnings,
+        failed=lambda: not stream.any_assembled,
+        within=lambda: _told(analysis.file),
+    )
+
+
+def _result(
+    analysis: Analysis, request: Request, states: Path | None, explain: bool, graph: str | None
+) -> Result:
+    from cli.mechanism import columns, graphs, poses, remarks
+    from cli.mechanism import forces as of_forces
+    from cli.mechanism.states import table as link_states
+    from cli.mechanism.studies import Studies
+
+    studies = Studies(analysis, request)
+    found = studies.document
+    if graph:
+        graphs.quantities(analysis, graph)  # a bad name is an error before anything is written
+
+    def of_poses() -> Table:
+        if request.forces:
+            return columns.forces(analysis)
+        return link_states(analysis) if analysis.only is None else columns.poses(analysis)
+
+    def document() -> Document:
+        listed = poses.document(analysis)
+        if request.forces:
+            listed = [pose | part for pose, part in zip(listed, of_forces.poses(analysis), strict=True)]
+        return {"name": analysis.mechanism.name, "poses": listed, **found}
+
+    def afterword() -> str:
+        from cli.mechanism import words
+
+        return words.afterword(studies, explain=explain)
+
+    def figure() -> Figure:
+        from cli.mechanism import force_picture, picture
+
+        several = len(analysis.inputs.shown) > 2 and analysis.motions[0].assembled.any()
+        if graph:
+            return picture.graphs(analysis, graph)
+        return force_picture.draw(analysis) if request.forces and several else picture.draw(analysis)
+
+    def beside() -> Iterable[bytes]:
+        # every link, whatever --only names
+        every = replace(analysis, only=None)
+        every.motions = analysis.motions
+        return _csv(iter([link_states(every)]))
+
+    own = columns.studies(studies)
+    # the table of a study asked for alone stands in place of the poses
+    alone = bool(own) and len(request.tables) == 1
+    return Result(
+        document=document,
+        tables={**own, "poses": of_poses} if alone else {"poses": of_poses, **own},
+        screen=of_poses if alone else None,
+        notes=lambda: analysis.mechanism.name,
+        afterword=afterword,
+        figure=figure,
+        beside={} if states is None else {states: beside},
+        warnings=remarks.warnings(studies),
+        failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),
+        within=lambda: _told(analysis.file),
+    )
+
+
+@contextmanager
+def _told(file: str) -> Iterator[None]:
+    """Name the file in what is wrong with a mechanism."""
+    from virtualwork import MechanismError
+
+    try:
+        yield
+    except MechanismError as error:
+        raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
+
+
+def _csv(tables: Iterator[Table]) -> Iterator[bytes]:
+    from cli.show.text import csv_text
+
+    for i, table in enumerate(tables):
+        yield csv_text(table.cells, header=i == 0).encode()

@@ -1,0 +1,189 @@
+"""What a call of `dalembert mechanism` works on: the mechanism, its assemblies, their motions, what is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cli.errors import DataError, memory, nearest
+from cli.mechanism.read import Inputs, Sweep
+from cli.read.files import load as load_bytes
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from virtualwork import Mechanism
+    from virtualwork.branch.assembly import Assembly
+    from virtualwork.motion import Motion
+
+ORDERS = ("position", "velocity", "acceleration", "jerk")
+
+
+def load(path: str) -> Mechanism:
+    """Read a description; - is standard input."""
+    from virtualwork import Mechanism
+
+    file = "standard input" if path == "-" else path
+    try:
+        if path == "-":
+            return Mechanism.from_toml_text(load_bytes(path).decode("utf-8-sig"), file, load=load_bytes)
+        return Mechanism.from_toml(path, load_bytes)
+    except UnicodeDecodeError:
+        raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
+    except (OSError, ValueError) as error:
+        if isinstance(error, OSError):
+            raise DataError(f"{file}: {error.strerror or error}") from None
+        raise DataError(str(error)) from None
+
+
+@dataclass
+class Analysis:
+    """One call: lazily the assemblies and their motions."""
+
+    file: str
+    mechanism: Mechanism
+    inputs: Inputs | Sweep
+    order: int
+    only: Sequence[str] | None = None
+    branch: str | None = None
+    warnings: list[str] = field(default_factory=list)
+    # the analysis of which this is a block of poses
+    block_of: Analysis | None = None
+
+    @classmethod
+    def of(
+        cls,
+        file: str,
+        mechanism: Mechanism,
+        inputs: Inputs | Sweep,
+        order: int | None,
+        only: Sequence[str] | None,
+        branch: str | None,
+    ) -> Analysis:
+        """Return the analysis to this order, or to the highest that the inputs' rates give."""
+        given = 0
+        for k, name in enumerate(("speed", "acceleration", "jerk"), 1):
+            if any(getattr(e, name) is not None for e in mechanism.inputs) or (
+                getattr(inputs, name, None) is not None
+            ):
+                given = k
+        return cls(file, mechanism, inputs, given if order is None else order, only, branch)
+
+    @property
+    def is_long(self) -> bool:
+        """Whether the poses are more than one block."""
+        from virtualwork.formulas.positions import BLOCK
+
+        return self.inputs.n > BLOCK
+
+    @property
+    def several(self) -> bool:
+        """Whether several assemblies are asked for."""
+        return len((self.block_of or self).assemblies) > 1
+
+    @cached_property
+    def assemblies(self) -> tuple[Assembly, ...]:
+        """The guess's assembly, or those that --branch asks for."""
+        if self.branch is None:
+            return (self.mechanism.assembly,)
+        every = self.mechanism.assemblies()
+        if any(g.kind == "Newton" for g in every[0].plan.groups):
+            self.warnings.append(
+                "--branch: groups without a closed form were searched from many starts; an assembly may be missing"
+            )
+        if self.branch == "all":
+            return every
+        number = int(self.branch)
+        if number > len(every):
+            raise DataError(
+                f"--branch {number}: the mechanism has {len(every)} assemblies at the guess's input"
+            )
+        return (every[number - 1],)
+
+    @cached_property
+    def motions(self) -> tuple[Motion, ...]:
+        """The motion of each assembly."""
+        from virtualwork.motion import Motion
+
+        q = self.inputs
+        found = tuple(Motion(a, q.values, q.speed, q.acceleration) for a in self.assemblies)
+        for motion in found:  # read from decimals, turned to radians: for the estimates of --digits
+            motion.input_error = float(np.finfo(float).eps) * np.abs(motion.inputs)
+        return found
+
+    @cached_property
+    def links(self) -> tuple[str, ...]:
+        """The links asked for."""
+        return tuple(n for n in self.mechanism.links if self.only is None or n in self.only)
+
+    @cached_property
+    def points(self) -> tuple[str, ...]:
+        """The points asked for, in the order of the file."""
+        named = dict.fromkeys(p for body in self.mechanism.bodies.values() for p in body)
+        return tuple(n for n in named if self.only is None or n in self.only)
+
+    @cached_property
+    def slides(self) -> tuple[str, ...]:
+        """The guides asked for, by their point; the points themselves tell where they are."""
+        return tuple(g.point for g in self.mechanism.guides if self.only is None or g.point in self.only)
+
+    @cached_property
+    def input_names(self) -> dict[str, str]:
+        """Each input and the name of its value: `input_deg`, or `input_m` of a slide."""
+        return {e.name: "input_m" if e.is_slide else "input_deg" for e in self.mechanism.inputs}
+
+    @cached_property
+    def input_columns(self) -> tuple[str, ...]:
+        """The columns of the inputs in a table."""
+        several = len(self.mechanism.inputs) > 1
+        return tuple(f"{name}_{key}" if several else key for name, key in self.input_names.items())
+
+    def given(self, link: str) -> NDArray[np.float64] | None:
+        """The angles asked for of a link that is driven against the ground, degrees; None for any other."""
+        for j, e in enumerate(self.mechanism.inputs):
+            if e.link == link and e.on == "ground":
+                return self.inputs.shown[:, j]
+        return None
+
+    def check_names(self) -> None:
+        """Refuse names that --only cannot find."""
+        known = {*self.mechanism.links, *(p for body in self.mechanism.bodies.values() for p in body)}
+        for name in self.only or ():
+            if name not in known:
+                raise DataError(
+                    f"{self.file}: --only: no link or point is named '{name}'{nearest(name, known)}"
+                )
+
+    def bytes_each(self, *, json: bool, table: bool, forces: bool) -> float:
+        """What the answer for one pose takes at most, as measured."""
+        rates = self.order + 1
+        numbers = rates * (len(self.links) + 2 * len(self.points) + len(self.slides))
+        if forces:
+            numbers += 5 + 6 * len(self.points)
+        wide = self.only is not None or forces
+        return 300 + 110 * numbers * json + table * (100 * numbers if wide else 1200 * len(self.links))
+
+    def check_size(self, *, json: bool, table: bool, forces: bool) -> None:
+        """Refuse what would take more memory than there is, before it is begun."""
+        each = self.bytes_each(json=json, table=table, forces=forces) * len(self.assemblies)
+        poses, room = self.inputs.n, memory()
+        if poses * each > room:
+            raise DataError(
+                f"{self.file}: {poses} poses of {len(self.links)} links and {len(self.points)} points would take "
+                f"{float(f'{poses * each / 1e9:.2g}'):g} GB: expected at most {room / each:.0f} poses, or fewer names by --only, or CSV, which is not limited"
+            )
+
+    def assembled(self, motion: Motion) -> NDArray[np.bool_]:
+        """Which poses are assembled, as far as what is asked for goes: with --only the rest is not solved."""
+        if self.only is None:
+            return motion.assembled
+        whole = np.ones(motion.n, dtype=bool)
+        for name in self.points:
+            whole &= np.isfinite(motion.point(name).complex(0))
+        for name in self.links:
+            whole &= np.isfinite(motion.link(name).angle)
+        return whole

@@ -1,0 +1,1 @@
+"""`dalembert place`: a correction put where masses can go."""

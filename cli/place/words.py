@@ -1,0 +1,30 @@
+"""What is said of placed masses."""
+
+from __future__ import annotations
+
+from cli.place.solve import Placing
+from cli.read.units import degrees, from_si
+from cli.show.text import angle_text
+
+
+def notes(found: Placing) -> str:
+    """Say what is to be reached."""
+    lines = [f"correction: {_vector(found, found.target)} (angles counter-clockwise)"]
+    if found.request.ratio != 1:
+        lines.append(f"at the other radius: {found.text(abs(found.target) * found.request.ratio)}")
+    for share in found.shares:
+        if share.z is not None:
+            z = from_si(share.z, "length", "mm")
+            lines.append(f"in the plane z = {z:g} mm: {_vector(found, share.goal)}")
+    return "\n".join([*lines, f"material to {'REMOVE' if found.request.removes else 'ADD'}:"])
+
+
+def error(found: Placing) -> str:
+    """Say what is missed."""
+    whole = max(abs(share.goal) for share in found.shares)
+    part = f" ({abs(found.error) / whole:.3%} of the correction)" if whole else ""
+    return f"error: {_vector(found, found.error)}{part}"
+
+
+def _vector(found: Placing, vector: complex) -> str:
+    return f"{found.text(abs(vector))} at {angle_text(degrees(vector), '.4g')}°"

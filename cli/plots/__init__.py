@@ -1,1 +1,0 @@
-"""Pictures; matplotlib is loaded only when one is asked for."""

@@ -1,0 +1,254 @@
+"""A table of link states, in SI, and its unknowns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.errors import DataError, quote
+from cli.read.headers import spellings
+from cli.read.tables import Table, read
+from cli.read.units import parse_number, to_si
+
+Real = NDArray[np.float64]
+
+COLUMNS = {
+    "mass": "mass",
+    "inertia": "inertia",
+    "vx": "velocity",
+    "vy": "velocity",
+    "ax": "acceleration",
+    "ay": "acceleration",
+    "omega": "speed",
+    "alpha": "angular acceleration",
+    "fx": "force",
+    "fy": "force",
+    "fvx": "velocity",
+    "fvy": "velocity",
+    "torque": "torque",
+}
+LOADS = {"fx": "fx_N", "fy": "fy_N", "torque": "torque_N_m"}
+
+
+class Cell(NamedTuple):
+    """Where an unknown acts: the link, which of its rows (0 but for a second force), the quantity, its share."""
+
+    link: str
+    occurrence: int
+    quantity: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """An unknown load and the cells it stands in; `name` is empty for a bare `?`."""
+
+    name: str
+    cells: tuple[Cell, ...]
+    row: int
+
+    @property
+    def label(self) -> str:
+        """How a message calls it: by its cells."""
+        cells = " and ".join(f"{LOADS[cell.quantity]} of link {cell.link}" for cell in self.cells)
+        return f"?{self.name} ({cells})"
+
+
+@dataclass
+class Step:
+    """An instant: its velocity fields, each a set of rows, and its unknowns."""
+
+    name: str
+    fields: dict[str, list[int]] = field(default_factory=dict)
+    unknowns: list[Unknown] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class StateTable:
+    """A table of link states, in SI."""
+
+    table: Table
+    steps: list[Step]
+    values: dict[str, Real]
+    occurrence: list[int]
+    warnings: list[str]
+
+    @property
+    def links(self) -> list[str]:
+        """The link of each row."""
+        return self.table.texts["link"]
+
+
+def read_states(path: str) -> StateTable:
+    """Read the states of links, one row per link, step and velocity field, and find the unknowns."""
+    table = read(path, numbers=COLUMNS, texts=["step", "field", "link"], blank=list(COLUMNS), marker="?")
+    if "link" not in table.texts:
+        raise DataError(f"{table.file}: no column link {table.told}")
+    if not table.numbers:
+        raise DataError(
+            f"{table.file}: no column of states or loads: expected some of vx_m_s, omega_rad_s, fx_N …"
+        )
+    for (row, quantity), mark in table.marks.items():
+        if quantity not in LOADS:
+            raise table.error(
+                row, table.numbers[quantity].header, mark, "a number: only a force or torque may be unknown"
+            )
+    for quantity in ("mass", "inertia"):
+        if quantity in table.numbers:
+            table.reject(table.numbers[quantity].values < 0, quantity, f"a {quantity} that is not negative")
+    warnings: list[str] = []
+    values = {
+        name: np.asarray(to_si(column.values, COLUMNS[name], column.unit))
+        for name, column in table.numbers.items()
+    }
+    for name, value in values.items():
+        overflown = ~np.isfinite(value) & np.isfinite(table.numbers[name].values)
+        table.reject(overflown, name, "a number of a size that can be computed with")
+    _point_velocity(values, table, warnings)
+    values = {name: np.nan_to_num(value, nan=0.0) for name, value in values.items()}
+    steps, occurrence = _sets(table, values)
+    _unknowns(table, steps, occurrence)
+    states = StateTable(table, steps, values, occurrence, warnings)
+    _check(states)
+    return states
+
+
+def _point_velocity(values: dict[str, Real], table: Table, warnings: list[str]) -> None:
+    """Fill the velocity of the force's point where it is empty: the centre of mass's."""
+    zero = np.zeros(table.rows)
+    for axis, other in (("x", "y"), ("y", "x")):
+        given = values.get(f"fv{axis}", np.full(table.rows, np.nan))
+        center = np.nan_to_num(values.get(f"v{axis}", zero), nan=0.0)
+        force = np.nan_to_num(values.get(f"f{axis}", zero), nan=1.0)
+        if f"fv{other}" in values:
+            half = np.isnan(given) & ~np.isnan(values[f"fv{other}"]) & (center != 0) & (force != 0)
+            if half.any():
+                row = int(np.argmax(half))
+                warnings.append(
+                    f"{table.file}: row {row + 1}: fv{other} is given and fv{axis} is empty: "
+                    f"taken as the centre of mass's, v{axis} = {center[row]:g} m/s"
+                )
+        if f"fv{axis}" in values or f"fv{other}" in values:
+            values[f"fv{axis}"] = np.where(np.isnan(given), center, given)
+
+
+def _sets(table: Table, values: dict[str, Real]) -> tuple[list[Step], list[int]]:
+    """Sort the rows into steps and velocity fields; a link's second row in a set is its occurrence 1."""
+    steps: dict[str, Step] = {}
+    seen: dict[tuple[str, str, str], int] = {}
+    occurrence = []
+    named = table.texts.get("step") or ["1"] * table.rows
+    fields = table.texts.get("field") or [""] * table.rows
+    massive = (
+        sum((values.get(name, np.zeros(table.rows)) for name in ("mass", "inertia")), np.zeros(table.rows))
+        > 0
+    )
+    for row, (step, of, link) in enumerate(zip(named, fields, table.texts["link"], strict=True)):
+        steps.setdefault(step, Step(step)).fields.setdefault(of, []).append(row)
+        count = seen.get((step, of, link), 0)
+        seen[step, of, link] = count + 1
+        if count and massive[row]:
+            raise table.error(
+                row,
+                "link",
+                link,
+                f"each link once in a {'field' if of else 'step'} (a row of its own for a second force has no mass)",
+            )
+        occurrence.append(count)
+    return list(steps.values()), occurrence
+
+
+def _unknowns(table: Table, steps: list[Step], occurrence: list[int]) -> None:
+    """Sort the marks into unknowns, as many in each step as it has velocity fields."""
+    if not table.marks:
+        where = " or ".join(spellings(name, COLUMNS[name]).split(",")[0] for name in LOADS)
+        raise DataError(f"{table.file}: no unknown: expected one cell marked ? in a column such as {where}")
+    marks: dict[int, list[tuple[str, str, float]]] = {}
+    for (row, quantity), mark in table.marks.items():
+        marks.setdefault(row, []).append((quantity, *_mark(table, row, quantity, mark)))
+    for step in steps:
+        cells: dict[str, dict[Cell, int]] = {}
+        for rows in step.fields.values():
+            for row in rows:
+                for quantity, name, factor in marks.get(row, ()):
+                    cell = Cell(table.texts["link"][row], occurrence[row], quantity, factor)
+                    cells.setdefault(name, {}).setdefault(cell, row)
+        at = f"{table.file}: step {quote(step.name)}"
+        bare = cells.get("", {})
+        if len(bare) > 1:
+            second = list(bare.items())[1]
+            raise table.error(
+                second[1],
+                table.numbers[second[0].quantity].header,
+                "?",
+                f"one ? in step {step.name} (the first is {LOADS[next(iter(bare)).quantity]} of link {next(iter(bare)).link}); "
+                "several unknowns are marked ?NAME and need as many velocity fields, a column field",
+            )
+        if not cells:
+            raise DataError(f"{at}: no unknown in it: expected one cell marked ?")
+        step.unknowns = [Unknown(name, tuple(found), min(found.values())) for name, found in cells.items()]
+        if len(step.unknowns) != len(step.fields):
+            raise DataError(
+                f"{at}: found {_count(len(step.unknowns), 'unknown')} ({', '.join(u.label for u in step.unknowns)}) and "
+                f"{_count(len(step.fields), 'velocity field')} (column field): expected as many of the one as of the other"
+            )
+
+
+def _mark(table: Table, row: int, quantity: str, mark: str) -> tuple[str, float]:
+    """Read `?`, `?NAME` or `?NAME*FACTOR` (a component of an unknown of given direction, its reaction): name and factor."""
+    name, star, factor = mark[1:].partition("*")
+    try:
+        share = parse_number(factor) if star else 1.0
+        if share == 0:
+            raise ValueError
+    except ValueError:
+        raise table.error(
+            row, table.numbers[quantity].header, mark, "?, ?NAME or ?NAME*FACTOR with a factor other than 0"
+        ) from None
+    return name.strip(), share
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
+def _check(states: StateTable) -> None:
+    """Say what the table leaves open: fields that disagree on the instant, accelerations without masses."""
+    table, values = states.table, states.values
+    fixed = [
+        name for name in ("mass", "inertia", "ax", "ay", "alpha", "fx", "fy", "torque") if name in values
+    ]
+    for step in states.steps:
+        first, *others = step.fields.values()
+        known = {(states.links[row], states.occurrence[row]): row for row in first}
+        for rows in others:
+            for row in rows:
+                model = known.get((states.links[row], states.occurrence[row]))
+                for name in fixed:
+                    if {(row, name), (model, name)} & table.marks.keys():
+                        continue
+                    if model is None or values[name][row] != values[name][model]:
+                        states.warnings.append(
+                            f"{table.file}: row {row + 1}: {table.numbers[name].header} of link {states.links[row]} is not that "
+                            "of the step's first velocity field: taken as given (the loads of one instant are the same in each)"
+                        )
+                        return
+    if "inertia" in values and ("ax" in values or "ay" in values):
+        zero = np.zeros(table.rows)
+        carried = (values["inertia"] > 0) & ((values.get("ax", zero) != 0) | (values.get("ay", zero) != 0))
+        given = table.numbers.get("mass")
+        blank = np.isnan(given.values) if given is not None else np.ones(table.rows, dtype=bool)
+        if (carried & blank).any():
+            row = int(np.argmax(carried & blank))
+            header = given.header if given is not None else "mass_kg"
+            raise table.error(
+                row, header, "", f"a mass: link {states.links[row]} has an inertia and its centre accelerates"
+            )
+    for rate, body in (("ax", "mass"), ("ay", "mass"), ("alpha", "inertia")):
+        if body not in values and values.get(rate, np.zeros(1)).any():
+            states.warnings.append(
+                f"{table.file}: there is {rate} and no column {body}_*: no inertia loads from it"
+            )

@@ -1,0 +1,126 @@
+"""An assembly of a mechanism: on which branch each group closes, wherever its input goes.
+
+The guess picks each group's sign once. What a pose at another input looks like follows from the branch alone (no
+marching): the sign of each closed form, turned over at each change point on the way (`virtualwork.branch.track`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from virtualwork.branch.choice import Choice
+from virtualwork.branch.guess import choose
+from virtualwork.branch.solutions import every_solution
+from virtualwork.branch.track import Track
+from virtualwork.describe.description import Description
+from virtualwork.formulas.newton import write_unknowns
+from virtualwork.formulas.positions import State
+from virtualwork.formulas.rates import Passage
+from virtualwork.plan.steps import Group, Step
+
+
+class Assembly(Choice):
+    """A mechanism put together in one way, ready to move."""
+
+    @classmethod
+    def from_guess(cls, m: Description) -> Assembly:
+        """The assembly that the guess chooses.
+
+        Raises
+        ------
+        AssemblyError
+            Where the guess is missing and there is more than one: the choices are listed.
+        """
+        return choose(m, cls)
+
+    @cached_property
+    def prepared(self) -> dict[bool, Any]:
+        """What acts at rest (False) and in motion (True), made once for all motions."""
+        return {}
+
+    @cached_property
+    def load_paths(self) -> dict[bool, Any]:
+        """How that bears on joints and inputs."""
+        return {}
+
+    @cached_property
+    def track(self) -> Track:
+        """Change points and limits along the input."""
+        return Track(self)
+
+    @property
+    def passage(self) -> Passage | None:
+        """How derivatives go through change points; None with several inputs."""
+        return self.track if self.track.active else None
+
+    def cover(self, low: float, high: float) -> None:
+        """Look for change points and limits over the inputs from low to high."""
+        self.track.cover(low, high)
+
+    @property
+    def close(self) -> Callable[[Group, State], None]:
+        """Closes the loops of a group on its branch."""
+        return self.track.close
+
+    def run(self, steps: Iterable[Step], st: State) -> None:
+        """Work out positions, step by step."""
+        self.track.run(steps, st)
+
+    def state(self, inputs: tuple[float, ...], targets: Iterable[str] | None = None) -> State:
+        """Positions of one pose, as Python numbers."""
+        st = State(list(inputs))
+        steps = self.plan.steps if targets is None else self.needed(targets)
+        try:
+            self.run(steps, st)
+        except ZeroDivisionError:
+            st = State([np.array([q]) for q in inputs], many=True)
+            with np.errstate(all="ignore"):
+                self.run(steps, st)
+        return st
+
+
+def all_assemblies(chosen: Assembly) -> tuple[Assembly, ...]:
+    """Every assembly at the guess's input: all signs of the closed forms, all solutions found for the others."""
+    found = [chosen]
+    for signs, starts in _combinations(chosen):
+        if signs != chosen.signs or any(
+            np.abs(np.exp(1j * np.asarray(starts[k])) - np.exp(1j * np.asarray(chosen.starts[k]))).max()
+            > 1e-6
+            for k in starts
+        ):
+            found.append(
+                Assembly(chosen.mechanism, chosen.plan, signs, starts, len(found) + 1, phases=chosen.phases)
+            )
+    return tuple(found)
+
+
+def _combinations(chosen: Assembly) -> list[tuple[dict[str, int], dict[str, Any]]]:
+    """Walk the steps at the guess's input and fork wherever a group closes in more than one way."""
+    m = chosen.mechanism
+    fronts: list[tuple[State, dict[str, int], dict[str, Any]]] = [(State(list(m.at)), {}, {})]
+    for step in chosen.plan.steps:
+        after: list[tuple[State, dict[str, int], dict[str, Any]]] = []
+        for st, signs, starts in fronts:
+            if not isinstance(step, Group):
+                chosen.run_untracked([step], st)
+                after.append((st, signs, starts))
+            elif step.kind == "Newton":
+                for x in every_solution(step, st, m.size):
+                    trial = st.copy()
+                    write_unknowns(step, trial, x[None])
+                    after.append((trial, signs, starts | {step.name: tuple(map(float, x))}))
+            else:
+                for sign in (1,) if step.kind == "PRP" else (1, -1):
+                    trial = st.copy()
+                    try:
+                        chosen.cases[step.name].solve(trial, sign, m.size)
+                    except ZeroDivisionError:
+                        continue
+                    if trial.margin[step.name] >= 0:
+                        after.append((trial, signs | {step.name: sign}, starts))
+        fronts = after
+    return [(signs, starts) for _, signs, starts in fronts]

@@ -1,0 +1,116 @@
+"""A choice of assembly: which way every loop closes, as the guess has it. Frozen data, and positions by it alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from dalembert.arithmetic.records import record
+from virtualwork.describe.description import Description
+from virtualwork.describe.record import Record
+from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.positions import Case, State, run
+from virtualwork.formulas.rates import Passage
+from virtualwork.plan.order import plan
+from virtualwork.plan.steps import Group, Plan, Step, Turn
+
+
+@record
+@dataclass(frozen=True, eq=False, repr=False)
+class Choice(Record):
+    """A mechanism put together in one way.
+
+    Attributes
+    ----------
+    mechanism : Description
+    plan : Plan
+        The order of solution.
+    signs : dict of group name to ±1
+    starts : dict of group name to the unknowns of a Newton group at the guess's input
+    number : int
+        1 for the guess's assembly; others count on.
+    phases : dict of a gear's number to its constant Σ c·θ, rad
+    """
+
+    mechanism: Description
+    plan: Plan = field(repr=False)
+    signs: Mapping[str, int] = field(default_factory=dict)
+    starts: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    number: int = 1
+    warnings: tuple[str, ...] = field(default=(), repr=False)
+    phases: Mapping[int, float] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.mechanism!r}, {self.number})"
+
+    @cached_property
+    def cases(self) -> dict[str, Case]:
+        """The groups with a closed form, ready to be solved."""
+        return {g.name: Case(g) for g in self.plan.groups if g.kind != "Newton"}
+
+    @cached_property
+    def merged(self) -> tuple[Plan, Group | None]:
+        """All loops at once: one plan with one group of every unknown; None where there is no loop."""
+        whole = plan(self.mechanism, merged=True, phases=self.phases)
+        return whole, next(iter(whole.groups), None)
+
+    @cached_property
+    def geared(self) -> set[str]:
+        """Bodies of which a gear of fractional ratio needs the angle itself, with its whole turns, at first or second hand."""
+        found: set[str] = set()
+        for step in reversed(self.plan.steps):
+            for turn in (step,) if isinstance(step, Turn) else step.ties if isinstance(step, Group) else ():
+                found |= {b for b, r in turn.angle.bases if turn.body in found or not float(r).is_integer()}
+        return found
+
+    @cached_property
+    def plain(self) -> dict[str, tuple[Case, int, float]]:
+        """The closed forms that keep their sign wherever the input goes, as far as is known: case, sign, size."""
+        return {
+            name: (self.cases[name], sign, self.mechanism.size)
+            for name, sign in self.signs.items()
+            if name in self.cases and self.geared.isdisjoint(self.cases[name].group.members)
+        }
+
+    @cached_property
+    def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
+        """What targets hang on, as far as it was asked for."""
+        return {}
+
+    def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
+        """The steps that targets hang on; worked out once for each set of targets."""
+        key = tuple(targets)
+        if key not in self.known_steps:
+            self.known_steps[key] = self.plan.needed(key)
+        return self.known_steps[key]
+
+    def before(self, group: Group) -> list[Step]:
+        """The steps that a group hangs on."""
+        return [step for step in self.needed(self.plan.writes(group)) if step is not group]
+
+    def run_untracked(self, steps: Iterable[Step], st: State) -> None:
+        """Work out positions with the signs as they are, as if no change point lay on the way."""
+        run(steps, st, self._close)
+
+    def _close(self, group: Group, st: State) -> None:
+        self.cases[group.name].solve(st, self.signs[group.name], self.mechanism.size)
+        for body in self.geared.intersection(group.members):
+            st.angle[body] = np.angle(st.turn[body])
+
+
+class Along(Passage, Protocol):
+    """The way of the one input, as change points and continuations need it."""
+
+    assembly: Choice
+    start: float
+    length: float
+    whole: bool
+    flips: dict[str, Reals]
+    folded: set[str]
+
+    def run(self, steps: Iterable[Step], st: State) -> None:
+        """Work out positions, each group on its branch."""

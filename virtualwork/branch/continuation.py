@@ -1,0 +1,264 @@
+"""Following a group with no closed form along the input: tangent prediction, Newton-Raphson correction.
+
+The march lays down nodes (unknowns and their rate) once; any pose starts from the cubic between two nodes and is
+corrected by Newton-Raphson on all poses together, so that no error accumulates.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from virtualwork.branch.choice import Along
+from virtualwork.formulas.double_roots import settle, singular
+from virtualwork.formulas.linear import solve, stack, stack_rows
+from virtualwork.formulas.newton import newton, write_unknowns
+from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.positions import State, columns
+from virtualwork.formulas.rates import Rates
+from virtualwork.plan.steps import Group
+
+# of one turn
+NODES = 120
+# of one turn: a step this short has met a limit
+FINEST = 1e-7
+
+
+class Continuation:
+    """The nodes of one group's branch, from the guess outwards."""
+
+    def __init__(self, track: Along, group: Group) -> None:
+        self.track, self.group = track, group
+        self.assembly = track.assembly
+        self.size = self.assembly.mechanism.size
+        self.before = self.assembly.before(group)
+        self.ends: list[tuple[float, int]] = []
+        self._crossed: list[tuple[float, float]] = []
+        self._found: dict[tuple[float, float], float] = {}
+        x = np.asarray(self.assembly.starts[group.name], dtype=float)
+        q = track.start
+        rate, det = self._rate(q, x)
+        self.q, self.x, self.rate, self.det = [q], [x], [rate], [det]
+        self.stopped = {1: False, -1: False}
+        self.step = {1: np.inf, -1: np.inf}  # the last one that was taken
+
+    def _state(self, q: float) -> State:
+        st = State([np.array([q])], many=True)
+        with np.errstate(all="ignore"):
+            self.track.run(self.before, st)
+        return st
+
+    def _rate(self, q: float, x: Reals) -> tuple[Reals, float]:
+        """dx/dq and the determinant (its sign is the branch)."""
+        st = self._state(q)
+        write_unknowns(self.group, st, x[None])
+        d = Rates(self.assembly.plan, st, [[1.0]], self.track)
+        d.advance(self.before, 1)
+        jacobian = stack(columns(self.group, st), 1)
+        right = stack_rows(d.right_side(self.group, 1), 1)
+        rate = solve(jacobian, -right)[0]
+        if jacobian.shape[1] == jacobian.shape[2]:
+            return rate, float(np.linalg.det(jacobian[0]))
+        if not np.isfinite(jacobian).all():
+            return rate, np.nan
+        return rate, float(np.prod(np.linalg.svd(jacobian[0], compute_uv=False)))
+
+    def extend(self, a: float, b: float) -> None:
+        """March until the nodes cover a to b."""
+        h = self.track.length / NODES
+        while not self.stopped[1] and self.q[-1] < b + h:
+            self._advance(1, h)
+        while not self.stopped[-1] and self.q[0] > a - h:
+            self._advance(-1, h)
+
+    def _advance(self, side: int, h: float) -> None:
+        end = -1 if side > 0 else 0
+        q, x, rate = self.q[end], self.x[end], self.rate[end]
+        if not np.isfinite(rate).all():
+            self.stopped[side] = True
+            return
+        step = min(h, 2 * self.step[side])
+        crossed: list[tuple[float, float]] = []
+        while step > FINEST * self.track.length:
+            to = q + side * step
+            guess = x + side * step * rate
+            st = self._state(to)
+            with np.errstate(all="ignore"):
+                found, closed = newton(self.group, st, guess[None], self.size, limit=12)
+            if closed[0]:
+                new, det = self._rate(to, found[0])
+                # a slide that runs away is measured by itself
+                far = np.maximum(np.abs(x), self.size)
+                far[: len(self.group.angles)] = 1.0
+                # the cubic's own defect: what the two rates say of the step, against what it was
+                defect = np.abs((found[0] - x - side * step * 0.5 * (rate + new)) / far).max()
+                change = np.abs((found[0] - x) / far).max()
+                if np.isfinite(new).all() and defect <= 0.05 * max(change, 1e-6) and change < 0.5:
+                    if np.sign(det) != np.sign(self.det[end]):
+                        crossed.append((min(q, to), max(q, to)))
+                    place = len(self.q) if side > 0 else 0
+                    self.q.insert(place, to)
+                    self.x.insert(place, found[0])
+                    self.rate.insert(place, new)
+                    self.det.insert(place, det)
+                    self._crossed += crossed
+                    self.step[side] = step
+                    return
+            step /= 2
+        self.stopped[side] = True
+        self.ends.append((self._limit(side), -side))
+
+    def singular(self) -> bool:
+        """Whether the Jacobian is singular at all nodes."""
+        some = np.unique(np.linspace(0, len(self.q) - 1, 24).astype(int))
+        st = State([np.array(self.q)[some]], many=True)
+        with np.errstate(all="ignore"):
+            self.track.run(self.before, st)
+            write_unknowns(self.group, st, np.array(self.x)[some])
+        return singular(self.group, st, len(some))
+
+    @property
+    def crossings(self) -> list[float]:
+        """The change points met: where the determinant goes through zero and the branch goes on.
+
+        Where it is zero in every pose its sign is noise, and there are none.
+        """
+        if self.group.name in self.track.folded:
+            return []
+        for a, b in self._crossed:
+            if (a, b) not in self._found:
+                centre, half = (a + b) / 2, (b - a) / 2
+                nodes = np.cos(np.pi * (np.arange(12) + 0.5) / 12)
+                x = self.unknowns(centre + half * nodes)
+                det = [self._rate(q, row)[1] for q, row in zip(centre + half * nodes, x, strict=True)]
+                if not np.isfinite(det).all():  # a pose between the two that does not close: no more is known
+                    self._found[a, b] = centre
+                    continue
+                roots = np.polynomial.Chebyshev.fit(nodes, det, 10, domain=[-1, 1]).roots()
+                real = np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= 1.1)])
+                self._found[a, b] = (
+                    centre + half * float(real[np.argmin(np.abs(real))]) if len(real) else centre
+                )
+        return [self._found[pair] for pair in self._crossed]
+
+    def unknowns(self, q: Reals) -> Reals:
+        """The group's unknowns at inputs q, (n, unknowns)."""
+        st = State([q], many=True)
+        with np.errstate(all="ignore"):
+            self.track.run(self.before, st)
+            self.close(st)
+        rows = [st.angle[b] for b in self.group.angles] + [st.slide[g] for g in self.group.slides]
+        return np.stack([np.broadcast_to(r, q.shape) for r in rows], axis=1)
+
+    def bridge(self, q: float, order: int) -> Reals:
+        """The unknowns' derivative across a removable singularity of the Jacobian: of the polynomial through poses
+        on both sides of it (Chebyshev points, so that it holds some 12 digits of a velocity)."""
+        half = 0.06 * self.track.length / (2 * np.pi)
+        nodes = np.cos(np.pi * (np.arange(14) + 0.5) / 14)
+        self.extend(q - half, q + half)
+        x = self.unknowns(q + half * nodes)
+        out = np.full(x.shape[1], np.nan)
+        if np.isfinite(x).all():
+            for j in range(x.shape[1]):
+                fit = np.polynomial.Chebyshev.fit(nodes, x[:, j], 13, domain=[-1, 1])
+                out[j] = fit.deriv(order)(0.0) / half**order
+        return out
+
+    def _limit(self, side: int) -> float:
+        """The limit itself: det² is smooth in the input there and goes to zero; extrapolated from the last nodes."""
+        order = slice(-6, None) if side > 0 else slice(0, 6)
+        q, d2 = np.array(self.q[order]), np.array(self.det[order]) ** 2
+        keep = np.flatnonzero(np.diff(np.concatenate([[np.nan], d2])) != 0)
+        q, d2 = q[keep], d2[keep]
+        near = q[-1] if side > 0 else q[0]
+        if len(q) < 2:
+            return float(near)
+        d2 = d2 / np.abs(d2).max()
+        # inverse interpolation: q as a polynomial of det², at det² = 0
+        total = 0.0
+        for i in range(len(q)):
+            weight = 1.0
+            for j in range(len(q)):
+                if j != i:
+                    weight *= -d2[j] / (d2[i] - d2[j])
+            total += weight * (q[i] - near)
+        # where the determinant runs to a pole instead (a slide that runs away) there is nothing to extrapolate
+        return float(near + total) if 0 <= side * total <= 16 * self.step[side] else float(near)
+
+    def _turned_back(self, q: Reals) -> Reals:
+        """Beyond a limit the branch is remembered: a whole turn later or earlier the mechanism stands as before."""
+        if not any(self.stopped.values()) or not self.track.whole or any(map(len, self.track.flips.values())):
+            return q
+        low = min([self.q[0], *(q for q, side in self.ends if side > 0)])
+        high = max([self.q[-1], *(q for q, side in self.ends if side < 0)])
+        outside = (q < low) | (q > high)
+        turned = low + np.mod(q - low, 2 * np.pi)
+        return np.where(outside & (turned <= high), turned, q)
+
+    def close(self, st: State) -> None:
+        """Close the group at a state's poses."""
+        q = self._turned_back(np.atleast_1d(np.asarray(st.inputs[0], dtype=float)))
+        nodes, x, rate = np.array(self.q), np.array(self.x), np.array(self.rate)
+        if len(nodes) == 1:
+            start = x[0] + np.outer(q - nodes[0], np.nan_to_num(rate[0]))
+            inside = np.ones(len(q), dtype=bool)
+        else:
+            i = np.clip(np.searchsorted(nodes, q) - 1, 0, len(nodes) - 2)
+            h = nodes[i + 1] - nodes[i]
+            t = ((q - nodes[i]) / h)[:, None]
+            inside = (q >= nodes[0] - 1e-9) & (q <= nodes[-1] + 1e-9)
+            a, b, h = x[i], x[i + 1], h[:, None]
+            start = (
+                a * (1 + 2 * t) * (1 - t) ** 2
+                + b * t * t * (3 - 2 * t)
+                + h * (rate[i] * t * (1 - t) ** 2 - rate[i + 1] * t * t * (1 - t))
+            )
+        for limit, side in self.ends:
+            # between the last node and the limit: x = x_L − 2x′·√((q_L − q_last)(q_L − q)), the fold's own parabola
+            end = -1 if side < 0 else 0
+            last, left = nodes[end], limit - nodes[end]
+            beyond = (np.abs(q - last) > 0) & ((q - last) * left > 0) & ((limit - q) * left >= 0)
+            if beyond.any() and left != 0:
+                root = np.sqrt(np.maximum((limit - q[beyond]) / left, 0.0))[:, None]
+                start[beyond] = x[end] + 2 * rate[end] * left * (1 - root)
+                inside |= beyond
+        many = st if st.many else st.copy(many=True)
+        start[~inside] = np.nan
+        with np.errstate(all="ignore"):
+            found, closed = newton(self.group, many, start, self.size)
+            if self.group.name in self.track.folded:
+                found = settle(self.group, many, found, self.size)
+                st.folded.add(self.group.name)
+        found[~(closed & inside)] = np.nan
+        write_unknowns(self.group, st, found)
+        st.margin[self.group.name] = (
+            np.where(closed & inside, 1.0, -1.0) if st.many else (1.0 if closed[0] else -1.0)
+        )
+
+
+def along_lines(track: Along, group: Group, st: State) -> None:
+    """With several inputs: every pose on its own straight line of inputs from the guess, all poses together."""
+    assembly = track.assembly
+    m = assembly.mechanism
+    q = [np.atleast_1d(np.asarray(v, dtype=float)) for v in st.inputs]
+    n = max(len(v) for v in q)
+    at = m.at
+    before = assembly.before(group)
+    far = max(float(np.abs(v - at[j]).max()) for j, v in enumerate(q))
+    steps = max(1, int(np.ceil(far / (2 * np.pi / NODES))))
+    x: Any = np.tile(np.asarray(assembly.starts[group.name], dtype=float), (n, 1))
+    closed = np.ones(n, dtype=bool)
+    last: Any = None
+    for i in range(1, steps + 1):
+        t = i / steps
+        trial = State([at[j] + t * (np.broadcast_to(v, n) - at[j]) for j, v in enumerate(q)], many=True)
+        with np.errstate(all="ignore"):
+            track.run(before, trial)
+            start = x if last is None else 2 * x - last
+            found, ok = newton(group, trial, start, m.size)
+        closed &= ok
+        last, x = x, np.where(ok[:, None], found, x)
+    x[~closed] = np.nan
+    write_unknowns(group, st, x)
+    st.margin[group.name] = np.where(closed, 1.0, -1.0) if st.many else (1.0 if closed[0] else -1.0)

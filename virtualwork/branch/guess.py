@@ -1,0 +1,350 @@
+"""The guess read: each group's assembly is picked in the order of solution, the one nearest to what the guess says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from virtualwork.branch.choice import Choice
+from virtualwork.branch.solutions import every_solution, guessed_unknowns
+from virtualwork.describe.description import Description
+from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError
+from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
+from virtualwork.formulas.linear import stack, stack_rows
+from virtualwork.formulas.newton import gaps, newton, write_unknowns
+from virtualwork.formulas.numbers import cross, dot
+from virtualwork.formulas.positions import Case, State, columns
+from virtualwork.plan.guessed import known_by_guess
+from virtualwork.plan.order import plan
+from virtualwork.plan.steps import Group, Plan, Turn
+
+C = TypeVar("C", bound=Choice)
+
+
+def choose(m: Description, make: Callable[..., C]) -> C:
+    """The assembly that the guess chooses; `make` takes what a `Choice` holds.
+
+    Raises
+    ------
+    AssemblyError
+        Where the guess is missing and there is more than one: the choices are listed.
+    """
+    return _Chooser(m).choose(make)
+
+
+class _Chooser:
+    """Reads the guess and picks each group's assembly in the order of solution."""
+
+    def __init__(self, m: Description) -> None:
+        self.m = m
+        self.plan = plan(m)
+        if not m.inputs:
+            raise MobilityError("[input]: missing")
+        self.angles, self.points = known_by_guess(m)
+        self.warnings: list[str] = []
+        # of the gears: Σ c·θ
+        self.phases: dict[int, float] = {}
+
+    def choose(self, make: Callable[..., C]) -> C:
+        """The assembly; a mechanism of which a part floats is refused by that part's name."""
+        st = State(list(self.m.at))
+        try:
+            loose = any(2 * len(g.closures) < len(g.angles) + len(g.slides) for g in self.plan.groups)
+            if loose or not self.plan.anchors.keys() >= self.m.links.keys():
+                raise MobilityError("[input]: constraints that depend on each other leave a part free")
+            found = self._choose(make, st)
+        except (MechanismError, ZeroDivisionError) as error:
+            self._refuse_floating()
+            if isinstance(error, MechanismError):
+                raise
+            raise AssemblyError(
+                "[guess] at: singular there, so that no direction is determined; give another `at`"
+            ) from None
+        if self._singular(st):
+            self._refuse_floating()
+        return found
+
+    def _singular(self, st: State) -> bool:
+        """Whether a group has a singular Jacobian at the guess, or none at all."""
+        for group in self.plan.groups:
+            if group.kind != "Newton":
+                if not st.margin.get(group.name, 0.0) > 1e-12:
+                    return True
+            else:
+                jacobian = stack(columns(group, st), 1)[0]
+                jacobian[:, : len(group.angles)] /= self.m.size
+                if not np.isfinite(jacobian).all() or not np.linalg.cond(jacobian) < 1e9:
+                    return True
+        return False
+
+    def _refuse_floating(self) -> None:
+        """Refuse a mechanism of which a part is free though the count of its joints and inputs says otherwise."""
+        x = []
+        for name, link in self.m.links.items():
+            turn = complex(np.exp(1j * self.angles.get(name, 0.0)))
+            origin = next((self.points[p] - z * turn for p, z in link.points.items() if p in self.points), 0j)
+            x += [self.angles.get(name, 0.0), origin.real / self.m.size, origin.imag / self.m.size]
+        found = hidden_freedom(self.m, np.array(x))
+        if found is not None:
+            links, joints = found
+            names = ", ".join(e.name for e in self.m.inputs)
+            raise MobilityError(
+                f"a free degree of freedom: {', '.join(links)} can still move while every input ({names}) is held, "
+                f"though by the count the mobility is {self.plan.blocks.mobility}: {', '.join(joints)} "
+                "depend on each other; join the part that is free"
+            )
+
+    def _choose(self, make: Callable[..., C], st: State) -> C:
+        signs: dict[str, int] = {}
+        starts: dict[str, Any] = {}
+        helper = Choice(self.m, self.plan)
+        for i, step in enumerate(self.plan.steps):
+            open_ = step
+            if isinstance(step, Turn) and step.angle.gears:
+                step = self._phased(step, st)
+            elif isinstance(step, Group) and any(tie.angle.gears for tie in step.ties):
+                step = replace(step, ties=tuple(self._phased(tie, st) for tie in step.ties))
+            if step is not open_:
+                self.plan = replace(self.plan, steps=(*self.plan.steps[:i], step, *self.plan.steps[i + 1 :]))
+            if isinstance(step, Group):
+                if step.kind == "Newton":
+                    starts[step.name] = tuple(map(float, self._newton(step, st)))
+                else:
+                    signs[step.name] = self._sign(step, helper.cases[step.name], st, signs)
+                    st.angle.update({b: float(np.angle(st.turn[b])) for b in step.members})
+            else:
+                helper.run_untracked([step], st)
+        if self.plan.blocks.redundant:
+            self._refuse_overdriven(self.plan, st)
+        phases = {
+            i: sum(c * float(st.angle[body]) for body, c in gear.shares().items())
+            for i, gear in enumerate(self.m.gears)
+        }
+        return make(self.m, self.plan, signs, starts, 1, tuple(self.warnings), phases)
+
+    def _refuse_overdriven(self, done: Plan, st: State) -> None:
+        """Constraints that depend on each other may leave less motion than there are inputs."""
+        jacobian = Constraints.at(self.m, coordinates(self.m, done, st), {}).jacobian
+        try:
+            s = np.linalg.svd(jacobian, compute_uv=False)
+        except np.linalg.LinAlgError:
+            raise AssemblyError(
+                "the lengths of the links differ too much to tell the mechanism's mobility"
+            ) from None
+        left = 3 * len(self.m.links) - int((s > 1e-9 * s[0]).sum())
+        counted = done.blocks.mobility
+        if left < len(self.m.inputs) or 1 <= counted < len(self.m.inputs):
+            left = min(left, counted) if counted >= 1 else left
+            names = ", ".join(e.name for e in self.m.inputs)
+            what = "the joints leave no motion, it is a structure" if left == 0 else f"mobility {left}"
+            raise MobilityError(f"[input]: {len(self.m.inputs)} input(s) ({names}), but {what}")
+
+    def _phased(self, step: Turn, st: State) -> Turn:
+        """A turn with the constants of its gears: its link stands at its guess, where one of them is open still.
+
+        Of more of them all but the last are those of the guessed angles.
+        """
+        angle = step.angle
+        for i, _ in angle.gears[:-1]:
+            self.phases.setdefault(i, self._constant(i, st))
+        for i, p in angle.gears[-1:]:
+            if i not in self.phases and all(b in st.angle for b, _ in angle.bases):
+                rest = st.affine(angle) + sum(r * st.angle[b] for b, r in angle.bases)
+                rest += sum(k * self.phases[g] for g, k in angle.gears[:-1])
+                self.phases[i] = (self.angles.get(step.body, 0.0) - rest) / p
+            self.phases.setdefault(i, self._constant(i, st))
+        const = angle.const + sum(p * self.phases[i] for i, p in angle.gears)
+        return Turn(step.body, replace(angle, const=const, gears=()))
+
+    def _constant(self, gear: int, st: State) -> float:
+        """Σ c·θ of a gear: of angles that are known, and of the guess for the others."""
+        shares = self.m.gears[gear].shares().items()
+        return sum(c * float(st.angle[b] if b in st.angle else self.angles.get(b, 0.0)) for b, c in shares)
+
+    def solutions(self, group: Group, case: Case, st: State) -> list[tuple[int, State]]:
+        found = []
+        for sign in (1, -1):
+            trial = st.copy()
+            try:
+                case.solve(trial, sign, self.m.size)
+            except ZeroDivisionError:
+                continue
+            if all(np.isfinite(trial.turn[b]) for b in group.members) and all(
+                np.isfinite(trial.slide[g]) for g in group.slides
+            ):
+                found.append((sign, trial))
+        return found
+
+    def _meeting(self, group: Group) -> str:
+        return (
+            f"[guess] at: {group.name} stands at a change point or a limit there, where its two assemblies "
+            "meet; taken is the one whose links stand still or turn with the input; another `at` chooses the other"
+        )
+
+    def _near(self, group: Group, case: Case, st: State, signs: Mapping[str, int], sign: int) -> None:
+        """Put the group into the state as it stands just beyond a point where its closed form has no direction."""
+        beside = State([q + 1e-7 * (self.m.size if self.m.inputs[0].is_slide else 1.0) for q in self.m.at])
+        before = Choice(self.m, self.plan, signs)
+        before.run_untracked(before.before(group), beside)
+        case.solve(beside, sign, self.m.size)
+        st.turn.update({b: beside.turn[b] for b in group.members})
+        st.slide.update({g: beside.slide[g] for g in group.slides})
+
+    def _ahead(
+        self, group: Group, case: Case, signs: Mapping[str, int], here: State | None = None
+    ) -> list[float] | None:
+        """How far the group's two assemblies go a little beyond the guess.
+
+        Each link's least distance to standing still or to turning with the input, so that a parallelogram is
+        preferred to its antiparallel twin; where the pose itself is not determined, the distance to the guess.
+        """
+        if len(self.m.inputs) != 1:
+            return None
+        step = 0.02 * (self.m.size if self.m.inputs[0].is_slide else 1.0)
+        before = Choice(self.m, self.plan, signs)
+        for side in (1, -1):
+            st = State([self.m.at[0] + side * step])
+            try:
+                before.run_untracked(before.before(group), st)
+            except (KeyError, ZeroDivisionError):
+                return None
+            found = self.solutions(group, case, st)
+            if len(found) == 2:
+                # seen from before the point, the Jacobian has the other sign on the same branch
+                distances = [self._distance(group, trial) for _, trial in found]
+                if here is not None and group.members:
+                    turned = complex(np.exp(1j * side * step))
+                    distances = [
+                        sum(
+                            min(abs(e - trial.turn[b]), abs(e * turned - trial.turn[b]))
+                            for b in group.members
+                            for e in [here.turn[b]]
+                        )
+                        for _, trial in found
+                    ]
+                return distances if side > 0 else distances[::-1]
+        return None
+
+    def _sign(self, group: Group, case: Case, st: State, signs: Mapping[str, int]) -> int:
+        if group.kind == "PRP":
+            try:
+                case.solve(st, 1, self.m.size)
+            except ZeroDivisionError:
+                raise AssemblyError(
+                    f"{group.name}: its two guides are parallel, so that its position is not determined; expected "
+                    "guides of different directions (`angle`)"
+                ) from None
+            return 1
+        found = self.solutions(group, case, st)
+        if not found:
+            ahead = self._ahead(group, case, signs)
+            if ahead is not None and self._informed(group):
+                self.warnings.append(self._meeting(group))
+                sign = (1, -1)[int(np.argmin(ahead))]
+                self._near(group, case, st, signs, sign)
+                return sign
+            st.turn.update({b: complex(np.nan, np.nan) for b in group.members})
+            st.slide.update(dict.fromkeys(group.slides, np.nan))
+            return self._sign_of_guess(group, case, st)
+        distances = [self._distance(group, trial) for _, trial in found]
+        # a guess to full precision tells apart even assemblies that all but meet; distances are squares
+        told = min(distances) < 1e-3 * max(distances) and max(distances) > 1e-28
+        if len(found) == 2 and abs(found[0][1].margin[group.name]) < 1e-14 and not told:
+            ahead = self._ahead(group, case, signs, found[0][1])
+            if ahead is not None:
+                distances = ahead
+            self.warnings.append(self._meeting(group))
+        elif len(found) == 2 and not self._informed(group):
+            raise AssemblyError(self._choices(group, [t for _, t in found]))
+        best = int(np.argmin(distances))
+        sign, chosen = found[best]
+        for name in ("turn", "point", "slide", "angle", "margin"):
+            getattr(st, name).update(getattr(chosen, name))
+        return sign
+
+    def _informed(self, group: Group) -> bool:
+        """Does the guess say anything about the links of this group?"""
+        given = self.m.guess
+        return any(b in given.angles for b in group.links) or any(
+            p in given.points for b in group.links for p in self.m.links[b].points
+        )
+
+    def _choices(self, group: Group, states: list[State]) -> str:
+        texts = []
+        for st in states:
+            parts = [f"{b} = {np.degrees(np.angle(st.turn[b])):.4g} deg" for b in group.members]
+            parts += [f"{self.m.guides[g].point} at {st.slide[g]:.4g} m" for g in group.slides]
+            texts.append(", ".join(parts))
+        return f"[guess]: {group.name} can be assembled in {len(texts)} ways; choose one: " + "; or ".join(
+            texts
+        )
+
+    def _distance(self, group: Group, st: State) -> float:
+        """How far an assembly is from the guess: chords of the unit circle, and points relative to the size."""
+        total = 0.0
+        for body in group.links:
+            if body in self.angles and body in st.turn:
+                total += abs(complex(st.turn[body]) - np.exp(1j * self.angles[body])) ** 2
+            base, terms = self.plan.anchors[body]
+            placed = all(t.body in st.turn and (t.slide is None or t.slide in st.slide) for t in terms)
+            if placed and base in st.point and body in st.turn:
+                for name, z in self.m.links[body].points.items():
+                    if name in self.points:
+                        here = st.point[base] + st.sum(terms) + z * st.turn[body]
+                        total += abs(here - self.points[name]) ** 2 / self.m.size**2
+        return total
+
+    def _sign_of_guess(self, group: Group, case: Case, st: State) -> int:
+        """Not assembled at the guess: the sign that the guessed angles would have."""
+        gap = case.gap(st)
+        why = "" if gap is None else f" ({gap.text('{:.6g} m'.format)})"
+        self.warnings.append(
+            f"[guess] at: {group.name} cannot be assembled there{why}; its branch is that of the guessed angles"
+        )
+        e = [np.exp(1j * self.angles[b]) if b in self.angles else None for b in group.angles]
+        try:
+            if group.kind == "RRR" and e[0] is not None and e[1] is not None:
+                return 1 if cross(case.arm(0, st) * e[0], case.arm(1, st) * e[1]) >= 0 else -1
+            if group.kind == "RRP" and e[0] is not None:
+                z, body = case.rails[0]
+                return 1 if dot(case.arm(0, st) * e[0], z * st.turn[body]) >= 0 else -1
+        except (KeyError, TypeError):
+            pass
+        return 1
+
+    # --- groups with no closed form ------------------------------------------------------------------------
+    def _newton(self, group: Group, st: State) -> Any:
+        many = st.copy(many=True)
+        why = ""
+        start = guessed_unknowns(group, many, self.angles, self.points, self.m, self.plan.directions)
+        if start is not None:
+            x, closed = newton(group, many, start, self.m.size)
+            if closed[0]:
+                write_unknowns(group, st, x)
+                return x[0]
+            left = float(np.linalg.norm(stack_rows(gaps(group, many), 1)))
+            why = f": from the guess on its loops stay {left:.6g} m apart"
+        found = every_solution(group, many, self.m.size)
+        if len(found) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
+            raise MobilityError(
+                f"{group.name}: more constraints than unknowns, and they contradict each other: a structure, or lengths "
+                f"that do not fit (look at {', '.join(self.plan.blocks.redundant)})"
+            )
+        if len(found) == 0:
+            raise AssemblyError(
+                f"[guess] at: {group.name} cannot be assembled there{why} (Newton-Raphson from many starts finds no "
+                "closed loop); give an `at` where it can, or check the lengths"
+            )
+        states = []
+        for x in found:
+            trial = st.copy()
+            write_unknowns(group, trial, x[None])
+            states.append(trial)
+        if len(found) > 1 and not self._informed(group):
+            raise AssemblyError(self._choices(group, states))
+        best = int(np.argmin([self._distance(group, trial) for trial in states]))
+        write_unknowns(group, st, found[best][None])
+        return found[best]

@@ -1,0 +1,100 @@
+"""The assemblies of a group with no closed form, at one input: the one that the guess means, and all others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from virtualwork.describe.description import Description
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.linear import stack, stack_rows
+from virtualwork.formulas.newton import gaps, newton, write_unknowns
+from virtualwork.formulas.numbers import dot
+from virtualwork.formulas.positions import State, columns
+from virtualwork.plan.steps import Group
+
+
+def guessed_unknowns(
+    group: Group,
+    st: State,
+    angles: Mapping[str, float],
+    points: Mapping[str, complex],
+    m: Description,
+    directions: Mapping[int, complex],
+) -> Any:
+    """A Newton group's unknowns from the guess, or None where an angle is not known.
+
+    A slide is that of the guessed points; where they do not say, it closes the loops as nearly as it can.
+    """
+    if any(b not in angles for b in group.angles):
+        return None
+    x = np.zeros((1, len(group.angles) + len(group.slides)))
+    x[0, : len(group.angles)] = [angles[b] for b in group.angles]
+    write_unknowns(group, st, x)
+    left = []
+    for j, g in enumerate(group.slides, len(group.angles)):
+        guide = m.guides[g]
+        on = complex(np.ravel(st.turn[guide.on])[0])
+        origin = _origin(guide.on, m.through(guide), on, points, m)
+        if guide.point in points and origin is not None:
+            x[0, j] = dot(points[guide.point] - origin, directions[g] * on)
+        else:
+            left.append(j)
+    write_unknowns(group, st, x)
+    if left:
+        # the loops are linear in the slides
+        along, gap = stack(columns(group, st), 1)[0][:, left], stack_rows(gaps(group, st), 1)[0]
+        if np.isfinite(along).all() and np.isfinite(gap).all():
+            x[0, left] = np.linalg.lstsq(along, -gap)[0]
+            write_unknowns(group, st, x)
+    return x
+
+
+def _origin(
+    body: str, z: complex, turn: complex, points: Mapping[str, complex], m: Description
+) -> complex | None:
+    if body == GROUND:
+        return z
+    for name, local in m.links[body].points.items():
+        if name in points:
+            return points[name] + (z - local) * turn
+    return None
+
+
+def every_solution(group: Group, st: State, size: float) -> Any:
+    """Every assembly of a Newton group at one input, by damped Newton from many starts spread evenly.
+
+    A systematic multi-start (Kronecker sequence of the generalised golden ratio): it finds what it finds, and does
+    not prove that there is no other.
+    """
+    n = len(group.angles) + len(group.slides)
+    starts = min(4096, 128 * n)
+    g = 1.0
+    for _ in range(64):
+        g = (1 + g) ** (1 / (n + 1))
+    u = (0.5 + np.outer(np.arange(1, starts + 1), g ** -np.arange(1.0, n + 1))) % 1.0
+    x0 = np.empty((starts, n))
+    na = len(group.angles)
+    x0[:, :na] = u[:, :na] * 2 * np.pi
+    x0[:, na:] = (2 * u[:, na:] - 1) * size
+    many = st.copy(many=True)
+    many.inputs = [np.full(starts, np.ravel(q)[0]) for q in st.inputs]
+    with np.errstate(all="ignore"):
+        x, closed = newton(group, many, x0, size)
+    x = x[closed]
+    if not len(x):
+        return x
+    x[:, :na] = (x[:, :na] + np.pi) % (2 * np.pi) - np.pi
+    keep: list[Any] = []
+    for row in x:
+        for other in keep:
+            d = row - other
+            d[:na] = np.abs(np.exp(1j * row[:na]) - np.exp(1j * other[:na]))
+            d[na:] /= size
+            if np.abs(d).max() < 1e-6:
+                break
+        else:
+            keep.append(row)
+    return np.array(keep)

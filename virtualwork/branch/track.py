@@ -1,0 +1,512 @@
+"""Along the input: change points, limits, and the branch between them.
+
+A closed form's Jacobian is ± the root of its radicand. Where the radicand touches zero without crossing it, two
+branches meet (a change point: the parallelogram at 0° and 180°, the folded kite); turning steadily through it, the
+Jacobian changes its sign. Where the radicand crosses zero the input can go no further (a limit). Both are found
+once, by sampling a turn of the input, and then to full precision. A pose's branch follows from the number of change
+points between the guess and it: nothing is marched in angle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from math import lcm
+from typing import Any
+
+import numpy as np
+
+from virtualwork.branch.change_point import ChangePoint, through
+from virtualwork.branch.choice import Choice
+from virtualwork.branch.continuation import Continuation, along_lines
+from virtualwork.describe.errors import MechanismError
+from virtualwork.formulas.numbers import EPS, Complexes, Number, Reals
+from virtualwork.formulas.positions import State, run
+from virtualwork.plan.steps import Group, Step, Turn
+
+# of one turn, or of one mechanism's size of slide
+SAMPLES = 720
+# a radicand below this may touch zero between two samples
+DIP = 0.05
+# change points nearer than this share of a turn are one
+SAME = 1e-6
+# turns of the input within which a branch is looked for to come back to itself
+TURNS = 32
+# poses of a turn that are compared for it
+COMPARED = 60
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Where the input can go no further, because a group's radicand crosses zero; `side` is where it is assembled."""
+
+    group: str
+    input: float
+    side: int
+
+
+class Track:
+    """What happens to an assembly along its one input."""
+
+    def __init__(self, assembly: Choice) -> None:
+        self.assembly = assembly
+        m = assembly.mechanism
+        self.plan = assembly.plan
+        self.active = len(m.inputs) == 1
+        self.start = m.at[0]
+        self.low = self.high = self.start
+        slide = m.inputs[0].is_slide
+        self.length = m.size if slide else 2 * np.pi
+        self.flips: dict[str, Reals] = {}
+        self.changes: dict[str, list[ChangePoint]] = {}
+        self._brackets: list[tuple[str, float, float]] = []
+        self._marched: dict[str, Continuation] = {}
+        self._followed: dict[str, tuple[Reals, Reals]] = {}
+        # one turn says it all where every turn of a body is a whole number of turns of the input
+        whole = all(
+            float(k).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, k in s.angle.inputs
+        ) and all(
+            float(r).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, r in s.angle.bases
+        )
+        self.whole = whole and not slide
+        self._repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
+        # no change point anywhere, however far the input turns
+        self.settled = False
+        # groups that are singular in every pose
+        self.folded: set[str] = set()
+        # where one turn begins, and what it has
+        self._period: tuple[float, dict[str, list[ChangePoint]]] | None = None
+        if not self.active:
+            self._look_around()
+
+    # --- what poses ask ---------------------------------------------------------------------------------------
+    def run(self, steps: Iterable[Step], st: State) -> None:
+        """Work out positions, step by step, each group on its branch."""
+        run(steps, st, self.close, self.assembly.plain)
+
+    def close(self, group: Group, st: State) -> None:
+        """Close the loops of one group."""
+        if group.kind == "Newton":
+            self._close_newton(group, st)
+            return
+        case, size = self.assembly.cases[group.name], self.assembly.mechanism.size
+        if group.name in self.flips and group.name not in self.folded:
+            case.solve(st, self.sign(group, st.inputs[0]), size)
+            self.mend(group, st)
+        else:
+            case.solve(st, self.assembly.signs[group.name], size, group.name in self.folded)
+        for body in self.assembly.geared.intersection(group.members):
+            st.angle[body] = self.unwound(body, st.inputs[0], np.angle(st.turn[body]))
+
+    def cover(self, low: float, high: float) -> None:
+        """Look for change points and limits over the inputs from low to high."""
+        if self.settled or not self.active:
+            return
+        if not (np.isfinite(low) and np.isfinite(high)):
+            return
+        low, high = min(low, self.start), max(high, self.start)
+        first = self.low == self.high
+        if first and low == high:
+            high = low + 1e-3 * self.length
+        if max(self.high - low, high - self.low) > 20000 * self.length:
+            raise MechanismError(
+                f"the input is asked {abs(high - low) / self.length:.3g} turns away from the guess; give `at` nearer"
+            )
+        with np.errstate(all="ignore"):
+            while self.high < high:
+                self._turn(self.high)
+                self.high += self.length
+                if first and self._seen_all():
+                    return
+                first = False
+            while self.low > low:
+                self.low -= self.length
+                self._turn(self.low)
+                if first and self._seen_all():
+                    return
+                first = False
+
+    def _seen_all(self) -> bool:
+        """Whether the one turn looked through says it all, or that it repeats."""
+        self.settled = self._repeats and not any(len(f) for f in self.flips.values())
+        if self._repeats and not self.assembly.geared:
+            # the first point of the turn may be found at its end again
+            seam = self.low + (1 - SAME) * self.length
+            turn = {name: [c for c in points if c.input < seam] for name, points in self.changes.items()}
+            if not any(len(points) % 2 for points in turn.values()):  # every group is back on its branch
+                self._period = self.low, turn
+        return self.settled
+
+    def _turn(self, a: float) -> None:
+        """Look through the turn that begins at a, or take over what a turn before it had."""
+        if self._period is None:
+            self._scan(a, a + self.length)
+            return
+        begin, turn = self._period
+        for name, points in turn.items():
+            for change in points:
+                where = change.input + self.length * round((a - begin) / self.length)
+                if np.abs(self.flips[name] - where).min() > SAME * self.length:
+                    self.flips[name] = np.sort(np.append(self.flips[name], where))
+                    self.changes[name].append(replace(change, input=where))
+
+    def sign(self, group: Group, q: Number) -> Number:
+        """The sign of the group's Jacobian at inputs q."""
+        base = self.assembly.signs[group.name]
+        flips = self.flips.get(group.name)
+        if flips is None or not len(flips):
+            return base
+        passed = np.searchsorted(flips, q, "right") - np.searchsorted(flips, self.start, "right")
+        return base * (1 - 2 * (passed & 1))
+
+    def mend(self, group: Group, st: State) -> None:
+        """Replace positions close to a change point by the series through it."""
+        for change, near, delta in self._near(group, st.inputs[0]):
+            move = change.unknown(delta, 0)
+            for j, body in enumerate(group.angles):
+                _put(st.turn, body, near, change.turn[j] * np.exp(1j * move[..., j]))
+            for j, g in enumerate(group.slides):
+                _put(st.slide, g, near, change.slide[j] + move[..., len(group.angles) + j])
+            _put(st.margin, group.name, near, np.zeros(np.shape(delta)))
+            for tie in group.ties:
+                st.turn[tie.body] = st.rotate(tie.angle)
+
+    def mend_rates(self, group: Group, q: Number, k: int, x: list[Number]) -> list[Number]:
+        """The same for the unknowns' k-th derivatives."""
+        for change, near, delta in self._near(group, q):
+            rate = change.unknown(delta, k)
+            for j in range(len(x)):
+                if near is None:
+                    x[j] = float(rate[..., j])
+                else:
+                    x[j] = np.array(np.broadcast_to(x[j], np.shape(q)))
+                    x[j][near] = rate[..., j]
+        return x
+
+    def bridge_rates(self, group: Group, q: Number, k: int, x: list[Number], singular: Any) -> list[Number]:
+        """Derivatives of a Newton group at poses where its Jacobian is singular though the branch goes on."""
+        if not self.active or group.name not in self._marched:
+            return x
+        for i in np.flatnonzero(singular):
+            rate = self._marched[group.name].bridge(float(np.atleast_1d(q)[i]), k)
+            if not np.isfinite(
+                rate
+            ).all():  # close to a limit nothing goes on: what the Jacobian gives is kept
+                continue
+            for j in range(len(x)):
+                if np.ndim(q) == 0:
+                    x[j] = float(rate[j])
+                else:
+                    x[j] = np.array(np.broadcast_to(x[j], np.shape(q)))
+                    x[j][i] = rate[j]
+        return x
+
+    def unwound(self, body: str, q: Number, angle: Number) -> Number:
+        """An angle with its whole turns, counted from the guess."""
+        if not self.active or body not in self._followed:
+            return angle
+        nodes, turns = self._followed[body]
+        good = np.isfinite(turns)
+        near = np.interp(q, nodes[good], turns[good])
+        whole = angle + 2 * np.pi * np.round((near - angle) / (2 * np.pi))
+        return whole if np.ndim(q) else float(whole)
+
+    def _follow(self, body: str, q: Reals, angle: Reals) -> None:
+        """Add samples of an angle and count its turns from the guess."""
+        nodes, angles = self._followed.get(body, (np.empty(0), np.empty(0)))
+        nodes, first = np.unique(np.append(nodes, q), return_index=True)
+        angles = np.append(angles, np.broadcast_to(angle, q.shape))[first]
+        good = np.isfinite(angles)
+        if good.any():
+            angles[good] = np.unwrap(angles[good])
+            here = np.interp(self.start, nodes[good], angles[good])
+            angles = angles - 2 * np.pi * np.round(here / (2 * np.pi))
+            self._followed[body] = nodes, angles
+
+    def _near(self, group: Group, q: Number) -> Iterator[tuple[ChangePoint, Any, Number]]:
+        for change in self.changes.get(group.name, ()):
+            if np.ndim(q) == 0:
+                if abs(q - change.input) < change.reach:
+                    yield change, None, q - change.input
+            else:
+                near = np.abs(q - change.input) < change.reach
+                if near.any():
+                    yield change, near, q[near] - change.input
+
+    def _fold(self, name: str) -> None:
+        """Note a group that is singular in every pose."""
+        self.folded.add(name)
+        self.assembly.plain.pop(name, None)
+
+    def _look_around(self) -> None:
+        """With several inputs: which closed forms are singular at all poses around the guess."""
+        at = self.assembly.mechanism.at
+        golden = np.sqrt(np.arange(2.0, 2 + len(at)))
+        off = (np.multiply.outer(np.arange(1.0, 25), golden) % 1.0 - 0.5) * 0.1 * self.length
+        st = State([a + off[:, j] for j, a in enumerate(at)], many=True)
+        with np.errstate(all="ignore"):
+            for s in self.plan.steps:
+                if isinstance(s, Group) and s.kind == "Newton":
+                    return
+                self.assembly.run_untracked([s], st)
+                if isinstance(s, Group) and self._meets(s, st.margin[s.name]):
+                    self._fold(s.name)
+                    self.assembly.cases[s.name].solve(st, 1, self.assembly.mechanism.size, folded=True)
+
+    def _meets(self, group: Group, margin: Number) -> bool:
+        """Whether a radicand is zero to rounding wherever there is one."""
+        if group.kind == "PRP":
+            return False
+        m = np.abs(np.atleast_1d(margin))
+        m = m[np.isfinite(m)]
+        return len(m) > 4 and bool((m <= self._noise(group)).all())
+
+    def _noise(self, group: Group) -> float:
+        """The rounding of a group's radicand."""
+        size, r = self.assembly.mechanism.size, self._radii(group)
+        return 256 * EPS * (1 + (size / r) ** 2 if r else 1)
+
+    def warnings(self) -> tuple[str, ...]:
+        """The assembly's warnings, and the groups that are singular in every pose in what was covered."""
+        found = []
+        for g in self.plan.groups:
+            if g.name in self.folded:
+                guides = self.assembly.mechanism.guides
+                what = ", ".join([*g.members, *(f"the slide at {guides[s].point}" for s in g.slides)])
+                found.append(
+                    f"singular in every pose: the speed of {what} is not determined: the assemblies of {g.name} meet "
+                    "all along. Places are those where they meet; rates and forces that hang on them are left out"
+                )
+        meeting = tuple(f"[guess] at: {name} " for name in self.folded)
+        return (*found, *(w for w in self.assembly.warnings if not (meeting and w.startswith(meeting))))
+
+    # --- looking ahead ------------------------------------------------------------------------------------------
+    def margin(self, group: Group, q: Reals) -> Reals:
+        """The group's radicand at inputs q, on the branch known so far."""
+        st = State([q], many=True)
+        with np.errstate(all="ignore"):
+            self.run(self.assembly.needed(self.plan.writes(group)), st)
+        return np.broadcast_to(st.margin[group.name], q.shape).astype(float)
+
+    def _scan(self, a: float, b: float) -> None:
+        step = (b - a) / SAMPLES
+        q: Reals = a + step * (np.arange(-3, SAMPLES + 3, dtype=float) + 0.5)
+        st = State([q], many=True)
+        for s in self.plan.steps:
+            if isinstance(s, Group) and s.kind != "Newton":
+                self.close(s, st)
+                if s.kind == "PRP":
+                    continue
+                m = np.broadcast_to(st.margin[s.name], q.shape)
+                if self._look(s, q, m, a, b):
+                    self.close(s, st)
+                for body in self.assembly.geared.intersection(s.members):
+                    self._follow(body, q, np.angle(st.turn[body]))
+                    st.angle[body] = self.unwound(body, q, np.angle(st.turn[body]))
+            elif isinstance(s, Group):
+                self._continued(s).extend(a, b)
+                if self._continued(s).singular():
+                    self._fold(s.name)
+                self.close(s, st)
+            else:
+                self.run([s], st)
+
+    def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
+        """Find where the radicand crosses or touches zero; say whether a change point was found."""
+        if self._meets(group, m):
+            self._fold(group.name)
+            return True
+        if np.mean(np.abs(m) < 1e-14) > 0.9:
+            return False  # stretched all along: zeros of rounding are no change points
+        inside = (q >= a) & (q < b)
+        crossing = np.flatnonzero((m[:-1] >= 0) != (m[1:] >= 0))
+        for i in crossing:
+            if np.isfinite(m[i]) and np.isfinite(m[i + 1]) and inside[i] | inside[i + 1]:
+                self._brackets.append((group.name, float(q[i]), float(q[i + 1])))
+        dips = 1 + np.flatnonzero((m[1:-1] <= m[:-2]) & (m[1:-1] < m[2:]) & (np.abs(m[1:-1]) < DIP))
+        fresh: list[float] = []
+        for i in dips:
+            found = self._bottom(group, float(q[i - 1]), float(q[i + 1]))
+            if found is None:
+                continue
+            where, depth, noise = found
+            if depth < -noise and m[i] > 0:  # the gap is narrower than the samples
+                self._brackets += [(group.name, float(q[i - 1]), where), (group.name, where, float(q[i + 1]))]
+            edge = 1e-9 * self.length  # a change point at the seam of two chunks belongs to both
+            if abs(depth) <= noise and a - edge <= where < b + edge:
+                known = self.flips.setdefault(group.name, np.empty(0))
+                self.assembly.plain.pop(group.name, None)
+                if not len(known) or np.abs(known - where).min() > SAME * self.length:
+                    self._brackets = [
+                        x for x in self._brackets if not (x[0] == group.name and x[1] <= where <= x[2])
+                    ]
+                    # a guess at the change point itself means the branch beyond it
+                    here = min(where, self.start) if abs(where - self.start) < 1e-9 * self.length else where
+                    self.flips[group.name] = np.sort(np.append(known, here))
+                    fresh.append(where)
+        # the branch through each one can be told only once all of them are known
+        for where in fresh:
+            self.changes.setdefault(group.name, []).append(through(self, group, where))
+        return bool(fresh)
+
+    def _bottom(self, group: Group, a: float, b: float) -> tuple[float, float, float] | None:
+        """The lowest point of a radicand near a sampled dip: where, how low, and the rounding in that depth.
+
+        The radicand is smooth: it is fitted at Chebyshev points, and its slope's root is free of cancellation.
+        """
+        centre, half = (a + b) / 2, (b - a) / 2
+        for widen in (1.0, 4.0):
+            nodes = np.cos(np.pi * (np.arange(14) + 0.5) / 14)
+            m = self.margin(group, centre + widen * half * nodes)
+            if not np.isfinite(m).all():
+                if widen == 1.0:
+                    return None
+                break
+            fit = np.polynomial.Chebyshev.fit(nodes, m, 11, domain=[-1, 1])
+            roots = fit.deriv().roots()
+            real = np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= 1.2)])
+            if not len(real):
+                return None
+            best = real[np.argmin(np.abs(fit(real)))]
+            where, depth = centre + widen * half * float(best), float(fit(best))
+            level = float(np.abs(m).max())
+            centre = where
+        return where, depth, self._noise(group) + 1e-9 * EPS * level
+
+    def _radii(self, group: Group) -> float:
+        arms = [abs(a) for a in self.assembly.cases[group.name].arms if a]
+        return min(arms, default=self.assembly.mechanism.size)
+
+    @property
+    def has_limits(self) -> bool:
+        """Was any limit met in what was covered?"""
+        return bool(self._brackets) or any(march.ends for march in self._marched.values())
+
+    # --- the branch's own scale -----------------------------------------------------------------------------------
+    @cached_property
+    def turns(self) -> int | None:
+        """How many turns of the input bring every group back to where it stood: the period of the branch.
+
+        A branch that passes an odd number of change points in a turn needs two; a fractional gear its own number. A
+        branch between two limits needs what tells its own inputs apart. None with a slide or several inputs, and where
+        no number of turns up to `TURNS` does it.
+        """
+        if not self.active or self.assembly.mechanism.inputs[0].is_slide:
+            return None
+        self.cover(self.start, self.start + self.length)
+        if self.settled or self._period is not None or not self.plan.groups:
+            return 1
+        steps = self.assembly.needed([key for g in self.plan.groups for key in self.plan.writes(g)])
+        factors = [k for s in steps if isinstance(s, Turn) for _, k in s.angle.inputs]
+        ratios = [Fraction(k).limit_denominator(TURNS) for k in factors]
+        if any(abs(float(r) - k) > 1e-12 * abs(k) for r, k in zip(ratios, factors, strict=True)):
+            return None
+        whole = lcm(*(r.denominator for r in ratios))
+        q = self.start + self.length * (np.arange(COMPARED) + 0.5) / COMPARED
+        here = self._stands(q)
+        for n in range(whole, TURNS + 1, whole):
+            self.cover(self.start - n * self.length, self.start + self.length)
+            # beyond a limit there is nothing to compare: what is not assembled contradicts nothing
+            if not (np.abs(self._stands(q - n * self.length) - here) > SAME).any():
+                return self._between_limits(n)
+        return self._between_limits(None)
+
+    def _between_limits(self, n: int | None) -> int | None:
+        """The turns of a range between two limits; n where there is none."""
+        if n == 1 or not self.has_limits:
+            return n
+        shifts = (0.0,) if n is None else (0.0, n * self.length)
+        every = [(limit.input + shift, limit.side) for limit in self._ends() for shift in shifts]
+        above = [q for q, side in every if q > self.start and side < 0]
+        below = [q for q, side in every if q < self.start and side > 0]
+        if not above or not below:
+            return n
+        return max(1, int(np.ceil((min(above) - max(below)) / self.length)))
+
+    def _stands(self, q: Reals) -> Complexes:
+        """Rotations and slides (over the size) of all groups at inputs q; NaN where not assembled."""
+        st = State([q], many=True)
+        with np.errstate(all="ignore"):
+            self.run(self.assembly.needed([key for g in self.plan.groups for key in self.plan.writes(g)]), st)
+        rows = [st.turn[b] for g in self.plan.groups for b in g.members]
+        rows += [st.slide[s] / self.assembly.mechanism.size for g in self.plan.groups for s in g.slides]
+        return np.array([np.broadcast_to(row, q.shape) for row in rows])
+
+    @property
+    def period(self) -> float | None:
+        """The input's span after which the branch repeats, rad; None where it does not, or with a slide."""
+        return None if self.turns is None else self.turns * self.length
+
+    def apart(self, q: Reals, from_: float) -> Reals:
+        """How far inputs are from one, by the nearest way round the branch."""
+        d = np.asarray(q - from_)
+        return d if self.period is None else d - self.period * np.round(d / self.period)
+
+    # --- limits ---------------------------------------------------------------------------------------------------
+    def limits(self) -> list[Limit]:
+        """Where the input can go no further, over one period of the branch or what was covered, to full precision."""
+        back = self.length if self.assembly.mechanism.inputs[0].is_slide or not self._repeats else 0.0
+        self.cover(self.start - back, self.start + (self.period or self.length))
+        return self._ends()
+
+    def _ends(self) -> list[Limit]:
+        """The limits in what was covered."""
+        by_name = {g.name: g for g in self.plan.groups}
+        found = [self._root(by_name[name], a, b) for name, a, b in self._brackets]
+        for name, marched in self._marched.items():
+            found += [Limit(name, q, side) for q, side in marched.ends]
+        unique: list[Limit] = []
+        for limit in sorted(found, key=lambda x: x.input):
+            if not unique or abs(limit.input - unique[-1].input) > 1e-10 * self.length:
+                unique.append(limit)
+        return unique
+
+    def _root(self, group: Group, a: float, b: float) -> Limit:
+        """The radicand's crossing between a and b: regula falsi (Illinois), then the last bits by bisection."""
+        fa, fb = (float(self.margin(group, np.array([q]))[0]) for q in (a, b))
+        side = -1 if fa >= 0 else 1
+        for _ in range(200):
+            if fa == 0 or fb == 0 or abs(b - a) <= 2 * EPS * max(abs(a), abs(b)):
+                break
+            q = b - fb * (b - a) / (fb - fa)
+            if not min(a, b) < q < max(a, b):
+                q = (a + b) / 2
+                if q in (a, b):
+                    break
+            f = float(self.margin(group, np.array([q]))[0])
+            if (f >= 0) != (fb >= 0):
+                a, fa = b, fb
+            else:
+                fa *= 0.5
+            b, fb = q, f
+        return Limit(group.name, a if abs(fa) < abs(fb) else b, side)
+
+    @property
+    def crossings(self) -> list[float]:
+        """Inputs at which two branches cross, in what was covered: of closed forms, and met on the way of the others."""
+        found = [float(q) for flips in self.flips.values() for q in flips]
+        return found + [float(q) for marched in self._marched.values() for q in marched.crossings]
+
+    # --- groups with no closed form ------------------------------------------------------------------------------
+    def _continued(self, group: Group) -> Continuation:
+        if group.name not in self._marched:
+            self._marched[group.name] = Continuation(self, group)
+        return self._marched[group.name]
+
+    def _close_newton(self, group: Group, st: State) -> None:
+        """Close a Newton group at the state's poses, from its continued branch."""
+        if self.active:
+            self._continued(group).close(st)
+        else:
+            along_lines(self, group, st)
+
+
+def _put(store: dict[Any, Any], key: Any, near: Any, value: Any) -> None:
+    if near is None:
+        store[key] = complex(value) if np.iscomplexobj(value) else float(value)
+        return
+    whole = np.array(np.broadcast_to(store[key], near.shape))
+    whole[near] = value
+    store[key] = whole

@@ -1,0 +1,148 @@
+"""A mechanism as its designer describes it: who is pinned, guided, geared, driven and loaded by what. Frozen, SI.
+
+Nothing is solved here: this is what the order of solution, the formulas and the studies work on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+from dalembert.arithmetic.records import record
+from virtualwork.describe.checks import refuse
+from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
+from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link, Point, as_point, as_points
+from virtualwork.describe.record import Record
+
+
+@record
+@dataclass(frozen=True, eq=False, repr=False)
+class Description(Record):
+    """The description of a planar mechanism; `virtualwork.Mechanism` is one that can also be asked.
+
+    Raises
+    ------
+    DescriptionError
+        Where names are unknown or sizes contradict each other; the message names the place.
+    """
+
+    ground: Mapping[str, complex]
+    links: Mapping[str, Link]
+    guides: tuple[Guide, ...] = ()
+    gears: tuple[Gear, ...] = ()
+    inputs: tuple[Input, ...] = ()
+    guess: Guess = field(default_factory=Guess)
+    name: str = ""
+    gravity: complex = 0j
+    forces: tuple[Force, ...] = ()
+    torques: tuple[Torque, ...] = ()
+    springs: tuple[Spring, ...] = ()
+    torsion_springs: tuple[TorsionSpring, ...] = ()
+    motors: tuple[Motor, ...] = ()
+    friction: tuple[Friction, ...] = ()
+
+    def __init__(
+        self,
+        ground: Mapping[str, Point],
+        links: Mapping[str, Link],
+        guides: Sequence[Guide] = (),
+        gears: Sequence[Gear] = (),
+        inputs: Input | Sequence[Input] = (),
+        guess: Guess | None = None,
+        name: str = "",
+        gravity: Point = 0j,
+        forces: Sequence[Force] = (),
+        torques: Sequence[Torque] = (),
+        springs: Sequence[Spring] = (),
+        torsion_springs: Sequence[TorsionSpring] = (),
+        motors: Sequence[Motor] = (),
+        friction: Sequence[Friction] = (),
+    ) -> None:
+        values = {
+            "ground": as_points(ground),
+            "links": MappingProxyType(dict(links)),
+            "guides": tuple(guides),
+            "gears": tuple(gears),
+            "inputs": (inputs,) if isinstance(inputs, Input) else tuple(inputs),
+            "guess": guess or Guess(),
+            "name": name,
+            "gravity": as_point(gravity),
+            "forces": tuple(forces),
+            "torques": tuple(torques),
+            "springs": tuple(springs),
+            "torsion_springs": tuple(torsion_springs),
+            "motors": tuple(motors),
+            "friction": tuple(friction),
+        }
+        for key, value in values.items():
+            object.__setattr__(self, key, value)
+        refuse(
+            self.links,
+            self.bodies,
+            self.pins,
+            self.guides,
+            self.gears,
+            self.inputs,
+            self.guess,
+            {"forces": self.forces, "torques": self.torques},
+        )
+
+    def __repr__(self) -> str:
+        counts = ((len(self.links), "link"), (len(self.pins) + len(self.guides) + len(self.gears), "joint"))
+        said = ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for n, what in counts)
+        driven = ", ".join(e.name for e in self.inputs) or "nothing"
+        return f"{type(self).__name__}({self.name!r}: {said}, driven: {driven})"
+
+    @cached_property
+    def size(self) -> float:
+        """The characteristic length, m: the longest distance between two points of one link or of the ground.
+
+        Every tolerance is relative to it.
+        """
+        spans = [abs(a - b) for body in self.bodies.values() for a in body.values() for b in body.values()]
+        rooms = [abs(g.through) for g in self.guides if not isinstance(g.through, str)]
+        return max(spans + rooms, default=0.0) or 1.0
+
+    @cached_property
+    def bodies(self) -> Mapping[str, Mapping[str, complex]]:
+        """The points of each body in its own axes; the ground comes first."""
+        return {GROUND: self.ground} | {name: link.points for name, link in self.links.items()}
+
+    @cached_property
+    def pins(self) -> Mapping[str, tuple[str, ...]]:
+        """The bodies that meet at each pin, in the order of the file, the ground first."""
+        holders: dict[str, list[str]] = {}
+        for body, points in self.bodies.items():
+            for point in points:
+                holders.setdefault(point, []).append(body)
+        return {point: tuple(bodies) for point, bodies in holders.items() if len(bodies) > 1}
+
+    @cached_property
+    def at(self) -> tuple[float, ...]:
+        """The inputs at which the guess is meant: its `at`, else each input's own value, else its guessed angle."""
+        if self.guess.at is not None:
+            return self.guess.at
+        return tuple(
+            entry.value if entry.value is not None else self.guess.angles.get(entry.name, 0.0)
+            for entry in self.inputs
+        )
+
+    def through(self, guide: Guide) -> complex:
+        """A point of a guide's line, in the axes of the body that carries it."""
+        return self.bodies[guide.on][guide.through] if isinstance(guide.through, str) else guide.through
+
+    def guide_of(self, entry: Input) -> int:
+        """The guide along which a slide input drives."""
+        return next(i for i, guide in enumerate(self.guides) if guide.point == entry.slider)
+
+    def driver_of(self, guide: int) -> int | None:
+        """The input that drives along a guide; None where none does."""
+        point = self.guides[guide].point
+        return next((j for j, entry in enumerate(self.inputs) if entry.slider == point), None)
+
+    def carrier(self, j: int) -> str:
+        """The body that feels the reaction of input j's torque: the carrier of its motor, else what it is driven on."""
+        entry = self.inputs[j]
+        return next((motor.carrier for motor in self.motors if motor.drives == entry.link), entry.on)

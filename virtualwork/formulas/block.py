@@ -1,0 +1,182 @@
+"""A block of poses as the loads see it: where points lie, how far they move, what has been formed there already.
+
+Whatever hangs on loads, a load's value or a quantity made of several, is formed once in a block, when it is first
+asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from virtualwork.describe.loads import TorsionSpring
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.numbers import Number, Reals, plus, times
+from virtualwork.formulas.poses import Poses, part
+from virtualwork.formulas.positions import State
+from virtualwork.formulas.rates import Rates
+from virtualwork.plan.steps import Path
+
+
+class Setting:
+    """What all blocks of a scene share: the poses, whether they move, how far torsion springs are wound.
+
+    Attributes
+    ----------
+    formed : set of str
+        The names of the joint forces formed so far.
+    drive : array (n, k), or None
+        The effort at each input by virtual work, as motors that other links carry need it.
+    """
+
+    def __init__(self, poses: Poses, at_rest: bool) -> None:
+        self.poses, self.at_rest = poses, at_rest
+        self.mechanism, self.plan = poses.mechanism, poses.plan
+        self.formed: set[str] = set()
+        self.drive: Reals | None = None
+        self._followed: dict[TorsionSpring, tuple[Reals, Reals]] = {}
+
+    @cached_property
+    def moves(self) -> bool:
+        """Whether anything moves at all: a speed or an acceleration that is not zero."""
+        return not self.at_rest and any(np.any(rate) for rates in self.poses.rates[:2] for rate in rates)
+
+    def rates(self, rows: slice, many: bool) -> tuple[Number, Number]:
+        """q̇ and q̈ of the one input over a block, None where zero."""
+        if self.at_rest:
+            return None, None
+        speed, acceleration, _ = self.poses.rates
+        return part(speed[0], rows, many), part(acceleration[0], rows, many)
+
+    def twist(self, st: State, spring: TorsionSpring) -> Number:
+        """θ_second − θ_first − free angle: within half a turn at the guess, and from there on followed continuously.
+
+        Where the inputs alone fix both angles they are taken as they are, whole turns included. With several inputs
+        the angle lies within half a turn of free.
+        """
+        a, b = spring.links
+        known = [self.plan.angles[body] for body in (a, b)]
+        if all(not angle.bases for angle in known):
+            return (st.affine(known[1]) - spring.free_angle) - st.affine(known[0])
+        relative = st.turn[b] * np.conj(st.turn[a]) * complex(np.exp(-1j * spring.free_angle))
+        within = np.angle(relative)
+        if len(st.inputs) == 1:
+            q, unwrapped = self._unwrapped(spring)
+            rough = np.interp(np.asarray(st.inputs[0], dtype=float), q, unwrapped)
+            within = within + 2 * np.pi * np.round((rough - within) / (2 * np.pi))
+        return within if st.many else float(within)
+
+    def _unwrapped(self, spring: TorsionSpring) -> tuple[Reals, Reals]:
+        """The twist of a torsion spring followed from the guess, roughly: only its whole turns are used."""
+        if spring not in self._followed:
+            m = self.mechanism
+            inputs, at = self.poses.inputs[:, 0], m.at[0]
+            low, high = min(float(np.nanmin(inputs)), at), max(float(np.nanmax(inputs)), at)
+            step = m.size / 720 if m.inputs[0].is_slide else 2 * np.pi / 720
+            q = np.linspace(low, high, min(20000, 2 + int((high - low) / step)))
+            along = self.poses.again(q[:, None])
+            a, b = (along.angle(body) if body != GROUND else np.zeros(len(q)) for body in spring.links)
+            relative = np.angle(np.exp(1j * (b - a - spring.free_angle)))
+            there = np.isfinite(relative)
+            path = np.unwrap(relative[there])
+            if len(path):
+                start = int(np.argmin(np.abs(q[there] - at)))
+                path = path + (relative[there][start] - path[start])
+                q = q[there]
+            self._followed[spring] = (q, path) if len(path) else (q, np.zeros(len(q)))
+        return self._followed[spring]
+
+
+class Formed(Protocol):
+    """Something that a block forms once: a load, or a quantity made of loads."""
+
+    @property
+    def lasts(self) -> bool:
+        """Whether it is kept over a long sweep, for others that ask later."""
+
+    def form(self, block: Block) -> Any:
+        """Its value over a block."""
+
+
+class Block:
+    """A block of poses as the loads see it: positions, velocity coefficients, velocities, accelerations.
+
+    A derivative that is identically zero is None.
+    """
+
+    def __init__(
+        self, setting: Setting, rows: slice, st: State, along: Rates | None, by: list[Rates]
+    ) -> None:
+        self.setting, self.rows, self.st, self.along, self.by = setting, rows, st, along, by
+        self.one = len(by) == 1
+        self.rates = setting.rates(rows, st.many) if self.one else (None, None)
+        # the friction of each pair that rubs, from the last iterate of its reaction
+        self.friction: dict[int, Number] = {}
+        self.kept: dict[Formed, Any] = {}
+
+    def formed(self, what: Formed) -> Any:
+        """The value of a load or a quantity, formed once."""
+        if what not in self.kept:
+            self.kept[what] = what.form(self)
+        return self.kept[what]
+
+    def forget(self, *, lasting: bool = False) -> None:
+        """Drop the arrays, or all but those that others will ask for."""
+        self.kept = {what: value for what, value in self.kept.items() if lasting and what.lasts}
+
+    def second(self, derivative: Callable[[Rates, int], Number]) -> tuple[float, Number]:
+        """ẍ = K q̈ + L q̇² of what has the derivatives K, L over the input: a factor and an array."""
+        if not self.one:
+            return 1.0, None if self.along is None else derivative(self.along, 2)
+        speed, rate = self.rates
+        normal = None if speed is None else derivative(self.by[0], 2)
+        tangential = None if rate is None else derivative(self.by[0], 1)
+        if tangential is None and isinstance(speed, float):
+            # one number for all poses: the array stays as it is
+            return speed * speed, normal
+        return 1.0, plus(times(normal, times(speed, speed)), times(tangential, rate))
+
+    def _first(self, derivative: Callable[[Rates], Number]) -> Number:
+        """ẋ = K q̇."""
+        if self.one:
+            return times(derivative(self.by[0]), self.rates[0])
+        return None if self.along is None else derivative(self.along)
+
+    def position(self, path: Path) -> Number:
+        """P, complex."""
+        return self.st.at(path)
+
+    def coefficient(self, path: Path, j: int) -> Number:
+        """∂P/∂q_j, complex."""
+        return self.by[j].vector(path, 1)
+
+    def turning(self, body: str, j: int) -> Number:
+        """∂θ/∂q_j."""
+        return None if body == GROUND else self.by[j].angle[body][0]
+
+    def velocity(self, path: Path) -> Number:
+        """Ṗ, complex."""
+        return self._first(lambda rates: rates.vector(path, 1))
+
+    def omega(self, body: str) -> Number:
+        """ω."""
+        return None if body == GROUND else self._first(lambda rates: rates.angle[body][0])
+
+    def slide_rate(self, guide: int) -> Number:
+        """ṡ of a guide."""
+        return self._first(lambda rates: rates.slide[guide][0])
+
+    def acceleration(self, path: Path, factor: float = 1.0) -> Number:
+        """P̈ = K q̈ + L q̇², complex, times a factor."""
+        own, value = self.second(lambda rates, k: rates.vector(path, k))
+        return None if value is None else value * (own * factor)
+
+    def alpha(self, body: str, factor: float = 1.0) -> Number:
+        """α, times a factor."""
+        if body == GROUND:
+            return None
+        own, value = self.second(lambda rates, k: rates.angle[body][k - 1])
+        return None if value is None else value * (own * factor)

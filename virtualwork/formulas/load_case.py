@@ -1,0 +1,232 @@
+"""The loads of a mechanism, at rest or in motion: what its description gives, as loads that act.
+
+A load that is zero for the whole case (no mass, no speed, no stiffness) is not made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from virtualwork.describe.description import Description
+from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe.loads import Force, Spring, TorsionSpring
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.loads import (
+    Constant,
+    Follower,
+    FrictionLoad,
+    InertiaForce,
+    InertiaTorque,
+    Load,
+    SpringEnd,
+    Tabled,
+    TorsionEnd,
+)
+from virtualwork.formulas.quantities import Combination, Quantities
+from virtualwork.plan.joints import Joint, joints
+from virtualwork.plan.steps import Path, Place, Plan, Term, combined
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """Mass, centre of mass and inertia of a link, with the motors it carries."""
+
+    mass: float
+    center: complex
+    inertia: float
+
+
+def rigid(m: Description, body: str) -> Rigid:
+    """Mass properties of a link with the motors it carries (Ibrahim §2.3: their mass and centre join the link).
+
+    The common centre is Σ m z / Σ m, and the inertia about it gains Σ m |z − z_G|² (Steiner).
+
+    >>> from virtualwork import Link, Mechanism, Motor
+    >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": 1}, mass=2, center=0.25, inertia=0.1)},
+    ...                 motors=[Motor("arm", "tool", mass=1, center=1)])
+    >>> rigid(arm, "arm")
+    Rigid(mass=3.0, center=(0.5+0j), inertia=0.475)
+    """
+    link = m.links[body]
+    parts = [(link.mass, link.center, link.inertia)]
+    parts += [(motor.mass, motor.center, 0.0) for motor in m.motors if motor.carrier == body and motor.mass]
+    if len(parts) == 1:
+        return Rigid(*parts[0])
+    mass = sum(part[0] for part in parts)
+    center = sum((part[0] * part[1] for part in parts), 0j) / mass if mass else link.center
+    return Rigid(mass, center, sum(i + w * abs(z - center) ** 2 for w, z, i in parts))
+
+
+class LoadCase:
+    """What acts on a mechanism, at rest or moving; a load that is zero throughout is not in the list.
+
+    It hangs on no motion: an assembly makes it once for rest and once for all motions.
+    """
+
+    def __init__(self, mechanism: Description, plan: Plan, moves: bool) -> None:
+        self.mechanism, self.plan, self.moves = mechanism, plan, moves
+        self.quantities = Quantities()
+        self._paths: dict[tuple[str, complex], Path] = {}
+        self._places = {step.node: step for step in plan.steps if isinstance(step, Place)}
+
+    def path(self, body: str, z: complex) -> Path:
+        """Where a point of a body lies: P[base] + Σ terms, as the order of solution places it."""
+        if (body, z) not in self._paths:
+            base, terms = self.plan.anchors[body]
+            self._paths[body, z] = base, combined((*terms, Term(z, body)))
+        return self._paths[body, z]
+
+    @cached_property
+    def rigid(self) -> dict[str, Rigid]:
+        """Mass properties of every link."""
+        return {body: rigid(self.mechanism, body) for body in self.mechanism.links}
+
+    @cached_property
+    def loads(self) -> list[Load]:
+        """Every load that is not zero throughout, friction apart."""
+        m = self.mechanism
+        found: list[Load] = []
+        for body, r in self.rigid.items():
+            at = body, self.path(body, r.center), r.center
+            if r.mass and m.gravity:
+                found.append(Constant("weight", *at, r.mass * m.gravity))
+            if r.mass and self.moves:
+                found.append(InertiaForce("inertia force", *at, r.mass, self.acceleration(at[1])))
+            if r.inertia and self.moves:
+                found.append(InertiaTorque("inertia torque", body, None, r.center, r.inertia))
+        found += [self._force(force) for force in m.forces if force.history or force.force]
+        found += [Constant("applied torque", t.link, None, 0j, t.torque) for t in m.torques if t.torque]
+        for spring in m.springs:
+            if spring.stiffness or (spring.damping and self.moves):
+                found += self._spring(spring)
+        for torsion in m.torsion_springs:
+            if torsion.stiffness or (torsion.damping and self.moves):
+                found += self._torsion(torsion)
+        return found
+
+    def _force(self, force: Force) -> Load:
+        at = "applied force", force.link, self.path(force.link, force.point), force.point
+        if force.history:
+            return Tabled(*at, force.history, force.periodic, force.frame == "link")
+        return (Follower if force.frame == "link" else Constant)(*at, force.force)
+
+    def _spring(self, spring: Spring) -> list[Load]:
+        ends = [self.path(*end) for end in spring.between]
+        found: list[Load] = []
+        for k, (body, z) in enumerate(spring.between):
+            if body != GROUND:
+                end = SpringEnd("spring", body, ends[k], z, spring=spring, other=ends[1 - k])
+                found.append(_beside(end, found))
+        return found
+
+    def _torsion(self, spring: TorsionSpring) -> list[Load]:
+        found: list[Load] = []
+        for body, sign in zip(spring.links, (1.0, -1.0), strict=True):
+            if body != GROUND:
+                found.append(
+                    _beside(TorsionEnd("torsion spring", body, None, sign=sign, spring=spring), found)
+                )
+        return found
+
+    @cached_property
+    def contacts(self) -> list[tuple[Joint, str, str, float, float]]:
+        """What rubs: (joint, body, the body it rubs on, coefficient, radius)."""
+        m, found = self.mechanism, []
+        known = joints(m) if m.friction and self.moves else []
+        for i, entry in enumerate(m.friction if self.moves else (), 1):
+            here = [joint for joint in known if joint.name == entry.joint]
+            if not here:
+                raise DescriptionError(
+                    f"[[friction]] {i} joint: '{entry.joint}' is no joint: nothing is pinned or guided there"
+                )
+            for joint in here:
+                if joint.guide is not None:
+                    g = m.guides[joint.guide]
+                    found.append((joint, g.link, g.on, entry.coefficient, entry.radius))
+                elif entry.radius or len(here) == 1:
+                    first, *others = joint.bodies
+                    found += [(joint, body, first, entry.coefficient, entry.radius) for body in others]
+        return found
+
+    @cached_property
+    def friction(self) -> list[FrictionLoad]:
+        """The friction loads, two for each contact: what the one side feels and its reaction."""
+        found: list[FrictionLoad] = []
+        for number, (joint, body, other, _, _) in enumerate(self.contacts):
+            for side, sign in ((body, 1.0), (other, -1.0)):
+                if side == GROUND:
+                    continue
+                if joint.guide is None:
+                    found.append(FrictionLoad("friction", side, None, 0j, joint.key, number, sign))
+                else:
+                    found.append(self._along(joint.guide, side, sign, joint.key, number, body == GROUND))
+        return found
+
+    def _along(self, i: int, side: str, sign: float, key: str, number: int, alone: bool) -> FrictionLoad:
+        """The friction along a guide on the body that slides (sign +1), or on the rail, where the pin stands."""
+        guide = self.mechanism.guides[i]
+        if sign > 0:
+            z = self.mechanism.bodies[side][guide.point]
+            return FrictionLoad("friction", side, self.path(side, z), z, key, number, sign, i)
+        through = self.mechanism.through(guide)
+        base, terms = self.path(side, through)
+        path = base, combined((*terms, Term(self.plan.directions[i], side, i)))
+        return FrictionLoad("friction", side, path, through, key, number, sign, i, carries=alone, rail=i)
+
+    @cached_property
+    def everything(self) -> list[Load]:
+        """Loads and friction."""
+        return [*self.loads, *self.friction]
+
+    def acceleration(self, path: Path) -> Combination:
+        """The acceleration of a point: Σ z·(s e^{iθ})″, from the point its body hangs on.
+
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> crank = Mechanism({"A": 0j}, {"crank": Link({"A": 0j})}, inputs=Input(link="crank"))
+        >>> case = LoadCase(crank, crank.assembly.plan, moves=True)
+        >>> [(of.kind, of.name, z) for of, z in case.acceleration(case.path("crank", 0.5j)).items()]
+        [('turn', 'crank', 0.5j)]
+        """
+        base, terms = path
+        found = Combination()
+        step = None if base is None else self._places[base]
+        if step is not None and step.base in self._fixed and len(step.terms) == 1:
+            terms = combined(
+                (*step.terms, *terms)
+            )  # as many vectors as with the point, and the turning alone
+            base = None
+        if base is not None and base not in self._fixed:
+            found.add(Combination({self.quantities.second("node", base): 1.0}))
+        for t in terms:
+            if t.body != GROUND or t.slide is not None:
+                found.add(Combination({self.quantities.second("turn", t.body, t.slide): t.z}))
+        return found
+
+    @cached_property
+    def _fixed(self) -> set[str | None]:
+        """The points that do not move."""
+        found: set[str | None] = {None}
+        for node, step in self._places.items():
+            if step.base in found and all(t.body == GROUND and t.slide is None for t in step.terms):
+                found.add(node)
+        return found
+
+    @cached_property
+    def carried(self) -> list[tuple[str, int, float]]:
+        """Torques of motors that sit on another body than `on`, (body, input, sign): what moves their reaction there.
+
+        The input's own torque acts between the driven link and `on`; with +T on `on` and −T on the carrier added, the
+        motor acts between the driven link and its carrier (Ibrahim §2.3).
+        """
+        found = []
+        for j, entry in enumerate(self.mechanism.inputs):
+            body = entry.on if entry.is_slide else self.mechanism.carrier(j)
+            if body != entry.on:
+                found += [(body, j, -1.0), (entry.on, j, 1.0)]
+        return [entry for entry in found if entry[0] != GROUND]
+
+
+def _beside(load: Load, before: list[Load]) -> Load:
+    """One side of a pair, after the other if that is there: the first carries the work of both."""
+    return replace(load, carries=False, mate=before[0]) if before else load

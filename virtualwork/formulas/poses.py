@@ -1,0 +1,406 @@
+"""Poses: blocks of them, each solved as far as it is asked, and never twice.
+
+Poses run in blocks small enough to stay in cache; a block keeps what it has solved. With one input, derivatives are
+taken once with respect to the input (the velocity coefficients K = dx/dq, L = d²x/dq², M = d³x/dq³), so that
+ẋ = K·q̇,  ẍ = K·q̈ + L·q̇²,  x⃛ = K·q⃛ + 3L·q̇·q̈ + M·q̇³.  With several inputs they are taken along the inputs' rates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from virtualwork.describe.description import Description
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.linear import inverse_norm, stack
+from virtualwork.formulas.numbers import Complexes, Number, Reals
+from virtualwork.formulas.positions import BLOCK, SWEEP, Case, State, columns, run
+from virtualwork.formulas.rates import Passage, Rates
+from virtualwork.formulas.sweep import EvenSweep
+from virtualwork.plan.steps import Group, Path, Plan, Step, Term, path_reads
+
+
+class Branch(Protocol):
+    """One assembly of a mechanism, as its poses need it: what to solve, and which way every loop closes."""
+
+    @property
+    def mechanism(self) -> Description:
+        """What moves."""
+
+    @property
+    def plan(self) -> Plan:
+        """The order of solution."""
+
+    @property
+    def prepared(self) -> dict[bool, Any]:
+        """What acts at rest (False) and in motion (True), made once for all poses."""
+
+    @property
+    def load_paths(self) -> dict[bool, Any]:
+        """How the loads bear on joints and inputs, at rest (False) and in motion (True)."""
+
+    @property
+    def merged(self) -> tuple[Plan, Group | None]:
+        """All loops at once."""
+
+    @property
+    def passage(self) -> Passage | None:
+        """How derivatives go through change points; None with several inputs."""
+
+    @property
+    def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
+        """The steps that targets hang on, as far as they were asked for."""
+
+    @property
+    def plain(self) -> dict[str, tuple[Case, int, float]]:
+        """The closed forms that keep their sign wherever the input goes: case, sign, size."""
+
+    @property
+    def close(self) -> Callable[[Group, State], None]:
+        """Closes the loops of any other group on its branch."""
+
+    def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
+        """The steps that targets hang on, worked out once."""
+
+    def cover(self, low: float, high: float) -> None:
+        """Look for change points and limits over the inputs from low to high."""
+
+
+class Poses:
+    """Poses of an assembly over given inputs and their rates.
+
+    Attributes
+    ----------
+    inputs : array (n, k)
+    block_of : EvenSweep, optional
+        The sweep that these inputs are `BLOCK` poses of: they have the digits of the sweep solved whole.
+    input_error : float or array (n, k)
+        Bound of the inputs' own errors, for the estimates of rounding errors: 0 where they are exact as given.
+    solved : list of (step, order)
+        What has been worked out so far; order 0 is position.
+    """
+
+    def __init__(
+        self,
+        branch: Branch,
+        angle: ArrayLike | None = None,
+        speed: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        jerk: ArrayLike | None = None,
+        block_of: EvenSweep | None = None,
+    ) -> None:
+        self.block_of = block_of
+        self._known_steps, self._plain, self._close = branch.known_steps, branch.plain, branch.close
+        self.branch, self.plan = branch, branch.plan
+        self.mechanism = m = branch.mechanism
+        k = len(m.inputs)
+        if angle is None:
+            given = [e.value for e in m.inputs]
+            angle = [a if v is None else v for v, a in zip(given, m.at, strict=True)]
+            angle = angle if k == 1 else [angle]
+        q = np.asarray(angle, dtype=float)
+        if k == 1:
+            q = q.reshape(-1, 1)
+        elif q.ndim == 1 and q.shape == (k,):
+            q = q.reshape(1, k)
+        elif q.ndim != 2 or q.shape[1] != k:
+            raise ValueError(f"angle: expected shape (n, {k}) for {k} inputs, found {q.shape}")
+        self.inputs = q
+        self.n = len(q)
+        self.rates = [
+            self._given(value, [getattr(e, name) for e in m.inputs])
+            for name, value in (("speed", speed), ("acceleration", acceleration), ("jerk", jerk))
+        ]
+        self.input_error: ArrayLike = 0.0
+        self.solved: list[tuple[Step, int]] = []
+        self._done: set[tuple[int, int, int]] = set()
+        self._blocks: list[State] | None = None
+        self._along: dict[int, list[Rates]] = {}
+
+    def _given(self, value: ArrayLike | None, own: list[float | None]) -> list[Number]:
+        """One rate of the inputs, a scalar or (n,) array for each input."""
+        k = len(own)
+        if value is None:
+            return [v or 0.0 for v in own]
+        v = np.asarray(value, dtype=float)
+        if v.ndim == 0:
+            return [float(v)] * k
+        if k == 1:
+            v = v.reshape(-1)
+            return [float(v[0])] if len(v) == 1 else [v]
+        v = np.broadcast_to(v, (self.n, k)) if v.ndim == 1 else v
+        return [v[:, j] for j in range(k)]
+
+    def again(self, inputs: Reals, rates: list[list[Number]] | None = None) -> Poses:
+        """The same assembly at other inputs (n, k), at rest or with other rates of them."""
+        other = Poses(self.branch, inputs if inputs.shape[1] > 1 else inputs[:, 0], 0.0, 0.0, 0.0)
+        if rates is not None:
+            other.rates = rates
+        return other
+
+    @cached_property
+    def assembled(self) -> NDArray[np.bool_]:
+        """(n,) bool: which poses can be assembled."""
+        self.solve([key for g in self.plan.groups for key in self.plan.writes(g)], 0)
+        whole = np.ones(self.n, dtype=bool)
+        for rows, st in self.rows():
+            for g in self.plan.groups:
+                for value in (*(st.turn[body] for body in g.angles), *(st.slide[s] for s in g.slides)):
+                    # the sum of squares is finite where all of them are; else each is looked at
+                    if not np.isfinite(np.vdot(value, value)):
+                        whole[rows] &= np.isfinite(value)
+        return np.asarray(whole & np.isfinite(self.inputs).all(axis=1))
+
+    @property
+    def condition(self) -> Reals:
+        """(n,): ‖J⁻¹‖∞ of the constraint Jacobian of all loops, lengths divided by the mechanism's size.
+
+        A relative error ε in the lengths or the input moves the pose by some ε·condition.
+        """
+        _, group = self.branch.merged
+        if group is None:
+            return np.where(self.assembled, 1.0, np.nan)
+        self.solve([key for s in self.plan.steps for key in self.plan.writes(s)], 0)
+        size = self.mechanism.size
+        whole = np.empty(self.n)
+        for rows, st in self.rows():
+            length = rows.stop - rows.start
+            with np.errstate(all="ignore"):
+                jacobian = stack(columns(group, st), length)
+                jacobian[:, :, : len(group.angles)] /= size
+                whole[rows] = inverse_norm(jacobian)
+                if st.folded:
+                    whole[rows][np.isfinite(whole[rows])] = np.inf
+        return whole
+
+    # --- solving ----------------------------------------------------------------------------------------------
+    def states(self) -> list[State]:
+        """The blocks of poses."""
+        if self._blocks is None:
+            k = self.inputs.shape[1]
+            if k == 1 and self.n:
+                q = self.inputs[:, 0]
+                self.branch.cover(float(q.min()), float(q.max()))
+            if self.n == 1 and self.block_of is None:
+                self._blocks = [State([float(v) for v in self.inputs[0]])]
+            else:
+                self._blocks = [
+                    State([self.inputs[i : i + BLOCK, j] for j in range(k)], many=True)
+                    for i in range(0, self.n, BLOCK)
+                ]
+                if k == 1 and self.swept:
+                    self._sweep(self.inputs[:, 0], self._blocks)
+        return self._blocks
+
+    @property
+    def swept(self) -> bool:
+        """Whether this is a sweep of so many poses, or a block of one, that e^{iq} is formed by angle addition."""
+        return self.n > SWEEP or self.block_of is not None
+
+    def _sweep(self, q: Reals, blocks: list[State]) -> None:
+        """Give the blocks of an even sweep their e^{iq}; where one block is not even, none gets them."""
+        sweep = self.block_of or EvenSweep(q[0], q[-1], self.n)
+        if all(sweep.off(q[i : i + BLOCK]) is not None for i in range(0, len(q), BLOCK)):
+            for st in blocks:
+                turns = sweep.turns(np.asarray(st.inputs[0]))
+                if turns is not None:
+                    st.spins[0] = turns
+
+    def rows(self) -> Iterator[tuple[slice, State]]:
+        """The blocks, each with the poses that are in it."""
+        for i, st in enumerate(self.states()):
+            yield slice(i * BLOCK, min((i + 1) * BLOCK, self.n)), st
+
+    def solve(
+        self,
+        targets: Iterable[str],
+        order: int,
+        which: int = -1,
+        then: Callable[[int], None] | None = None,
+    ) -> list[Rates]:
+        """Work out the targets' derivatives up to an order; `which`: along the motion (−1), or for input j alone.
+
+        `then` is called with each block's number while the block is still in cache, and what it forms is forgotten.
+        """
+        wanted = tuple(targets)
+        steps = self._known_steps.get(wanted) or self.branch.needed(wanted)
+        missing: list[tuple[int, list[Step]]] = []
+        for k in range(order + 1):
+            key = which if k else -2
+            new = [s for s in steps if (id(s), k, key) not in self._done]
+            if new:
+                missing.append((k, new))
+                self._done.update((id(s), k, key) for s in new)
+                self.solved += [(s, k) for s in new]
+        if not missing and then is None:
+            return self._along.get(which, [])
+        states = self.states()
+        if order and which not in self._along:
+            self._along[which] = [self._rates_of(st, i, which) for i, st in enumerate(states)]
+        many = len(states) > 1
+        with np.errstate(all="ignore"):
+            for i, st in enumerate(states):
+                try:
+                    self._advance(i, which, missing)
+                except (ZeroDivisionError, OverflowError):
+                    # one pose on Python numbers at a singular place: the same again on arrays
+                    states[i] = State([np.array([q]) for q in st.inputs], many=True)
+                    for w in self._along:
+                        self._along[w] = [self._rates_of(s, b, w) for b, s in enumerate(states)]
+                    for step, k in self.solved:
+                        for w in list(self._along) if k else [-2]:
+                            if (id(step), k, w) in self._done:
+                                self._advance(i, w, [(k, [step])])
+                if then is not None:
+                    then(i)
+                if many and order:
+                    self._along[which][i].slim()
+        return self._along.get(which, [])
+
+    @property
+    def along_input(self) -> list[Rates]:
+        """The derivatives over the one input, block by block, as far as they are solved."""
+        return self._along[-1]
+
+    def _advance(self, i: int, which: int, missing: list[tuple[int, list[Step]]]) -> None:
+        for k, steps in missing:
+            if k == 0:
+                run(steps, self.states()[i], self._close, self._plain)
+            else:
+                self._along[which][i].advance(steps, k)
+
+    def _rates_of(self, st: State, block: int, which: int) -> Rates:
+        k = self.inputs.shape[1]
+        if k == 1:
+            return Rates(self.plan, st, [[1.0]], self.branch.passage)
+        if which >= 0:
+            return Rates(self.plan, st, [[1.0] if j == which else [] for j in range(k)])
+        rows = slice(block * BLOCK, (block + 1) * BLOCK)
+        return Rates(self.plan, st, [[part(rate[j], rows, st.many) for rate in self.rates] for j in range(k)])
+
+    # --- over all poses -----------------------------------------------------------------------------------------
+    def join(self, parts: list[Number], kind: type) -> Any:
+        """The blocks' values as one array (n,)."""
+        if len(parts) == 1:
+            value: Any = np.asarray(parts[0], dtype=kind)
+            return value.copy() if value.shape == (self.n,) else np.full(self.n, value)
+        sizes = (np.shape(st.inputs[0]) for st in self.states())
+        return np.concatenate(
+            [np.broadcast_to(np.asarray(p, dtype=kind), size) for p, size in zip(parts, sizes, strict=True)]
+        )
+
+    def over(self, form: Callable[[int, State], Number], kind: type = float) -> Any:
+        """What a form gives of each block, as one array (n,); None is zero."""
+        values = (form(i, st) for i, st in enumerate(self.states()))
+        return self.join([0.0 if v is None else v for v in values], kind)
+
+    def in_time(self, order: int, get: Callable[[int, int], Number], kind: type = float) -> Any:
+        """Chain rule from derivatives with respect to the one input to derivatives in time."""
+        if self.inputs.shape[1] > 1:
+            return self.over(lambda i, st: get(i, order), kind)
+        rates = [rate[0] for rate in self.rates]
+
+        def form(i: int, st: State) -> Number:
+            v, a, j = (part(x, slice(i * BLOCK, (i + 1) * BLOCK), st.many) for x in rates)
+            # what each derivative over the input is weighed with
+            if order == 1:
+                weights: tuple[Number, ...] = (v,)
+            elif order == 2:
+                weights = a, None if v is None else v * v
+            else:
+                second = None if v is None or a is None else 3.0 * v * a
+                weights = j, second, None if v is None else v * v * v
+            total: Number = None
+            for k in range(order, 0, -1):
+                weight = weights[k - 1]
+                value = None if weight is None else get(i, k)
+                if value is not None:
+                    # a factor of exactly 1 costs nothing
+                    value = value if isinstance(weight, float) and weight == 1.0 else value * weight
+                    total = value if total is None else total + value
+            return total
+
+        return self.over(form, kind)
+
+    def _which(self, j: int) -> int:
+        return -1 if self.inputs.shape[1] == 1 else j
+
+    # --- quantities -------------------------------------------------------------------------------------------
+    def rate(self, j: int, order: int) -> Reals:
+        """The order-th derivative of input j in time, (n,)."""
+        return np.broadcast_to(np.asarray(self.rates[order - 1][j], dtype=float), (self.n,))
+
+    def angle(self, body: str) -> Reals:
+        """A link's angle, (n,) rad."""
+        self.solve((f"angle:{body}",), 0)
+        return self.over(lambda i, st: np.angle(st.turn[body]))  # type: ignore[no-any-return]
+
+    def angle_derivative(self, body: str, order: int) -> Reals:
+        """A link's ω, α or angular jerk, (n,)."""
+        if body == GROUND:
+            return np.zeros(self.n)
+        rates = self.solve((f"angle:{body}",), order)
+        return self.in_time(order, lambda i, k: rates[i].angle[body][k - 1])  # type: ignore[no-any-return]
+
+    def angle_coefficient(self, body: str, j: int = 0, order: int = 1) -> Reals:
+        """dθ/dq_j, (n,); order 2: d²θ/dq_j²."""
+        if body == GROUND:
+            return np.zeros(self.n)
+        rates = self.solve((f"angle:{body}",), order, self._which(j))
+        return self.over(lambda i, st: rates[i].angle[body][order - 1])  # type: ignore[no-any-return]
+
+    def _path(self, body: str, z: complex, node: str | None) -> tuple[tuple[str, ...], Path]:
+        """What a point of a body hangs on, and where it lies."""
+        if node is not None:
+            return (f"point:{node}",), (node, ())
+        base, terms = self.plan.anchors[body]
+        path = base, (*terms, Term(z, body))
+        return tuple(sorted(path_reads(path))), path
+
+    def point_derivative(self, body: str, z: complex, order: int, node: str | None = None) -> Complexes:
+        """Position (order 0) or a time derivative of any point of a body, x + iy, (n,)."""
+        keys, path = self._path(body, z, node)
+        rates = self.solve(keys, order)
+        if order == 0:
+            return self.over(lambda i, st: st.at(path), complex)  # type: ignore[no-any-return]
+        return self.in_time(order, lambda i, k: rates[i].vector(path, k), complex)  # type: ignore[no-any-return]
+
+    def point_coefficient(
+        self, body: str, z: complex, j: int = 0, node: str | None = None, order: int = 1
+    ) -> Complexes:
+        """dP/dq_j of any point of a body, x + iy, (n,); order 2: d²P/dq_j²."""
+        keys, path = self._path(body, z, node)
+        rates = self.solve(keys, order, self._which(j))
+        return self.over(lambda i, st: rates[i].vector(path, order), complex)  # type: ignore[no-any-return]
+
+    def slide_derivative(self, guide: int, order: int) -> Reals:
+        """A slide or its time derivative, (n,)."""
+        rates = self.solve((f"slide:{guide}",), order)
+        if order == 0:
+            return self.over(lambda i, st: st.slide[guide])  # type: ignore[no-any-return]
+        return self.in_time(order, lambda i, k: rates[i].slide[guide][k - 1])  # type: ignore[no-any-return]
+
+    def slide_coefficient(self, guide: int, j: int = 0) -> Reals:
+        """ds/dq_j, (n,)."""
+        rates = self.solve((f"slide:{guide}",), 1, self._which(j))
+        return self.over(lambda i, st: rates[i].slide[guide][0])  # type: ignore[no-any-return]
+
+    def columns(self, group: Group) -> list[list[Complexes]]:
+        """The Jacobian of one Assur group: for each of its loops, the column of each of its unknowns, (n,) complex."""
+        rates = self.solve([*self.plan.writes(group), *self.plan.reads(group)], 1)
+        blocks = [r.columns(group) for r in rates]
+        return [
+            [self.join([b[i][j] for b in blocks], complex) for j in range(len(blocks[0][i]))]
+            for i in range(len(group.closures))
+        ]
+
+
+def part(rate: Number, rows: slice, many: bool) -> Number:
+    """A rate of an input, a number or (n,), over a block of poses; None where it is zero throughout."""
+    if isinstance(rate, float):
+        return rate or None
+    return rate[rows] if many else float(rate[0])

@@ -1,0 +1,229 @@
+"""Derivatives of every order along given derivatives of the inputs.
+
+They follow Leibniz's rule on e^{iθ}:  (e^{iθ})⁽ᵏ⁾ = i Σ_j C(k−1, j) θ⁽ʲ⁺¹⁾ (e^{iθ})⁽ᵏ⁻¹⁻ʲ⁾. The part of a loop's k-th
+derivative that holds no unknown of order k is its right-hand side; the columns of the Jacobian are the same for every
+order. This is the velocity (Ibrahim §1.4), acceleration (§1.5, with the Coriolis term 2ω·ṡ of §1.10) and jerk in one
+formula.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import comb
+from typing import Any, Protocol
+
+import numpy as np
+
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.linear import singular_poses, solve_columns, solve_determined
+from virtualwork.formulas.numbers import Number, cross
+from virtualwork.formulas.positions import State, columns
+from virtualwork.plan.steps import Angle, Group, Path, Place, Plan, Step, Term, Turn
+
+
+class Passage(Protocol):
+    """How the derivatives go on where a Jacobian vanishes though the branch does not end."""
+
+    changes: dict[str, list[Any]]
+
+    def bridge_rates(self, group: Group, q: Number, k: int, x: list[Number], singular: Any) -> list[Number]:
+        """The k-th derivatives of a group's unknowns with those at singular poses replaced."""
+
+    def mend_rates(self, group: Group, q: Number, k: int, x: list[Number]) -> list[Number]:
+        """The k-th derivatives of a group's unknowns with those close to a change point replaced."""
+
+
+class Rates:
+    """Derivatives of every order along given input derivatives, over the poses of one `State`.
+
+    Attributes
+    ----------
+    rates : list over inputs of [first, second, third ... derivative]
+    angle : dict of body to [θ′, θ″, ...]
+    point : dict of node to [P′, P″, ...]
+    slide : dict of guide to [s′, s″, ...]
+
+    A derivative that is identically zero is None, and costs nothing.
+    """
+
+    def __init__(
+        self, plan: Plan, st: State, rates: list[list[Number]], passage: Passage | None = None
+    ) -> None:
+        self.plan, self.st, self.rates, self.passage = plan, st, rates, passage
+        self.angle: dict[str, list[Number]] = {GROUND: []}
+        self.point: dict[str | None, list[Number]] = {None: []}
+        self.slide: dict[int, list[Number]] = {}
+        self._turn: dict[tuple[str, int], Number] = {}
+        self._normal: dict[str, Number] = {}
+        self._columns: dict[str, list[list[Number]]] = {}
+        self._inverse: dict[str, Number] = {}
+
+    def rate(self, j: int, k: int) -> Number:
+        """The k-th derivative of input j."""
+        return self.rates[j][k - 1] if k <= len(self.rates[j]) else None
+
+    def turn_partial(self, body: str, k: int, top: Number) -> Number:
+        """(e^{iθ})⁽ᵏ⁾ with θ⁽ᵏ⁾ replaced by `top`."""
+        theta = self.angle[body]
+        if k == 2 and theta[0] is not None:
+            # the commonest case, (iα − ω²)·e^{iθ}, in one step; the right side of a group asks for its second part first
+            if body not in self._normal:
+                self._normal[body] = -(theta[0] * theta[0]) * self.st.turn[body]
+            normal = self._normal[body]
+            return normal if top is None else normal + 1j * (top * self.st.turn[body])
+        total: Number = None
+        for j in range(k - 1):
+            if theta[j] is not None:
+                total = _plus(total, _times(comb(k - 1, j), _times(theta[j], self.turn(body, k - 1 - j))))
+        if top is not None:
+            total = _plus(total, _times(top, self.st.turn[body]))
+        return None if total is None else 1j * total
+
+    def turn(self, body: str, k: int) -> Number:
+        """(e^{iθ})⁽ᵏ⁾."""
+        if k == 0:
+            return self.st.turn[body]
+        if body == GROUND:
+            return None
+        if (body, k) not in self._turn:
+            self._turn[body, k] = self.turn_partial(body, k, self.angle[body][k - 1])
+        return self._turn[body, k]
+
+    def vector(self, path: Path, k: int) -> Number:
+        """The k-th derivative of a point, P[base] + Σ terms."""
+        base, terms = path
+        v: Number = None if base is None else self.point[base][k - 1]
+        for t in terms:
+            v = _plus(v, self._term(t, k))
+        return v
+
+    def slim(self) -> None:
+        """Forget what is cheaper to form again than to keep over a long sweep."""
+        self._turn, self._normal, self._columns, self._inverse = {}, {}, {}, {}
+
+    def advance(self, steps: Iterable[Step], k: int) -> None:
+        """Carry steps on to derivatives of order k; the lower orders are known."""
+        for step in steps:
+            if isinstance(step, Place):
+                _put(self.point, step.node, k, self.vector((step.base, step.terms), k))
+            elif isinstance(step, Group):
+                self._group(step, k)
+            elif isinstance(step, Turn):
+                _put(self.angle, step.body, k, self._tied(step.angle, k))
+            else:
+                _put(self.slide, step.guide, k, self.rate(step.input, k))
+
+    def _tied(self, angle: Angle, k: int, without: tuple[str, ...] = ()) -> Number:
+        value: Number = None
+        for j, f in angle.inputs:
+            value = _plus(value, _times(f, self.rate(j, k)))
+        for base, r in angle.bases:
+            if base not in without:
+                value = _plus(value, _times(r, self.angle[base][k - 1]))
+        return value
+
+    def _term(
+        self, t: Term, k: int, tops: dict[str, Number] | None = None, unknown: tuple[int, ...] = ()
+    ) -> Number:
+        """(z·s·e^{iθ})⁽ᵏ⁾; `tops` stand for (e^{iθ})⁽ᵏ⁾, and an unknown slide's k-th derivative is left out."""
+        highest = tops[t.body] if tops and t.body in tops else self.turn(t.body, k)
+        if t.slide is None:
+            return _times(t.z, highest)
+        s = self.slide.get(t.slide, [])
+        total = None if highest is None else self.st.slide[t.slide] * highest
+        for j in range(1, k + 1):
+            if j == k and t.slide in unknown:
+                break
+            if s[j - 1] is not None:
+                e = self.turn(t.body, k - j)
+                if e is not None:
+                    total = _plus(total, _times(comb(k, j), s[j - 1] * e))
+        return _times(t.z, total)
+
+    def right_side(self, group: Group, k: int) -> list[Number]:
+        """The k-th derivative of each loop with the unknowns' own k-th derivatives left out."""
+        tops: dict[str, Number] = {}
+        for body in group.angles:
+            self.angle.setdefault(body, [])
+            tops[body] = self.turn_partial(body, k, None)
+        for tie in group.ties:
+            self.angle.setdefault(tie.body, [])
+            tops[tie.body] = self.turn_partial(tie.body, k, self._tied(tie.angle, k, group.angles))
+        rows = []
+        for closure in group.closures:
+            w: Number = None
+            if closure.start is not None:
+                w = self.point[closure.start][k - 1]
+            if closure.end is not None:
+                w = _plus(w, _times(-1, self.point[closure.end][k - 1]))
+            for t in closure.terms:
+                w = _plus(w, self._term(t, k, tops, group.slides))
+            rows.append(0j if w is None else w)
+        return rows
+
+    def columns(self, group: Group) -> list[list[Number]]:
+        """The group's Jacobian, formed once for all orders."""
+        if group.name not in self._columns:
+            self._columns[group.name] = columns(group, self.st)
+        return self._columns[group.name]
+
+    def inverse(self, group: Group) -> Number:
+        """1/(c1 × c2) of a closed form's two columns, formed once for all orders and the joint forces."""
+        if group.name not in self._inverse:
+            c1, c2 = self.columns(group)[0]
+            self._inverse[group.name] = 1 / cross(c1, c2)
+        return self._inverse[group.name]
+
+    def _group(self, group: Group, k: int) -> None:
+        right = self.right_side(group, k)
+        cols = self.columns(group)
+        if group.name in self.st.folded:
+            self.write(group, k, solve_determined(cols, right, len(group.angles)))
+            return
+        if group.kind != "Newton":
+            (c1, c2), w = cols[0], right[0]
+            inverse = self.inverse(group)
+            x: list[Number] = [cross(c2, w) * inverse, cross(w, c1) * inverse]
+        else:
+            x = solve_columns(cols, right)
+            if self.passage is not None:
+                bad = singular_poses(cols, len(group.angles), np.size(self.st.inputs[0]))
+                if bad.any():
+                    x = self.passage.bridge_rates(group, self.st.inputs[0], k, x, bad)
+        if self.passage is not None and self.passage.changes:
+            x = self.passage.mend_rates(group, self.st.inputs[0], k, x)
+        self.write(group, k, x)
+
+    def write(self, group: Group, k: int, x: list[Number]) -> None:
+        """Store the unknowns' k-th derivatives and those of the angles tied to them."""
+        n = len(group.angles)
+        for body in group.members:
+            for j in [j for known, j in self._turn if known == body and j >= k]:
+                del self._turn[body, j]
+            if k == 1:
+                self._normal.pop(body, None)
+        for body, value in zip(group.angles, x[:n], strict=True):
+            _put(self.angle, body, k, value)
+        for g, value in zip(group.slides, x[n:], strict=True):
+            _put(self.slide, g, k, value)
+        for tie in group.ties:
+            _put(self.angle, tie.body, k, self._tied(tie.angle, k))
+
+
+def _put(store: dict[Any, list[Number]], key: Any, k: int, value: Number) -> None:
+    series = store.setdefault(key, [])
+    del series[k - 1 :]
+    series.append(value)
+
+
+# as in `numbers`, but here: the terms of Leibniz's rule are added up by the hundred, and a binomial of 1 costs nothing
+
+
+def _plus(a: Number, b: Number) -> Number:
+    return b if a is None else a if b is None else a + b
+
+
+def _times(f: Number, a: Number) -> Number:
+    if a is None:
+        return None
+    return a if isinstance(f, (int, float)) and f == 1 else f * a

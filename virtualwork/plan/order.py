@@ -1,0 +1,425 @@
+"""The order of solution of a mechanism: its Assur groups, as a flat list of steps that is plain data.
+
+The equations of the joints and the coordinates they hold form a bipartite graph. Its Dulmage-Mendelsohn
+decomposition (A. L. Dulmage, N. S. Mendelsohn, Can. J. Math. 10 (1958) 517) is unique; its irreducible blocks, in
+order, are the Assur groups: each is solved when what it hangs on is known. Angles tied by sliders, gears and
+inputs are linear relations and are eliminated before anything else; what remains of a block is its loop closure
+R_1 e^{iθ1} + R_2 e^{iθ2} + ... = 0 (Ibrahim eq. 1.3.1; Nicoletti, lecture 7) in its own few angles and slides.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
+from typing import TypeVar
+
+from virtualwork.describe.description import Description
+from virtualwork.describe.parts import GROUND
+from virtualwork.plan.graph import decompose
+from virtualwork.plan.guessed import known_by_guess
+from virtualwork.plan.joints import relations
+from virtualwork.plan.steps import (
+    Angle,
+    Closure,
+    Group,
+    Kind,
+    Path,
+    Place,
+    Plan,
+    Slide,
+    Step,
+    Term,
+    Turn,
+    Variable,
+    combined,
+)
+
+Key = TypeVar("Key", int, str)
+
+
+def direction(angle: float) -> complex:
+    """e^{i·angle}, exact at the quarter turns, so that a guide at 90° is not tilted by a rounding.
+
+    >>> direction(math.pi / 2)
+    1j
+    """
+    quarter = angle / (math.pi / 2)
+    if abs(quarter - round(quarter)) <= 1e-15 * max(1.0, abs(quarter)):
+        return (1 + 0j, 1j, -1 + 0j, -1j)[round(quarter) % 4]
+    return complex(math.cos(angle), math.sin(angle))
+
+
+def plan(m: Description, *, merged: bool = False, phases: Mapping[int, float] | None = None) -> Plan:
+    """The order of solution of a mechanism.
+
+    Parameters
+    ----------
+    m : Description
+    merged : bool
+        All loops at once in one group (the Newton-Raphson of Nicoletti, lecture 7) instead of group by group.
+    phases : mapping of a gear's number to its constant Σ c·θ, rad, optional
+        Where they are known already.
+
+    Raises
+    ------
+    MobilityError
+        A free degree of freedom, too many inputs.
+    """
+    return _Planner(m, merged, phases or {}).run()
+
+
+class _Planner:
+    """Walks the blocks in order and writes the steps."""
+
+    def __init__(self, m: Description, merged: bool, phases: Mapping[int, float]) -> None:
+        self.m, self.merged, self.phases = m, merged, phases
+        self.guess = known_by_guess(m)[0] if m.gears else {}
+        self.relations = list(relations(m))
+        self.driven = {m.guide_of(e): j for j, e in enumerate(m.inputs) if e.is_slide}
+        self.steps: list[Step] = []
+        self.angles: dict[str, Angle] = {GROUND: Angle()}
+        self.anchors: dict[str, Path] = {GROUND: (None, ())}
+        self.nodes: set[str] = set()
+        self.slides_known: set[int] = set()
+        self.directions = {i: direction(g.angle) for i, g in enumerate(m.guides)}
+        self.guide_nodes: dict[int, str] = {}
+        self.used: set[tuple[str, str]] = (
+            set()
+        )  # (joint, body) already spent to place a body or to close a loop
+        # long chains: what is done is not looked through again for every block
+        self.solved: set[str] = set()  # bodies whose angle the steps written so far give
+        self.settled: set[str] = set()  # placed bodies whose pins are placed too
+        self.joined: set[str] = set()  # bodies all of whose loops are closed
+
+    def run(self) -> Plan:
+        self.blocks = decompose(self.m)
+        for body_point, z in self.m.ground.items():
+            self._place(body_point, GROUND, z)
+        pending = list(self.blocks.order)
+        if self.merged:
+            pending = [tuple(v for block in pending for v in block)]
+        for block in pending:
+            self._block(block)
+        for body, points in self.m.bodies.items():
+            for name, z in points.items():
+                self._place(name, body, z)
+        for i in range(len(self.m.guides)):
+            self._guide_node(i)
+        return Plan(
+            tuple(self.steps), self.anchors, self.angles, self.directions, self.blocks, self.guide_nodes
+        )
+
+    # --- points -------------------------------------------------------------------------------------------
+    def _place(self, node: str, body: str, z: complex) -> str:
+        if node not in self.nodes and body in self.anchors:
+            base, terms = self.anchors[body]
+            self.steps.append(Place(node, base, _longer(terms, Term(z, body))))
+            self.nodes.add(node)
+            self.used.add((node, body))
+        return node
+
+    def _guide_node(self, i: int) -> str:
+        """The point of guide i's link that runs in it: `link.point`."""
+        g = self.m.guides[i]
+        self.guide_nodes[i] = g.point
+        return self._place(g.point, g.link, self.m.bodies[g.link][g.point])
+
+    # --- one block ----------------------------------------------------------------------------------------
+    def _block(self, block: tuple[Variable, ...]) -> None:
+        fresh = [name for kind, name in block if kind == "angle"]
+        slides = sorted(int(name) for kind, name in block if kind == "slide")
+        for i in slides:
+            if i in self.driven:
+                self.steps.append(Slide(i, self.driven[i]))
+                self.slides_known.add(i)
+        free, ties = self._eliminate(fresh)
+        for tie in ties:
+            if not any(base in free for base, _ in tie.angle.bases):
+                self.steps.append(tie)
+                self.solved.add(tie.body)
+        own = tuple(tie for tie in ties if any(base in free for base, _ in tie.angle.bases))
+        self._settle()
+        moving = {name for kind, name in block if kind in "xy"} - set(self.anchors)
+        closures, trees = self._loops(moving)
+        unknown = tuple(i for i in slides if i not in self.slides_known)
+        if closures or free or unknown:
+            held = {*free, *(t.body for t in own), *moving}
+            links = tuple(b for b in self.m.links if b in held)
+            group = Group(" + ".join(links), links, "Newton", tuple(free), unknown, tuple(closures), own)
+            self.steps.append(replace(group, kind=self._kind(group)))
+            self.solved.update(group.members)
+            self.slides_known.update(unknown)
+        self.anchors.update(trees)
+        self._settle()
+
+    def _kind(self, group: Group) -> Kind:
+        """Chace's case, where the group is one loop with two unknowns that turn or slide simply."""
+        if len(group.closures) != 1 or len(group.angles) + len(group.slides) != 2:
+            return "Newton"
+        own = {body: body for body in group.angles}
+        for tie in group.ties:
+            bases = [(b, r) for b, r in tie.angle.bases if b in group.angles]
+            if len(bases) != 1 or len(tie.angle.bases) != 1 or bases[0][1] != 1.0 or tie.angle.gears:
+                return "Newton"
+            own[tie.body] = bases[0][0]
+        terms = group.closures[0].terms
+        held = {own.get(t.body) for t in terms} | {t.slide for t in terms}
+        if not held.issuperset((*group.angles, *group.slides)):
+            return "Newton"  # an unknown that its loop does not hold
+        turning = {own.get(t.body) for t in terms if t.slide in group.slides and t.slide is not None}
+        if len(group.angles) == 2:
+            return "RRR"
+        if len(group.angles) == 1:
+            return "RRP" if turning == {None} else "RPR"
+        return "PRP"
+
+    # --- angles: sliders, gears and inputs are linear relations ----------------------------------------------
+    def _relations(self, fresh: list[str]) -> list[tuple[Mapping[str, float], Angle]]:
+        """Σ c·θ = const + Σ k·input, for every relation all of whose angles are known once this block is."""
+        new = set(fresh)
+        found = []
+        for relation in self.relations:
+            bodies = relation.shares.keys()
+            if bodies & new and all(body in new or body in self.angles for body in bodies):
+                right = relation.right
+                if relation.gear is not None:
+                    known = self.phases.get(relation.gear)
+                    right = Angle(known) if known is not None else Angle(gears=((relation.gear, 1.0),))
+                found.append((relation.shares, right))
+        return found
+
+    def _eliminate(self, fresh: list[str]) -> tuple[list[str], list[Turn]]:
+        """Gauss-Jordan on the linear relations: which angles stay free, and what the others are."""
+        rows: list[tuple[dict[str, float], Angle]] = []
+        for c, right in self._relations(fresh):
+            known = replace(right, gears=())
+            for body, factor in c.items():
+                if body not in fresh:
+                    known = _plus(known, self.angles[body], -factor)
+            unknown = {body: factor for body, factor in c.items() if body in fresh}
+            if (
+                right.gears
+            ):  # its constant is that of the guess, at once where no link before it has to be placed
+                there = known.at(self.m.at)
+                if there is None:
+                    known = _plus(known, right, 1.0)
+                else:
+                    stands = sum(factor * self.guess.get(body, 0.0) for body, factor in unknown.items())
+                    known = _plus(known, Angle(stands - there), 1.0)
+            rows.append((unknown, known))
+        solved: dict[str, tuple[dict[str, float], Angle]] = {}
+        for unknown, known in rows:
+            for body, (others, value) in solved.items():
+                if body in unknown:
+                    f = unknown.pop(body)
+                    known = _plus(known, value, -f)
+                    for other, o in others.items():
+                        unknown[other] = unknown.get(other, 0.0) + f * o
+            unknown = {b: f for b, f in unknown.items() if abs(f) > 1e-13}
+            if not unknown:
+                continue
+            pivot = max(unknown, key=lambda b: (abs(abs(unknown[b]) - 1) < 1e-12, fresh.index(b)))
+            p = unknown.pop(pivot)
+            others = {b: -f / p for b, f in unknown.items()}
+            value = _times(known, 1 / p)
+            for body, (was, val) in list(solved.items()):
+                if pivot in was:
+                    f = was.pop(pivot)
+                    for other, o in others.items():
+                        was[other] = was.get(other, 0.0) + f * o
+                    solved[body] = (was, _plus(val, value, f))
+            solved[pivot] = (others, value)
+        free = [b for b in fresh if b not in solved]
+        for b in free:
+            self.angles[b] = Angle(bases=((b, 1.0),))
+        turns = []
+        for b, (others, value) in solved.items():
+            angle = value
+            for other, f in others.items():
+                angle = _plus(angle, Angle(bases=((other, 1.0),)), f)
+            self.angles[b] = Angle(bases=((b, 1.0),)) if angle.gears else angle
+            turns.append(Turn(b, angle))
+        return free, turns
+
+    # --- positions ------------------------------------------------------------------------------------------
+    def _settle(self) -> None:
+        """Place every body whose angle is known and that a joint ties to a placed one."""
+        progress = True
+        while progress:
+            progress = False
+            for body in self.m.links:
+                if body not in self.anchors and body in self.solved:
+                    found = self._attach(
+                        body, set(self.anchors), lambda b, z: self._chain(b, z, self.anchors)
+                    )
+                    if found is not None:
+                        self.anchors[body] = found
+                        progress = True
+            for body in [b for b in self.anchors if b not in self.settled]:
+                self.settled.add(body)
+                for name, z in self.m.bodies[body].items():
+                    if name in self.m.pins:
+                        self._place(name, body, z)
+
+    def _chain(self, body: str, z: complex, anchors: Mapping[str, Path]) -> Path:
+        base, terms = anchors[body]
+        return base, _longer(terms, Term(z, body))
+
+    def _attach(
+        self, body: str, placed: Collection[str], chain: Callable[[str, complex], Path]
+    ) -> Path | None:
+        """The first joint that ties a body to the placed ones: pins first, then guides whose slide is known."""
+        points = self.m.bodies[body]
+        for name, z in points.items():
+            if name in self.nodes:
+                self.used.add((name, body))
+                return name, _longer((), Term(-z, body))
+        for i in range(len(self.m.guides)):
+            if i not in self.slides_known or (f"guide {i}", "") in self.used:
+                continue
+            found = self._by_guide(i, body, placed, chain)
+            if found is not None:
+                return found
+        return None
+
+    def _by_guide(
+        self, i: int, body: str, placed: Collection[str], chain: Callable[[str, complex], Path]
+    ) -> Path | None:
+        g, d = self.m.guides[i], self.directions[i]
+        if g.link == body and g.on in placed:
+            base, terms = chain(g.on, self.m.through(self.m.guides[i]))
+            found = (
+                base,
+                combined((*terms, Term(d, g.on, i), Term(-self.m.bodies[body][g.point], body))),
+            )
+        elif g.on == body and g.link in placed:
+            base, terms = chain(g.link, self.m.bodies[g.link][g.point])
+            found = base, combined((*terms, Term(-self.m.through(self.m.guides[i]), body), Term(-d, body, i)))
+        else:
+            return None
+        self.used.add((f"guide {i}", ""))
+        return found
+
+    def _loops(self, moving: set[str]) -> tuple[list[Closure], dict[str, Path]]:
+        """A tree over the block's bodies from what is placed; every joint outside the tree closes a loop."""
+        anchors = dict(self.anchors)
+        nodes: dict[str, Path] = {name: (name, ()) for name in self.nodes}
+        closures: list[Closure] = []
+        # all loops at once: the driven links last, so that loops close over the passive side, as Nicoletti writes them
+        last = {str(e.link) for e in self.m.inputs} if self.merged else set()
+        # placed bodies matter where they meet what moves, or one that was placed since the last loops were closed
+        fresh = moving | (set(anchors) - self.joined)
+        pins = {name for body in fresh for name in self.m.bodies[body]}
+        queue = [body for body in anchors if not pins.isdisjoint(self.m.bodies[body])]
+        self.joined.update(anchors, moving)
+        guides = [i for i in range(len(self.m.guides)) if (f"guide {i}", "") not in self.used]
+
+        def chain(body: str, z: complex) -> Path:
+            return self._chain(body, z, anchors)
+
+        def join(body: str, name: str) -> None:
+            """Enter a body at pin `name`, or close the loop there where it already stands."""
+            z = self.m.bodies[body][name]
+            if (name, body) in self.used:
+                return
+            if body in anchors:
+                if name in nodes:
+                    base, terms = chain(body, z)
+                    if base == name and not terms:
+                        return
+                    self.used.add((name, body))
+                    self._close(closures, (base, terms), nodes[name], name, body, None)
+                else:
+                    nodes[name] = chain(body, z)
+                    self.used.add((name, body))
+            else:
+                base, terms = nodes[name]
+                anchors[body] = base, _longer(terms, Term(-z, body))
+                self.used.add((name, body))
+                queue.append(body)
+
+        visited: set[str] = set()
+        while True:
+            while queue:
+                body = next((b for b in queue if b not in last), queue[0])
+                queue.remove(body)
+                if body in visited:
+                    continue
+                visited.add(body)
+                for name, z in self.m.bodies[body].items():
+                    if name not in self.m.pins:
+                        continue
+                    if name not in nodes:
+                        nodes[name] = chain(body, z)
+                        self.used.add((name, body))
+                    for other in self.m.pins[name]:
+                        if other in moving or other in anchors:
+                            join(other, name)
+            # pins first: a guide carries a slide and is a poorer branch of the tree
+            found = False
+            for i in list(guides):
+                g = self.m.guides[i]
+                for body in (g.link, g.on):
+                    if body in moving and body not in anchors and not found:
+                        entry = self._by_guide(i, body, set(anchors), chain)
+                        if entry is not None:
+                            anchors[body] = entry
+                            queue.append(body)
+                            guides.remove(i)
+                            found = True
+            if not found:
+                break
+        for i in guides:
+            g = self.m.guides[i]
+            if g.link in anchors and g.on in anchors and (f"guide {i}", "") not in self.used:
+                base, terms = chain(g.on, self.m.through(self.m.guides[i]))
+                line = base, combined((*terms, Term(self.directions[i], g.on, i)))
+                pin = chain(g.link, self.m.bodies[g.link][g.point])
+                self.used.add((f"guide {i}", ""))
+                # the loop's force is that on a body which moves: of a fixed pin in a slot, on the slot's
+                if g.link == GROUND:
+                    self._close(closures, line, pin, g.point, g.on, i)
+                else:
+                    self._close(closures, pin, line, g.point, g.link, i)
+        return closures, {b: a for b, a in anchors.items() if b not in self.anchors}
+
+    def _close(
+        self, closures: list[Closure], there: Path, here: Path, joint: str, body: str, guide: int | None
+    ) -> None:
+        (start, plus), (end, minus) = there, here
+        terms = combined((*plus, *(Term(-t.z, t.body, t.slide) for t in minus)))
+        closures.append(Closure(start, end, terms, joint, body, guide))
+
+
+def _plus(a: Angle, b: Angle, factor: float) -> Angle:
+    """a + factor·b."""
+    const, more = a.const + factor * b.const, factor * b.const
+    added = abs(more) + abs(const) if a.const and b.const else 0.0
+    return Angle(
+        const,
+        _sums(a.inputs, b.inputs, factor),
+        _sums(a.bases, b.bases, factor),
+        _sums(a.gears, b.gears, factor),
+        a.size + abs(factor) * b.size + added,
+    )
+
+
+def _sums(
+    own: tuple[tuple[Key, float], ...], other: tuple[tuple[Key, float], ...], factor: float
+) -> tuple[tuple[Key, float], ...]:
+    total = dict(own)
+    for key, k in other:
+        total[key] = total.get(key, 0.0) + factor * k
+    return tuple((key, k) for key, k in total.items() if k != 0)
+
+
+def _times(a: Angle, factor: float) -> Angle:
+    return _plus(Angle(), a, factor)
+
+
+def _longer(terms: tuple[Term, ...], t: Term) -> tuple[Term, ...]:
+    """Terms and one more, added to that of the same body and slide."""
+    if any(own.body == t.body and own.slide == t.slide for own in terms):
+        return combined((*terms, t))
+    return (*terms, t) if t.z != 0 else terms

@@ -1,0 +1,291 @@
+"""What kind of mechanism this is: mobility, redundant constraints, Grashof classes, limits, dead and change points."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe.description import Description
+from virtualwork.describe.errors import AssemblyError
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.constraints import Constraints, coordinates, dependent
+from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.positions import State
+
+# two sums of lengths nearer than this, relative, are equal
+EQUAL = 1e-12
+
+
+@dataclass(frozen=True)
+class FourBar:
+    """A closed chain of four pinned bodies.
+
+    `grashof`: crank-rocker, double-crank, double-rocker, triple-rocker (no link turns fully), change-point; for a
+    chain that does not hold the ground, as seen from its first body. `transmission`: the least and the largest
+    angle between its coupler and follower, rad.
+    """
+
+    links: tuple[str, ...]
+    lengths: tuple[float, float, float, float]
+    grashof: str
+    transmission: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Check:
+    """A mechanism's character; every part is worked out when first read.
+
+    Examples
+    --------
+    >>> from virtualwork import Guess, Input, Link, Mechanism
+    >>> m = Mechanism(ground={"A": (0, 0), "D": (4, 0)},
+    ...               links={"crank": Link({"A": (0, 0), "B": (2, 0)}),
+    ...                      "coupler": Link({"B": (0, 0), "C": (5, 0)}),
+    ...                      "rocker": Link({"D": (0, 0), "C": (2, 0)})},
+    ...               inputs=Input(link="crank"),
+    ...               guess=Guess(at=3.14, angles={"coupler": 0.3, "rocker": 2.0}))
+    >>> check = Check(m.assembly)
+    >>> check.four_bars[0].grashof, [round(math.degrees(q), 6) for q in check.input_limits]
+    ('triple-rocker', [46.567463, 313.432537])
+    """
+
+    assembly: Assembly
+
+    def __repr__(self) -> str:
+        four_bars = ", ".join(f"{'-'.join(f.links)}: {f.grashof}" for f in self.four_bars) or "no four-bar"
+        return f"Check({self.mechanism.name!r}: mobility {self.mobility}, {four_bars})"
+
+    @property
+    def mechanism(self) -> Description:
+        """What is checked."""
+        return self.assembly.mechanism
+
+    @property
+    def mobility(self) -> int:
+        """Grübler's count: three for each link, less what the joints take."""
+        return self.assembly.plan.blocks.mobility
+
+    @cached_property
+    def _rank(self) -> tuple[int, tuple[str, ...]]:
+        m, plan = self.mechanism, self.assembly.plan
+        here = Constraints.at(m, coordinates(m, plan, self._typical()), self.assembly.phases)
+        if not len(here.labels):
+            return 0, ()
+        if not np.isfinite(here.jacobian).all():
+            raise AssemblyError("assembled at no pose of the motion where the joints' rank could be told")
+        return dependent(here.labels, here.jacobian)
+
+    @property
+    def mobility_by_rank(self) -> int:
+        """The degrees of freedom that the Jacobian of the joints leaves, at a pose that is not singular."""
+        return 3 * len(self.mechanism.links) - self._rank[0]
+
+    @property
+    def redundant(self) -> tuple[str, ...]:
+        """The joints whose constraints depend on each other, so that some of them could be left out."""
+        return self._rank[1]
+
+    def _typical(self) -> State:
+        """A pose away from the singular ones."""
+        m, track = self.mechanism, self.assembly.track
+        low, high = self._span()
+        qs = (
+            [m.at[0] + (high - low) * f for f in (0.0, 0.0137, 0.0511, -0.0271, 0.113)]
+            if track.active
+            else [m.at[0]]
+        )
+        best, chosen = np.inf, None
+        for q in qs:
+            inputs = (q, *m.at[1:])
+            condition = float(Poses(self.assembly, np.array([inputs])).condition[0])
+            if condition < best or (chosen is None and condition == np.inf):
+                best, chosen = condition, inputs
+        if chosen is None:
+            raise AssemblyError("check: the mechanism cannot be assembled near its guess")
+        return self.assembly.state(chosen)
+
+    # --- along the input ------------------------------------------------------------------------------------
+    def _span(self) -> tuple[float, float]:
+        track = self.assembly.track
+        if not track.active:
+            return 0.0, 0.0
+        if self.mechanism.inputs[0].is_slide:
+            return track.start - track.length, track.start + track.length
+        return track.start, track.start + (track.period or track.length)
+
+    @cached_property
+    def input_limits(self) -> tuple[float, float] | None:
+        """The ends of the input's range around the guess, rad or m; None where it goes on for ever."""
+        track = self.assembly.track
+        if not track.active:
+            return None
+        slide = self.mechanism.inputs[0].is_slide
+        limits = track.limits()
+        if not limits:
+            return None
+        period = track.period
+        turns = (0.0,) if period is None else (-period, 0.0, period)
+        every = sorted((limit.input + t, limit.side) for limit in limits for t in turns)
+        above = [q for q, side in every if q > track.start and side < 0]
+        below = [q for q, side in every if q < track.start and side > 0]
+        if slide and (not above or not below):
+            return (below[-1] if below else -math.inf, above[0] if above else math.inf)
+        if not above or not below:
+            return None
+        return below[-1], above[0]
+
+    @cached_property
+    def dead_points(self) -> tuple[float, ...]:
+        """Inputs at which the linkage locks, every end of a range of the input, rad, or m.
+
+        Angles in [0, period of the branch): where change points make a branch need two turns of the input, the
+        same angle a turn later is another pose (`virtualwork.branch.track.Track.turns`).
+        """
+        return self._in_period(
+            [limit.input for limit in self.assembly.track.limits()] if self.assembly.track.active else []
+        )
+
+    @cached_property
+    def change_points(self) -> tuple[float, ...]:
+        """Inputs at which two branches cross, rad in [0, period of the branch), or m."""
+        track = self.assembly.track
+        if not track.active:
+            return ()
+        track.cover(*self._span())
+        return self._in_period(track.crossings)
+
+    def _in_period(self, found: list[float]) -> tuple[float, ...]:
+        period = self.assembly.track.period
+        if period is None:
+            return tuple(sorted(found))
+        unique: list[float] = []
+        for q in sorted(q % period for q in found):
+            # an input of −1e-15 is 0, not a whole period
+            q = 0.0 if period - q < 1e-9 or q < 1e-9 else q
+            if all(abs(q - other) > 1e-8 for other in unique):
+                unique.append(q)
+        return tuple(sorted(unique))
+
+    @property
+    def singular(self) -> tuple[str, ...]:
+        """The groups that are singular in every pose: their assemblies meet all along, their rates are not determined."""
+        track = self.assembly.track
+        if track.active:
+            track.cover(*self._span())
+        return tuple(g.name for g in self.assembly.plan.groups if g.name in track.folded)
+
+    # --- parts ------------------------------------------------------------------------------------------------
+    @property
+    def groups(self) -> tuple[dict[str, Any], ...]:
+        """The Assur groups in their order of solution, each with its links, its kind and its method."""
+        return tuple(
+            {
+                "links": list(g.links),
+                "kind": g.kind if g.kind != "Newton" else f"{len(g.angles) + len(g.slides)} unknowns",
+                "method": "Newton-Raphson" if g.kind == "Newton" else "closed form",
+            }
+            for g in self.assembly.plan.groups
+        )
+
+    @cached_property
+    def four_bars(self) -> tuple[FourBar, ...]:
+        """Every closed chain of four pinned bodies, with its Grashof class."""
+        m = self.mechanism
+        pins: dict[frozenset[str], list[str]] = {}
+        for point, bodies in m.pins.items():
+            for a, b in combinations(bodies, 2):
+                pins.setdefault(frozenset((a, b)), []).append(point)
+        driven = [str(e.link) for e in m.inputs if e.link is not None]
+        order = [GROUND, *driven, *(b for b in m.links if b not in driven)]
+        found = []
+        for a, b, c, d in _cycles(order, pins):
+            corners = [pins[frozenset(pair)][0] for pair in ((a, b), (b, c), (c, d), (d, a))]
+            if len(set(corners)) < 4:
+                continue
+            lengths = tuple(
+                abs(m.bodies[body][p] - m.bodies[body][q])
+                for body, p, q in zip((a, b, c, d), (corners[-1], *corners[:-1]), corners, strict=True)
+            )
+            found.append(self._four_bar((a, b, c, d), corners, lengths))  # type: ignore[arg-type]
+        return tuple(found)
+
+    def _four_bar(
+        self,
+        bodies: tuple[str, str, str, str],
+        corners: list[str],
+        lengths: tuple[float, float, float, float],
+    ) -> FourBar:
+        ground, crank, coupler, rocker = lengths
+        links = bodies[1:] if bodies[0] == GROUND else bodies
+        if bodies[0] == GROUND and any(e.link == bodies[1] and e.on == GROUND for e in self.mechanism.inputs):
+            reach = [abs(ground - crank), ground + crank]
+            ends = [min(max(r, abs(coupler - rocker)), coupler + rocker) for r in reach]
+            angles = sorted(_angle(coupler, rocker, r) for r in ends)
+        else:
+            angles = self._seen(bodies, corners)
+        return FourBar(links, lengths, grashof_class(*lengths), (angles[0], angles[-1]))
+
+    @cached_property
+    def _sampled(self) -> Poses:
+        """Poses over the whole span, for every four-bar the same."""
+        low, high = self._span()
+        q = np.linspace(low, high, 1441)
+        return Poses(self.assembly, q if self.assembly.track.active else np.array([self.mechanism.at]))
+
+    def _seen(self, bodies: tuple[str, ...], corners: list[str]) -> list[float]:
+        """The transmission angle over the motion, sampled, for chains that are not driven at their own crank."""
+        b, c, d = (self._sampled.point_derivative(GROUND, 0j, 0, p) for p in corners[1:])
+        mu = np.abs(np.angle((b - c) * np.conj(d - c)))
+        mu = mu[np.isfinite(mu)]
+        return [float(mu.min()), float(mu.max())] if len(mu) else [math.nan, math.nan]
+
+
+def grashof_class(ground: float, crank: float, coupler: float, rocker: float) -> str:
+    """The class of a four-bar by its lengths (F. Grashof, 1883; names as in Norton, Design of Machinery, §2.13).
+
+    Examples
+    --------
+    >>> grashof_class(100, 40, 120, 80), grashof_class(4, 2, 5, 2), grashof_class(5, 2, 5, 2)
+    ('crank-rocker', 'triple-rocker', 'change-point')
+    """
+    shortest, p, q, longest = sorted((ground, crank, coupler, rocker))
+    difference = (shortest + longest) - (p + q)
+    if abs(difference) <= EQUAL * longest:
+        return "change-point"
+    if difference > 0:
+        return "triple-rocker"
+    if shortest == ground:
+        return "double-crank"
+    return "double-rocker" if shortest == coupler else "crank-rocker"
+
+
+def _angle(a: float, b: float, opposite: float) -> float:
+    """The angle between sides a and b of a triangle, by its half: no cancellation near 0 and π."""
+    up = (opposite - (a - b)) * (opposite + (a - b))
+    down = (a + b - opposite) * (a + b + opposite)
+    return 2 * math.atan2(math.sqrt(max(up, 0.0)), math.sqrt(max(down, 0.0)))
+
+
+def _cycles(order: list[str], pins: dict[frozenset[str], list[str]]) -> list[tuple[str, str, str, str]]:
+    """Every ring of four bodies once, beginning with the earliest, the earlier neighbour next."""
+    found = []
+    rank = {body: i for i, body in enumerate(order)}
+    beside = {b: [o for o in order if frozenset((b, o)) in pins and o != b] for b in order}
+    for a in order:
+        for b in beside[a]:
+            for c in beside[b]:
+                for d in beside[c]:
+                    if (
+                        len({a, b, c, d}) == 4
+                        and a in beside[d]
+                        and rank[a] < min(rank[b], rank[c], rank[d])
+                        and rank[b] < rank[d]
+                    ):
+                        found.append((a, b, c, d))
+    return found
