@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import csv
-import re
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 
 from cli.errors import DataError, cell_error, quote
+from cli.read.decoding import LINE, LOOKED_AT, decoded, delimiter
 from cli.read.files import read_bytes
 from cli.read.headers import Heading, heading, is_unit, likeness, offers
 from cli.read.units import parse_number
@@ -17,11 +16,6 @@ from cli.read.workbooks import Sheet, address, is_workbook, read_sheet, split_sh
 
 # rows from which importing pandas pays
 LARGE = 10_000
-# so many rows are looked at for the header, and for what parts the cells
-LOOKED_AT = 20
-
-_LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
-_QUOTED = re.compile(r'"[^"]*"')
 
 
 @dataclass
@@ -69,7 +63,7 @@ class Source:
                 if any(cell and not cell.isspace() for cell in row):
                     yield line, row
             return
-        lines = (match.group() for match in _LINE.finditer(self.text))
+        lines = (match.group() for match in LINE.finditer(self.text))
         reader = csv.reader(lines, delimiter=self.delimiter, strict=True)
         line = 1
         try:
@@ -132,8 +126,8 @@ def open_source(path: str, known: Mapping[str, str], texts: Sequence[str] | None
             others = ", ".join(map(quote, sheet.others))
             warnings.append(f"{file}: read the sheet {quote(sheet.name)}; there are also {others}")
     else:
-        text = _decode(file, data, warnings)
-        source = Source(file, text, _delimiter(text), warnings)
+        text = decoded(file, data, warnings)
+        source = Source(file, text, delimiter(text), warnings)
     first = list(islice(source.everything(), LOOKED_AT))
     if not first:
         raise DataError(f"{file}: the file is empty{source.of_sheet}: expected a header and rows")
@@ -207,39 +201,3 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _decode(file: str, data: bytes, warnings: list[str]) -> str:
-    codec = "utf-8-sig"
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        codec = "utf-16"
-    elif b"\0" in data[:200] and len(data) % 2 == 0:
-        # without a byte order mark: ASCII in UTF-16 has its zeros on one side
-        codec = "utf-16-le" if not any(data[1:200:2]) else "utf-16-be" if not any(data[:200:2]) else codec
-    try:
-        text = data.decode(codec)
-    except UnicodeDecodeError:
-        try:
-            text = data.decode("cp1252")
-        except UnicodeDecodeError:
-            raise DataError(f"{file}: this is not text: expected CSV in UTF-8") from None
-        codec = "cp1252"
-    if re.search(r"[\0-\x08\x0e-\x1f\x7f]", text):
-        raise DataError(f"{file}: this is not text (control characters): expected CSV in UTF-8")
-    if codec != "utf-8-sig":
-        warnings.append(
-            f"{file}: read as {'Windows-1252 (Latin-1)' if codec == 'cp1252' else 'UTF-16'}, for it is not UTF-8"
-        )
-    return text
-
-
-def _delimiter(text: str) -> str:
-    """Return the mark that parts the most of the first lines into equally many cells."""
-    lines = (match.group() for match in _LINE.finditer(text))
-    first = list(islice((_QUOTED.sub("", line) for line in lines if line.strip()), LOOKED_AT))
-
-    def alike(mark: str) -> int:
-        counts = Counter(line.count(mark) for line in first if mark in line)
-        return max(counts.values(), default=0)
-
-    return max("\t;,", key=alike) if any(map(alike, "\t;,")) else ","
