@@ -14,6 +14,7 @@ import typer
 
 from cli.errors import one_line
 from cli.read.files import refuse_inputs
+from cli.read.headers import check_renamed, rename
 from cli.show.columns import Result, Table
 from cli.show.files import write
 from cli.show.text import csv_text, json_parts, paragraphs, table_text
@@ -75,6 +76,14 @@ class ShowOptions:
         bool,
         typer.Option("--digits", help="In tables and CSV print only the digits that hold against rounding."),
     ] = False
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=HEADER",
+            help="Read the column HEADER of a table as NAME, such as mass_kg=Masse; repeatable.",
+            callback=rename,
+        ),
+    ] = None
 
     @property
     def as_csv(self) -> bool:
@@ -128,6 +137,7 @@ def show(result: Result, options: ShowOptions) -> None:
         other = None if screen is None else lambda: screen().cells
         report = compare(table.cells, table.keys, str(options.expect), options.rtol, other)
         checked = f"{table_text(report.columns)}\n{report.summary}"
+    check_renamed()
     if options.digits:
         result, cut = _with_digits_that_hold(result, first)
         first = cache(lambda: cut)
