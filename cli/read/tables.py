@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 LARGE = 10_000  # rows from which importing pandas pays
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Numbers:
     """A column of numbers in the file's own unit; NaN where an allowed blank or mark stands."""
 
@@ -39,7 +39,7 @@ class Numbers:
     values: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cells:
     """A column with a unit whose cells are left as text."""
 
@@ -53,7 +53,7 @@ class Cells:
         return parse_number(_pointed(text) if self.decimal_comma else text)
 
 
-@dataclass
+@dataclass(eq=False)
 class Table:
     """A table as read: columns by the name of their quantity, without the unit suffix."""
 
@@ -195,7 +195,7 @@ def _pointed(text: str) -> str:
 _LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
 
 
-@dataclass
+@dataclass(eq=False)
 class _Source:
     """The text of a file and how its cells are told apart."""
 
