@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
+from itertools import islice
 
 from cli.errors import DataError
+
+# so many rows are looked at for what parts the cells, and for the header
+LOOKED_AT = 20
+
+LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
+_QUOTED = re.compile(r'"[^"]*"')
 
 
 def decoded(file: str, data: bytes, warnings: list[str]) -> str:
     """Return the text of UTF-8, UTF-16 or Windows-1252."""
-    if data[:4] == b"PK\x03\x04":
-        raise DataError(
-            f"{file}: this is a spreadsheet or zip file: expected CSV text (save the sheet as CSV)"
-        )
     codec = "utf-8-sig"
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         codec = "utf-16"
@@ -37,7 +41,12 @@ def decoded(file: str, data: bytes, warnings: list[str]) -> str:
 
 
 def delimiter(text: str) -> str:
-    """Return what parts the cells of the header: a comma, a semicolon or a tab."""
-    first = re.search(r"\S.*", text)
-    header = first.group() if first else ""
-    return max(",;\t", key=lambda mark: (header.count(mark), mark == ","))
+    """Return the mark that parts the most of the first lines into equally many cells."""
+    lines = (match.group() for match in LINE.finditer(text))
+    first = list(islice((_QUOTED.sub("", line) for line in lines if line.strip()), LOOKED_AT))
+
+    def alike(mark: str) -> int:
+        counts = Counter(line.count(mark) for line in first if mark in line)
+        return max(counts.values(), default=0)
+
+    return max("\t;,", key=alike) if any(map(alike, "\t;,")) else ","

@@ -45,6 +45,11 @@ def compare(
     file with columns of that one.
     """
     expected = read(file, texts=None)
+    spelled = {name.lower(): name for name in columns}
+    expected.texts = {
+        name if name in columns else spelled.get(name.lower(), name): cells
+        for name, cells in expected.texts.items()
+    }
     header = list(expected.texts)
     if other is not None and not columns.keys() >= set(header) and (table := other()).keys() >= set(header):
         columns = table

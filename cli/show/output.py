@@ -72,6 +72,13 @@ class ShowOptions:
         bool,
         typer.Option("--digits", help="In tables and CSV print only the digits that hold against rounding."),
     ] = False
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=HEADER",
+            help="Read the column HEADER of a table as NAME, such as mass_kg=Masse; repeatable.",
+        ),
+    ] = None
 
     @property
     def as_csv(self) -> bool:
@@ -95,7 +102,10 @@ def command(find: Callable[..., Result]) -> Callable[..., None]:
 
     @wraps(find)
     def run(**given: object) -> None:
+        from cli.read.headers import rename
+
         options = ShowOptions(**{name: given.pop(name) for name in shared})  # type: ignore[arg-type]
+        rename(options.column)
         if "show" in own:
             given["show"] = options
         result = find(**given)
@@ -121,6 +131,7 @@ def _parameters(of: Callable[..., object]) -> dict[str, Parameter]:
 
 def show(result: Result, options: ShowOptions) -> None:
     """Write the files asked for, print the result; status 1 if an expectation is not met, or nothing was found."""
+    from cli.read.headers import check_renamed
     from cli.show.files import write
     from cli.show.text import csv_text, json_parts, paragraphs, table_text
 
@@ -137,6 +148,7 @@ def show(result: Result, options: ShowOptions) -> None:
         other = None if screen is None else lambda: screen().cells
         report = compare(table.cells, table.keys, str(options.expect), options.rtol, other)
         checked = f"{table_text(report.columns)}\n{report.summary}"
+    check_renamed()
     if options.digits:
         result, cut = _with_digits_that_hold(result, first)
         first = cache(lambda: cut)
