@@ -136,6 +136,7 @@ def show(result: Result, options: ShowOptions) -> None:
     from cli.show.text import csv_text, json_parts, paragraphs, table_text
 
     if result.blocks is not None:
+        check_renamed()
         _stream(result, result.blocks(), options)
         return
     first, output = cache(next(iter(result.tables.values()))), options.output
