@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cli.read.files import note
+from cli.read.files import note, split_sheet
 from cli.read.tables import Numbers, read
 from cli.read.units import UNITS, to_si
-from cli.read.workbooks import split_sheet
 from cli.show.text import csv_text
 
 _KNOWN = {
