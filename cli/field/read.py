@@ -94,6 +94,10 @@ def _layouts(table: Table, rotor: Rows) -> Iterator[tuple[Rows, Rows]]:
             yield rotors[same], rows[same]
 
 
+class NotOneInitialRun(DataError):
+    """A table of runs with no initial run, with several, or with readings that lack: all runs have to be fitted together."""
+
+
 class _Reader:
     """Reads the groups; the first rotor of each tells how it was measured."""
 
@@ -153,17 +157,14 @@ class _Reader:
                         f"{self.table.file}: {of}runs {quote(initial or '')} and {quote(run)} both have no trial mass: "
                         "expected one run, for --influence gives the coefficients"
                     )
-                raise self.fail(
-                    first[members[0]],
-                    "trial_plane",
-                    "",
-                    f"a trial mass in run {run}, for run {initial} is the initial one already",
+                raise NotOneInitialRun(
+                    f"{self.table.file}: {of}runs {quote(initial or '')} and {quote(run)} both have no trial mass"
                 )
             else:
                 trials.append(trial)
                 standing = standing or trial.kept
         if initial is None:
-            raise DataError(
+            raise NotOneInitialRun(
                 f"{self.table.file}: {of}every run has a trial mass: expected an initial run with trial_plane, "
                 "trial_mass and trial_angle empty"
             )
@@ -430,7 +431,7 @@ class _Reader:
                 )
         for channel, mine in zip(channels, found, strict=True):
             if not mine:
-                raise DataError(
+                raise NotOneInitialRun(
                     f"{self.table.file}: {of}run {quote(run)} has no reading of sensor {channel}, which the initial run "
                     f"{quote(initial)} has"
                 )

@@ -14,11 +14,14 @@ from cli.errors import DataError
 
 # device and inode: a link to a file is the file
 _read: set[tuple[int, int]] = set()
+# what can be read only once: standard input, pipes
+_held: dict[str, bytes] = {}
 
 
 def forget() -> None:
     """Begin a call: nothing has been read."""
     _read.clear()
+    _held.clear()
 
 
 def note(path: str | Path) -> Path:
@@ -31,7 +34,13 @@ def note(path: str | Path) -> Path:
 
 def load(path: str | Path) -> bytes:
     """Read a file, or standard input for `-`; OSError or ValueError where it cannot be."""
-    return sys.stdin.buffer.read() if path == "-" else note(path).read_bytes()
+    name = str(path)
+    if name in _held:
+        return _held[name]
+    data = sys.stdin.buffer.read() if path == "-" else note(path).read_bytes()
+    if path == "-" or not os.path.isfile(path):
+        _held[name] = data
+    return data
 
 
 def read_bytes(path: str) -> tuple[str, bytes]:

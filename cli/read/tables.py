@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
@@ -129,6 +129,7 @@ def read(
     cells: Mapping[str, str] | None = None,
     blank: Sequence[str] = (),
     marker: str = "",
+    headers: Callable[[list[str]], list[str]] | None = None,
 ) -> Table:
     """Read a CSV file, or standard input for `-`.
 
@@ -146,6 +147,8 @@ def read(
         The quantities of `numbers` whose cells may be empty: they read as NaN.
     marker
         Cells of `numbers` that begin with it are no numbers: NaN, and their text in `Table.marks`.
+    headers
+        What the header as written means: the columns' names by their places.
 
     Raises
     ------
@@ -153,6 +156,8 @@ def read(
         No such file, no text, no header, no rows, a doubled column, an unknown unit, a cell that is no number.
     """
     source = _open(path)
+    if headers is not None:
+        source.header = headers(source.header)
     known = {**(numbers or {}), **(cells or {})}
     texts = source.header if texts is None else texts
     found = _find_columns(source, known, texts)
