@@ -44,6 +44,7 @@ class Mechanism(Description):
     Norton's four-bar (Design of Machinery, ex. 4-1): crank 40, coupler 120, rocker 80, ground 100 mm.
 
     >>> import math
+    >>> from virtualwork import Guess, Input, Link
     >>> m = Mechanism(
     ...     ground={"A": (0, 0), "D": (0.100, 0)},
     ...     links={"crank": Link({"A": (0, 0), "B": (0.040, 0)}),
@@ -111,6 +112,7 @@ class Mechanism(Description):
 
         Examples
         --------
+        >>> from virtualwork import Input, Link
         >>> m = Mechanism(ground={"O": (0, 0)}, links={"arm": Link({"O": (0, 0), "P": (2, 0)})},
         ...               inputs=Input(link="arm"))
         >>> m.motion(0.0, speed=3.0).point("P").velocity
@@ -137,6 +139,7 @@ class Mechanism(Description):
 
         Examples
         --------
+        >>> from virtualwork import Input, Link
         >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="bob"),
         ...                      gravity=-9.81j)
         >>> pendulum.equilibria()

@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.records import alike
 from virtualwork.bounds.forces import ForceErrors
 from virtualwork.bounds.motion import MotionErrors
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.describe.record import same
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.poses import Poses
@@ -249,7 +249,9 @@ class Motion:
         if not isinstance(other, Motion):
             return NotImplemented
         mine, its = self.poses, other.poses
-        return self.assembly == other.assembly and same((mine.inputs, mine.rates), (its.inputs, its.rates))
+        return self.assembly == other.assembly and all(
+            alike(a, b) for a, b in zip((mine.inputs, *mine.rates), (its.inputs, *its.rates), strict=True)
+        )
 
     __hash__ = object.__hash__
 
@@ -317,7 +319,7 @@ class Motion:
         """Motion of any point of a link: a name, or coordinates in the link's own axes."""
         if isinstance(point, str):
             return PointMotion(self, link, self.mechanism.bodies[link][point], point)
-        return PointMotion(self, link, as_point(point))
+        return PointMotion(self, link, point if isinstance(point, complex) else as_point(point))
 
     def link(self, name: str) -> LinkMotion:
         """Motion of a link.

@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from cli.errors import DataError
-from cli.read.files import read_bytes
+from cli.read.sources import open_source
 from cli.read.tables import Cells, Numbers, Table, read
 from cli.read.units import degrees, parse_number, phasor
 
@@ -52,21 +52,18 @@ def headed(header: list[str]) -> list[str]:
 
 def is_log(path: str) -> bool:
     """Tell by its first line whether a file is a log in a layout of its own, and no table of runs."""
-    text = read_bytes(path)[1][:4000].decode("utf-8", errors="replace").lstrip("\ufeff")
-    if _keyed(text):
+    source = open_source(path, {}, None)
+    if source.sheet is None and _keyed(source.text):
         return True
-    line = next((line for line in text.splitlines() if line.strip(" ;,\t")), "")
-    cells = re.split(r"[;,\t]", line)
-    columns = {cell.strip().lower() for cell in cells}
-    return not cells[0].strip() or bool(columns & {"state", *NAMES} - {"plane", "amplitude"})
+    columns = {each.name.lower() for each in source.headings}
+    return not source.headings[0].name or bool(columns & {"state", *NAMES} - {"plane", "amplitude"})
 
 
 def log_table(path: str) -> tuple[Table, dict[str, float]]:
     """Read a log in any of the layouts, and the limits of masses that it states."""
-    file, data = read_bytes(path)
-    text = data.decode("utf-8-sig", errors="replace")
-    if _keyed(text):
-        return _vectors(file, text)
+    source = open_source(path, {}, None)
+    if source.sheet is None and _keyed(source.text):
+        return _vectors(source.file, source.text)
     table = read(
         path,
         numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -66,8 +67,14 @@ class Result:
     afterword: Callable[[], str] = lambda: ""
     """What the terminal shows below the table."""
     figure: Callable[[], Figure] | None = None
-    beside: Mapping[Path, Callable[[], bytes]] = field(default_factory=dict)
+    beside: Mapping[Path, Callable[[], bytes | Iterable[bytes]]] = field(default_factory=dict)
     """Files that options of the command itself ask for."""
     warnings: list[str] = field(default_factory=list)
-    failed: bool = False
+    failed: Callable[[], bool] = lambda: False
     """Whether nothing that was asked for could be found: status 1, once all is shown."""
+    blocks: Callable[[], Iterator[Table]] | None = None
+    """The table in parts, where it is too long to be held: written as CSV, and nothing else."""
+    within: Callable[[], AbstractContextManager[None]] = nullcontext
+    """What the forms are made within: it turns errors of a library into those that a user is told."""
+    late_warnings: Callable[[], list[str]] = list
+    """What there is to say once all parts are written."""

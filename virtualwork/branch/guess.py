@@ -111,7 +111,7 @@ class _Chooser:
                 self.plan = replace(self.plan, steps=(*self.plan.steps[:i], step, *self.plan.steps[i + 1 :]))
             if isinstance(step, Group):
                 if step.kind == "Newton":
-                    starts[step.name] = self._newton(step, st)
+                    starts[step.name] = tuple(map(float, self._newton(step, st)))
                 else:
                     signs[step.name] = self._sign(step, helper.cases[step.name], st, signs)
                     st.angle.update({b: float(np.angle(st.turn[b])) for b in step.members})

@@ -84,7 +84,7 @@ class Track:
     # --- what poses ask ---------------------------------------------------------------------------------------
     def run(self, steps: Iterable[Step], st: State) -> None:
         """Work out positions, step by step, each group on its branch."""
-        run(steps, st, self.close)
+        run(steps, st, self.close, self.assembly.plain)
 
     def close(self, group: Group, st: State) -> None:
         """Close the loops of one group."""
@@ -235,6 +235,11 @@ class Track:
                 if near.any():
                     yield change, near, q[near] - change.input
 
+    def _fold(self, name: str) -> None:
+        """Note a group that is singular in every pose."""
+        self.folded.add(name)
+        self.assembly.plain.pop(name, None)
+
     def _look_around(self) -> None:
         """With several inputs: which closed forms are singular at all poses around the guess."""
         at = self.assembly.mechanism.at
@@ -247,7 +252,7 @@ class Track:
                     return
                 self.assembly.run_untracked([s], st)
                 if isinstance(s, Group) and self._meets(s, st.margin[s.name]):
-                    self.folded.add(s.name)
+                    self._fold(s.name)
                     self.assembly.cases[s.name].solve(st, 1, self.assembly.mechanism.size, folded=True)
 
     def _meets(self, group: Group, margin: Number) -> bool:
@@ -303,7 +308,7 @@ class Track:
             elif isinstance(s, Group):
                 self._continued(s).extend(a, b)
                 if self._continued(s).singular():
-                    self.folded.add(s.name)
+                    self._fold(s.name)
                 self.close(s, st)
             else:
                 self.run([s], st)
@@ -311,7 +316,7 @@ class Track:
     def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
         """Find where the radicand crosses or touches zero; say whether a change point was found."""
         if self._meets(group, m):
-            self.folded.add(group.name)
+            self._fold(group.name)
             return True
         if np.mean(np.abs(m) < 1e-14) > 0.9:
             return False  # stretched all along: zeros of rounding are no change points
@@ -332,6 +337,7 @@ class Track:
             edge = 1e-9 * self.length  # a change point at the seam of two chunks belongs to both
             if abs(depth) <= noise and a - edge <= where < b + edge:
                 known = self.flips.setdefault(group.name, np.empty(0))
+                self.assembly.plain.pop(group.name, None)
                 if not len(known) or np.abs(known - where).min() > SAME * self.length:
                     self._brackets = [
                         x for x in self._brackets if not (x[0] == group.name and x[1] <= where <= x[2])

@@ -10,12 +10,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
+from dalembert.arithmetic.records import record
 from virtualwork.describe.checks import refuse
 from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link, Point, as_point, as_points
 from virtualwork.describe.record import Record
 
 
+@record
 @dataclass(frozen=True, eq=False, repr=False)
 class Description(Record):
     """The description of a planar mechanism; `virtualwork.Mechanism` is one that can also be asked.

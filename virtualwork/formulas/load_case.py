@@ -42,7 +42,7 @@ def rigid(m: Description, body: str) -> Rigid:
 
     The common centre is Σ m z / Σ m, and the inertia about it gains Σ m |z − z_G|² (Steiner).
 
-    >>> from virtualwork import Link, Motor
+    >>> from virtualwork import Link, Mechanism, Motor
     >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": 1}, mass=2, center=0.25, inertia=0.1)},
     ...                 motors=[Motor("arm", "tool", mass=1, center=1)])
     >>> rigid(arm, "arm")
@@ -182,7 +182,7 @@ class LoadCase:
     def acceleration(self, path: Path) -> Combination:
         """The acceleration of a point: Σ z·(s e^{iθ})″, from the point its body hangs on.
 
-        >>> from virtualwork import Input, Link
+        >>> from virtualwork import Input, Link, Mechanism
         >>> crank = Mechanism({"A": 0j}, {"crank": Link({"A": 0j})}, inputs=Input(link="crank"))
         >>> case = LoadCase(crank, crank.assembly.plan, moves=True)
         >>> [(of.kind, of.name, z) for of, z in case.acceleration(case.path("crank", 0.5j)).items()]

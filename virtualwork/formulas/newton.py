@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.records import record
 from virtualwork.formulas.linear import solve, stack, stack_rows
 from virtualwork.formulas.numbers import EPS, Number, Reals
 from virtualwork.formulas.positions import State, columns, loop
@@ -39,7 +40,8 @@ def gaps(group: Group, st: State) -> list[Number]:
     return [loop(closure, st) for closure in group.closures]
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Iterate:
     """One row of the Newton-Raphson table: the unknowns and the gap they leave."""
 

@@ -61,9 +61,7 @@ class One:
 class Many:
     """Arrays over poses; what is the same in all of them may be a Python number."""
 
-    def sqrt(self, x: Number) -> Number:
-        """The root."""
-        return np.sqrt(x)
+    sqrt = staticmethod(np.sqrt)
 
     def exp(self, angle: Number) -> Number:
         """e^{i·angle}."""

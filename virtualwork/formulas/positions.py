@@ -6,7 +6,9 @@ Assur group. The steps do not know what kind of numbers they run on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +26,7 @@ from virtualwork.plan.steps import Angle, Closure, Group, Path, Place, Step, Ter
 
 # poses worked out together: their temporaries stay in the cache
 BLOCK = 8192
+EMPTY: Mapping[str, Any] = MappingProxyType({})
 # from so many poses on, e^{iθ} of a uniform sweep is formed by angle addition
 SWEEP = 256
 
@@ -117,14 +120,26 @@ class State:
         return 1.0 + 0j if value is None else value
 
 
-def run(steps: Iterable[Step], st: State, close: Callable[[Group, State], None]) -> None:
-    """Work out positions, step by step; `close` closes the loops of a group on its branch."""
+def run(
+    steps: Iterable[Step],
+    st: State,
+    close: Callable[[Group, State], None],
+    plain: Mapping[str, tuple[Case, int, float]] = EMPTY,
+) -> None:
+    """Work out positions, step by step.
+
+    `close` closes the loops of a group on its branch; those of `plain`, (case, sign, size), keep one sign all along.
+    """
     for step in steps:
         if isinstance(step, Place):
             v = st.sum(step.terms)
             st.point[step.node] = v if step.base is None else st.point[step.base] + v
         elif isinstance(step, Group):
-            close(step, st)
+            if step.name in plain:
+                case, sign, size = plain[step.name]
+                case.solve(st, sign, size)
+            else:
+                close(step, st)
         elif isinstance(step, Turn):
             turn(step, st)
         else:

@@ -27,8 +27,6 @@ class Scene:
     poses : Poses
     case : LoadCase
         What acts, the same for all motions of an assembly.
-    paths : LoadPaths
-        How the loads bear on what moves, and how joint forces follow.
     moves : bool
         Whether anything moves at all.
     formed : set of str
@@ -42,10 +40,18 @@ class Scene:
         self.moves, self.formed = self.setting.moves, self.setting.formed
         known = poses.branch.prepared
         if self.moves not in known:
-            known[self.moves] = LoadPaths(LoadCase(self.mechanism, self.plan, self.moves))
-        self.paths: LoadPaths = known[self.moves]
-        self.case: LoadCase = self.paths.case
+            known[self.moves] = LoadCase(self.mechanism, self.plan, self.moves)
+        self.case: LoadCase = known[self.moves]
         self._blocks: dict[tuple[str, ...], list[Block]] = {}
+
+    @cached_property
+    def paths(self) -> LoadPaths:
+        """How the loads bear on what moves, and how joint forces follow; made once for an assembly."""
+        known = self.poses.branch.load_paths
+        if self.moves not in known:
+            known[self.moves] = LoadPaths(self.case)
+        found: LoadPaths = known[self.moves]
+        return found
 
     @property
     def loads(self) -> list[Load]:

@@ -76,6 +76,7 @@ class _Planner:
         self.m, self.merged, self.phases = m, merged, phases
         self.guess = known_by_guess(m)[0] if m.gears else {}
         self.relations = list(relations(m))
+        self.driven = {m.guide_of(e): j for j, e in enumerate(m.inputs) if e.is_slide}
         self.steps: list[Step] = []
         self.angles: dict[str, Angle] = {GROUND: Angle()}
         self.anchors: dict[str, Path] = {GROUND: (None, ())}
@@ -113,7 +114,7 @@ class _Planner:
     def _place(self, node: str, body: str, z: complex) -> str:
         if node not in self.nodes and body in self.anchors:
             base, terms = self.anchors[body]
-            self.steps.append(Place(node, base, combined((*terms, Term(z, body)))))
+            self.steps.append(Place(node, base, _longer(terms, Term(z, body))))
             self.nodes.add(node)
             self.used.add((node, body))
         return node
@@ -128,10 +129,9 @@ class _Planner:
     def _block(self, block: tuple[Variable, ...]) -> None:
         fresh = [name for kind, name in block if kind == "angle"]
         slides = sorted(int(name) for kind, name in block if kind == "slide")
-        driven = {self.m.guide_of(e): j for j, e in enumerate(self.m.inputs) if e.is_slide}
         for i in slides:
-            if i in driven:
-                self.steps.append(Slide(i, driven[i]))
+            if i in self.driven:
+                self.steps.append(Slide(i, self.driven[i]))
                 self.slides_known.add(i)
         free, ties = self._eliminate(fresh)
         for tie in ties:
@@ -264,7 +264,7 @@ class _Planner:
 
     def _chain(self, body: str, z: complex, anchors: Mapping[str, Path]) -> Path:
         base, terms = anchors[body]
-        return base, combined((*terms, Term(z, body)))
+        return base, _longer(terms, Term(z, body))
 
     def _attach(
         self, body: str, placed: Collection[str], chain: Callable[[str, complex], Path]
@@ -274,7 +274,7 @@ class _Planner:
         for name, z in points.items():
             if name in self.nodes:
                 self.used.add((name, body))
-                return name, combined([Term(-z, body)])
+                return name, _longer((), Term(-z, body))
         for i in range(len(self.m.guides)):
             if i not in self.slides_known or (f"guide {i}", "") in self.used:
                 continue
@@ -335,7 +335,7 @@ class _Planner:
                     self.used.add((name, body))
             else:
                 base, terms = nodes[name]
-                anchors[body] = base, combined((*terms, Term(-z, body)))
+                anchors[body] = base, _longer(terms, Term(-z, body))
                 self.used.add((name, body))
                 queue.append(body)
 
@@ -416,3 +416,10 @@ def _sums(
 
 def _times(a: Angle, factor: float) -> Angle:
     return _plus(Angle(), a, factor)
+
+
+def _longer(terms: tuple[Term, ...], t: Term) -> tuple[Term, ...]:
+    """Terms and one more, added to that of the same body and slide."""
+    if any(own.body == t.body and own.slide == t.slide for own in terms):
+        return combined((*terms, t))
+    return (*terms, t) if t.z != 0 else terms
