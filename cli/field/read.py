@@ -143,6 +143,7 @@ class _Reader:
         trials: list[Trial] = []
         initial: str | None = None
         standing = False
+        again: DataError | None = None
         for run, members in by_run.items():
             trial = self._trial(run, members, first, planes)
             if trial is None and initial is None and not standing:
@@ -155,12 +156,19 @@ class _Reader:
                         f"{self.table.file}: {of}runs {quote(initial or '')} and {quote(run)} both have no trial mass: "
                         "expected one run, for --influence gives the coefficients"
                     )
-                raise NotOneInitialRun(
-                    f"{self.table.file}: {of}runs {quote(initial or '')} and {quote(run)} both have no trial mass"
+                again = again or self.fail(
+                    first[members[0]],
+                    "trial_plane",
+                    "",
+                    f"a trial mass in run {run}, for run {initial} is the initial one already",
                 )
             else:
                 trials.append(trial)
                 standing = standing or trial.kept
+        # with runs to spare all of them are fitted together
+        lacking = NotOneInitialRun if len(by_run) > 1 + len(planes) > 1 else DataError
+        if again is not None:
+            raise lacking(str(again))
         if initial is None:
             raise NotOneInitialRun(
                 f"{self.table.file}: {of}every run has a trial mass: expected an initial run with trial_plane, "
@@ -178,7 +186,10 @@ class _Reader:
         matches = []
         runs = np.empty((len(rotors), len(trials), len(channels)), dtype=complex)
         for j, trial in enumerate(trials):
-            mine = self._match(trial.run, initial, by_run[trial.run], first, channels, of)
+            try:
+                mine = self._match(trial.run, initial, by_run[trial.run], first, channels, of)
+            except DataError as error:
+                raise lacking(str(error)) from None
             matches.append(mine)
             for s, members in enumerate(mine):
                 runs[:, j, s] = self.vibration[rows[:, members]].mean(axis=1)
@@ -427,7 +438,7 @@ class _Reader:
                 )
         for channel, mine in zip(channels, found, strict=True):
             if not mine:
-                raise NotOneInitialRun(
+                raise DataError(
                     f"{self.table.file}: {of}run {quote(run)} has no reading of sensor {channel}, which the initial run "
                     f"{quote(initial)} has"
                 )
