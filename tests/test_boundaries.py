@@ -34,6 +34,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("__init__",),
         ("mechanism",),
         ("motion",),
+        ("forces",),
         ("family",),
         ("intime",),
         ("study",),
@@ -329,3 +330,20 @@ def test_the_wheel_holds_the_packages_and_the_examples(tmp_path: Path) -> None:
     assert held == tracked
     assert "cli/examples/riul-rotor/rotor.csv" in held
     assert {f"{package}/py.typed" for package in INSTALLED} <= held
+
+
+# Within a command's folder, from the top down; the other files of a folder stand between these as they need.
+ROLES = (("command",), ("columns", "picture", "remarks", "report", "words"), ("solve",), ("read",))
+
+
+def test_a_commands_files_stand_in_one_order() -> None:
+    """The options, then columns, words and pictures, then the solution, then what is read."""
+    level = {role: i for i, roles in enumerate(ROLES) for role in roles}
+    for module, others in graph().items():
+        package, *rest = module.split(".")
+        if package != "cli" or len(rest) != 2 or rest[1] not in level:
+            continue
+        for other in others:
+            *room, role = other.split(".")
+            if room == [package, rest[0]] and role in level:
+                assert level[rest[1]] <= level[role], f"{module} imports {other}"

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.read import options
-from cli.show.columns import Result
 from cli.show.output import command, suffix_among
 
 if TYPE_CHECKING:
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
 
     from cli.field.fit import LogFits
     from cli.field.solve import FieldBalancing
-    from cli.show.columns import Document, Table
+    from cli.show.columns import Document, Result, Table
 
 
 @command
@@ -229,14 +228,14 @@ def run(
         max_mass=asked.limits_in(limits, measured) or measured.max_mass,
         max_residual=None if ceiling is None else asked.ceiling_in(ceiling, measured),
         from_here=from_here,
-        runout={} if runout is None else read_runout(runout, measured, lagging=against),
+        runout={} if runout is None else read_runout(runout, measured, lagging=against or measured.lags),
         reading_error=error,
         monte_carlo=monte_carlo,
         four_run=four_run,
         ridge=ridge,
         tolerance=tolerance,
         radius=arm,
-        conventions=asked.conventions(method, phase_lag, rotation),
+        conventions=asked.conventions(method, phase_lag or measured.lags, rotation),
         places=options.places(positions, blades, first),
     )
     found = FieldBalancing(measured, request, stored)
@@ -249,6 +248,7 @@ def _result(
     found: FieldBalancing, fits: LogFits | None, source: str, save_influence: Path | None, report: Path | None
 ) -> Result:
     from cli.field import columns, fit, fit_columns, fit_words, remarks, words
+    from cli.show.columns import Result
     from cli.show.text import csv_text
 
     warnings = remarks.warnings(found) + list(fit.remarks(found))

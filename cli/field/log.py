@@ -316,6 +316,7 @@ class _Logs:
         if self.lagging is None and len(against):
             turned = np.where((told < 0)[:, None, None], fit.readings.conj(), fit.readings)
             fit = joint_fit(turned, fit.masses)
+            self.runs.lags = True
         words = {1: "lead", -1: "lag", 0: None}
         return fit, [words[int(turn * sense)] for sense in told.tolist()]
 

@@ -144,6 +144,8 @@ class Runs:
     speed_unit: str
     max_mass: dict[str, float] = field(default_factory=dict)
     """The limits that the file states, plane -> SI."""
+    lags: bool = False
+    """Whether the runs themselves told that the phase lags, and it was turned round."""
     warnings: list[str] = field(default_factory=list)
 
 

@@ -12,7 +12,6 @@ import typer
 
 from cli.errors import DataError
 from cli.read import options
-from cli.show.columns import Result
 from cli.show.output import ShowOptions, command, suffix_among
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
     from cli.mechanism.solve import Analysis
     from cli.mechanism.studies import Request
-    from cli.show.columns import Document, Table
+    from cli.show.columns import Document, Result, Table
 
 
 @command
@@ -160,6 +159,7 @@ def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
     from cli.mechanism import columns
     from cli.mechanism.states import table as link_states
     from cli.mechanism.stream import Stream
+    from cli.show.columns import Result
 
     form = columns.forces if forces else link_states if analysis.only is None else columns.poses
     stream = Stream(analysis, form, forces)
@@ -182,6 +182,7 @@ def _result(
     from cli.mechanism import forces as of_forces
     from cli.mechanism.states import table as link_states
     from cli.mechanism.studies import Studies
+    from cli.show.columns import Result
 
     studies = Studies(analysis, request)
     found = studies.document

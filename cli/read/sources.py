@@ -6,13 +6,16 @@ import csv
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
+from typing import TYPE_CHECKING
 
 from cli.errors import DataError, cell_error, quote
 from cli.read.decoding import LINE, LOOKED_AT, decoded, delimiter
-from cli.read.files import read_bytes
+from cli.read.files import is_workbook, read_bytes, split_sheet
 from cli.read.headers import Heading, heading, is_unit, likeness, offers
 from cli.read.units import parse_number
-from cli.read.workbooks import Sheet, address, is_workbook, read_sheet, split_sheet
+
+if TYPE_CHECKING:
+    from cli.read.workbooks import Sheet
 
 # rows from which importing pandas pays
 LARGE = 10_000
@@ -83,6 +86,8 @@ class Source:
         line, _ = next(islice(self.rows(), index, None))
         if self.sheet is None:
             return cell_error(self.file, index + 1, line, column, found, expected)
+        from cli.read.workbooks import address
+
         at = f"row {line}"
         if column in self.header:
             at = f"cell {address((line - 1, self.header.index(column)))}"
@@ -120,6 +125,8 @@ def open_source(path: str, known: Mapping[str, str], texts: Sequence[str] | None
     file, data = read_bytes(path)
     warnings: list[str] = []
     if is_workbook(data):
+        from cli.read.workbooks import read_sheet
+
         sheet = read_sheet(file, data, wanted)
         source = Source(file, "", "", warnings, sheet)
         if sheet.others and not wanted:

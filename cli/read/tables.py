@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Numbers:
     """A column of numbers in the file's own unit; NaN where an allowed blank or mark stands."""
 
@@ -35,7 +35,7 @@ class Numbers:
     values: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cells:
     """A column with a unit whose cells are left as text."""
 
@@ -49,7 +49,7 @@ class Cells:
         return parse_number(_pointed(text) if self.decimal_comma else text)
 
 
-@dataclass
+@dataclass(eq=False)
 class Table:
     """A table as read: columns by the name of their quantity, without the unit suffix."""
 

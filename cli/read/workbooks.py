@@ -13,9 +13,8 @@ from typing import Any
 from xml.etree import ElementTree
 
 from cli.errors import DataError, quote
+from cli.read.files import ZIP
 
-ZIP, OLE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
-SUFFIXES = (".xlsx", ".xlsm", ".xls", ".ods")
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+\s*")
 
 Place = tuple[int, int]
@@ -39,17 +38,6 @@ class Sheet:
         return DataError(
             f"{self.file}: sheet {quote(self.name)}, cell {address(place)}: found {found}, expected {expected}"
         )
-
-
-def is_workbook(data: bytes) -> bool:
-    """Whether a file's bytes are those of a spreadsheet."""
-    return data[:4] in (ZIP, OLE)
-
-
-def split_sheet(path: str) -> tuple[str, str]:
-    """Split `FILE.xlsx#Sheet name`."""
-    file, mark, sheet = path.partition("#")
-    return (file, sheet) if mark and file.lower().endswith(SUFFIXES) else (path, "")
 
 
 def address(place: Place) -> str:

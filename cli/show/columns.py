@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     Document = dict[str, Json]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Column:
     """A quantity of a table: strings are names, None and NaN are empty cells."""
 
@@ -38,7 +38,7 @@ class Column:
         return f"{self.name}_{self.unit}" if self.unit else self.name
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """Columns of one length."""
 
@@ -52,7 +52,7 @@ class Table:
         return {column.header: column.values for column in self.columns}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Result:
     """What a command has found, in every form it can be shown in; each is formed when it is asked for."""
 

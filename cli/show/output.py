@@ -14,13 +14,9 @@ import typer
 
 from cli.errors import one_line
 from cli.read.files import refuse_inputs
-from cli.read.headers import check_renamed, rename
-from cli.show.columns import Result, Table
-from cli.show.files import write
-from cli.show.text import csv_text, json_parts, paragraphs, table_text
 
 if TYPE_CHECKING:
-    from cli.show.columns import Document
+    from cli.show.columns import Document, Result, Table
 
 
 def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
@@ -34,7 +30,7 @@ def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
     return check
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ShowOptions:
     """The options that every command shares, in the order in which its help lists them."""
 
@@ -81,7 +77,6 @@ class ShowOptions:
         typer.Option(
             metavar="NAME=HEADER",
             help="Read the column HEADER of a table as NAME, such as mass_kg=Masse; repeatable.",
-            callback=rename,
         ),
     ] = None
 
@@ -103,12 +98,14 @@ def command(find: Callable[..., Result]) -> Callable[..., None]:
 
     Where the function has a parameter `show`, it is given them.
     """
-    own = signature(find, eval_str=True).parameters
-    shared = signature(ShowOptions, eval_str=True).parameters
+    own, shared = (_parameters(of) for of in (find, ShowOptions))
 
     @wraps(find)
     def run(**given: object) -> None:
+        from cli.read.headers import rename
+
         options = ShowOptions(**{name: given.pop(name) for name in shared})  # type: ignore[arg-type]
+        rename(options.column)
         if "show" in own:
             given["show"] = options
         result = find(**given)
@@ -116,15 +113,30 @@ def command(find: Callable[..., Result]) -> Callable[..., None]:
             show(result, options)
 
     parameters = [*(p for name, p in own.items() if name != "show"), *shared.values()]
-    parameters = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in parameters]
     run.__signature__ = signature(find).replace(parameters=parameters, return_annotation=None)  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run
 
 
+def _parameters(of: Callable[..., object]) -> dict[str, Parameter]:
+    """Return the parameters with their types; what is returned is not looked at, nor loaded for it."""
+    names = getattr(of, "__globals__", globals())
+    return {
+        name: p.replace(
+            kind=Parameter.KEYWORD_ONLY, annotation=eval(p.annotation, names) if name != "show" else None
+        )
+        for name, p in signature(of).parameters.items()
+    }
+
+
 def show(result: Result, options: ShowOptions) -> None:
     """Write the files asked for, print the result; status 1 if an expectation is not met, or nothing was found."""
+    from cli.read.headers import check_renamed
+    from cli.show.files import write
+    from cli.show.text import csv_text, json_parts, paragraphs, table_text
+
     if result.blocks is not None:
+        check_renamed()
         _stream(result, result.blocks(), options)
         return
     first, output = cache(next(iter(result.tables.values()))), options.output
@@ -171,6 +183,9 @@ def show(result: Result, options: ShowOptions) -> None:
 
 def _stream(result: Result, blocks: Iterator[Table], options: ShowOptions) -> None:
     """Write a table that comes in parts."""
+    from cli.show.files import write
+    from cli.show.text import csv_text
+
     unknown = 0
 
     def parts() -> Iterator[str]:

@@ -394,7 +394,9 @@ def test_many_machines_with_runs_of_their_own(dalembert: Dalembert) -> None:
 
 def test_a_table_with_runs_to_spare_may_repeat_the_base_run_and_lack_a_reading(dalembert: Dalembert) -> None:
     text = standard(MASSES, [0] * 6)
-    lacking = "".join(line for line in text.splitlines(keepends=True) if not line.startswith(("2,1,", "0,0,")))
+    lacking = "".join(
+        line for line in text.splitlines(keepends=True) if not line.startswith(("2,1,", "0,0,"))
+    )
     for table, readings in ((text, 12), (lacking, 10)):
         rotor, _ = found(dalembert("field", "-", "--json", stdin=table))
         assert rotor["fit"]["readings"] == readings

@@ -41,7 +41,8 @@ class Continuation:
         rate, det = self._rate(q, x)
         self.q, self.x, self.rate, self.det = [q], [x], [rate], [det]
         self.stopped = {1: False, -1: False}
-        self.step = {1: np.inf, -1: np.inf}  # the last one that was taken
+        # the last one that was taken
+        self.step = {1: np.inf, -1: np.inf}
 
     def _state(self, q: float) -> State:
         st = State([np.array([q])], many=True)
@@ -132,7 +133,8 @@ class Continuation:
                 nodes = np.cos(np.pi * (np.arange(12) + 0.5) / 12)
                 x = self.unknowns(centre + half * nodes)
                 det = [self._rate(q, row)[1] for q, row in zip(centre + half * nodes, x, strict=True)]
-                if not np.isfinite(det).all():  # a pose between the two that does not close: no more is known
+                # a pose between the two that does not close: no more is known
+                if not np.isfinite(det).all():
                     self._found[a, b] = centre
                     continue
                 roots = np.polynomial.Chebyshev.fit(nodes, det, 10, domain=[-1, 1]).roots()

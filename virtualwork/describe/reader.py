@@ -17,6 +17,7 @@ from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link
 from virtualwork.describe.units import LARGEST, wrong
 
 D = TypeVar("D", bound=Description)
+P = TypeVar("P")
 
 TABLES = {
     "name", "units", "ground", "links", "input", "guess", "slots", "sliders", "gears", "gravity", "forces",
@@ -49,7 +50,8 @@ def read_text(
         data = tomllib.loads(text)
     except RecursionError:
         raise DescriptionError(f"{file}: no valid TOML: nested too deeply") from None
-    except ValueError as error:  # a TOMLDecodeError, or a number of thousands of digits
+    except ValueError as error:
+        # a TOMLDecodeError, or a number of thousands of digits
         raise DescriptionError(f"{file}: no valid TOML: {error}") from None
     try:
         return make(**_Reader(data, folder or Path(), load).parts())
@@ -75,18 +77,22 @@ class _Reader(LoadEntries):
             "ground": ground,
             "links": self.links,
             "guides": guides,
-            "gears": [self.gear(e, i) for i, e in self.rows("gears")],
+            "gears": self.every("gears", self.gear),
             "inputs": inputs,
             "guess": self.guess(inputs),
             "name": self.name(),
             "gravity": self.gravity(),
-            "forces": [self.force(e, i) for i, e in self.rows("forces")],
-            "torques": [self.torque(e, i) for i, e in self.rows("torques")],
-            "springs": [self.spring(e, i) for i, e in self.rows("springs")],
-            "torsion_springs": [self.torsion(e, i) for i, e in self.rows("torsion_springs")],
-            "motors": [self.motor(e, i) for i, e in self.rows("motors")],
-            "friction": [self.rub(e, i) for i, e in self.rows("friction")],
+            "forces": self.every("forces", self.force),
+            "torques": self.every("torques", self.torque),
+            "springs": self.every("springs", self.spring),
+            "torsion_springs": self.every("torsion_springs", self.torsion),
+            "motors": self.every("motors", self.motor),
+            "friction": self.every("friction", self.rub),
         }
+
+    def every(self, name: str, read: Callable[[dict[str, Any], int], P]) -> list[P]:
+        """Every entry of an array of tables, read."""
+        return [read(entry, i) for i, entry in self.rows(name)] if name in self.data else []
 
     def name(self) -> str:
         found = self.data.get("name", "")

@@ -102,11 +102,6 @@ class Folded:
 ONE, MANY = One(), Many()
 
 
-def square(z: Number) -> Number:
-    """|z|², without the root."""
-    return (z.conjugate() * z).real
-
-
 def cross(a: Number, b: Number) -> Number:
     """The plane's vector product a_x·b_y − a_y·b_x.
 

@@ -63,9 +63,6 @@ class Branch(Protocol):
     def close(self) -> Callable[[Group, State], None]:
         """Closes the loops of any other group on its branch."""
 
-    def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
-        """The steps that targets hang on, worked out once."""
-
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""
 
@@ -227,7 +224,9 @@ class Poses:
         `then` is called with each block's number while the block is still in cache, and what it forms is forgotten.
         """
         wanted = tuple(targets)
-        steps = self._known_steps.get(wanted) or self.branch.needed(wanted)
+        steps = self._known_steps.get(wanted)
+        if steps is None:
+            steps = self._known_steps[wanted] = self.plan.needed(wanted)
         missing: list[tuple[int, list[Step]]] = []
         for k in range(order + 1):
             key = which if k else -2

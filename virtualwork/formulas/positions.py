@@ -94,7 +94,8 @@ class State:
         """const + Σ k·input, the part of an angle that needs no other angle."""
         value: Number = angle.const or None
         for j, k in angle.inputs:
-            value = plus(value, self.inputs[j] if k == 1.0 else k * self.inputs[j])
+            turned = self.inputs[j] if k == 1.0 else k * self.inputs[j]
+            value = turned if value is None else value + turned
         return 0.0 if value is None else value
 
     def rotate(self, angle: Angle) -> Number:
@@ -123,7 +124,7 @@ class State:
 def run(
     steps: Iterable[Step],
     st: State,
-    close: Callable[[Group, State], None],
+    close: Callable[[Group, State], None] | None = None,
     plain: Mapping[str, tuple[Case, int, float]] = EMPTY,
 ) -> None:
     """Work out positions, step by step.
@@ -138,7 +139,7 @@ def run(
             if step.name in plain:
                 case, sign, size = plain[step.name]
                 case.solve(st, sign, size)
-            else:
+            elif close is not None:
                 close(step, st)
         elif isinstance(step, Turn):
             turn(step, st)

@@ -88,9 +88,12 @@ class _Planner:
             set()
         )  # (joint, body) already spent to place a body or to close a loop
         # long chains: what is done is not looked through again for every block
-        self.solved: set[str] = set()  # bodies whose angle the steps written so far give
-        self.settled: set[str] = set()  # placed bodies whose pins are placed too
-        self.joined: set[str] = set()  # bodies all of whose loops are closed
+        # bodies whose angle the steps written so far give
+        self.solved: set[str] = set()
+        # placed bodies whose pins are placed too
+        self.settled: set[str] = set()
+        # bodies all of whose loops are closed
+        self.joined: set[str] = set()
 
     def run(self) -> Plan:
         self.blocks = decompose(self.m)
@@ -166,7 +169,8 @@ class _Planner:
         terms = group.closures[0].terms
         held = {own.get(t.body) for t in terms} | {t.slide for t in terms}
         if not held.issuperset((*group.angles, *group.slides)):
-            return "Newton"  # an unknown that its loop does not hold
+            # an unknown that its loop does not hold
+            return "Newton"
         turning = {own.get(t.body) for t in terms if t.slide in group.slides and t.slide is not None}
         if len(group.angles) == 2:
             return "RRR"
@@ -200,7 +204,8 @@ class _Planner:
             unknown = {body: factor for body, factor in c.items() if body in fresh}
             if (
                 right.gears
-            ):  # its constant is that of the guess, at once where no link before it has to be placed
+                # its constant is that of the guess, at once where no link before it has to be placed
+            ):
                 there = known.at(self.m.at)
                 if there is None:
                     known = _plus(known, right, 1.0)

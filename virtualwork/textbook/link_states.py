@@ -331,7 +331,8 @@ def balance(states: LinkStates, unknowns: Sequence[UnitLoad]) -> Balance:
         works = coefficient != 0
         value = np.full(works.shape, np.nan)
         np.divide(-states.power[..., None], coefficient, out=value, where=works)
-        value += 0.0  # no −0
+        # no −0
+        value += 0.0
         return Balance(
             value,
             works,
