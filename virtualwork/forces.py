@@ -24,6 +24,7 @@ class Forces(Dynamics):
         --------
         A weight of 2·9.81 N on an arm of 0.5 m at 60°:
 
+        >>> import numpy as np
         >>> from virtualwork import Input, Link, Mechanism
         >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="arm"),
         ...                 gravity=-9.81j)

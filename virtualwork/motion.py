@@ -346,6 +346,12 @@ class Motion:
         """
         return self.dynamics.reaction(joint, on)
 
+    def applied(self, link: str) -> tuple[Complexes, Reals]:
+        """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
+        if not self.mechanism.applies:
+            return np.zeros(self.n, complex), np.zeros(self.n)
+        return self.dynamics.applied(link)
+
     def unit(self, j: int = 0) -> Motion:
         """The motion through the same poses at a unit speed of input j alone: its velocities are virtual displacements."""
         if j not in self._units:

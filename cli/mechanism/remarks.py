@@ -158,7 +158,7 @@ def statements(analysis: Analysis) -> list[str]:
         if d.statics is not None:
             found += d.statics.undetermined()
     for motion in analysis.motions[:1]:
-        for body, r in motion.dynamics.scene.rigid.items():
+        for body, r in motion.mechanism.rigid.items():
             if (
                 r.inertia
                 and not r.mass

@@ -61,7 +61,7 @@ def table(analysis: Analysis) -> Table:
     @cache
     def bounds(motion: Motion, link: str, field: int | None, guide: int | None, key: str) -> list[float]:
         along = motion if field is None else motion.unit(field)
-        center = motion.dynamics.scene.rigid[link].center
+        center = motion.mechanism.rigid[link].center
         if key in ("fvx_m_s", "fvy_m_s"):
             assert guide is not None
             return bounds_of(_guided(along, guide, link))
@@ -99,7 +99,7 @@ def rows(analysis: Analysis) -> list[tuple[Place, dict[str, Any]]]:
     several = analysis.several
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
         order = analysis.order
-        massive = any(r.mass or r.inertia for r in motion.dynamics.scene.rigid.values())
+        massive = any(r.mass or r.inertia for r in motion.mechanism.rigid.values())
         if order == 1 and massive:
             order = 2  # a speed alone already makes accelerations, and masses feel them
         parts = {name: _part(analysis, motion, name, order) for name in analysis.links}
@@ -144,7 +144,7 @@ def rows(analysis: Analysis) -> list[tuple[Place, dict[str, Any]]]:
 
 
 def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
-    body = motion.dynamics.scene.rigid[name]
+    body = motion.mechanism.rigid[name]
     part: Part = {"mass_kg": [body.mass] * motion.n, "inertia_kg_m2": [body.inertia] * motion.n}
     for x, y, k in (("x_m", "y_m", 0), ("vx_m_s", "vy_m_s", 1), ("ax_m_s2", "ay_m_s2", 2))[: order + 1]:
         z = motion.at(name, body.center).complex(k)
@@ -152,7 +152,7 @@ def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
     angle = of_link(motion, name, min(order, 2), analysis.given(name))
     part |= {key: angle[key] for key in ("angle_deg", "omega_rad_s", "alpha_rad_s2") if key in angle}
     if order >= 1:
-        force, torque = motion.dynamics.applied(name)
+        force, torque = motion.applied(name)
         loads = (*pair(force), cells(torque))
         # a pose that cannot be assembled has no loads either
         known = motion.assembled
@@ -165,7 +165,7 @@ def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
 
 def _virtual(motion: Motion, name: str, j: int) -> Part:
     """The virtual velocities of a link for a unit of input j."""
-    x, y = pair(motion.at(name, motion.dynamics.scene.rigid[name].center).coefficient(j))
+    x, y = pair(motion.at(name, motion.mechanism.rigid[name].center).coefficient(j))
     return {"vx_m_s": x, "vy_m_s": y, "omega_rad_s": cells(motion.link(name).coefficient(j))}
 
 

@@ -192,6 +192,15 @@ def parse_number(text: str) -> float:
     return value
 
 
+def is_number(text: str) -> bool:
+    """Whether a text is a number and nothing else."""
+    try:
+        parse_number(text)
+    except ValueError:
+        return False
+    return True
+
+
 def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
     """Read an option's value such as `3000rpm` or `30 g_mm`: the number and the unit it was given in.
 

@@ -1,6 +1,6 @@
 """Following a group with no closed form along the input: tangent prediction, Newton-Raphson correction.
 
-The march lays down nodes (unknowns and their rate) once; any pose starts from the cubic between two nodes and is
+The continuation lays down nodes (unknowns and their rate) once; any pose starts from the cubic between two nodes and is
 corrected by Newton-Raphson on all poses together, so that no error accumulates.
 """
 
@@ -66,7 +66,7 @@ class Continuation:
         return rate, float(np.prod(np.linalg.svd(jacobian[0], compute_uv=False)))
 
     def extend(self, a: float, b: float) -> None:
-        """March until the nodes cover a to b."""
+        """Go on until the nodes cover a to b."""
         h = self.track.length / NODES
         while not self.stopped[1] and self.q[-1] < b + h:
             self._advance(1, h)

@@ -63,7 +63,7 @@ class Track:
         self.flips: dict[str, Reals] = {}
         self.changes: dict[str, list[ChangePoint]] = {}
         self._brackets: list[tuple[str, float, float]] = []
-        self._marched: dict[str, Continuation] = {}
+        self._continuations: dict[str, Continuation] = {}
         self._followed: dict[str, tuple[Reals, Reals]] = {}
         # one turn says it all where every turn of a body is a whole number of turns of the input
         whole = all(
@@ -189,10 +189,10 @@ class Track:
 
     def bridge_rates(self, group: Group, q: Number, k: int, x: list[Number], singular: Any) -> list[Number]:
         """Derivatives of a Newton group at poses where its Jacobian is singular though the branch goes on."""
-        if not self.active or group.name not in self._marched:
+        if not self.active or group.name not in self._continuations:
             return x
         for i in np.flatnonzero(singular):
-            rate = self._marched[group.name].bridge(float(np.atleast_1d(q)[i]), k)
+            rate = self._continuations[group.name].bridge(float(np.atleast_1d(q)[i]), k)
             if not np.isfinite(
                 rate
                 # close to a limit nothing goes on: what the Jacobian gives is kept
@@ -345,7 +345,7 @@ class Track:
     @property
     def has_limits(self) -> bool:
         """Was any limit met in what was covered?"""
-        return bool(self._brackets) or any(march.ends for march in self._marched.values())
+        return bool(self._brackets) or any(way.ends for way in self._continuations.values())
 
     # --- the branch's own scale -----------------------------------------------------------------------------------
     @cached_property
@@ -420,8 +420,8 @@ class Track:
         found = [
             Limit(name, *crossing(partial(self.margin, by_name[name]), a, b)) for name, a, b in self._brackets
         ]
-        for name, marched in self._marched.items():
-            found += [Limit(name, q, side) for q, side in marched.ends]
+        for name, way in self._continuations.items():
+            found += [Limit(name, q, side) for q, side in way.ends]
         unique: list[Limit] = []
         for limit in sorted(found, key=lambda x: x.input):
             if not unique or abs(limit.input - unique[-1].input) > 1e-10 * self.length:
@@ -432,13 +432,13 @@ class Track:
     def crossings(self) -> list[float]:
         """Inputs at which two branches cross, in what was covered: of closed forms, and met on the way of the others."""
         found = [float(q) for flips in self.flips.values() for q in flips]
-        return found + [float(q) for marched in self._marched.values() for q in marched.crossings]
+        return found + [float(q) for way in self._continuations.values() for q in way.crossings]
 
     # --- groups with no closed form ------------------------------------------------------------------------------
     def _continued(self, group: Group) -> Continuation:
-        if group.name not in self._marched:
-            self._marched[group.name] = Continuation(self, group)
-        return self._marched[group.name]
+        if group.name not in self._continuations:
+            self._continuations[group.name] = Continuation(self, group)
+        return self._continuations[group.name]
 
     def _close_newton(self, group: Group, st: State) -> None:
         """Close a Newton group at the state's poses, from its continued branch."""

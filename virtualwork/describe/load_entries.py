@@ -131,7 +131,7 @@ class LoadEntries(Entries):
             self.pair(entry.get("center", [0, 0]), "length", f"{where} center"),
         )
 
-    def rub(self, entry: dict[str, Any], i: int) -> Friction:
+    def joint_friction(self, entry: dict[str, Any], i: int) -> Friction:
         """Friction in a joint."""
         where = f"[[friction]] {i}"
         known_keys(entry, {"joint", "coefficient", "radius"}, where, "key")

@@ -155,3 +155,12 @@ class Guess(Record):
         object.__setattr__(self, "at", values)
         object.__setattr__(self, "angles", MappingProxyType(dict(angles or {})))
         object.__setattr__(self, "points", as_points(points or {}))
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """Mass, centre of mass and inertia of a link, with the motors it carries."""
+
+    mass: float
+    center: complex
+    inertia: float

@@ -87,7 +87,7 @@ class _Reader(LoadEntries):
             "springs": self.every("springs", self.spring),
             "torsion_springs": self.every("torsion_springs", self.torsion),
             "motors": self.every("motors", self.motor),
-            "friction": self.every("friction", self.rub),
+            "friction": self.every("friction", self.joint_friction),
         }
 
     def every(self, name: str, read: Callable[[dict[str, Any], int], P]) -> list[P]:

@@ -183,7 +183,7 @@ class Case:
             for t in closure.terms
             if t.body not in members and (t.slide is None or t.slide not in group.slides)
         )
-        self.arms: list[complex | None] = []
+        self.arms: list[complex] = []
         self.bent: list[list[tuple[Term, Angle]]] = []
         self.tie = tie
         for angle in group.angles:
@@ -207,7 +207,7 @@ class Case:
 
     def arm(self, i: int, st: State) -> Number:
         """The arm of unknown angle i."""
-        value: Number = self.arms[i]
+        value: Number = st.kind.constant(self.arms[i])
         for t, relative in self.bent[i]:
             v = t.z
             if relative.inputs or relative.const:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualwork.describe.parts import GROUND
+from virtualwork.describe.parts import GROUND, Rigid
 from virtualwork.formulas.block import Block, Setting
-from virtualwork.formulas.load_case import LoadCase, Rigid
+from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.loads import FrictionLoad, Load
 from virtualwork.formulas.poses import Poses
@@ -64,9 +64,9 @@ class Scene:
         return self.case.friction
 
     @property
-    def rigid(self) -> dict[str, Rigid]:
+    def rigid(self) -> Mapping[str, Rigid]:
         """Mass properties of every link."""
-        return self.case.rigid
+        return self.mechanism.rigid
 
     # --- solving ----------------------------------------------------------------------------------------------
     def _targets(self, keys: Iterable[str]) -> tuple[tuple[str, ...], int]:
