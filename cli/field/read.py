@@ -43,7 +43,7 @@ def read_runs(path: str, *, lagging: bool, phaseless: bool, stored_unit: str | N
     if not both and stored_unit is None:
         raise DataError(
             f"{table.file}: no column trial_mass_kg (or trial_mass_g, trial_unbalance_g_mm …): expected trial masses, "
-            f"or stored coefficients by --influence (the header is: {', '.join(table.header)})"
+            f"or stored coefficients by --influence {table.told}"
         )
     size = table.cells[both[0]] if both else None
     names, rotor = number_names(table.texts.get("rotor") or ["1"] * table.rows)
@@ -94,6 +94,10 @@ def _layouts(table: Table, rotor: Rows) -> Iterator[tuple[Rows, Rows]]:
             yield rotors[same], rows[same]
 
 
+class NotOneInitialRun(DataError):
+    """A table of runs with no initial run, with several, or with readings that lack: all runs have to be fitted together."""
+
+
 class _Reader:
     """Reads the groups; the first rotor of each tells how it was measured."""
 
@@ -110,9 +114,7 @@ class _Reader:
         if not self.run and self.stored:
             self.run = ["initial"] * self.table.rows
         if not self.run:
-            raise DataError(
-                f"{self.table.file}: no column run (the header is: {', '.join(self.table.header)})"
-            )
+            raise DataError(f"{self.table.file}: no column run {self.table.told}")
         masses = next(
             (self.table.cells[n] for n in ("trial_mass", "trial_unbalance") if n in self.table.cells), None
         )
@@ -141,6 +143,7 @@ class _Reader:
         trials: list[Trial] = []
         initial: str | None = None
         standing = False
+        again: DataError | None = None
         for run, members in by_run.items():
             trial = self._trial(run, members, first, planes)
             if trial is None and initial is None and not standing:
@@ -153,7 +156,7 @@ class _Reader:
                         f"{self.table.file}: {of}runs {quote(initial or '')} and {quote(run)} both have no trial mass: "
                         "expected one run, for --influence gives the coefficients"
                     )
-                raise self.fail(
+                again = again or self.fail(
                     first[members[0]],
                     "trial_plane",
                     "",
@@ -162,8 +165,12 @@ class _Reader:
             else:
                 trials.append(trial)
                 standing = standing or trial.kept
+        # with runs to spare all of them are fitted together
+        lacking = NotOneInitialRun if len(by_run) > 1 + len(planes) > 1 else DataError
+        if again is not None:
+            raise lacking(str(again))
         if initial is None:
-            raise DataError(
+            raise NotOneInitialRun(
                 f"{self.table.file}: {of}every run has a trial mass: expected an initial run with trial_plane, "
                 "trial_mass and trial_angle empty"
             )
@@ -179,7 +186,10 @@ class _Reader:
         matches = []
         runs = np.empty((len(rotors), len(trials), len(channels)), dtype=complex)
         for j, trial in enumerate(trials):
-            mine = self._match(trial.run, initial, by_run[trial.run], first, channels, of)
+            try:
+                mine = self._match(trial.run, initial, by_run[trial.run], first, channels, of)
+            except DataError as error:
+                raise lacking(str(error)) from None
             matches.append(mine)
             for s, members in enumerate(mine):
                 runs[:, j, s] = self.vibration[rows[:, members]].mean(axis=1)
@@ -353,9 +363,7 @@ class _Reader:
         assert self.size is not None
         angle = self.table.cells.get("trial_angle")
         if angle is None:
-            raise DataError(
-                f"{self.table.file}: no column trial_angle_deg (the header is: {', '.join(self.table.header)})"
-            )
+            raise DataError(f"{self.table.file}: no column trial_angle_deg {self.table.told}")
         size = self._numbers(self.size, rows, place, "a trial mass, positive")
         turn = self._numbers(angle, rows, place, "the angle of the trial mass")
         if not (size >= SMALLEST).all():

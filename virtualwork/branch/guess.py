@@ -11,15 +11,15 @@ import numpy as np
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.solutions import every_solution, guessed_unknowns
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError
+from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
 from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
 from virtualwork.formulas.linear import stack, stack_rows
 from virtualwork.formulas.newton import gaps, newton, write_unknowns
 from virtualwork.formulas.numbers import cross, dot
-from virtualwork.formulas.positions import Case, State, columns
+from virtualwork.formulas.positions import Case, State, columns, run
 from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Plan, Turn
+from virtualwork.plan.steps import Group, Plan, Step, Turn
 
 C = TypeVar("C", bound=Choice)
 
@@ -56,6 +56,8 @@ class _Chooser:
             if loose or not self.plan.anchors.keys() >= self.m.links.keys():
                 raise MobilityError("[input]: constraints that depend on each other leave a part free")
             found = self._choose(make, st)
+        except ParallelGuidesError:
+            raise
         except (MechanismError, ZeroDivisionError) as error:
             self._refuse_floating()
             if isinstance(error, MechanismError):
@@ -101,8 +103,12 @@ class _Chooser:
         signs: dict[str, int] = {}
         starts: dict[str, Any] = {}
         helper = Choice(self.m, self.plan)
+        waiting: list[Step] = []
         for i, step in enumerate(self.plan.steps):
             open_ = step
+            if isinstance(step, Group) or (isinstance(step, Turn) and step.angle.gears):
+                run(waiting, st)
+                waiting = []
             if isinstance(step, Turn) and step.angle.gears:
                 step = self._phased(step, st)
             elif isinstance(step, Group) and any(tie.angle.gears for tie in step.ties):
@@ -111,12 +117,13 @@ class _Chooser:
                 self.plan = replace(self.plan, steps=(*self.plan.steps[:i], step, *self.plan.steps[i + 1 :]))
             if isinstance(step, Group):
                 if step.kind == "Newton":
-                    starts[step.name] = self._newton(step, st)
+                    starts[step.name] = tuple(map(float, self._newton(step, st)))
                 else:
                     signs[step.name] = self._sign(step, helper.cases[step.name], st, signs)
                     st.angle.update({b: float(np.angle(st.turn[b])) for b in step.members})
             else:
-                helper.run_untracked([step], st)
+                waiting.append(step)
+        run(waiting, st)
         if self.plan.blocks.redundant:
             self._refuse_overdriven(self.plan, st)
         phases = {
@@ -233,7 +240,7 @@ class _Chooser:
             try:
                 case.solve(st, 1, self.m.size)
             except ZeroDivisionError:
-                raise AssemblyError(
+                raise ParallelGuidesError(
                     f"{group.name}: its two guides are parallel, so that its position is not determined; expected "
                     "guides of different directions (`angle`)"
                 ) from None
