@@ -149,7 +149,7 @@ class _String:
         for k, part in enumerate(self.link_parts, 1):
             what = f"link {k}"
             tokens = self._tokens(what, part[2:], 8)
-            ids, _, inner = ",".join(tokens[7:]).partition(",,")
+            ids, _cut, inner = ",".join(tokens[7:]).partition(",,")
             rows.append((what, part[:2], tokens, [i for i in ids.split(",") if i], inner.split(",")))
         inside = {s for *_, subsets in rows for s in subsets if s}
         real = [tokens for _, kind, tokens, *_ in rows if kind[1:] == "R"]
