@@ -149,8 +149,8 @@ class _String:
         for k, part in enumerate(self.link_parts, 1):
             what = f"link {k}"
             tokens = self._tokens(what, part[2:], 8)
-            ids, _cut, inner = ",".join(tokens[7:]).partition(",,")
-            rows.append((what, part[:2], tokens, [i for i in ids.split(",") if i], inner.split(",")))
+            outer, _, inner = ",".join(tokens[7:]).partition(",,")
+            rows.append((what, part[:2], tokens, [i for i in outer.split(",") if i], inner.split(",")))
         inside = {s for *_, subsets in rows for s in subsets if s}
         real = [tokens for _, kind, tokens, *_ in rows if kind[1:] == "R"]
         unset = bool(real) and all(self._decimal("mass", t[k]) == 1 for t in real for k in (2, 3))
@@ -162,7 +162,7 @@ class _String:
             self.d.notes.append(
                 f"masses are taken as kg, inertias as kg·{self.d.length}2: the string names no unit"
             )
-        for what, kind, tokens, ids, _ in rows:
+        for what, kind, tokens, ids, _rest in rows:
             id_ = tokens[0]
             if kind[:1] == "N" and id_ in inside:
                 continue
