@@ -85,7 +85,7 @@ class Continuation:
             guess = x + side * step * rate
             st = self._state(to)
             with np.errstate(all="ignore"):
-                found, closed = newton(self.group, st, guess[None], self.size, limit=12)
+                found, closed = newton(self.group, st, guess[None], self.size, limit=8)
             if closed[0]:
                 new, det = self._rate(to, found[0])
                 # a slide that runs away is measured by itself
