@@ -438,9 +438,7 @@ def _further(t: Topology) -> str:
     """What the program makes of the poses at both sides of the guess."""
     way = (1.0,) if len(t.inputs) == 1 else (0.8, 0.6)
     poses = [
-        (side * off, x)
-        for side in (1.0, -1.0)
-        for off, x in follow(t, tuple(side * w for w in way)).items()
+        (side * off, x) for side in (1.0, -1.0) for off, x in follow(t, tuple(side * w for w in way)).items()
     ]
     if not poses:
         return "put together"

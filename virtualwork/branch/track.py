@@ -20,7 +20,8 @@ import numpy as np
 
 from virtualwork.branch.change_point import ChangePoint, through
 from virtualwork.branch.choice import Choice
-from virtualwork.branch.continuation import Continuation, along_lines
+from virtualwork.branch.continuation import Continuation, along_lines, wind_along_lines
+from virtualwork.branch.roots import chebyshev_nodes, real_roots
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.numbers import EPS, Complexes, Number, Reals
 from virtualwork.formulas.positions import State, run
@@ -97,7 +98,11 @@ class Track:
             self.mend(group, st)
         else:
             case.solve(st, self.assembly.signs[group.name], size, group.name in self.folded)
-        for body in self.assembly.geared.intersection(group.members):
+        bodies = self.assembly.geared.intersection(group.members)
+        if not self.active:
+            wind_along_lines(self, group, st, bodies)
+            return
+        for body in bodies:
             st.angle[body] = self.unwound(body, st.inputs[0], np.angle(st.turn[body]))
 
     def cover(self, low: float, high: float) -> None:
@@ -352,15 +357,14 @@ class Track:
         """
         centre, half = (a + b) / 2, (b - a) / 2
         for widen in (1.0, 4.0):
-            nodes = np.cos(np.pi * (np.arange(14) + 0.5) / 14)
+            nodes = chebyshev_nodes(14)
             m = self.margin(group, centre + widen * half * nodes)
             if not np.isfinite(m).all():
                 if widen == 1.0:
                     return None
                 break
             fit = np.polynomial.Chebyshev.fit(nodes, m, 11, domain=[-1, 1])
-            roots = fit.deriv().roots()
-            real = np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= 1.2)])
+            real = real_roots(fit.deriv(), 1.2)
             if not len(real):
                 return None
             best = real[np.argmin(np.abs(fit(real)))]

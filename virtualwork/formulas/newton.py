@@ -81,7 +81,7 @@ def newton(
 
     def reach() -> Reals:
         """What a loop's rounding is relative to: the mechanism's size, or a slide that runs beyond it."""
-        return np.abs(x[:, len(group.angles) :]).max(axis=1, initial=size)
+        return np.asarray(np.abs(x[:, len(group.angles) :]).max(axis=1, initial=size))
 
     far = reach()
     if table is not None:
@@ -94,7 +94,9 @@ def newton(
         jacobian = stack(columns(group, st), n)
         dx = solve(jacobian, -f)
         dx[done | ~np.isfinite(dx).all(axis=1)] = 0.0
-        big = np.abs(dx / np.where(slides, far[:, None], 1.0)).max(axis=1, initial=0.0)  # a group may have no unknown of its own
+        big = np.abs(dx / np.where(slides, far[:, None], 1.0)).max(
+            axis=1, initial=0.0
+        )  # a group may have no unknown of its own
         if damped:  # no angle turns by more than some 60° in a step
             dx *= np.minimum(1.0, 1.0 / np.maximum(big, 1e-300))[:, None]
         factor = np.ones(n)
