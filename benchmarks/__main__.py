@@ -16,7 +16,8 @@ import typer
 from benchmarks.speed import DOMAINS
 from cli.errors import DataError, nearest, one_line
 from cli.read import options
-from cli.show.shown import Json, Output, Plot, Shown, Text, show
+from cli.show.columns import Column, Result, Table
+from cli.show.output import command
 
 if TYPE_CHECKING:
     from benchmarks.speed.measure import Measurement
@@ -42,6 +43,7 @@ Docs = Annotated[
 
 
 @app.command()
+@command
 def speed(
     name: Annotated[
         list[str] | None, typer.Argument(metavar="[NAME]...", help=f"Domains: {', '.join(DOMAINS)}.")
@@ -51,11 +53,7 @@ def speed(
         bool, typer.Option("--peers", help="The same work with other packages, where they are installed.")
     ] = False,
     docs: Docs = None,
-    json: Json = False,
-    output: Output = None,
-    plot: Plot = None,
-    text: Text = False,
-) -> None:
+) -> Result:
     """Measure run time against error, for each method the program offers.
 
     Times are CPU times per item, also as multiples of a calibration loop measured in the same run (one element of
@@ -88,18 +86,15 @@ def speed(
         "kernel_calls": [m.kernels for m in measurements],
         "peer": ["yes" if m.peer else "no" for m in measurements],
     }
-    show(
-        Shown(
-            document=lambda: {"measurements": _records(columns)},
-            columns=columns,
-            keys=("domain", "work", "method", "size"),
-            figure=lambda: import_module("benchmarks.speed.picture").draw(measurements),
-        ),
-        json=json,
-        output=output,
-        plot=plot,
-        text=text,
+    return Result(
+        document=lambda: {"measurements": _records(columns)},
+        tables={"measurements": lambda: _table(columns, "domain", "work", "method", "size")},
+        figure=lambda: import_module("benchmarks.speed.picture").draw(measurements),
     )
+
+
+def _table(columns: dict[str, list[Any]], *keys: str) -> Table:
+    return Table([Column(name, "", values) for name, values in columns.items()], keys)
 
 
 def _records(columns: dict[str, list[Any]]) -> list[dict[str, Any]]:
@@ -130,6 +125,7 @@ def _measure(domains: list[str], quick: bool, peers: bool) -> Iterator[Measureme
 
 
 @app.command()
+@command
 def stress(
     name: Annotated[
         list[str] | None, typer.Argument(metavar="[NAME]...", help="Campaigns, by the names of the table.")
@@ -141,10 +137,7 @@ def stress(
         int, typer.Option(min=0, help="The seed of the first case; without --time this one case of each.")
     ] = 0,
     docs: Docs = None,
-    json: Json = False,
-    output: Output = None,
-    text: Text = False,
-) -> None:
+) -> Result:
     """Run random campaigns at singular places; status 1 if errors lie beyond the program's own estimate too often."""
     from benchmarks import page
     from benchmarks.stress.campaigns import Tally, campaigns, run
@@ -174,28 +167,20 @@ def stress(
         "share_bounded": [t.bounded for t in tallies],
         "median_slack": [t.slack for t in tallies],
     }
-    show(
-        Shown(
-            lambda: {"campaigns": _records(columns)},
-            columns,
-        ),
-        json=json,
-        text=text,
-        output=output,
+    return Result(
+        document=lambda: {"campaigns": _records(columns)},
+        tables={"campaigns": lambda: _table(columns)},
+        failed=lambda: any(t.bounded < 0.999 for t in tallies),
     )
-    if any(t.bounded < 0.999 for t in tallies):
-        raise typer.Exit(1)
 
 
 @app.command()
+@command
 def fuzz(
     inputs: Annotated[int, typer.Argument(metavar="N", min=1, help="How many damaged inputs.")],
     seed: Annotated[int, typer.Option(min=0, help="The seed of the first: `1 --seed S` is one again.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
-    json: Json = False,
-    output: Output = None,
-    text: Text = False,
-) -> None:
+) -> Result:
     """Run damaged inputs through the commands; status 1 if one is not handled as it should be."""
     from shlex import join
 
@@ -227,29 +212,22 @@ def fuzz(
         "faults": [len(t.faults) for t in found],
     }
     total = sum(t.inputs for t in found)
-    show(
-        Shown(
-            lambda: {
-                "first_seed": seed,
-                "inputs": total,
-                "commands": _records(columns),
-                "faults": [
-                    {"seed": case, "arguments": outcome.arguments, "fault": outcome.fault}
-                    for t in found
-                    for case, outcome in t.faults
-                ],
-            },
-            columns,
-            ("command",),
-            afterword=lambda: f"{total} inputs from seed {seed}, {sum(len(t.faults) for t in found)} faults",
-            warnings=[] if LIMITED else ["this system limits no process's memory: it was not limited"],
-        ),
-        json=json,
-        text=text,
-        output=output,
+    return Result(
+        document=lambda: {
+            "first_seed": seed,
+            "inputs": total,
+            "commands": _records(columns),
+            "faults": [
+                {"seed": case, "arguments": outcome.arguments, "fault": outcome.fault}
+                for t in found
+                for case, outcome in t.faults
+            ],
+        },
+        tables={"commands": lambda: _table(columns, "command")},
+        afterword=lambda: f"{total} inputs from seed {seed}, {sum(len(t.faults) for t in found)} faults",
+        warnings=[] if LIMITED else ["this system limits no process's memory: it was not limited"],
+        failed=lambda: any(t.faults for t in found),
     )
-    if any(t.faults for t in found):
-        raise typer.Exit(1)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ import os
 import sys
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
 
 import typer
 
@@ -65,7 +64,7 @@ def build(called: str | None) -> typer.Typer:
     return app
 
 
-def main(front: Callable[[str | None], Callable[..., Any]] = build) -> None:
+def main(front: Callable[[str | None], Callable[..., object]] = build) -> None:
     """Run the command; a data error is one line on standard error and status 1, never a traceback.
 
     `front` builds the command line: one that is used many times need not be built each time.

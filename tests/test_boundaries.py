@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 CORE = ("balancing", "virtualwork", "rigidbody3d")
-HEAVY = {"numpy", "pandas", "scipy", "matplotlib", "rich", "pydantic"}
+HEAVY = {"numpy", "pandas", "scipy", "matplotlib", "rich", "pydantic", "python_calamine", "xlsxwriter"}
 
 # From the top down. A room (a file or a folder of its package) imports rooms of the levels below its own, never above
 # and never beside it; a file in a folder may import any of the same folder, but in no circle.
@@ -34,6 +34,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("__init__",),
         ("mechanism",),
         ("motion",),
+        ("forces",),
         ("family",),
         ("intime",),
         ("study",),
@@ -275,6 +276,7 @@ def test_the_ground_stands_on_numpy_alone() -> None:
 
 def test_nothing_imports_the_tests_or_an_undeclared_package() -> None:
     declared = {"numpy", "scipy", "pandas", "typer", "matplotlib", "mpl_toolkits", "trimesh", "llvmlite"}
+    declared |= {"python_calamine", "xlsxwriter"}
     for module, tree in trees().items():
         allowed = set(sys.stdlib_module_names) | set(INSTALLED) | declared
         if module.startswith("benchmarks.peers."):
@@ -328,3 +330,20 @@ def test_the_wheel_holds_the_packages_and_the_examples(tmp_path: Path) -> None:
     assert held == tracked
     assert "cli/examples/riul-rotor/rotor.csv" in held
     assert {f"{package}/py.typed" for package in INSTALLED} <= held
+
+
+# Within a command's folder, from the top down; the other files of a folder stand between these as they need.
+ROLES = (("command",), ("columns", "picture", "remarks", "report", "words"), ("solve",), ("read",))
+
+
+def test_a_commands_files_stand_in_one_order() -> None:
+    """The options, then columns, words and pictures, then the solution, then what is read."""
+    level = {role: i for i, roles in enumerate(ROLES) for role in roles}
+    for module, others in graph().items():
+        package, *rest = module.split(".")
+        if package != "cli" or len(rest) != 2 or rest[1] not in level:
+            continue
+        for other in others:
+            *room, role = other.split(".")
+            if room == [package, rest[0]] and role in level:
+                assert level[rest[1]] <= level[role], f"{module} imports {other}"

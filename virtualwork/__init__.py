@@ -1,24 +1,28 @@
 """Planar mechanisms: kinematics, and equilibrium at rest and in motion by virtual work."""
 
-from virtualwork.describe.errors import AssemblyError, DescriptionError, MechanismError, MobilityError
-from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
-from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link
-from virtualwork.formulas.effort import ledger
-from virtualwork.mechanism import Mechanism, equilibria
-from virtualwork.study import counterweights
-from virtualwork.study.check import Check, grashof_class
-from virtualwork.study.cycle import Cycle
-from virtualwork.study.equilibrium import Equilibria, Equilibrium
-from virtualwork.textbook.combinations import (
-    block_on_bar,
-    crank_rod_piston,
-    on_incline,
-    on_moving_ramp,
-    rotation,
-    second_point,
-    sense,
-)
-from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from virtualwork.describe.errors import AssemblyError, DescriptionError, MechanismError, MobilityError
+    from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
+    from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link
+    from virtualwork.formulas.effort import ledger
+    from virtualwork.mechanism import Mechanism, equilibria
+    from virtualwork.study import counterweights
+    from virtualwork.study.check import Check, grashof_class
+    from virtualwork.study.cycle import Cycle
+    from virtualwork.study.equilibrium import Equilibria, Equilibrium
+    from virtualwork.textbook.combinations import (
+        block_on_bar,
+        crank_rod_piston,
+        on_incline,
+        on_moving_ramp,
+        rotation,
+        second_point,
+        sense,
+    )
+    from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
 
 __all__ = [
     "GROUND",
@@ -57,3 +61,72 @@ __all__ = [
     "second_point",
     "sense",
 ]
+
+# where each name stands; a room is loaded when one of its names is asked for
+_ROOMS = {
+    "virtualwork.describe.errors": (
+        "AssemblyError",
+        "DescriptionError",
+        "MechanismError",
+        "MobilityError",
+    ),
+    "virtualwork.describe.loads": (
+        "Force",
+        "Friction",
+        "Motor",
+        "Spring",
+        "Torque",
+        "TorsionSpring",
+    ),
+    "virtualwork.describe.parts": (
+        "GROUND",
+        "Gear",
+        "Guess",
+        "Guide",
+        "Input",
+        "Link",
+    ),
+    "virtualwork.formulas.effort": ("ledger",),
+    "virtualwork.mechanism": (
+        "Mechanism",
+        "equilibria",
+    ),
+    "virtualwork.study": ("counterweights",),
+    "virtualwork.study.check": (
+        "Check",
+        "grashof_class",
+    ),
+    "virtualwork.study.cycle": ("Cycle",),
+    "virtualwork.study.equilibrium": (
+        "Equilibria",
+        "Equilibrium",
+    ),
+    "virtualwork.textbook.combinations": (
+        "block_on_bar",
+        "crank_rod_piston",
+        "on_incline",
+        "on_moving_ramp",
+        "rotation",
+        "second_point",
+        "sense",
+    ),
+    "virtualwork.textbook.link_states": (
+        "LinkStates",
+        "UnitLoad",
+        "balance",
+    ),
+}
+
+
+def __getattr__(name: str) -> object:
+    for room, names in _ROOMS.items():
+        if name in names:
+            module = import_module(room)
+            value: object = getattr(module, name, None) or import_module(f"{room}.{name}")
+            globals()[name] = value
+            return value
+    raise AttributeError(f"module 'virtualwork' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

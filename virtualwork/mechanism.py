@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
@@ -12,10 +13,11 @@ from virtualwork.branch.assembly import Assembly, all_assemblies
 from virtualwork.describe.description import Description
 from virtualwork.describe.reader import read, read_text
 from virtualwork.motion import Motion
-from virtualwork.study.check import Check
-from virtualwork.study.equilibrium import SAMPLES, Equilibria
-from virtualwork.study.equilibrium import equilibria as search
-from virtualwork.study.newton_table import AllAtOnce, all_at_once
+
+if TYPE_CHECKING:
+    from virtualwork.study.check import Check
+    from virtualwork.study.equilibrium import Equilibria
+    from virtualwork.study.newton_table import AllAtOnce
 
 
 class Mechanism(Description):
@@ -44,6 +46,7 @@ class Mechanism(Description):
     Norton's four-bar (Design of Machinery, ex. 4-1): crank 40, coupler 120, rocker 80, ground 100 mm.
 
     >>> import math
+    >>> from virtualwork import Guess, Input, Link
     >>> m = Mechanism(
     ...     ground={"A": (0, 0), "D": (0.100, 0)},
     ...     links={"crank": Link({"A": (0, 0), "B": (0.040, 0)}),
@@ -111,6 +114,7 @@ class Mechanism(Description):
 
         Examples
         --------
+        >>> from virtualwork import Input, Link
         >>> m = Mechanism(ground={"O": (0, 0)}, links={"arm": Link({"O": (0, 0), "P": (2, 0)})},
         ...               inputs=Input(link="arm"))
         >>> m.motion(0.0, speed=3.0).point("P").velocity
@@ -123,9 +127,11 @@ class Mechanism(Description):
     @cached_property
     def check(self) -> Check:
         """What kind of mechanism this is: mobility, redundant constraints, Grashof classes, limits, dead points."""
+        from virtualwork.study.check import Check
+
         return Check(self.assembly)
 
-    def equilibria(self, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:
+    def equilibria(self, spans: ArrayLike | None = None, samples: int = 1440) -> Equilibria:
         """Every position in which the mechanism rests under its loads without effort, each stable or not.
 
         Parameters
@@ -137,15 +143,20 @@ class Mechanism(Description):
 
         Examples
         --------
+        >>> from virtualwork import Input, Link
         >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="bob"),
         ...                      gravity=-9.81j)
         >>> pendulum.equilibria()
         Equilibria(1.5708 unstable, 4.71239 stable)
         """
+        from virtualwork.study.equilibrium import equilibria as search
+
         return search(self.assembly, spans, samples)
 
     def newton(self, *inputs: float, limit: int = 50) -> AllAtOnce:
         """All loops at once by Newton-Raphson from the guess, with the table of iterates."""
+        from virtualwork.study.newton_table import all_at_once
+
         return all_at_once(self.assembly, inputs or self.at, limit)
 
     def assemblies(self) -> tuple[Assembly, ...]:
@@ -153,6 +164,6 @@ class Mechanism(Description):
         return all_assemblies(self.assembly)
 
 
-def equilibria(mechanism: Mechanism, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:
+def equilibria(mechanism: Mechanism, spans: ArrayLike | None = None, samples: int = 1440) -> Equilibria:
     """Every position in which a mechanism rests under its loads without effort; see `Mechanism.equilibria`."""
     return mechanism.equilibria(spans, samples)

@@ -1,6 +1,6 @@
 """The door out: what a mechanism does over given inputs, its points, links, slides and forces.
 
-Each quantity is solved when first asked for, and never twice.
+Each quantity is solved when first asked for, and never twice; the files of forces, bounds and studies are loaded then.
 
 >>> import numpy as np
 >>> from virtualwork import Input, Link, Mechanism
@@ -18,23 +18,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from virtualwork.bounds.forces import ForceErrors
-from virtualwork.bounds.motion import MotionErrors
+from dalembert.arithmetic.records import alike
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.describe.record import same
-from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.sweep import EvenSweep
 from virtualwork.plan.steps import Step
-from virtualwork.study.counterweights import least_squares
-from virtualwork.study.cycle import Cycle
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+    from virtualwork.bounds.motion import MotionErrors
+    from virtualwork.forces import Forces
+    from virtualwork.study.cycle import Cycle
 
 
 class PointMotion:
@@ -185,35 +184,6 @@ class SlideMotion:
         return self.motion.rounding.slide(self.guide, order)
 
 
-class Forces(Dynamics):
-    """The forces of a motion, with bounds of their rounding errors."""
-
-    @cached_property
-    def _errors(self) -> ForceErrors:
-        return ForceErrors(self)
-
-    def error_estimate(self) -> ForceErrors:
-        """Return bounds of the rounding errors of all forces, under the names of what they bound.
-
-        Dimensions, loads and inputs are taken as exact. With joint friction there are none: infinite.
-
-        Examples
-        --------
-        A weight of 2·9.81 N on an arm of 0.5 m at 60°:
-
-        >>> from virtualwork import Input, Link, Mechanism
-        >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="arm"),
-        ...                 gravity=-9.81j)
-        >>> found = arm.motion(np.pi / 3).dynamics
-        >>> bool(abs(found.effort[0, 0] - 4.905) <= found.error_estimate().effort[0, 0] < 1e-14)
-        True
-        """
-        return self._errors
-
-    def __repr__(self) -> str:
-        return f"Forces({self.poses.n} poses, {len(self.scene.loads)} loads)"
-
-
 class Motion:
     """Position, velocity, acceleration, jerk and forces over given inputs, on demand.
 
@@ -249,7 +219,9 @@ class Motion:
         if not isinstance(other, Motion):
             return NotImplemented
         mine, its = self.poses, other.poses
-        return self.assembly == other.assembly and same((mine.inputs, mine.rates), (its.inputs, its.rates))
+        return self.assembly == other.assembly and all(
+            alike(a, b) for a, b in zip((mine.inputs, *mine.rates), (its.inputs, *its.rates), strict=True)
+        )
 
     __hash__ = object.__hash__
 
@@ -317,7 +289,7 @@ class Motion:
         """Motion of any point of a link: a name, or coordinates in the link's own axes."""
         if isinstance(point, str):
             return PointMotion(self, link, self.mechanism.bodies[link][point], point)
-        return PointMotion(self, link, as_point(point))
+        return PointMotion(self, link, point if isinstance(point, complex) else as_point(point))
 
     def link(self, name: str) -> LinkMotion:
         """Motion of a link.
@@ -341,12 +313,16 @@ class Motion:
     @cached_property
     def rounding(self) -> MotionErrors:
         """Bounds of the rounding errors of this motion, each formed when first asked for."""
+        from virtualwork.bounds.motion import MotionErrors
+
         return MotionErrors(self.poses)
 
     # --- forces -----------------------------------------------------------------------------------------------
     @cached_property
     def dynamics(self) -> Forces:
         """All forces of this motion, each formed when first asked for."""
+        from virtualwork.forces import Forces
+
         return Forces(self.poses)
 
     @property
@@ -370,6 +346,12 @@ class Motion:
         """
         return self.dynamics.reaction(joint, on)
 
+    def applied(self, link: str) -> tuple[Complexes, Reals]:
+        """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
+        if not self.mechanism.applies:
+            return np.zeros(self.n, complex), np.zeros(self.n)
+        return self.dynamics.applied(link)
+
     def unit(self, j: int = 0) -> Motion:
         """The motion through the same poses at a unit speed of input j alone: its velocities are virtual displacements."""
         if j not in self._units:
@@ -381,6 +363,8 @@ class Motion:
     @property
     def cycle(self) -> Cycle:
         """The sweep as a cycle of work: mean and peak effort, energy balance, flywheel."""
+        from virtualwork.study.cycle import Cycle
+
         return Cycle(self)
 
     def counterweights(self, links: Sequence[str]) -> tuple[dict[str, complex], Complexes, Complexes]:
@@ -388,6 +372,8 @@ class Motion:
 
         See `virtualwork.study.counterweights.least_squares`.
         """
+        from virtualwork.study.counterweights import least_squares
+
         return least_squares(self, links)
 
     # --- as a table -------------------------------------------------------------------------------------------------

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.read import options
-from cli.show.columns import Result
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from cli.show.columns import Result
 
 
 @command
@@ -72,6 +73,7 @@ def run(
     from cli.balance.solve import Balancing, Request
     from cli.read.planes import from_options, from_table
     from cli.read.tolerance import tolerance_of
+    from cli.show.columns import Result
 
     if (plane is None) == (planes is None):
         raise options.bad("--plane", "expected --plane (once or more) or --planes FILE.csv")

@@ -15,7 +15,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rotors:
     """The masses of a table, in SI, and the units the table is written in."""
 
@@ -50,7 +50,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
     if not amounts:
         raise DataError(
             f"{table.file}: no column mass_kg (or mass_g, weight_N, unbalance_g_mm …): expected a mass or weight with "
-            f"a radius, or an unbalance (the header is: {', '.join(table.header)})"
+            f"a radius, or an unbalance {table.told}"
         )
     (amount,) = amounts
     given = table.numbers[amount]

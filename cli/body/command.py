@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.read import options
-from cli.show.columns import Result
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.body.solve import ShaftRequest
+    from cli.show.columns import Result
 
 _VECTOR = "X,Y,Z"
 
@@ -75,6 +75,7 @@ def run(
     from cli.body import columns, words
     from cli.body.solve import MovingBody, Request
     from cli.read.parts import read_parts
+    from cli.show.columns import Result
 
     request = Request(
         omega=options.vector("--omega", omega, "speed"),

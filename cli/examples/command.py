@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -59,6 +59,7 @@ def names() -> list[str]:
     return sorted(folder.name for folder in EXAMPLES.iterdir() if folder.joinpath(ABOUT).is_file())
 
 
-def describe(name: str) -> dict[str, Any]:
+def describe(name: str) -> dict[str, str]:
     """Return what an example's `example.toml` says of it: line, command, source."""
-    return tomllib.loads(EXAMPLES.joinpath(name, ABOUT).read_text(encoding="utf-8"))
+    about: dict[str, str] = tomllib.loads(EXAMPLES.joinpath(name, ABOUT).read_text(encoding="utf-8"))
+    return about

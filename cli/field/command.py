@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.read import options
-from cli.show.columns import Result
 from cli.show.output import command, suffix_among
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.field.solve import FieldBalancing
+    from cli.show.columns import Result
 
 
 @command
@@ -189,6 +189,7 @@ def run(
 
 def _result(found: FieldBalancing, source: str, save_influence: Path | None, report: Path | None) -> Result:
     from cli.field import columns, remarks, words
+    from cli.show.columns import Result
     from cli.show.text import csv_text
 
     warnings = remarks.warnings(found)

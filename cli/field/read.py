@@ -43,7 +43,7 @@ def read_runs(path: str, *, lagging: bool, phaseless: bool, stored_unit: str | N
     if not both and stored_unit is None:
         raise DataError(
             f"{table.file}: no column trial_mass_kg (or trial_mass_g, trial_unbalance_g_mm …): expected trial masses, "
-            f"or stored coefficients by --influence (the header is: {', '.join(table.header)})"
+            f"or stored coefficients by --influence {table.told}"
         )
     size = table.cells[both[0]] if both else None
     names, rotor = number_names(table.texts.get("rotor") or ["1"] * table.rows)
@@ -110,9 +110,7 @@ class _Reader:
         if not self.run and self.stored:
             self.run = ["initial"] * self.table.rows
         if not self.run:
-            raise DataError(
-                f"{self.table.file}: no column run (the header is: {', '.join(self.table.header)})"
-            )
+            raise DataError(f"{self.table.file}: no column run {self.table.told}")
         masses = next(
             (self.table.cells[n] for n in ("trial_mass", "trial_unbalance") if n in self.table.cells), None
         )
@@ -353,9 +351,7 @@ class _Reader:
         assert self.size is not None
         angle = self.table.cells.get("trial_angle")
         if angle is None:
-            raise DataError(
-                f"{self.table.file}: no column trial_angle_deg (the header is: {', '.join(self.table.header)})"
-            )
+            raise DataError(f"{self.table.file}: no column trial_angle_deg {self.table.told}")
         size = self._numbers(self.size, rows, place, "a trial mass, positive")
         turn = self._numbers(angle, rows, place, "the angle of the trial mass")
         if not (size >= SMALLEST).all():

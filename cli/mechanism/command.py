@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.errors import one_line
+from cli.errors import DataError
 from cli.read import options
-from cli.read.files import refuse_inputs
-from cli.show.columns import Column, Table
-from cli.show.digits import digits_that_hold
-from cli.show.files import write
-from cli.show.output import suffix_among
-from cli.show.shown import Digits, Expect, Json, Output, Plot, Rtol, Shown, Text, show
-from cli.show.text import csv_text
+from cli.show.output import ShowOptions, command, suffix_among
 
 if TYPE_CHECKING:
-    from cli.mechanism.asked import Asked
-    from cli.mechanism.solve import Job
+    from matplotlib.figure import Figure
+
+    from cli.mechanism.solve import Analysis
+    from cli.mechanism.studies import Request
+    from cli.show.columns import Document, Result, Table
 
 
+@command
 def run(
     file: Annotated[str, typer.Argument(metavar="FILE.toml", help="The mechanism; - is standard input.")],
     at: Annotated[
@@ -89,8 +86,6 @@ def run(
             help="--plot draws these against the input, such as H.x,coupler.omega.",
         ),
     ] = None,
-    json: Json = False,
-    output: Output = None,
     states: Annotated[
         Path | None,
         typer.Option(
@@ -99,19 +94,18 @@ def run(
             callback=suffix_among(".csv"),
         ),
     ] = None,
-    plot: Plot = None,
-    expect: Expect = None,
-    rtol: Rtol = 1e-3,
-    text: Text = False,
-    digits: Digits = False,
-) -> None:
+    *,
+    show: ShowOptions,
+) -> Result:
     """Solve a planar mechanism: positions, velocities, accelerations, its limits and its assemblies.
 
     FILE.toml describes ground, links, slots, sliders, gears, input and guess. Without --only the table has a row
     for each pose and link (what `dalembert work` reads); with --only or --forces a row for each pose. In a pipe
     --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
     """
-    from cli.mechanism.solve import ORDERS
+    from cli.mechanism.read import wanted
+    from cli.mechanism.solve import ORDERS, Analysis, load
+    from cli.mechanism.studies import Request
 
     if order is not None and order not in ORDERS:
         raise options.bad("--order", f"'{order}': expected {', '.join(ORDERS)}")
@@ -127,250 +121,134 @@ def run(
     if (flywheel is not None or counterweights is not None) and sweep is None and inputs is None:
         flag = "--flywheel" if flywheel is not None else "--counterweights"
         raise options.bad(flag, "expected a cycle too: --sweep, such as --sweep 0deg:360deg:1deg")
-    if graph is not None and plot is None:
+    if graph is not None and show.plot is None:
         raise options.bad("--graph", "expected --plot FILE too: the picture that the curves are drawn into")
-    tables = [
-        flag
-        for flag, given in (
-            ("--forces", forces),
-            ("--newton", newton),
-            ("--check", check),
-            ("--equilibrium", equilibrium),
-            ("--flywheel", flywheel is not None),
-            ("--counterweights", counterweights is not None),
-        )
-        if given
-    ]
-    as_csv = _as_csv(json=json, text=text, output=output, expect=expect)
-    if as_csv and len(tables) > 1:
-        raise options.bad(
-            tables[1],
-            f"{' and '.join(tables)} are tables of their own, and CSV holds one: ask for --json or --text",
-        )
-    from cli.mechanism.asked import Asked
-    from virtualwork import MechanismError
-
-    asked = Asked(
-        forces, equilibrium, flywheel, counterweights, swept=sweep is not None or inputs is not None
+    request = Request(
+        newton,
+        check,
+        forces,
+        equilibrium,
+        flywheel,
+        counterweights,
+        swept=sweep is not None or inputs is not None,
     )
-    try:
-        job = _job(file, at, sweep, inputs, names, order, branch)
-        if (
-            as_csv
-            and not (json or text or tables[:1] not in ([], ["--forces"]) or plot or expect)
-            and job.is_long
-        ):
-            if not _stream(job, forces=forces, digits=digits, output=output, states=states):
-                raise typer.Exit(1)
-            return
+    own = request.tables
+    if show.as_csv and len(own) > 1:
+        raise options.bad(
+            own[1],
+            f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
+        )
+    with _told(file):
+        mechanism = load(file)
+        q = wanted(mechanism, at, sweep, inputs)
+        analysis = Analysis.of(
+            file, mechanism, q, None if order is None else ORDERS.index(order), names, branch
+        )
+        analysis.check_names()
+        others = show.json or show.text or show.plot or show.expect
+        if show.as_csv and not others and own in ([], ["--forces"]) and analysis.is_long:
+            return _long(analysis, forces, states)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
-        table = not json or expect is not None or output is not None
-        document = json or (output is not None and output.suffix.lower() == ".json")
-        job.check_size(json=document, table=table or states is not None, forces=forces)
-        shown = _shown(
-            job,
-            asked,
-            own=tables[0] if len(tables) == 1 and tables != ["--forces"] else None,
-            table=table,
-            newton=newton,
-            check=check,
-            explain=explain,
-            graph=graph,
-        )
-        beside = {} if states is None else {states: _link_states(job)}
-        show(
-            shown,
-            json=json,
-            output=output,
-            plot=plot,
-            expect=expect,
-            rtol=rtol,
-            text=text,
-            digits=digits,
-            beside=beside,
-        )
-    except MechanismError as error:
-        from cli.errors import DataError
-
-        raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
-    if not any(job.assembled(motion).any() for motion in job.motions):
-        raise typer.Exit(1)
+        table = not show.json or show.expect is not None or show.output is not None
+        analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces)
+        return _result(analysis, request, states, explain, graph)
 
 
-def _stream(job: Job, *, forces: bool, digits: bool, output: Path | None, states: Path | None) -> bool:
-    """Write the table of a long sweep a block of poses at a time; return whether some pose is assembled."""
-    from cli.mechanism import forces as of_forces
-    from cli.mechanism import poses
-    from cli.mechanism import rounding as bounds
-    from cli.mechanism import states as of_states
+def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
+    """The table of a long sweep, a block of poses at a time."""
+    from cli.mechanism import columns
+    from cli.mechanism.states import table as link_states
     from cli.mechanism.stream import Stream
+    from cli.show.columns import Result
 
-    form, errors = of_states.table, bounds.of_states
-    if forces:
-        form, errors = of_forces.table, bounds.of_forces
-    elif job.only is not None:
-        form, errors = poses.wide_table, bounds.of_poses
-    stream = Stream(job, forces)
-    unknown = 0
-
-    def parts(stream: Stream, form: Any, cut: bool) -> Iterator[str]:
-        nonlocal unknown
-        for i, (block, columns) in enumerate(stream.tables(form)):
-            if cut:
-                columns, without = _cut(columns, errors(block))
-                unknown += without
-            yield csv_text(columns, header=i == 0)
-
-    refuse_inputs([path for path in (output, states) if path is not None])
-    if states is not None:
-        every = Stream(replace(job, only=None))
-        write(states, (part.encode() for part in parts(every, of_states.table, False)))
-    if output is not None:
-        write(output, (part.encode() for part in parts(stream, form, digits)))
-    else:
-        for part in parts(stream, form, digits):
-            sys.stdout.write(part)
-        sys.stdout.flush()
-    said = stream.warnings()
-    if unknown:
-        said.append(f"--digits: of {unknown} numbers no digit is known to hold; their cells are empty")
-    for warning in said:
-        print(f"warning: {one_line(warning)}", file=sys.stderr)
-    return stream.any_assembled
+    form = columns.forces if forces else link_states if analysis.only is None else columns.poses
+    stream = Stream(analysis, form, forces)
+    every = Stream(replace(analysis, only=None), link_states)
+    return Result(
+        document=dict,
+        tables={},
+        blocks=stream.tables,
+        beside={} if states is None else {states: lambda: _csv(every.tables())},
+        late_warnings=stream.warnings,
+        failed=lambda: not stream.any_assembled,
+        within=lambda: _told(analysis.file),
+    )
 
 
-def _cut(columns: dict[str, Any], errors: Mapping[str, Any]) -> tuple[dict[str, Any], int]:
-    """Cut columns to the digits that hold; return also of how many numbers no digit is known."""
-    listed = []
-    for name, values in columns.items():
-        bounds = errors.get(name)
-        unit = "deg" * name.endswith("_deg")
-        listed.append(Column(name, unit, values, None if bounds is None else partial(list, bounds)))
-    table, unknown = digits_that_hold(Table(listed))
-    return {column.name: column.values for column in table.columns}, unknown
+def _result(
+    analysis: Analysis, request: Request, states: Path | None, explain: bool, graph: str | None
+) -> Result:
+    from cli.mechanism import columns, graphs, poses, remarks
+    from cli.mechanism import forces as of_forces
+    from cli.mechanism.states import table as link_states
+    from cli.mechanism.studies import Studies
+    from cli.show.columns import Result
 
+    studies = Studies(analysis, request)
+    found = studies.document
+    if graph:
+        graphs.quantities(analysis, graph)  # a bad name is an error before anything is written
 
-def _as_csv(*, json: bool, text: bool, output: Path | None, expect: Path | None) -> bool:
-    """Whether the answer is written as CSV: to a file, or to a pipe."""
-    if output is not None:
-        return output.suffix.lower() == ".csv"
-    return not (json or text or expect is not None or sys.stdout.isatty())
+    def of_poses() -> Table:
+        if request.forces:
+            return columns.forces(analysis)
+        return link_states(analysis) if analysis.only is None else columns.poses(analysis)
 
-
-def _link_states(job: Job) -> bytes:
-    """The table of `--states`: every link, whatever `--only` names."""
-    from cli.mechanism import states
-
-    every = replace(job, only=None)
-    every.motions = job.motions
-    return csv_text(states.table(every)).encode()
-
-
-def _job(
-    file: str,
-    at: list[str] | None,
-    sweep: str | None,
-    inputs: str | None,
-    only: list[str] | None,
-    order: str | None,
-    branch: str | None,
-) -> Job:
-    from cli.mechanism.read import wanted
-    from cli.mechanism.solve import ORDERS, Job, load
-
-    m = load(file)
-    q = wanted(m, at, sweep, inputs)
-    given = 0
-    for k, name in enumerate(("speed", "acceleration", "jerk"), 1):
-        if any(getattr(e, name) is not None for e in m.inputs) or getattr(q, name, None) is not None:
-            given = k
-    job = Job(file, m, q, ORDERS.index(order) if order is not None else given, only, branch)
-    job.check_names()
-    return job
-
-
-def _shown(
-    job: Job,
-    asked: Asked,
-    *,
-    own: str | None,
-    table: bool,
-    newton: bool,
-    check: bool,
-    explain: bool,
-    graph: str | None,
-) -> Shown:
-    """What was asked for; `own`: the option whose table a pipe shows in place of the poses."""
-    from cli.mechanism import checking, poses, states, tables
-
-    columns: dict[str, list[Any]] = {}
-
-    @cache
-    def of_poses() -> dict[str, list[Any]]:
-        if asked.forces:
-            return asked.table(job)
-        return states.table(job) if job.only is None else poses.wide_table(job)
-
-    if own is None and table:
-        columns = of_poses()
-    extra: dict[str, Any] = {}
-    after: list[str] = []
-    if newton:
-        _, part = checking.newton_tables(job)
-        extra |= part
-        after.append(checking.newton_text(part))
-    if check:
-        extra["check"] = checking.check_document(job)
-        after.append(checking.check_text(extra["check"]))
-    of_forces = asked.document(job)
-    extra |= of_forces
-    if own is not None:
-        columns = {
-            "--newton": lambda: tables.of_iterates(extra),
-            "--check": lambda: tables.of_check(extra["check"]),
-            "--equilibrium": lambda: tables.of_equilibria(extra["equilibria"], job.input_names),
-            "--flywheel": lambda: tables.of_cycle(extra["cycle"]),
-            "--counterweights": lambda: tables.of_counterweights(extra["counterweights"]),
-        }[own]()
-    warnings = job.warnings + checking.limit_warnings(job) + asked.warnings(job)
-
-    def document() -> dict[str, Any]:
-        return {"name": job.mechanism.name, "poses": asked.with_forces(job, poses.document(job)), **extra}
+    def document() -> Document:
+        listed = poses.document(analysis)
+        if request.forces:
+            listed = [pose | part for pose, part in zip(listed, of_forces.poses(analysis), strict=True)]
+        return {"name": analysis.mechanism.name, "poses": listed, **found}
 
     def afterword() -> str:
-        told = [checking.explain_text(job)] if explain else []
-        return "\n\n".join([*after, *asked.text(of_forces), *told, *(asked.explain(job) if explain else [])])
+        from cli.mechanism import words
 
-    def errors() -> dict[str, Any]:
-        from cli.mechanism import rounding as digits
+        return words.afterword(studies, explain=explain)
 
-        if not table:
-            return {}
-        if asked.forces:
-            return digits.of_forces(job)
-        return digits.of_states(job) if job.only is None else digits.of_poses(job)
+    def figure() -> Figure:
+        from cli.mechanism import force_picture, picture
 
-    def figure() -> Any:
-        if asked.forces and not graph and len(job.inputs.shown) > 2 and job.motions[0].assembled.any():
-            return asked.figure(job)
-        from cli.mechanism import picture as pictures
+        several = len(analysis.inputs.shown) > 2 and analysis.motions[0].assembled.any()
+        if graph:
+            return picture.graphs(analysis, graph)
+        return force_picture.draw(analysis) if request.forces and several else picture.draw(analysis)
 
-        return pictures.graphs(job, graph) if graph else pictures.draw(job)
+    def beside() -> Iterable[bytes]:
+        # every link, whatever --only names
+        every = replace(analysis, only=None)
+        every.motions = analysis.motions
+        return _csv(iter([link_states(every)]))
 
-    if graph:
-        from cli.mechanism.graphs import quantities
-
-        quantities(job, graph)  # a bad name is an error before anything is written
-    of_each_pose = ("step", "branch", "link", *job.input_columns)
-    return Shown(
+    own = columns.studies(studies)
+    # the table of a study asked for alone stands in place of the poses
+    alone = bool(own) and len(request.tables) == 1
+    return Result(
         document=document,
-        columns=columns,
-        keys=of_each_pose if own is None else [*of_each_pose[:3], *tables.KEYS],
-        table=None if own is None else of_poses,
-        notes=lambda: job.mechanism.name,
+        tables={**own, "poses": of_poses} if alone else {"poses": of_poses, **own},
+        screen=of_poses if alone else None,
+        notes=lambda: analysis.mechanism.name,
         afterword=afterword,
         figure=figure,
-        errors=errors if own is None else dict,
-        table_errors=None if own is None else errors,
-        warnings=warnings,
+        beside={} if states is None else {states: beside},
+        warnings=remarks.warnings(studies),
+        failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),
+        within=lambda: _told(analysis.file),
     )
+
+
+@contextmanager
+def _told(file: str) -> Iterator[None]:
+    """Name the file in what is wrong with a mechanism."""
+    from virtualwork import MechanismError
+
+    try:
+        yield
+    except MechanismError as error:
+        raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
+
+
+def _csv(tables: Iterator[Table]) -> Iterator[bytes]:
+    from cli.show.text import csv_text
+
+    for i, table in enumerate(tables):
+        yield csv_text(table.cells, header=i == 0).encode()

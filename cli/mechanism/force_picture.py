@@ -11,21 +11,21 @@ from cli.mechanism.forces import rows_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.mechanism.solve import Job
+    from cli.mechanism.solve import Analysis
 
 STYLES = ("-", "--", "-.", ":")
 GREYS = ("0.0", "0.35", "0.55")
 
 
-def draw(job: Job) -> Figure:
+def draw(analysis: Analysis) -> Figure:
     """Draw the effort and the sizes of the joint forces against the input, and the shaking force as a hodograph."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
-    m, motion = job.mechanism, job.motions[0]
+    m, motion = analysis.mechanism, analysis.motions[0]
     d = motion.dynamics
     slide = m.inputs[0].is_slide
-    x = job.inputs.shown[:, 0]
+    x = analysis.inputs.shown[:, 0]
     label = f"position of {m.inputs[0].name}, m" if slide else f"angle of {m.inputs[0].name}, deg"
     shakes = d.scene.moves  # at rest the ground carries a constant load, which is no picture
     figure = Figure(figsize=(11 if shakes else 7, 6.4), layout="constrained")
@@ -45,7 +45,7 @@ def draw(job: Job) -> Figure:
         top.legend(fontsize=8, frameon=False)
     top.set_ylabel("force at the input, N" if slide else "torque at the input, N·m")
     top.grid(color="0.9")
-    for i, (joint, on, of) in enumerate(rows_of(job, motion)):
+    for i, (joint, on, of) in enumerate(rows_of(analysis, motion)):
         size = np.abs(d.joint_force(joint, on))
         if np.isfinite(size).any():
             bottom.plot(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.errors import nearest
-from cli.mechanism.solve import Job
+from cli.mechanism.solve import Analysis
 from cli.read import options
 
 if TYPE_CHECKING:
@@ -29,10 +29,10 @@ class Quantity:
     values: NDArray[np.float64]
 
 
-def quantities(job: Job, text: str) -> list[Quantity]:
+def quantities(analysis: Analysis, text: str) -> list[Quantity]:
     """The curves that `--graph` names, of the first assembly asked for."""
-    motion = job.motions[0]
-    m = job.mechanism
+    motion = analysis.motions[0]
+    m = analysis.mechanism
     points = {p for body in m.bodies.values() for p in body}
     guides = {g.point for g in m.guides}
     found = []

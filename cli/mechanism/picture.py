@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.mechanism.graphs import quantities
-from cli.mechanism.solve import Job
+from cli.mechanism.solve import Analysis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 DRAWN = 6  # poses of a sweep that are drawn, the first in full
 
 
-def draw(job: Job) -> Figure:
+def draw(analysis: Analysis) -> Figure:
     """Draw the mechanism to scale: the first pose in full, others as ghosts, the paths of its points."""
     from matplotlib.figure import Figure
 
-    scale, unit = _unit(job.mechanism.size)
-    motion = job.motions[0]
+    scale, unit = _unit(analysis.mechanism.size)
+    motion = analysis.motions[0]
     figure = Figure(figsize=(7.2, 6.0), layout="constrained")
     axes = figure.subplots()
     axes.set_aspect("equal", adjustable="datalim")
     good = np.flatnonzero(motion.assembled)
-    for curve, name in _paths(job, motion):
+    for curve, name in _paths(analysis, motion):
         axes.plot(curve.real * scale, curve.imag * scale, color="0.15", lw=0.9, ls="-", zorder=2)
         at = curve[np.isfinite(curve)]
         if len(at):
@@ -42,16 +42,16 @@ def draw(job: Job) -> Figure:
             dict.fromkeys(good[np.linspace(0, len(good) - 1, min(DRAWN, len(good))).astype(int)].tolist())
         )
         for rank, i in enumerate(reversed(chosen)):
-            _pose(axes, job, motion, i, scale, full=rank == len(chosen) - 1)
-    for name, z in job.mechanism.ground.items():
+            _pose(axes, analysis, motion, i, scale, full=rank == len(chosen) - 1)
+    for name, z in analysis.mechanism.ground.items():
         axes.plot(z.real * scale, z.imag * scale, marker="^", ms=9, mfc="white", mec="black", zorder=6)
         _label(axes, name, z * scale, (7, -11))
-    shown = job.inputs.shown[good[0]] if len(good) else []
+    shown = analysis.inputs.shown[good[0]] if len(good) else []
     where = ", ".join(
         f"{e.name} at {v * (scale if e.is_slide else 1):.6g} {unit if e.is_slide else 'deg'}"
-        for e, v in zip(job.mechanism.inputs, shown, strict=False)
+        for e, v in zip(analysis.mechanism.inputs, shown, strict=False)
     )
-    axes.set_title(" — ".join(t for t in (job.mechanism.name, where) if t), fontsize=10)
+    axes.set_title(" — ".join(t for t in (analysis.mechanism.name, where) if t), fontsize=10)
     axes.set_xlabel(f"x, {unit}")
     axes.set_ylabel(f"y, {unit}")
     axes.grid(color="0.9", lw=0.6)
@@ -63,11 +63,11 @@ def _unit(size: float) -> tuple[float, str]:
     return (1e3, "mm") if size < 2 else (1.0, "m")
 
 
-def _paths(job: Job, motion: Motion) -> list[tuple[Any, str]]:
+def _paths(analysis: Analysis, motion: Motion) -> list[tuple[Any, str]]:
     """The curves of the points asked for, over the whole travel of the input."""
     from virtualwork.motion import Motion
 
-    m = job.mechanism
+    m = analysis.mechanism
     if len(m.inputs) != 1:
         full = motion
     else:
@@ -79,16 +79,16 @@ def _paths(job: Job, motion: Motion) -> list[tuple[Any, str]]:
             low = motion.inputs.min() if turns > 1 else track.start
             high = low + 2 * np.pi * turns
         full = Motion(motion.assembly, np.linspace(low, high, 1441)) if high > low else motion
-    if job.only is not None:
-        names = [p for p in job.points if p not in m.ground]
+    if analysis.only is not None:
+        names = [p for p in analysis.points if p not in m.ground]
     else:
         guided = {g.point for g in m.guides}
         names = [p for n in m.links for p in m.links[n].points if p not in m.pins and p not in guided]
     return [(full.point(name).complex(0), name) for name in names] if full.n > 1 else []
 
 
-def _pose(axes: Axes, job: Job, motion: Motion, i: int, scale: float, *, full: bool) -> None:
-    m = job.mechanism
+def _pose(axes: Axes, analysis: Analysis, motion: Motion, i: int, scale: float, *, full: bool) -> None:
+    m = analysis.mechanism
     for k, (name, link) in enumerate(m.links.items()):
         z = np.array([motion.point(p).complex(0)[i] for p in link.points]) * scale
         colour = "0.72"
@@ -158,21 +158,21 @@ def _label(axes: Axes, name: str, z: complex, offset: tuple[int, int]) -> None:
 STYLES = ("-", "--", "-.", ":")
 
 
-def graphs(job: Job, text: str) -> Figure:
+def graphs(analysis: Analysis, text: str) -> Figure:
     """Draw quantities against the input: one panel for each unit."""
     from matplotlib.figure import Figure
 
-    found = quantities(job, text)
+    found = quantities(analysis, text)
     units = list(dict.fromkeys(q.unit for q in found))
     figure = Figure(figsize=(7.2, 1.0 + 2.2 * len(units)), layout="constrained")
     rows = figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0]
-    m = job.mechanism
+    m = analysis.mechanism
     x: Any
     if len(m.inputs) == 1:
         slide = m.inputs[0].is_slide
-        x, label = job.inputs.shown[:, 0], f"{m.inputs[0].name}, {'m' if slide else 'deg'}"
+        x, label = analysis.inputs.shown[:, 0], f"{m.inputs[0].name}, {'m' if slide else 'deg'}"
     else:
-        x, label = np.arange(1, len(job.inputs.shown) + 1), "step"
+        x, label = np.arange(1, len(analysis.inputs.shown) + 1), "step"
     for axes, unit in zip(rows, units, strict=True):
         for k, q in enumerate(q for q in found if q.unit == unit):
             marker = "o" if len(x) == 1 else None

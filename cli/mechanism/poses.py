@@ -1,4 +1,4 @@
-"""Poses as JSON and as tables."""
+"""Poses as Python's numbers, and as the JSON document has them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.mechanism.solve import Job
+from cli.mechanism.solve import Analysis
 from cli.read.units import degrees
 
 if TYPE_CHECKING:
@@ -74,10 +74,10 @@ def of_slide(motion: Motion, name: str, order: int) -> dict[str, Column]:
     }
 
 
-def inputs_of(job: Job) -> dict[str, Column]:
+def inputs_of(analysis: Analysis) -> dict[str, Column]:
     """`input_deg` or `input_m`; with several inputs, a value per link."""
-    m = job.mechanism
-    shown = job.inputs.shown
+    m = analysis.mechanism
+    shown = analysis.inputs.shown
     if len(m.inputs) == 1:
         return {"input_m" if m.inputs[0].is_slide else "input_deg": shown[:, 0].tolist()}
     rows = [
@@ -90,7 +90,7 @@ def inputs_of(job: Job) -> dict[str, Column]:
     return {"inputs": rows}
 
 
-def marks_of(job: Job, motion: Motion) -> list[list[str]]:
+def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
     """What is special about each pose: a change point, a limit of the input, a dead point."""
     found: list[list[str]] = [[] for _ in range(motion.n)]
     track = motion.assembly.track
@@ -109,25 +109,28 @@ def marks_of(job: Job, motion: Motion) -> list[list[str]]:
     return found
 
 
-def document(job: Job) -> list[dict[str, Any]]:
+def document(analysis: Analysis) -> list[dict[str, Any]]:
     """The poses as INTERFACE's JSON has them, every assembly after the other at each input."""
-    shown = inputs_of(job)
+    shown = inputs_of(analysis)
     columns = []
-    for assembly, motion in zip(job.assemblies, job.motions, strict=True):
-        assembled = job.assembled(motion)
+    for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
+        assembled = analysis.assembled(motion)
         columns.append(
             (
                 assembly.number,
                 assembled.tolist(),
-                cells(motion.condition) if job.only is None else None,
-                marks_of(job, motion),
-                {name: of_link(motion, name, job.order, job.given(name)) for name in job.links},
-                {name: of_point(motion, name, job.order) for name in job.points},
-                {name: of_slide(motion, name, job.order) for name in job.slides},
+                cells(motion.condition) if analysis.only is None else None,
+                marks_of(analysis, motion),
+                {
+                    name: of_link(motion, name, analysis.order, analysis.given(name))
+                    for name in analysis.links
+                },
+                {name: of_point(motion, name, analysis.order) for name in analysis.points},
+                {name: of_slide(motion, name, analysis.order) for name in analysis.slides},
             )
         )
     poses = []
-    for i in range(len(job.inputs.shown)):
+    for i in range(len(analysis.inputs.shown)):
         for number, assembled, condition, marks, links, points, slides in columns:
             pose: dict[str, Any] = {key: values[i] for key, values in shown.items()}
             pose |= {"branch": number, "assembled": assembled[i]}
@@ -142,39 +145,3 @@ def document(job: Job) -> list[dict[str, Any]]:
                     }
             poses.append(pose)
     return poses
-
-
-def wide_table(job: Job) -> dict[str, Column]:
-    """One row for each pose and assembly: what --only asks for, side by side."""
-    table: dict[str, Column] = {}
-    inputs = inputs_of(job)
-    several = job.several
-
-    def put(key: str, values: Column, rows: int) -> None:
-        table.setdefault(key, [None] * 0)
-        table[key] += values
-
-    for assembly, motion in zip(job.assemblies, job.motions, strict=True):
-        put("step", list(job.inputs.steps), motion.n)
-        if several:
-            put("branch", [str(assembly.number)] * motion.n, motion.n)
-        if "inputs" in inputs:
-            for j, e in enumerate(job.mechanism.inputs):
-                put(
-                    f"{e.name}_input_{'m' if e.is_slide else 'deg'}",
-                    job.inputs.shown[:, j].tolist(),
-                    motion.n,
-                )
-        else:
-            for key, values in inputs.items():
-                put(key, values, motion.n)
-        for name in job.points:
-            for key, values in of_point(motion, name, job.order).items():
-                put(f"{name}_{key}", values, motion.n)
-        for name in job.slides:
-            for key, values in of_slide(motion, name, job.order).items():
-                put(f"{name}_{key}", values, motion.n)
-        for name in job.links:
-            for key, values in of_link(motion, name, job.order, job.given(name)).items():
-                put(f"{name}_{key}", values, motion.n)
-    return table

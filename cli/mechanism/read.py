@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from virtualwork import Mechanism
 
-# poses in one sweep: beyond it a double cannot count them; `Job.check_size` knows what one takes in memory
+# poses in one sweep: beyond it a double cannot count them; `Analysis.check_size` knows what one takes in memory
 MOST = 10**15
 
 
@@ -256,9 +256,7 @@ def _from_table(m: Mechanism, path: str) -> Inputs:
     for name, e in names.items():
         if name.lower() not in columns:
             units = " or ".join(f"{name}_{u}" for u in list(UNITS["length" if e.is_slide else "angle"])[:2])
-            raise DataError(
-                f"{path}: no column {units} for the input '{name}' (the header is: {', '.join(table.header)})"
-            )
+            raise DataError(f"{path}: no column {units} for the input '{name}' {table.told}")
         raw, unit, si = columns[name.lower()]
         values.append(si)
         shown.append(si if e.is_slide else (raw if unit == "deg" else np.degrees(si)))

@@ -41,7 +41,7 @@ def load(path: str) -> Mechanism:
 
 
 @dataclass
-class Job:
+class Analysis:
     """One call: lazily the assemblies and their motions."""
 
     file: str
@@ -51,8 +51,27 @@ class Job:
     only: Sequence[str] | None = None
     branch: str | None = None
     warnings: list[str] = field(default_factory=list)
-    # the job of which this is a block of poses
-    block_of: Job | None = None
+    # the analysis of which this is a block of poses
+    block_of: Analysis | None = None
+
+    @classmethod
+    def of(
+        cls,
+        file: str,
+        mechanism: Mechanism,
+        inputs: Inputs | Sweep,
+        order: int | None,
+        only: Sequence[str] | None,
+        branch: str | None,
+    ) -> Analysis:
+        """Return the analysis to this order, or to the highest that the inputs' rates give."""
+        given = 0
+        for k, name in enumerate(("speed", "acceleration", "jerk"), 1):
+            if any(getattr(e, name) is not None for e in mechanism.inputs) or (
+                getattr(inputs, name, None) is not None
+            ):
+                given = k
+        return cls(file, mechanism, inputs, given if order is None else order, only, branch)
 
     @property
     def is_long(self) -> bool:

@@ -8,15 +8,19 @@ several inputs every pose has as many velocity fields (column `field`): a unit o
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cli.mechanism.poses import cells, of_link, pair
-from cli.mechanism.solve import Job
+from cli.mechanism.columns import bounds_of, column, link_error, pose_keys
+from cli.mechanism.poses import LINK, POINT, cells, of_link, pair
+from cli.mechanism.solve import Analysis
+from cli.show.columns import Table
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from virtualwork.motion import Motion
 
 GROUND = "ground"
@@ -24,6 +28,8 @@ ORDER = (
     "step", "branch", "field", "link", "x_m", "y_m", "angle_deg", "mass_kg", "inertia_kg_m2", "vx_m_s", "vy_m_s",
     "omega_rad_s", "ax_m_s2", "ay_m_s2", "alpha_rad_s2", "fx_N", "fy_N", "fvx_m_s", "fvy_m_s", "torque_N_m",
 )  # fmt: skip
+
+EXACT = ("step", "branch", "field", "link", "mass_kg", "inertia_kg_m2")
 
 Part = dict[str, list[Any]]
 
@@ -47,35 +53,68 @@ class Place(NamedTuple):
     mark: Mark | None
 
 
-def table(job: Job) -> dict[str, list[Any]]:
+def table(analysis: Analysis) -> Table:
     """Centre of mass, angle, rates and loads of every link at every pose."""
-    listed = [row for _, row in rows(job)]
-    keys = {key for row in listed for key in row}
-    return {key: [row.get(key) for row in listed] for key in ORDER if key in keys}
+    listed = rows(analysis)
+    keys = {key for _, row in listed for key in row}
+
+    @cache
+    def bounds(motion: Motion, link: str, field: int | None, guide: int | None, key: str) -> list[float]:
+        along = motion if field is None else motion.unit(field)
+        center = motion.mechanism.rigid[link].center
+        if key in ("fvx_m_s", "fvy_m_s"):
+            assert guide is not None
+            return bounds_of(_guided(along, guide, link))
+        if key in ("fx_N", "fy_N", "torque_N_m"):
+            force, moment = motion.dynamics.error_estimate().applied(link)
+            return bounds_of(moment if key == "torque_N_m" else force)
+        for k, names in enumerate(POINT):
+            if key in names:
+                return bounds_of((along if k == 1 else motion).at(link, center).error_estimate(k))
+        k = LINK.index(key)
+        return bounds_of(link_error(analysis, along if k == 1 else motion, link, k))
+
+    def error(key: str) -> list[float]:
+        found = []
+        for place, row in listed:
+            guide = None if place.mark is None else place.mark.guide
+            value = row.get(key)
+            number = isinstance(value, float) and value != 0
+            found.append(
+                bounds(place.motion, place.link, place.field, guide, key)[place.pose] if number else 0.0
+            )
+        return found
+
+    columns = [
+        column(key, [row.get(key) for _, row in listed], None if key in EXACT else partial(error, key))
+        for key in ORDER
+        if key in keys
+    ]
+    return Table(columns, keys=pose_keys(analysis))
 
 
-def rows(job: Job) -> list[tuple[Place, dict[str, Any]]]:
+def rows(analysis: Analysis) -> list[tuple[Place, dict[str, Any]]]:
     """The table's rows, each with what it holds."""
     found: list[tuple[Place, dict[str, Any]]] = []
-    several = job.several
-    for assembly, motion in zip(job.assemblies, job.motions, strict=True):
-        order = job.order
-        massive = any(r.mass or r.inertia for r in motion.dynamics.scene.rigid.values())
+    several = analysis.several
+    for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
+        order = analysis.order
+        massive = any(r.mass or r.inertia for r in motion.mechanism.rigid.values())
         if order == 1 and massive:
             order = 2  # a speed alone already makes accelerations, and masses feel them
-        parts = {name: _part(job, motion, name, order) for name in job.links}
+        parts = {name: _part(analysis, motion, name, order) for name in analysis.links}
         fields: list[tuple[str, dict[str, Part], list[Mark]]] = [("", {}, [])]
         if order >= 1:
-            k = len(job.mechanism.inputs)
+            k = len(analysis.mechanism.inputs)
             fields = [("", {}, _marks(motion, None))]
             if k > 1:
                 fields = [
-                    (e.name, {name: _virtual(motion, name, j) for name in job.links}, _marks(motion, j))
-                    for j, e in enumerate(job.mechanism.inputs)
+                    (e.name, {name: _virtual(motion, name, j) for name in analysis.links}, _marks(motion, j))
+                    for j, e in enumerate(analysis.mechanism.inputs)
                 ]
         several_fields = bool(fields[0][0])
         for i in range(motion.n):
-            head: dict[str, Any] = {"step": job.inputs.steps[i]}
+            head: dict[str, Any] = {"step": analysis.inputs.steps[i]}
             if several:
                 head["branch"] = str(assembly.number)
             for j, (field, velocities, marks) in enumerate(fields):
@@ -104,16 +143,16 @@ def rows(job: Job) -> list[tuple[Place, dict[str, Any]]]:
     return found
 
 
-def _part(job: Job, motion: Motion, name: str, order: int) -> Part:
-    body = motion.dynamics.scene.rigid[name]
+def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
+    body = motion.mechanism.rigid[name]
     part: Part = {"mass_kg": [body.mass] * motion.n, "inertia_kg_m2": [body.inertia] * motion.n}
     for x, y, k in (("x_m", "y_m", 0), ("vx_m_s", "vy_m_s", 1), ("ax_m_s2", "ay_m_s2", 2))[: order + 1]:
         z = motion.at(name, body.center).complex(k)
         part[x], part[y] = pair(z)
-    angle = of_link(motion, name, min(order, 2), job.given(name))
+    angle = of_link(motion, name, min(order, 2), analysis.given(name))
     part |= {key: angle[key] for key in ("angle_deg", "omega_rad_s", "alpha_rad_s2") if key in angle}
     if order >= 1:
-        force, torque = motion.dynamics.applied(name)
+        force, torque = motion.applied(name)
         loads = (*pair(force), cells(torque))
         # a pose that cannot be assembled has no loads either
         known = motion.assembled
@@ -126,7 +165,7 @@ def _part(job: Job, motion: Motion, name: str, order: int) -> Part:
 
 def _virtual(motion: Motion, name: str, j: int) -> Part:
     """The virtual velocities of a link for a unit of input j."""
-    x, y = pair(motion.at(name, motion.dynamics.scene.rigid[name].center).coefficient(j))
+    x, y = pair(motion.at(name, motion.mechanism.rigid[name].center).coefficient(j))
     return {"vx_m_s": x, "vy_m_s": y, "omega_rad_s": cells(motion.link(name).coefficient(j))}
 
 
@@ -176,3 +215,15 @@ def _share(name: str, factor: float) -> str:
     if not np.isfinite(factor) or factor == 0:
         return ""
     return name if factor == 1.0 else f"{name}*{factor!r}"
+
+
+def _guided(motion: Motion, guide: int, link: str) -> NDArray[np.float64]:
+    """The bound of the velocity of the point of a link at which a driven slider's force acts."""
+    m, r = motion.mechanism, motion.rounding
+    g = m.guides[guide]
+    if link == g.link:
+        return motion.at(link, g.point).error_estimate(1)
+    slide, omega = np.abs(motion.poses.slide_derivative(guide, 0)), np.abs(motion.link(link).omega)
+    carried = motion.at(link, m.through(g)).error_estimate(1)
+    turned = slide * (r.angle(link, 1) + omega * r.rotation(link)) + omega * r.slide(guide)
+    return np.asarray(carried + turned)

@@ -8,11 +8,12 @@ import typer
 
 from cli.place.read import Request, read_drill, read_planes, read_ratio, read_stock, read_vector
 from cli.read import options
-from cli.show.columns import Result
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from cli.show.columns import Result
 
 
 @command
@@ -88,6 +89,7 @@ def run(
     limit = options.quantity("--max-mass", max_mass, "mass", positive=True)
     from cli.place import columns, words
     from cli.place.solve import Placing
+    from cli.show.columns import Result
 
     found = Placing(
         Request(vectors, chosen, limit, weights, pieces, max_pieces, ratio, drilled, moved, remove)

@@ -12,6 +12,8 @@ import typer
 
 from cli.errors import DataError
 
+ZIP, OLE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
+SUFFIXES = (".xlsx", ".xlsm", ".xls", ".ods")
 # device and inode: a link to a file is the file
 _read: set[tuple[int, int]] = set()
 
@@ -58,3 +60,14 @@ def refuse_inputs(outputs: Iterable[Path]) -> None:
         if name in seen:
             raise typer.BadParameter(f"'{path}' is given twice: expected a file for each output")
         seen.add(name)
+
+
+def is_workbook(data: bytes) -> bool:
+    """Whether a file's bytes are those of a spreadsheet."""
+    return data[:4] in (ZIP, OLE)
+
+
+def split_sheet(path: str) -> tuple[str, str]:
+    """Split `FILE.xlsx#Sheet name`."""
+    file, mark, sheet = path.partition("#")
+    return (file, sheet) if mark and file.lower().endswith(SUFFIXES) else (path, "")

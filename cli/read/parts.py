@@ -61,7 +61,7 @@ def read_parts(path: str) -> Parts:
     """Read a table of parts and put them together."""
     table = read(path, numbers=_NUMBERS, texts=["part", "shape", "file", "file_unit"], blank=list(_NUMBERS))
     if "shape" not in table.texts:
-        raise DataError(f"{table.file}: no column shape (the header is: {', '.join(table.header)})")
+        raise DataError(f"{table.file}: no column shape {table.told}")
     values = {
         name: to_si(column.values, _NUMBERS[name], column.unit) + 0.0
         for name, column in table.numbers.items()

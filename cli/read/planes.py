@@ -14,7 +14,7 @@ from cli.read.tables import read
 from cli.read.units import SMALLEST, parse_quantity, to_si
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Planes:
     """Correction planes, in SI; `rotor` names each plane's rotor where they differ from rotor to rotor."""
 
@@ -99,7 +99,7 @@ def from_table(path: str) -> Planes:
     """Read a table with the columns plane, radius_* and, but for single planes, z_*; rotor where they differ."""
     table = read(path, numbers={"z": "length", "radius": "length"}, texts=["plane", "rotor"])
     if "plane" not in table.texts:
-        raise DataError(f"{table.file}: no column plane (the header is: {', '.join(table.header)})")
+        raise DataError(f"{table.file}: no column plane {table.told}")
     radius = table.require("radius", "length")
     table.reject(~(radius.values >= SMALLEST), "radius", "a positive radius")
     names, rotor = table.texts["plane"], table.texts.get("rotor")

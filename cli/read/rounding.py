@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -24,12 +22,12 @@ def vector_error(size: ArrayLike, angle: ArrayLike, unit: str) -> Real:
     return np.asarray(np.abs(size) * (3 * EPS + to_si(last, "angle", unit)))
 
 
-def size_error(vector: Any, bound: ArrayLike) -> Real:
+def size_error(vector: ArrayLike, bound: ArrayLike) -> Real:
     """Bound the error of a vector's size, once more converted to a unit."""
-    return np.asarray(bound + 3 * EPS * np.abs(vector))
+    return np.asarray(np.asarray(bound) + 3 * EPS * np.abs(vector))
 
 
-def angle_error(vector: Any, bound: Any, degrees: Any) -> Real:
+def angle_error(vector: ArrayLike, bound: ArrayLike, degrees: ArrayLike) -> Real:
     """Bound the error of a vector's angle, degrees: half a turn where not even its direction is known."""
     size = np.asarray(np.abs(vector), dtype=float)
     error, shown = np.asarray(bound, dtype=float), np.asarray(degrees, dtype=float)

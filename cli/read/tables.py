@@ -1,43 +1,41 @@
-"""CSV in: whatever a spreadsheet writes, read into columns, each cell's fault named by row and column.
+"""Tables in: CSV and workbooks, read into columns, each cell's fault named by row and column.
 
-A command says which quantities it knows; `read` finds their columns by name and unit suffix, in any
-order and case, and converts the cells. Tables of some 10 000 rows and more go through pandas; whatever
-pandas stumbles over is read again by the standard `csv` module, which knows the row of every cell.
+A command says which quantities it knows; `read` finds their columns by name and unit, in any order and
+case, and converts the cells. CSV of some 10 000 rows and more goes through pandas; whatever pandas
+stumbles over is read again by the standard `csv` module, which knows the row of every cell.
 """
 
 from __future__ import annotations
 
-import csv
 import io
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import islice
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cli.errors import DataError, cell_error, quote
-from cli.read.files import read_bytes
-from cli.read.units import LARGEST, UNITS, find_unit, nearest_unit, parse_number
+from cli.errors import DataError, quote
+from cli.read.headers import find_columns, offers, spellings
+from cli.read.sources import LARGE, Source, open_source
+from cli.read.units import LARGEST, parse_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-LARGE = 10_000  # rows from which importing pandas pays
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Numbers:
     """A column of numbers in the file's own unit; NaN where an allowed blank or mark stands."""
 
     header: str
+    """As the file writes it."""
     unit: str
     values: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cells:
     """A column with a unit whose cells are left as text."""
 
@@ -51,7 +49,7 @@ class Cells:
         return parse_number(_pointed(text) if self.decimal_comma else text)
 
 
-@dataclass
+@dataclass(eq=False)
 class Table:
     """A table as read: columns by the name of their quantity, without the unit suffix."""
 
@@ -63,16 +61,18 @@ class Table:
     cells: dict[str, Cells] = field(default_factory=dict)
     marks: dict[tuple[int, str], str] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
-    _source: _Source | None = None
+    told: str = ""
+    """What is said of the file where a column is missed: its header, and which columns may be meant."""
+    _source: Source | None = None
 
     @cached_property
     def _written(self) -> list[list[str]]:
         assert self._source is not None
-        return [cells for _, cells in self._source.records()]
+        return [cells for _, cells in self._source.rows()]
 
     def written(self, index: int, quantity: str) -> str:
         """Return a cell of a number column as the file wrote it; looked up for messages only."""
-        return self._written[index + 1][self.header.index(self.numbers[quantity].header)].strip()
+        return self._written[index][self.header.index(self.numbers[quantity].header)].strip()
 
     def wrong(self, index: int, quantity: str, expected: str) -> DataError:
         """Make the one line for a number: column and value as the file wrote them."""
@@ -91,15 +91,10 @@ class Table:
                 except ValueError:
                     raise self.error(i, name, cell, WITH_COMMA) from None
 
-    def where(self, index: int) -> tuple[int, int]:
-        """Return the number of a data row (from 1) and its line in the file."""
-        assert self._source is not None
-        line, _ = next(islice(self._source.records(), index + 1, None))
-        return index + 1, line
-
     def error(self, index: int, column: str, found: object, expected: str) -> DataError:
         """Make the one line for a cell: `column` as the header spells it."""
-        return cell_error(self.file, *self.where(index), column, str(found), expected)
+        assert self._source is not None
+        return self._source.error(index, column, str(found), expected)
 
     def reject(self, bad: NDArray[np.bool_], quantity: str, expected: str) -> None:
         """Raise the error of the first cell of a number column for which `bad` holds."""
@@ -109,16 +104,8 @@ class Table:
     def require(self, quantity: str, dimension: str) -> Numbers:
         """Return a column of numbers, or say that the table lacks it."""
         if quantity not in self.numbers:
-            raise DataError(
-                f"{self.file}: no column {spellings(quantity, dimension)} (the header is: {', '.join(self.header)})"
-            )
+            raise DataError(f"{self.file}: no column {spellings(quantity, dimension)} {self.told}")
         return self.numbers[quantity]
-
-
-def spellings(quantity: str, dimension: str) -> str:
-    """List the names a quantity's column may have: `mass_kg, mass_g or mass_lb`."""
-    names = [f"{quantity}_{unit}" if unit else quantity for unit in UNITS[dimension]][:4]
-    return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def read(
@@ -130,7 +117,7 @@ def read(
     blank: Sequence[str] = (),
     marker: str = "",
 ) -> Table:
-    """Read a CSV file, or standard input for `-`.
+    """Read a CSV file or a workbook (`FILE.xlsx#Sheet`), or standard input for `-`.
 
     Parameters
     ----------
@@ -152,17 +139,24 @@ def read(
     DataError
         No such file, no text, no header, no rows, a doubled column, an unknown unit, a cell that is no number.
     """
-    source = _open(path)
     known = {**(numbers or {}), **(cells or {})}
-    texts = source.header if texts is None else texts
-    found = _find_columns(source, known, texts)
-    table = Table(source.file, source.header, 0, warnings=source.warnings, _source=source)
+    source = open_source(path, known, texts)
+    texts = [each.name for each in source.headings] if texts is None else texts
+    found = find_columns(source.file, source.headings, known, texts)
     used = {index for index, _ in found.values()}
-    extra = [name for index, name in enumerate(source.header) if index not in used]
+    extra = [each for index, each in enumerate(source.headings) if index not in used]
+    missed = {name: dimension for name, dimension in known.items() if name not in found}
+    missed_texts = [name for name in texts if name not in found]
+    table = Table(source.file, source.header, 0, warnings=source.warnings, _source=source)
+    table.told = source.told(extra, missed, missed_texts)
     if extra:
+        names = ", ".join(quote(each.written) if each.written else "without a header" for each in extra)
+        offered = offers(extra, missed, missed_texts)
         table.warnings.append(
-            f"{source.file}: ignored the column{'s' * (len(extra) > 1)} {', '.join(quote(name) for name in extra)}"
+            f"{source.file}: ignored the column{'s' * (len(extra) > 1)} {names}"
+            + (f"; to read: {' '.join(offered)}" if offered else "")
         )
+    source.check_cells(used)
     plan = [
         (
             name,
@@ -176,7 +170,9 @@ def read(
     if not (source.large and _read_large(source, table, plan, marker)):
         _read_small(source, table, plan, marker)
     if table.rows == 0:
-        raise DataError(f"{source.file}: a header and no rows: expected at least one row of data")
+        raise DataError(
+            f"{source.file}: a header and no rows{source.of_sheet}: expected at least one row of data"
+        )
     return table
 
 
@@ -190,136 +186,13 @@ def _pointed(text: str) -> str:
     return text.replace(",", ".")
 
 
-_LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
-
-
-@dataclass
-class _Source:
-    """The text of a file and how its cells are told apart."""
-
-    file: str
-    text: str
-    delimiter: str
-    header: list[str]
-    warnings: list[str]
-    large: bool
-
-    def has_commas(self, columns: Iterable[Iterable[str]]) -> bool:
-        """Tell whether these cells have decimal commas: where no comma parts cells, and one stands in a cell."""
-        return self.delimiter != "," and any("," in cell for column in columns for cell in column)
-
-    def records(self) -> Iterator[tuple[int, list[str]]]:
-        """Yield (line, cells) of the header and of every row that is not blank."""
-        lines = (match.group() for match in _LINE.finditer(self.text))
-        reader = csv.reader(lines, delimiter=self.delimiter, strict=True)
-        line = 1
-        try:
-            for record in reader:
-                if any(cell and not cell.isspace() for cell in record):
-                    yield line, record
-                line = reader.line_num + 1
-        except csv.Error as error:
-            raise DataError(f"{self.file}: line {line}: {error}: expected CSV with balanced quotes") from None
-
-
-def _open(path: str) -> _Source:
-    file, data = read_bytes(path)
-    warnings: list[str] = []
-    text = _decode(file, data, warnings)
-    source = _Source(file, text, _delimiter(text), [], warnings, text.count("\n") >= LARGE)
-    _, first = next(source.records(), (0, []))
-    if not first:
-        raise DataError(f"{file}: the file is empty: expected a header and rows")
-    source.header = [name.strip() for name in first]
-    return source
-
-
-def _decode(file: str, data: bytes, warnings: list[str]) -> str:
-    if data[:4] == b"PK\x03\x04":
-        raise DataError(
-            f"{file}: this is a spreadsheet or zip file: expected CSV text (save the sheet as CSV)"
-        )
-    codec = "utf-8-sig"
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        codec = "utf-16"
-    elif b"\0" in data[:200] and len(data) % 2 == 0:
-        # without a byte order mark: ASCII in UTF-16 has its zeros on one side
-        codec = "utf-16-le" if not any(data[1:200:2]) else "utf-16-be" if not any(data[:200:2]) else codec
-    try:
-        text = data.decode(codec)
-    except UnicodeDecodeError:
-        try:
-            text = data.decode("cp1252")
-        except UnicodeDecodeError:
-            raise DataError(f"{file}: this is not text: expected CSV in UTF-8") from None
-        codec = "cp1252"
-    if re.search(r"[\0-\x08\x0e-\x1f\x7f]", text):
-        raise DataError(f"{file}: this is not text (control characters): expected CSV in UTF-8")
-    if codec != "utf-8-sig":
-        warnings.append(
-            f"{file}: read as {'Windows-1252 (Latin-1)' if codec == 'cp1252' else 'UTF-16'}, for it is not UTF-8"
-        )
-    return text
-
-
-def _delimiter(text: str) -> str:
-    first = re.search(r"\S.*", text)
-    header = first.group() if first else ""
-    return max(",;\t", key=lambda mark: (header.count(mark), mark == ","))
-
-
-def _find_columns(
-    source: _Source, known: Mapping[str, str], texts: Sequence[str]
-) -> dict[str, tuple[int, str]]:
-    """Find each quantity's column: its place in the row and its unit."""
-    found: dict[str, tuple[int, str]] = {}
-    lower = [name.lower() for name in source.header]
-    for name in texts:
-        places = [index for index, header in enumerate(lower) if header == name.lower()]
-        if len(places) > 1:
-            raise DataError(f"{source.file}: the column {name} stands twice: expected it once")
-        if places:
-            found[name] = (places[0], "")
-    for name, dimension in known.items():
-        good: list[tuple[int, str]] = []
-        bad: list[tuple[int, str]] = []
-        for index, header in enumerate(lower):
-            if header == name or header.startswith(name + "_"):
-                unit = find_unit(dimension, source.header[index][len(name) + 1 :])
-                (bad if unit is None else good).append((index, unit or ""))
-        if len(good) > 1:
-            both = " and ".join(source.header[index] for index, _ in good)
-            raise DataError(
-                f"{source.file}: {name} is given more than once, by the columns {both}: expected one of them"
-            )
-        if good:
-            found[name] = good[0]
-        elif bad:
-            # a column that another quantity claims (`z_rotation` beside `z`) is not an unknown unit
-            others = [other for other in (*known, *texts) if other.startswith(name + "_")]
-            strays = [
-                i for i, _ in bad if not any(lower[i] == o or lower[i].startswith(o + "_") for o in others)
-            ]
-            if strays:
-                header = source.header[strays[0]]
-                suffix = header[len(name) + 1 :]
-                problem = f"the unknown unit '{suffix}'" if suffix else "no unit"
-                hint = nearest_unit(suffix, dimension) if suffix else ""
-                raise DataError(
-                    f"{source.file}: the column {header} has {problem}: expected {spellings(name, dimension)}{hint}"
-                )
-    return found
-
-
 _Plan = Sequence[tuple[str, int, str, str, bool]]
 
 
-def _read_small(source: _Source, table: Table, plan: _Plan, marker: str) -> None:
-    records = source.records()
-    next(records)
+def _read_small(source: Source, table: Table, plan: _Plan, marker: str) -> None:
     width = len(source.header)
     rows: list[list[str]] = []
-    for line, record in records:
+    for line, record in source.rows():
         if len(record) != width:
             if len(record) < width or any(cell.strip() for cell in record[width:]):
                 raise DataError(
@@ -356,17 +229,19 @@ def _read_small(source: _Source, table: Table, plan: _Plan, marker: str) -> None
             table.numbers[name] = Numbers(source.header[index], unit, values)
 
 
-def _version(package: Any) -> tuple[int, int]:
+def _version(package: ModuleType) -> tuple[int, int]:
     major, minor = package.__version__.split(".")[:2]
     return int(major), int(minor)
 
 
-def _read_large(source: _Source, table: Table, plan: _Plan, marker: str) -> bool:
+def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
     """Read with pandas; False where anything is out of order, for the csv module to say what and where."""
     import pandas as pd
 
     # from 3.1 numbers are read to the nearest double without being asked to
-    exact: dict[str, Any] = {} if _version(pd) >= (3, 1) else {"float_precision": "round_trip"}
+    exact: dict[str, Literal["round_trip"]] = (
+        {} if _version(pd) >= (3, 1) else {"float_precision": "round_trip"}
+    )
 
     def read(decimal: str) -> pd.DataFrame:
         return pd.read_csv(

@@ -103,6 +103,20 @@ def amplitude_kind(unit: str) -> tuple[str, str]:
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII)
 
 
+_SIGNS = str.maketrans(
+    {"µ": "u", "μ": "u", "°": "deg", "²": "2", "³": "3", "^": ""} | dict.fromkeys("·⋅×* /", "_")
+)
+_PER_MINUTE = re.compile(r"(?:1|r|rev|u|tr|giri|rot)\s*/\s*min|min\s*(?:\^?-1|⁻¹)", re.IGNORECASE)
+
+
+def unit_name(written: str) -> str:
+    """Return a unit as the suffixes spell it: `mm/s` is mm_s, `g·mm` g_mm, `µm` um, `°` deg, `1/min` rpm."""
+    written = written.strip()
+    if _PER_MINUTE.fullmatch(written):
+        return "rpm"
+    return re.sub("_+", "_", written.translate(_SIGNS)).strip("_")
+
+
 def find_unit(dimension: str, suffix: str) -> str | None:
     """Return the unit of this dimension whose name is `suffix`, in any case of letters; None if there is none."""
     units = UNITS[dimension]
@@ -187,7 +201,7 @@ def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
     if match is None:
         raise ValueError(f"'{text}' is not a number with a unit (units: {known})")
     number, suffix = match.groups()
-    suffix = suffix.replace("*", "_").replace("·", "_").replace(" ", "_").replace("/", "_").replace("^", "")
+    suffix = unit_name(suffix)
     unit = find_unit(dimension, suffix)
     if unit is None:
         if not suffix:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     Document = dict[str, Json]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Column:
     """A quantity of a table: strings are names, None and NaN are empty cells."""
 
@@ -37,7 +38,7 @@ class Column:
         return f"{self.name}_{self.unit}" if self.unit else self.name
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """Columns of one length."""
 
@@ -51,7 +52,7 @@ class Table:
         return {column.header: column.values for column in self.columns}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Result:
     """What a command has found, in every form it can be shown in; each is formed when it is asked for."""
 
@@ -66,8 +67,14 @@ class Result:
     afterword: Callable[[], str] = lambda: ""
     """What the terminal shows below the table."""
     figure: Callable[[], Figure] | None = None
-    beside: Mapping[Path, Callable[[], bytes]] = field(default_factory=dict)
+    beside: Mapping[Path, Callable[[], bytes | Iterable[bytes]]] = field(default_factory=dict)
     """Files that options of the command itself ask for."""
     warnings: list[str] = field(default_factory=list)
-    failed: bool = False
+    failed: Callable[[], bool] = lambda: False
     """Whether nothing that was asked for could be found: status 1, once all is shown."""
+    blocks: Callable[[], Iterator[Table]] | None = None
+    """The table in parts, where it is too long to be held: written as CSV, and nothing else."""
+    within: Callable[[], AbstractContextManager[None]] = nullcontext
+    """What the forms are made within: it turns errors of a library into those that a user is told."""
+    late_warnings: Callable[[], list[str]] = list
+    """What there is to say once all parts are written."""

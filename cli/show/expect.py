@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +14,10 @@ from cli.errors import DataError, nearest
 from cli.read.tables import read
 from cli.read.units import column_dimensions, parse_number
 
-Columns = Mapping[str, Any]
+if TYPE_CHECKING:
+    from cli.show.columns import Cell, Values
+
+    Columns = Mapping[str, Values]
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,11 @@ def compare(
     file with columns of that one.
     """
     expected = read(file, texts=None)
+    spelled = {name.lower(): name for name in columns}
+    expected.texts = {
+        name if name in columns else spelled.get(name.lower(), name): cells
+        for name, cells in expected.texts.items()
+    }
     header = list(expected.texts)
     if other is not None and not columns.keys() >= set(header) and (table := other()).keys() >= set(header):
         columns = table
@@ -55,7 +63,7 @@ def compare(
     matched = [name for name in header if name in keys and not (is_input(name) and "step" in header)]
     rows = list(_match(columns, file, expected.texts, matched, expected.rows, rtol))
     named = [key for key in keys if key in columns and (key in matched or not is_input(key))]
-    lines: dict[str, list[Any]] = {
+    lines: dict[str, list[Cell]] = {
         name: [] for name in ("row", "column", "value", "expected", "error", "verdict")
     }
     for index, row in enumerate(rows):
@@ -84,7 +92,7 @@ def _alike(name: str, columns: Iterable[str]) -> list[str]:
     return [column for column in columns if not asked or asked & column_dimensions(column)]
 
 
-def _is_number(column: Sequence[Any]) -> bool:
+def _is_number(column: Values) -> bool:
     """Tell whether a column of the result holds numbers: names and verdicts keep their commas."""
     known = next((value for value in column if value is not None), None)
     return isinstance(known, Real)
@@ -122,7 +130,7 @@ def _match(
         places[tuple(expected[name][index] for name in names)].remove(left[0])
 
 
-def _nearest(name: str, column: Sequence[Any], rows: list[int], wanted: str, rtol: float) -> list[int]:
+def _nearest(name: str, column: Values, rows: list[int], wanted: str, rtol: float) -> list[int]:
     """The rows whose number comes nearest to the one wanted, within the tolerance."""
     try:
         number = parse_number(wanted)
@@ -138,7 +146,7 @@ def _nearest(name: str, column: Sequence[Any], rows: list[int], wanted: str, rto
     return [row for row, d in zip(rows, away, strict=True) if d < np.inf and d == away.min()]
 
 
-def _error(name: str, value: Any, wanted: str, column: Any) -> tuple[Any, float]:
+def _error(name: str, value: Cell, wanted: str, column: Values) -> tuple[Cell, float]:
     """Return the expected value and the error of the found one."""
     if isinstance(value, str):
         return wanted, 0.0 if value == wanted else math.inf
@@ -154,5 +162,7 @@ def _error(name: str, value: Any, wanted: str, column: Any) -> tuple[Any, float]
         return number, abs(math.radians(math.remainder(value - number, 360.0)))
     if name.endswith("angle_rad"):
         return number, abs(math.remainder(value - number, math.tau))
-    scale = abs(number) or max((abs(other) for other in column if other is not None), default=0.0)
+    scale = abs(number) or max(
+        (abs(other) for other in column if other is not None and not isinstance(other, str)), default=0.0
+    )
     return number, abs(value - number) / scale if scale else abs(value - number)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, wraps
 from inspect import Parameter, signature
@@ -14,12 +14,9 @@ import typer
 
 from cli.errors import one_line
 from cli.read.files import refuse_inputs
-from cli.show.columns import Result, Table
-from cli.show.files import write
-from cli.show.text import csv_text, json_parts, paragraphs, table_text
 
 if TYPE_CHECKING:
-    from cli.show.columns import Document
+    from cli.show.columns import Document, Result, Table
 
 
 def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
@@ -33,7 +30,7 @@ def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
     return check
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ShowOptions:
     """The options that every command shares, in the order in which its help lists them."""
 
@@ -75,6 +72,25 @@ class ShowOptions:
         bool,
         typer.Option("--digits", help="In tables and CSV print only the digits that hold against rounding."),
     ] = False
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=HEADER",
+            help="Read the column HEADER of a table as NAME, such as mass_kg=Masse; repeatable.",
+        ),
+    ] = None
+
+    @property
+    def as_csv(self) -> bool:
+        """Whether the result is written as CSV: to a file, or to a pipe."""
+        if self.output is not None:
+            return self.output.suffix.lower() == ".csv"
+        return not (self.json or self.text or self.expect is not None or sys.stdout.isatty())
+
+    @property
+    def as_json(self) -> bool:
+        """Whether the JSON document is formed."""
+        return self.json or (self.output is not None and self.output.suffix.lower() == ".json")
 
 
 def command(find: Callable[..., Result]) -> Callable[..., None]:
@@ -82,25 +98,47 @@ def command(find: Callable[..., Result]) -> Callable[..., None]:
 
     Where the function has a parameter `show`, it is given them.
     """
-    own = signature(find, eval_str=True).parameters
-    shared = signature(ShowOptions, eval_str=True).parameters
+    own, shared = (_parameters(of) for of in (find, ShowOptions))
 
     @wraps(find)
     def run(**given: object) -> None:
+        from cli.read.headers import rename
+
         options = ShowOptions(**{name: given.pop(name) for name in shared})  # type: ignore[arg-type]
+        rename(options.column)
         if "show" in own:
             given["show"] = options
-        show(find(**given), options)
+        result = find(**given)
+        with result.within():
+            show(result, options)
 
     parameters = [*(p for name, p in own.items() if name != "show"), *shared.values()]
-    parameters = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in parameters]
     run.__signature__ = signature(find).replace(parameters=parameters, return_annotation=None)  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run
 
 
+def _parameters(of: Callable[..., object]) -> dict[str, Parameter]:
+    """Return the parameters with their types; what is returned is not looked at, nor loaded for it."""
+    names = getattr(of, "__globals__", globals())
+    return {
+        name: p.replace(
+            kind=Parameter.KEYWORD_ONLY, annotation=eval(p.annotation, names) if name != "show" else None
+        )
+        for name, p in signature(of).parameters.items()
+    }
+
+
 def show(result: Result, options: ShowOptions) -> None:
     """Write the files asked for, print the result; status 1 if an expectation is not met, or nothing was found."""
+    from cli.read.headers import check_renamed
+    from cli.show.files import write
+    from cli.show.text import csv_text, json_parts, paragraphs, table_text
+
+    if result.blocks is not None:
+        check_renamed()
+        _stream(result, result.blocks(), options)
+        return
     first, output = cache(next(iter(result.tables.values()))), options.output
     report = None
     if options.expect is not None:
@@ -111,6 +149,7 @@ def show(result: Result, options: ShowOptions) -> None:
         other = None if screen is None else lambda: screen().cells
         report = compare(table.cells, table.keys, str(options.expect), options.rtol, other)
         checked = f"{table_text(report.columns)}\n{report.summary}"
+    check_renamed()
     if options.digits:
         result, cut = _with_digits_that_hold(result, first)
         first = cache(lambda: cut)
@@ -125,8 +164,7 @@ def show(result: Result, options: ShowOptions) -> None:
         write(output, csv_text(first().cells).encode())
     elif output is not None:
         write(output, (part.encode() for part in json_parts(_document(result))))
-    for warning in result.warnings:
-        print(f"warning: {one_line(warning)}", file=sys.stderr)
+    _warn(result.warnings)
     if options.json:
         sys.stdout.writelines(json_parts(_document(result)))
         if report is not None:
@@ -139,8 +177,49 @@ def show(result: Result, options: ShowOptions) -> None:
     elif output is None:
         sys.stdout.write(csv_text(first().cells))
     sys.stdout.flush()
-    if result.failed or (report is not None and not report.passed):
+    if result.failed() or (report is not None and not report.passed):
         raise typer.Exit(1)
+
+
+def _stream(result: Result, blocks: Iterator[Table], options: ShowOptions) -> None:
+    """Write a table that comes in parts."""
+    from cli.show.files import write
+    from cli.show.text import csv_text
+
+    unknown = 0
+
+    def parts() -> Iterator[str]:
+        nonlocal unknown
+        for i, table in enumerate(blocks):
+            if options.digits:
+                from cli.show.digits import digits_that_hold
+
+                table, without = digits_that_hold(table)
+                unknown += without
+            yield csv_text(table.cells, header=i == 0)
+
+    refuse_inputs([path for path in (options.output, *result.beside) if path is not None])
+    for path, data in result.beside.items():
+        write(path, data())
+    if options.output is not None:
+        write(options.output, (part.encode() for part in parts()))
+    else:
+        sys.stdout.writelines(parts())
+        sys.stdout.flush()
+    _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)])
+    if result.failed():
+        raise typer.Exit(1)
+
+
+def _warn(warnings: Iterable[str]) -> None:
+    for warning in warnings:
+        print(f"warning: {one_line(warning)}", file=sys.stderr)
+
+
+def _unknown(count: int) -> list[str]:
+    if not count:
+        return []
+    return [f"--digits: of {count} numbers no digit is known to hold; their cells are empty"]
 
 
 def _document(result: Result) -> Document:
@@ -155,9 +234,8 @@ def _with_digits_that_hold(result: Result, first: Callable[[], Table]) -> tuple[
     screen = result.screen if result.screen is None else cache(result.screen)
     if screen is not None and not any(column.error for column in table.columns):
         unknown = digits_that_hold(screen())[1]
-    noted = f"--digits: of {unknown} numbers no digit is known to hold; their cells are empty"
     return replace(
         result,
-        warnings=[*result.warnings, *([noted] if unknown else [])],
+        warnings=[*result.warnings, *_unknown(unknown)],
         screen=None if screen is None else lambda: digits_that_hold(screen())[0],
     ), table

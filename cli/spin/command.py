@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.read import options
-from cli.show.columns import Result
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from cli.show.columns import Result
 
 
 class Method(StrEnum):
@@ -58,6 +59,7 @@ def run(
     """
     import numpy as np
 
+    from cli.show.columns import Result
     from cli.spin import columns, words
     from cli.spin.read import read_body
     from cli.spin.solve import Rotation

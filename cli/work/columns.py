@@ -43,9 +43,7 @@ def unknowns(found: WorkBalance) -> Table:
                 None if value is None or cell.quantity != name else from_si(value, COLUMNS[name], given.unit)
                 for _, _, cell, value in cells
             ]
-            # as the table spells it
-            written, unit = given.header[: len(name)], given.header[len(name) + 1 :]
-            columns.append(Column(written, unit, values, partial(errors, name, given.unit)))
+            columns.append(Column(name, given.unit, values, partial(errors, name, given.unit)))
     return Table(columns, [column.name for column in columns if column.name in KEYS])
 
 

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.read import options
-from cli.show.columns import Result
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from cli.show.columns import Result
 
 
 @command
@@ -38,6 +39,7 @@ def run(
     column field.
     """
     g = 0j if gravity is None else options.plane_vector("--gravity", gravity)
+    from cli.show.columns import Result
     from cli.work import columns, words
     from cli.work.read import read_states
     from cli.work.solve import WorkBalance

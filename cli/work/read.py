@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError, quote
-from cli.read.tables import Table, read, spellings
+from cli.read.headers import spellings
+from cli.read.tables import Table, read
 from cli.read.units import parse_number, to_si
 
 Real = NDArray[np.float64]
@@ -85,7 +86,7 @@ def read_states(path: str) -> StateTable:
     """Read the states of links, one row per link, step and velocity field, and find the unknowns."""
     table = read(path, numbers=COLUMNS, texts=["step", "field", "link"], blank=list(COLUMNS), marker="?")
     if "link" not in table.texts:
-        raise DataError(f"{table.file}: no column link (the header is: {', '.join(table.header)})")
+        raise DataError(f"{table.file}: no column link {table.told}")
     if not table.numbers:
         raise DataError(
             f"{table.file}: no column of states or loads: expected some of vx_m_s, omega_rad_s, fx_N …"

@@ -74,7 +74,7 @@ BAD = {
     "a long row": (HEAD + "9,30,60,20,7\n", r"row 1 \(line 2\): found 5 cells, expected 4"),
     "an open quote": (HEAD + '9,30,60,"20\n', r"line 2: .*quotes"),
     "binary": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0", r"this is not text"),
-    "a workbook": (b"PK\x03\x04\x14\0\0", r"save the sheet as CSV"),
+    "a workbook": (b"PK\x03\x04\x14\0\0", r"rotor.csv: broken workbook .*: expected .xlsx, .xls or .ods"),
     "mixed decimals": (
         "mass_kg;radius_mm;angle_deg;z_mm\n9,5;3.0;60;20\n",
         r"column radius_mm: found '3.0'.*decimal comma",

@@ -14,7 +14,7 @@ import pytest
 
 from cli.errors import LONGEST
 from cli.mechanism.read import wanted
-from cli.mechanism.solve import Job, load
+from cli.mechanism.solve import Analysis, load
 
 # each is a whole command, or several
 pytestmark = pytest.mark.slow
@@ -180,9 +180,9 @@ def test_a_sweep_takes_no_more_than_is_reckoned(
     monkeypatch.chdir(tmp_path)
     m = load("klann.toml")
     names = ["H"] if "--only" in options else None
-    job = Job("klann.toml", m, wanted(m, None, "0deg:360deg/5000", None), 2, names)
+    analysis = Analysis("klann.toml", m, wanted(m, None, "0deg:360deg/5000", None), 2, names)
     json_asked = "--json" in options
-    reckoned = job.bytes_each(json=json_asked, table=not json_asked, forces="--forces" in options) * 4990
+    reckoned = analysis.bytes_each(json=json_asked, table=not json_asked, forces="--forces" in options) * 4990
     assert peak[5000] - peak[10] <= reckoned + 8e6  # what the allocator keeps
 
 

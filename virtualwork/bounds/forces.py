@@ -227,7 +227,8 @@ class ForceErrors:
                 joint = r.by_key[key]
                 out[:, i] = d.joint_moment(joint, m.guides[joint.guide].link) / statics.size  # type: ignore[index]
             elif kind == "gear":
-                continue  # its torque is nobody's answer: it follows from the others, see `_gears`
+                # its torque is nobody's answer: it follows from the others, see `_gears`
+                continue
             else:
                 out[:, i] = d.newton_euler[:, int(key)] / (1.0 if kind == "force" else statics.size)
         return out
@@ -262,7 +263,8 @@ class ForceErrors:
             put(load.body, error, arm * (error + np.abs(value) * turned[load.body]))
         for j, entry in enumerate(m.inputs):
             body = entry.on if entry.is_slide else m.carrier(j)
-            if body != entry.on:  # the motor's reaction is put there as a load
+            # the motor's reaction is put there as a load
+            if body != entry.on:
                 for carrying in {body, entry.on} - {GROUND}:
                     put(carrying, 0.0, self.effort[:, j])
         for joint in self.dynamics.reactions.joints:

@@ -51,7 +51,8 @@ class MotionErrors:
         self.groups: tuple[Group, ...] = self.plan.groups
         self.angles = [body for g in self.groups for body in g.angles]
         self.slides = [s for g in self.groups for s in g.slides]
-        self.share: dict[str, dict[int, float]] = {GROUND: {}}  # ∂θ_body/∂x
+        # ∂θ_body/∂x
+        self.share: dict[str, dict[int, float]] = {GROUND: {}}
         self.routes: dict[str | None, Route] = {None: ((), ())}
         self.ties: list[Turn] = []
         self.given: Reals = np.broadcast_to(np.asarray(poses.input_error, dtype=float), poses.inputs.shape)
@@ -101,7 +102,8 @@ class MotionErrors:
             if body == GROUND:
                 continue
             e = poses.join([st.turn[body] for st in states], complex)
-            with np.errstate(all="ignore"):  # a pose that is not assembled has none
+            # a pose that is not assembled has none
+            with np.errstate(all="ignore"):
                 length = np.abs(e)
                 found.turn[body] = e / length
             self._length[body] = np.abs(length - 1)

@@ -6,7 +6,7 @@ marching): the sign of each closed form, turned over at each change point on the
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from typing import Any
 
@@ -43,6 +43,11 @@ class Assembly(Choice):
         return {}
 
     @cached_property
+    def load_paths(self) -> dict[bool, Any]:
+        """How that bears on joints and inputs."""
+        return {}
+
+    @cached_property
     def track(self) -> Track:
         """Change points and limits along the input."""
         return Track(self)
@@ -55,6 +60,11 @@ class Assembly(Choice):
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""
         self.track.cover(low, high)
+
+    @property
+    def close(self) -> Callable[[Group, State], None]:
+        """Closes the loops of a group on its branch."""
+        return self.track.close
 
     def run(self, steps: Iterable[Step], st: State) -> None:
         """Work out positions, step by step."""
@@ -102,7 +112,7 @@ def _combinations(chosen: Assembly) -> list[tuple[dict[str, int], dict[str, Any]
                 for x in every_solution(step, st, m.size):
                     trial = st.copy()
                     write_unknowns(step, trial, x[None])
-                    after.append((trial, signs, starts | {step.name: x}))
+                    after.append((trial, signs, starts | {step.name: tuple(map(float, x))}))
             else:
                 for sign in (1,) if step.kind == "PRP" else (1, -1):
                     trial = st.copy()

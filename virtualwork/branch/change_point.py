@@ -8,7 +8,7 @@ branches; at k > 2 it is linear in the free (k−1)-th rate. So the branch goes 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from math import factorial
 from typing import Any
@@ -73,7 +73,8 @@ def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[
     d = start()
     jacobian = stack(d.columns(group), 1)[0]
     if not np.isfinite(jacobian).all():
-        return []  # what the group hangs on is not assembled here
+        # what the group hangs on is not assembled here
+        return []
     u, s, vt = np.linalg.svd(jacobian)
     left, null = u[:, -1], vt[-1]
     span = len(s) - 1
@@ -215,3 +216,25 @@ def _at_centre(nodes: Reals) -> Reals:
     w = np.array([1 / np.prod(x - np.delete(nodes, i)) for i, x in enumerate(nodes)])
     w = w / -nodes
     return np.asarray(w / w.sum())
+
+
+def near_by(changes: Iterable[ChangePoint], q: Number) -> Iterator[tuple[ChangePoint, Any, Number]]:
+    """The change points close to inputs q: each with which of the inputs (None: the one), and how far they are."""
+    for change in changes:
+        if np.ndim(q) == 0:
+            if abs(q - change.input) < change.reach:
+                yield change, None, q - change.input
+        else:
+            near = np.abs(q - change.input) < change.reach
+            if near.any():
+                yield change, near, q[near] - change.input
+
+
+def put(store: dict[Any, Any], key: Any, near: Any, value: Any) -> None:
+    """Replace a value, or those of some poses."""
+    if near is None:
+        store[key] = complex(value) if np.iscomplexobj(value) else float(value)
+        return
+    whole = np.array(np.broadcast_to(store[key], near.shape))
+    whole[near] = value
+    store[key] = whole

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from dalembert.arithmetic.records import record
 from virtualwork.describe.description import Description
 from virtualwork.describe.record import Record
 from virtualwork.formulas.numbers import Reals
@@ -18,6 +19,7 @@ from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, Turn
 
 
+@record
 @dataclass(frozen=True, eq=False, repr=False)
 class Choice(Record):
     """A mechanism put together in one way.
@@ -37,10 +39,13 @@ class Choice(Record):
     mechanism: Description
     plan: Plan = field(repr=False)
     signs: Mapping[str, int] = field(default_factory=dict)
-    starts: Mapping[str, Any] = field(default_factory=dict)
+    starts: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     number: int = 1
     warnings: tuple[str, ...] = field(default=(), repr=False)
     phases: Mapping[int, float] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.mechanism!r}, {self.number})"
 
     @cached_property
     def cases(self) -> dict[str, Case]:
@@ -63,15 +68,25 @@ class Choice(Record):
         return found
 
     @cached_property
-    def _needed(self) -> dict[frozenset[str], tuple[Step, ...]]:
+    def plain(self) -> dict[str, tuple[Case, int, float]]:
+        """The closed forms that keep their sign wherever the input goes, as far as is known: case, sign, size."""
+        return {
+            name: (self.cases[name], sign, self.mechanism.size)
+            for name, sign in self.signs.items()
+            if name in self.cases and self.geared.isdisjoint(self.cases[name].group.members)
+        }
+
+    @cached_property
+    def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
+        """What targets hang on, as far as it was asked for."""
         return {}
 
     def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
         """The steps that targets hang on; worked out once for each set of targets."""
-        key = frozenset(targets)
-        if key not in self._needed:
-            self._needed[key] = self.plan.needed(key)
-        return self._needed[key]
+        key = tuple(targets)
+        if key not in self.known_steps:
+            self.known_steps[key] = self.plan.needed(key)
+        return self.known_steps[key]
 
     def before(self, group: Group) -> list[Step]:
         """The steps that a group hangs on."""

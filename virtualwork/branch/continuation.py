@@ -1,6 +1,6 @@
 """Following a group with no closed form along the input: tangent prediction, Newton-Raphson correction.
 
-The march lays down nodes (unknowns and their rate) once; any pose starts from the cubic between two nodes and is
+The continuation lays down nodes (unknowns and their rate) once; any pose starts from the cubic between two nodes and is
 corrected by Newton-Raphson on all poses together, so that no error accumulates.
 """
 
@@ -46,7 +46,8 @@ class Continuation:
         rate, det = self._rate(q, x)
         self.q, self.x, self.rate, self.det = [q], [x], [rate], [det]
         self.stopped = {1: False, -1: False}
-        self.step = {1: np.inf, -1: np.inf}  # the last one that was taken
+        # the last one that was taken
+        self.step = {1: np.inf, -1: np.inf}
 
     def _state(self, q: float) -> State:
         st = State([np.array([q])], many=True)
@@ -70,7 +71,7 @@ class Continuation:
         return rate, float(np.prod(np.linalg.svd(jacobian[0], compute_uv=False)))
 
     def extend(self, a: float, b: float) -> None:
-        """March until the nodes cover a to b."""
+        """Go on until the nodes cover a to b."""
         h = self.track.length / NODES
         while not self.stopped[1] and b + h - self.q[-1] > SEAM * self.track.length:
             self._advance(1, min(h, b + h - self.q[-1]))
@@ -140,7 +141,8 @@ class Continuation:
                 nodes = chebyshev_nodes(12)
                 x = self.unknowns(centre + half * nodes)
                 det = [self._rate(q, row)[1] for q, row in zip(centre + half * nodes, x, strict=True)]
-                if not np.isfinite(det).all():  # a pose between the two that does not close: no more is known
+                # a pose between the two that does not close: no more is known
+                if not np.isfinite(det).all():
                     self._found[a, b] = centre
                     continue
                 real = real_roots(np.polynomial.Chebyshev.fit(nodes, det, 10, domain=[-1, 1]), 1.1)

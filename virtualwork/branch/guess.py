@@ -16,10 +16,10 @@ from virtualwork.formulas.constraints import Constraints, coordinates, hidden_fr
 from virtualwork.formulas.linear import stack, stack_rows
 from virtualwork.formulas.newton import gaps, newton, write_unknowns
 from virtualwork.formulas.numbers import cross, dot
-from virtualwork.formulas.positions import Case, State, columns
+from virtualwork.formulas.positions import Case, State, columns, run
 from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Plan, Turn
+from virtualwork.plan.steps import Group, Plan, Step, Turn
 
 C = TypeVar("C", bound=Choice)
 
@@ -101,8 +101,12 @@ class _Chooser:
         signs: dict[str, int] = {}
         starts: dict[str, Any] = {}
         helper = Choice(self.m, self.plan)
+        waiting: list[Step] = []
         for i, step in enumerate(self.plan.steps):
             open_ = step
+            if isinstance(step, Group) or (isinstance(step, Turn) and step.angle.gears):
+                run(waiting, st)
+                waiting = []
             if isinstance(step, Turn) and step.angle.gears:
                 step = self._phased(step, st)
             elif isinstance(step, Group) and any(tie.angle.gears for tie in step.ties):
@@ -111,12 +115,13 @@ class _Chooser:
                 self.plan = replace(self.plan, steps=(*self.plan.steps[:i], step, *self.plan.steps[i + 1 :]))
             if isinstance(step, Group):
                 if step.kind == "Newton":
-                    starts[step.name] = self._newton(step, st)
+                    starts[step.name] = tuple(map(float, self._newton(step, st)))
                 else:
                     signs[step.name] = self._sign(step, helper.cases[step.name], st, signs)
                     st.angle.update({b: float(np.angle(st.turn[b])) for b in step.members})
             else:
-                helper.run_untracked([step], st)
+                waiting.append(step)
+        run(waiting, st)
         if self.plan.blocks.redundant:
             self._refuse_overdriven(self.plan, st)
         phases = {

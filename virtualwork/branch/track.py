@@ -9,21 +9,21 @@ points between the guess and it: nothing is marched in angle.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from math import lcm
 from typing import Any
 
 import numpy as np
 
-from virtualwork.branch.change_point import ChangePoint, through
+from virtualwork.branch.change_point import ChangePoint, near_by, put, through
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.continuation import Continuation, along_lines, wind_along_lines
-from virtualwork.branch.roots import chebyshev_nodes, real_roots
+from virtualwork.branch.radicand import crossing, lowest, rounding, vanishes
 from virtualwork.describe.errors import MechanismError
-from virtualwork.formulas.numbers import EPS, Complexes, Number, Reals
+from virtualwork.formulas.numbers import Complexes, Number, Reals
 from virtualwork.formulas.positions import State, run
 from virtualwork.plan.steps import Group, Step, Turn
 
@@ -63,7 +63,7 @@ class Track:
         self.flips: dict[str, Reals] = {}
         self.changes: dict[str, list[ChangePoint]] = {}
         self._brackets: list[tuple[str, float, float]] = []
-        self._marched: dict[str, Continuation] = {}
+        self._continuations: dict[str, Continuation] = {}
         self._followed: dict[str, tuple[Reals, Reals]] = {}
         # one turn says it all where every turn of a body is a whole number of turns of the input
         whole = all(
@@ -85,7 +85,7 @@ class Track:
     # --- what poses ask ---------------------------------------------------------------------------------------
     def run(self, steps: Iterable[Step], st: State) -> None:
         """Work out positions, step by step, each group on its branch."""
-        run(steps, st, self.close)
+        run(steps, st, self.close, self.assembly.plain)
 
     def close(self, group: Group, st: State) -> None:
         """Close the loops of one group."""
@@ -140,7 +140,8 @@ class Track:
             # the first point of the turn may be found at its end again
             seam = self.low + (1 - SAME) * self.length
             turn = {name: [c for c in points if c.input < seam] for name, points in self.changes.items()}
-            if not any(len(points) % 2 for points in turn.values()):  # every group is back on its branch
+            # every group is back on its branch
+            if not any(len(points) % 2 for points in turn.values()):
                 self._period = self.low, turn
         return self.settled
 
@@ -168,19 +169,19 @@ class Track:
 
     def mend(self, group: Group, st: State) -> None:
         """Replace positions close to a change point by the series through it."""
-        for change, near, delta in self._near(group, st.inputs[0]):
+        for change, near, delta in near_by(self.changes.get(group.name, ()), st.inputs[0]):
             move = change.unknown(delta, 0)
             for j, body in enumerate(group.angles):
-                _put(st.turn, body, near, change.turn[j] * np.exp(1j * move[..., j]))
+                put(st.turn, body, near, change.turn[j] * np.exp(1j * move[..., j]))
             for j, g in enumerate(group.slides):
-                _put(st.slide, g, near, change.slide[j] + move[..., len(group.angles) + j])
-            _put(st.margin, group.name, near, np.zeros(np.shape(delta)))
+                put(st.slide, g, near, change.slide[j] + move[..., len(group.angles) + j])
+            put(st.margin, group.name, near, np.zeros(np.shape(delta)))
             for tie in group.ties:
                 st.turn[tie.body] = st.rotate(tie.angle)
 
     def mend_rates(self, group: Group, q: Number, k: int, x: list[Number]) -> list[Number]:
         """The same for the unknowns' k-th derivatives."""
-        for change, near, delta in self._near(group, q):
+        for change, near, delta in near_by(self.changes.get(group.name, ()), q):
             rate = change.unknown(delta, k)
             for j in range(len(x)):
                 if near is None:
@@ -192,13 +193,14 @@ class Track:
 
     def bridge_rates(self, group: Group, q: Number, k: int, x: list[Number], singular: Any) -> list[Number]:
         """Derivatives of a Newton group at poses where its Jacobian is singular though the branch goes on."""
-        if not self.active or group.name not in self._marched:
+        if not self.active or group.name not in self._continuations:
             return x
         for i in np.flatnonzero(singular):
-            rate = self._marched[group.name].bridge(float(np.atleast_1d(q)[i]), k)
+            rate = self._continuations[group.name].bridge(float(np.atleast_1d(q)[i]), k)
             if not np.isfinite(
                 rate
-            ).all():  # close to a limit nothing goes on: what the Jacobian gives is kept
+                # close to a limit nothing goes on: what the Jacobian gives is kept
+            ).all():
                 continue
             for j in range(len(x)):
                 if np.ndim(q) == 0:
@@ -230,15 +232,10 @@ class Track:
             angles = angles - 2 * np.pi * np.round(here / (2 * np.pi))
             self._followed[body] = nodes, angles
 
-    def _near(self, group: Group, q: Number) -> Iterator[tuple[ChangePoint, Any, Number]]:
-        for change in self.changes.get(group.name, ()):
-            if np.ndim(q) == 0:
-                if abs(q - change.input) < change.reach:
-                    yield change, None, q - change.input
-            else:
-                near = np.abs(q - change.input) < change.reach
-                if near.any():
-                    yield change, near, q[near] - change.input
+    def _fold(self, name: str) -> None:
+        """Note a group that is singular in every pose."""
+        self.folded.add(name)
+        self.assembly.plain.pop(name, None)
 
     def _look_around(self) -> None:
         """With several inputs: which closed forms are singular at all poses around the guess."""
@@ -251,22 +248,13 @@ class Track:
                 if isinstance(s, Group) and s.kind == "Newton":
                     return
                 self.assembly.run_untracked([s], st)
-                if isinstance(s, Group) and self._meets(s, st.margin[s.name]):
-                    self.folded.add(s.name)
+                if isinstance(s, Group) and s.kind != "PRP" and vanishes(st.margin[s.name], self._noise(s)):
+                    self._fold(s.name)
                     self.assembly.cases[s.name].solve(st, 1, self.assembly.mechanism.size, folded=True)
-
-    def _meets(self, group: Group, margin: Number) -> bool:
-        """Whether a radicand is zero to rounding wherever there is one."""
-        if group.kind == "PRP":
-            return False
-        m = np.abs(np.atleast_1d(margin))
-        m = m[np.isfinite(m)]
-        return len(m) > 4 and bool((m <= self._noise(group)).all())
 
     def _noise(self, group: Group) -> float:
         """The rounding of a group's radicand."""
-        size, r = self.assembly.mechanism.size, self._radii(group)
-        return 256 * EPS * (1 + (size / r) ** 2 if r else 1)
+        return rounding(self.assembly.cases[group.name], self.assembly.mechanism.size)
 
     def warnings(self) -> tuple[str, ...]:
         """The assembly's warnings, and the groups that are singular in every pose in what was covered."""
@@ -294,8 +282,14 @@ class Track:
         step = (b - a) / SAMPLES
         q: Reals = a + step * (np.arange(-3, SAMPLES + 3, dtype=float) + 0.5)
         st = State([q], many=True)
+        waiting: list[Step] = []
         for s in self.plan.steps:
-            if isinstance(s, Group) and s.kind != "Newton":
+            if not isinstance(s, Group):
+                waiting.append(s)
+                continue
+            run(waiting, st)
+            waiting = []
+            if s.kind != "Newton":
                 self.close(s, st)
                 if s.kind == "PRP":
                     continue
@@ -305,21 +299,20 @@ class Track:
                 for body in self.assembly.geared.intersection(s.members):
                     self._follow(body, q, np.angle(st.turn[body]))
                     st.angle[body] = self.unwound(body, q, np.angle(st.turn[body]))
-            elif isinstance(s, Group):
+            else:
                 self._continued(s).extend(a, b)
                 if self._continued(s).singular():
-                    self.folded.add(s.name)
+                    self._fold(s.name)
                 self.close(s, st)
-            else:
-                self.run([s], st)
 
     def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
         """Find where the radicand crosses or touches zero; say whether a change point was found."""
-        if self._meets(group, m):
-            self.folded.add(group.name)
+        if group.kind != "PRP" and vanishes(m, self._noise(group)):
+            self._fold(group.name)
             return True
         if np.mean(np.abs(m) < 1e-14) > 0.9:
-            return False  # stretched all along: zeros of rounding are no change points
+            # stretched all along: zeros of rounding are no change points
+            return False
         inside = (q >= a) & (q < b)
         crossing = np.flatnonzero((m[:-1] >= 0) != (m[1:] >= 0))
         for i in crossing:
@@ -328,15 +321,18 @@ class Track:
         dips = 1 + np.flatnonzero((m[1:-1] <= m[:-2]) & (m[1:-1] < m[2:]) & (np.abs(m[1:-1]) < DIP))
         fresh: list[float] = []
         for i in dips:
-            found = self._bottom(group, float(q[i - 1]), float(q[i + 1]))
+            found = lowest(partial(self.margin, group), float(q[i - 1]), float(q[i + 1]), self._noise(group))
             if found is None:
                 continue
             where, depth, noise = found
-            if depth < -noise and m[i] > 0:  # the gap is narrower than the samples
+            # the gap is narrower than the samples
+            if depth < -noise and m[i] > 0:
                 self._brackets += [(group.name, float(q[i - 1]), where), (group.name, where, float(q[i + 1]))]
-            edge = 1e-9 * self.length  # a change point at the seam of two chunks belongs to both
+            # a change point at the seam of two chunks belongs to both
+            edge = 1e-9 * self.length
             if abs(depth) <= noise and a - edge <= where < b + edge:
                 known = self.flips.setdefault(group.name, np.empty(0))
+                self.assembly.plain.pop(group.name, None)
                 if not len(known) or np.abs(known - where).min() > SAME * self.length:
                     self._brackets = [
                         x for x in self._brackets if not (x[0] == group.name and x[1] <= where <= x[2])
@@ -350,37 +346,10 @@ class Track:
             self.changes.setdefault(group.name, []).append(through(self, group, where))
         return bool(fresh)
 
-    def _bottom(self, group: Group, a: float, b: float) -> tuple[float, float, float] | None:
-        """The lowest point of a radicand near a sampled dip: where, how low, and the rounding in that depth.
-
-        The radicand is smooth: it is fitted at Chebyshev points, and its slope's root is free of cancellation.
-        """
-        centre, half = (a + b) / 2, (b - a) / 2
-        for widen in (1.0, 4.0):
-            nodes = chebyshev_nodes(14)
-            m = self.margin(group, centre + widen * half * nodes)
-            if not np.isfinite(m).all():
-                if widen == 1.0:
-                    return None
-                break
-            fit = np.polynomial.Chebyshev.fit(nodes, m, 11, domain=[-1, 1])
-            real = real_roots(fit.deriv(), 1.2)
-            if not len(real):
-                return None
-            best = real[np.argmin(np.abs(fit(real)))]
-            where, depth = centre + widen * half * float(best), float(fit(best))
-            level = float(np.abs(m).max())
-            centre = where
-        return where, depth, self._noise(group) + 1e-9 * EPS * level
-
-    def _radii(self, group: Group) -> float:
-        arms = [abs(a) for a in self.assembly.cases[group.name].arms if a]
-        return min(arms, default=self.assembly.mechanism.size)
-
     @property
     def has_limits(self) -> bool:
         """Was any limit met in what was covered?"""
-        return bool(self._brackets) or any(march.ends for march in self._marched.values())
+        return bool(self._brackets) or any(way.ends for way in self._continuations.values())
 
     # --- the branch's own scale -----------------------------------------------------------------------------------
     @cached_property
@@ -452,46 +421,28 @@ class Track:
     def _ends(self) -> list[Limit]:
         """The limits in what was covered."""
         by_name = {g.name: g for g in self.plan.groups}
-        found = [self._root(by_name[name], a, b) for name, a, b in self._brackets]
-        for name, marched in self._marched.items():
-            found += [Limit(name, q, side) for q, side in marched.ends]
+        found = [
+            Limit(name, *crossing(partial(self.margin, by_name[name]), a, b)) for name, a, b in self._brackets
+        ]
+        for name, way in self._continuations.items():
+            found += [Limit(name, q, side) for q, side in way.ends]
         unique: list[Limit] = []
         for limit in sorted(found, key=lambda x: x.input):
             if not unique or abs(limit.input - unique[-1].input) > 1e-10 * self.length:
                 unique.append(limit)
         return unique
 
-    def _root(self, group: Group, a: float, b: float) -> Limit:
-        """The radicand's crossing between a and b: regula falsi (Illinois), then the last bits by bisection."""
-        fa, fb = (float(self.margin(group, np.array([q]))[0]) for q in (a, b))
-        side = -1 if fa >= 0 else 1
-        for _ in range(200):
-            if fa == 0 or fb == 0 or abs(b - a) <= 2 * EPS * max(abs(a), abs(b)):
-                break
-            q = b - fb * (b - a) / (fb - fa)
-            if not min(a, b) < q < max(a, b):
-                q = (a + b) / 2
-                if q in (a, b):
-                    break
-            f = float(self.margin(group, np.array([q]))[0])
-            if (f >= 0) != (fb >= 0):
-                a, fa = b, fb
-            else:
-                fa *= 0.5
-            b, fb = q, f
-        return Limit(group.name, a if abs(fa) < abs(fb) else b, side)
-
     @property
     def crossings(self) -> list[float]:
         """Inputs at which two branches cross, in what was covered: of closed forms, and met on the way of the others."""
         found = [float(q) for flips in self.flips.values() for q in flips]
-        return found + [float(q) for marched in self._marched.values() for q in marched.crossings]
+        return found + [float(q) for way in self._continuations.values() for q in way.crossings]
 
     # --- groups with no closed form ------------------------------------------------------------------------------
     def _continued(self, group: Group) -> Continuation:
-        if group.name not in self._marched:
-            self._marched[group.name] = Continuation(self, group)
-        return self._marched[group.name]
+        if group.name not in self._continuations:
+            self._continuations[group.name] = Continuation(self, group)
+        return self._continuations[group.name]
 
     def _close_newton(self, group: Group, st: State) -> None:
         """Close a Newton group at the state's poses, from its continued branch."""
@@ -499,12 +450,3 @@ class Track:
             self._continued(group).close(st)
         else:
             along_lines(self, group, st)
-
-
-def _put(store: dict[Any, Any], key: Any, near: Any, value: Any) -> None:
-    if near is None:
-        store[key] = complex(value) if np.iscomplexobj(value) else float(value)
-        return
-    whole = np.array(np.broadcast_to(store[key], near.shape))
-    whole[near] = value
-    store[key] = whole

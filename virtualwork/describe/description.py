@@ -10,12 +10,25 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
+from dalembert.arithmetic.records import record
 from virtualwork.describe.checks import refuse
 from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
-from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link, Point, as_point, as_points
+from virtualwork.describe.parts import (
+    GROUND,
+    Gear,
+    Guess,
+    Guide,
+    Input,
+    Link,
+    Point,
+    Rigid,
+    as_point,
+    as_points,
+)
 from virtualwork.describe.record import Record
 
 
+@record
 @dataclass(frozen=True, eq=False, repr=False)
 class Description(Record):
     """The description of a planar mechanism; `virtualwork.Mechanism` is one that can also be asked.
@@ -126,6 +139,35 @@ class Description(Record):
             entry.value if entry.value is not None else self.guess.angles.get(entry.name, 0.0)
             for entry in self.inputs
         )
+
+    @cached_property
+    def rigid(self) -> Mapping[str, Rigid]:
+        """Mass properties of every link with the motors it carries (Ibrahim §2.3: their mass and centre join the link).
+
+        The common centre is Σ m z / Σ m, and the inertia about it gains Σ m |z − z_G|² (Steiner).
+
+        >>> arm = Description({"O": 0j}, {"arm": Link({"O": 0j, "P": 1}, mass=2, center=0.25, inertia=0.1)},
+        ...                   motors=[Motor("arm", "tool", mass=1, center=1)])
+        >>> arm.rigid["arm"]
+        Rigid(mass=3.0, center=(0.5+0j), inertia=0.475)
+        """
+        return {body: self._rigid(body, link) for body, link in self.links.items()}
+
+    def _rigid(self, body: str, link: Link) -> Rigid:
+        parts = [(link.mass, link.center, link.inertia)]
+        parts += [
+            (motor.mass, motor.center, 0.0) for motor in self.motors if motor.carrier == body and motor.mass
+        ]
+        if len(parts) == 1:
+            return Rigid(*parts[0])
+        mass = sum(part[0] for part in parts)
+        center = sum((part[0] * part[1] for part in parts), 0j) / mass if mass else link.center
+        return Rigid(mass, center, sum(i + w * abs(z - center) ** 2 for w, z, i in parts))
+
+    @property
+    def applies(self) -> bool:
+        """Whether anything but weight and inertia acts on a link: forces, torques, springs, friction."""
+        return any((self.forces, self.torques, self.springs, self.torsion_springs, self.friction))
 
     def through(self, guide: Guide) -> complex:
         """A point of a guide's line, in the axes of the body that carries it."""

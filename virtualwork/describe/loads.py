@@ -52,7 +52,7 @@ class TorsionSpring:
 
 @dataclass(frozen=True)
 class Motor:
-    """A motor carried by one link and driving another; its mass joins the carrier (000 §2.3)."""
+    """A motor carried by one link and driving another; its mass joins the carrier (Ibrahim §2.3)."""
 
     carrier: str
     drives: str

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from dalembert.arithmetic.records import record
 from virtualwork.describe.record import Record
 
 GROUND = "ground"
@@ -32,6 +33,7 @@ def as_points(given: Mapping[str, Point]) -> Mapping[str, complex]:
     return MappingProxyType({name: as_point(value) for name, value in given.items()})
 
 
+@record
 @dataclass(frozen=True, eq=False, repr=False)
 class Link(Record):
     """A rigid link: its named points in its own axes, and its mass.
@@ -132,6 +134,7 @@ class Input:
         return self.slider is not None
 
 
+@record
 @dataclass(frozen=True, eq=False, repr=False)
 class Guess(Record):
     """Roughly how the mechanism stands when its inputs are `at`: this chooses the assembly."""
@@ -152,3 +155,12 @@ class Guess(Record):
         object.__setattr__(self, "at", values)
         object.__setattr__(self, "angles", MappingProxyType(dict(angles or {})))
         object.__setattr__(self, "points", as_points(points or {}))
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """Mass, centre of mass and inertia of a link, with the motors it carries."""
+
+    mass: float
+    center: complex
+    inertia: float

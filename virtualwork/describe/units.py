@@ -9,7 +9,12 @@ from __future__ import annotations
 import math
 import re
 from fractions import Fraction
+from typing import Any
 
+from virtualwork.describe.errors import DescriptionError
+
+# SI: no quantity of a machine is larger, and no product of five of them overflows
+LARGEST = 1e60
 # dimensions as exponents of (length, mass, time, angle)
 Dimension = tuple[int, int, int, int]
 
@@ -135,3 +140,45 @@ def scaled(number: str, factor: float) -> float:
     if exact.denominator > 10**12:
         return value * factor
     return float(Fraction(number) * exact)
+
+
+def wrong(where: str, found: Any, expected: str) -> DescriptionError:
+    """The complaint that something else was expected."""
+    return DescriptionError(f"{where}: found {found!r}, expected {expected}")
+
+
+class Units:
+    """What a file's bare numbers mean: its lengths and angles in units of their own, everything else SI."""
+
+    def __init__(self, given: dict[str, Any]) -> None:
+        self.factors: dict[str, float] = {}
+        for kind, text in given.items():
+            found = unit(str(text))
+            if found is None or found[1] != EXPECTED[kind][1]:
+                raise wrong(f"[units] {kind}", text, f"a unit of {kind} such as 'mm' or 'deg'")
+            self.factors[kind] = found[0]
+
+    def number(self, value: Any, kind: str, where: str) -> float:
+        """One quantity: a bare number in the file's unit (length, angle) or SI, or a string with its unit."""
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            factor = self.factors.get(kind, 1.0)
+            # a whole number of TOML has no bound
+            result: float | None = scaled(repr(value), factor) if abs(value) <= LARGEST else math.inf
+        elif isinstance(value, str):
+            result = parse(value, kind)
+            if result is None:
+                try:
+                    return self.number(float(value), kind, where)
+                except ValueError:
+                    pass
+        else:
+            result = None
+        if result is None or not abs(result) <= LARGEST:
+            raise wrong(where, value, EXPECTED[kind][0])
+        return result
+
+    def pair(self, value: Any, kind: str, where: str) -> complex:
+        """Two of them, [x, y], as x + iy."""
+        if not isinstance(value, list) or len(value) != 2:
+            raise wrong(where, value, "two numbers [x, y]")
+        return complex(*(self.number(v, kind, where) for v in value))

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from virtualwork.formulas.numbers import ONE, Kind, Number, cross, square
+from virtualwork.formulas.numbers import ONE, Kind, Number, cross
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def two_angles(
     >>> abs(-5 + 3 * e1 + 4 * e2) < 1e-15, round(margin, 15)
     (True, 1.0)
     """
-    d2 = square(w)
+    d2 = (w.conjugate() * w).real
     r1, r2 = abs(v1), abs(v2)
     outer, inner = r1 + r2, r1 - r2
     radicand = (outer * outer - d2) * (d2 - inner * inner)
@@ -107,7 +107,7 @@ def angle_and_slide(
     """Solve W + V·e^{iφ} + s·U = 0 for the rotation and the slide (RRP: a circle and a line, |U| = 1).
 
     In axes along U, V·e^{iφ} is x + iy with y = −Im(W·Ū), x = ±√(r² − y²), and s = −Re(W·Ū) − x.
-    sign is that of x = V·e^{iφ}·U (000 §1.11: the two solution sets of the crank, rod and piston).
+    sign is that of x = V·e^{iφ}·U (Ibrahim §1.11: the two solution sets of the crank, rod and piston).
 
     Returns
     -------
@@ -147,7 +147,7 @@ def turning_slide(
     """
     seen = v * u.conjugate()
     p, q = seen.real, seen.imag
-    radicand = square(w) - q * q
+    radicand = (w.conjugate() * w).real - q * q
     x = sign * kind.sqrt(radicand)
     return -w / (kind.join(x, q) * u), x - p, radicand / (length * length)
 

@@ -225,10 +225,10 @@ class Dynamics:
         n = self.poses.n
         force, moment = np.zeros(n, complex), np.zeros(n)
         center = self.scene.rigid[link].center
-        loads = [load for load in [*self.scene.loads, *self.scene.friction] if load.body == link]
-        for block in self.scene.blocks([f"angle:{link}"]):
+        loads = [load for load in self.scene.case.everything if load.body == link and load.kind not in OWN]
+        for block in self.scene.blocks([f"angle:{link}"]) if loads else ():
             for load in loads:
-                value = None if load.kind in OWN else block.formed(load)
+                value = block.formed(load)
                 if value is None:
                     continue
                 if load.path is None:

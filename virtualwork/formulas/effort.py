@@ -43,7 +43,8 @@ def write_effort(scene: Scene, block: Block, out: Reals) -> None:
         total: Number = None
         for body, guide, load in paths.working:
             moved = block.by[j].slide[guide][0] if body is None else block.turning(body, j)
-            if moved is not None:  # what cannot move is not evaluated
+            # what cannot move is not evaluated
+            if moved is not None:
                 value = paths.value(block, load)
                 total = plus(total, value if isinstance(moved, float) and moved == 1 else times(value, moved))
         if total is not None:

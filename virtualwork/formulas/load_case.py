@@ -5,7 +5,7 @@ A load that is zero for the whole case (no mass, no speed, no stiffness) is not 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 from virtualwork.describe.description import Description
@@ -28,36 +28,6 @@ from virtualwork.plan.joints import Joint, joints
 from virtualwork.plan.steps import Path, Place, Plan, Term, combined
 
 
-@dataclass(frozen=True)
-class Rigid:
-    """Mass, centre of mass and inertia of a link, with the motors it carries."""
-
-    mass: float
-    center: complex
-    inertia: float
-
-
-def rigid(m: Description, body: str) -> Rigid:
-    """Mass properties of a link with the motors it carries (Ibrahim §2.3: their mass and centre join the link).
-
-    The common centre is Σ m z / Σ m, and the inertia about it gains Σ m |z − z_G|² (Steiner).
-
-    >>> from virtualwork import Link, Motor
-    >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": 1}, mass=2, center=0.25, inertia=0.1)},
-    ...                 motors=[Motor("arm", "tool", mass=1, center=1)])
-    >>> rigid(arm, "arm")
-    Rigid(mass=3.0, center=(0.5+0j), inertia=0.475)
-    """
-    link = m.links[body]
-    parts = [(link.mass, link.center, link.inertia)]
-    parts += [(motor.mass, motor.center, 0.0) for motor in m.motors if motor.carrier == body and motor.mass]
-    if len(parts) == 1:
-        return Rigid(*parts[0])
-    mass = sum(part[0] for part in parts)
-    center = sum((part[0] * part[1] for part in parts), 0j) / mass if mass else link.center
-    return Rigid(mass, center, sum(i + w * abs(z - center) ** 2 for w, z, i in parts))
-
-
 class LoadCase:
     """What acts on a mechanism, at rest or moving; a load that is zero throughout is not in the list.
 
@@ -78,16 +48,11 @@ class LoadCase:
         return self._paths[body, z]
 
     @cached_property
-    def rigid(self) -> dict[str, Rigid]:
-        """Mass properties of every link."""
-        return {body: rigid(self.mechanism, body) for body in self.mechanism.links}
-
-    @cached_property
     def loads(self) -> list[Load]:
         """Every load that is not zero throughout, friction apart."""
         m = self.mechanism
         found: list[Load] = []
-        for body, r in self.rigid.items():
+        for body, r in self.mechanism.rigid.items():
             at = body, self.path(body, r.center), r.center
             if r.mass and m.gravity:
                 found.append(Constant("weight", *at, r.mass * m.gravity))
@@ -182,7 +147,7 @@ class LoadCase:
     def acceleration(self, path: Path) -> Combination:
         """The acceleration of a point: Σ z·(s e^{iθ})″, from the point its body hangs on.
 
-        >>> from virtualwork import Input, Link
+        >>> from virtualwork import Input, Link, Mechanism
         >>> crank = Mechanism({"A": 0j}, {"crank": Link({"A": 0j})}, inputs=Input(link="crank"))
         >>> case = LoadCase(crank, crank.assembly.plan, moves=True)
         >>> [(of.kind, of.name, z) for of, z in case.acceleration(case.path("crank", 0.5j)).items()]

@@ -290,7 +290,7 @@ class LoadPaths:
         """
         key = "rest", body
         if key not in self._known:
-            about = self.case.rigid[body].center
+            about = self.mechanism.rigid[body].center
             sides = self.order.sides[body]
             for side in sides:
                 z, guide, _ = self.place(side)

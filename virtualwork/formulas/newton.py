@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.records import record
 from virtualwork.formulas.linear import solve, stack, stack_rows
 from virtualwork.formulas.numbers import EPS, Number, Reals
 from virtualwork.formulas.positions import State, columns, loop
@@ -39,7 +40,8 @@ def gaps(group: Group, st: State) -> list[Number]:
     return [loop(closure, st) for closure in group.closures]
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Iterate:
     """One row of the Newton-Raphson table: the unknowns and the gap they leave."""
 
@@ -94,10 +96,10 @@ def newton(
         jacobian = stack(columns(group, st), n)
         dx = solve(jacobian, -f)
         dx[done | ~np.isfinite(dx).all(axis=1)] = 0.0
-        big = np.abs(dx / np.where(slides, far[:, None], 1.0)).max(
-            axis=1, initial=0.0
-        )  # a group may have no unknown of its own
-        if damped:  # no angle turns by more than some 60° in a step
+        # a group may have no unknown of its own
+        big = np.abs(dx / np.where(slides, far[:, None], 1.0)).max(axis=1, initial=0.0)
+        # no angle turns by more than some 60° in a step
+        if damped:
             dx *= np.minimum(1.0, 1.0 / np.maximum(big, 1e-300))[:, None]
         factor = np.ones(n)
         for _ in range(12 if damped else 1):

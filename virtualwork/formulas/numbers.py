@@ -25,6 +25,9 @@ PARALLEL = 1e-11
 class Kind(Protocol):
     """The operations of one kind of number."""
 
+    def constant(self, z: complex) -> Number:
+        """A constant of the mechanism as such a number, so that its size and its inverse have all digits."""
+
     def sqrt(self, x: Number) -> Number:
         """The root; NaN of a negative number."""
 
@@ -40,6 +43,10 @@ class Kind(Protocol):
 
 class One:
     """Python numbers: a single pose."""
+
+    def constant(self, z: complex) -> complex:
+        """The constant itself."""
+        return z
 
     def sqrt(self, x: float) -> float:
         """The root."""
@@ -61,9 +68,11 @@ class One:
 class Many:
     """Arrays over poses; what is the same in all of them may be a Python number."""
 
-    def sqrt(self, x: Number) -> Number:
-        """The root."""
-        return np.sqrt(x)
+    sqrt = staticmethod(np.sqrt)
+
+    def constant(self, z: complex) -> complex:
+        """The constant itself."""
+        return z
 
     def exp(self, angle: Number) -> Number:
         """e^{i·angle}."""
@@ -95,6 +104,7 @@ class Folded:
 
     def __init__(self, kind: Kind) -> None:
         self.exp, self.join, self.regular = kind.exp, kind.join, kind.regular
+        self.constant = kind.constant
 
     def sqrt(self, x: Number) -> Number:
         """Zero."""
@@ -102,11 +112,6 @@ class Folded:
 
 
 ONE, MANY = One(), Many()
-
-
-def square(z: Number) -> Number:
-    """|z|², without the root."""
-    return (z.conjugate() * z).real
 
 
 def cross(a: Number, b: Number) -> Number:

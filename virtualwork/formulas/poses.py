@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.linear import inverse_norm, stack
-from virtualwork.formulas.numbers import Complexes, Number, Reals, plus, times
-from virtualwork.formulas.positions import BLOCK, SWEEP, State, columns
+from virtualwork.formulas.numbers import Complexes, Number, Reals
+from virtualwork.formulas.positions import BLOCK, SWEEP, Case, State, columns, run
 from virtualwork.formulas.rates import Passage, Rates
 from virtualwork.formulas.sweep import EvenSweep
 from virtualwork.plan.steps import Group, Path, Plan, Step, Term, path_reads
@@ -40,6 +40,10 @@ class Branch(Protocol):
         """What acts at rest (False) and in motion (True), made once for all poses."""
 
     @property
+    def load_paths(self) -> dict[bool, Any]:
+        """How the loads bear on joints and inputs, at rest (False) and in motion (True)."""
+
+    @property
     def merged(self) -> tuple[Plan, Group | None]:
         """All loops at once."""
 
@@ -47,11 +51,17 @@ class Branch(Protocol):
     def passage(self) -> Passage | None:
         """How derivatives go through change points; None with several inputs."""
 
-    def needed(self, targets: Iterable[str]) -> tuple[Step, ...]:
-        """The steps that targets hang on."""
+    @property
+    def known_steps(self) -> dict[tuple[str, ...], tuple[Step, ...]]:
+        """The steps that targets hang on, as far as they were asked for."""
 
-    def run(self, steps: Iterable[Step], st: State) -> None:
-        """Work out positions."""
+    @property
+    def plain(self) -> dict[str, tuple[Case, int, float]]:
+        """The closed forms that keep their sign wherever the input goes: case, sign, size."""
+
+    @property
+    def close(self) -> Callable[[Group, State], None]:
+        """Closes the loops of any other group on its branch."""
 
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""
@@ -81,6 +91,7 @@ class Poses:
         block_of: EvenSweep | None = None,
     ) -> None:
         self.block_of = block_of
+        self._known_steps, self._plain, self._close = branch.known_steps, branch.plain, branch.close
         self.branch, self.plan = branch, branch.plan
         self.mechanism = m = branch.mechanism
         k = len(m.inputs)
@@ -212,7 +223,10 @@ class Poses:
 
         `then` is called with each block's number while the block is still in cache, and what it forms is forgotten.
         """
-        steps = self.branch.needed(targets)
+        wanted = tuple(targets)
+        steps = self._known_steps.get(wanted)
+        if steps is None:
+            steps = self._known_steps[wanted] = self.plan.needed(wanted)
         missing: list[tuple[int, list[Step]]] = []
         for k in range(order + 1):
             key = which if k else -2
@@ -254,7 +268,7 @@ class Poses:
     def _advance(self, i: int, which: int, missing: list[tuple[int, list[Step]]]) -> None:
         for k, steps in missing:
             if k == 0:
-                self.branch.run(steps, self.states()[i])
+                run(steps, self.states()[i], self._close, self._plain)
             else:
                 self._along[which][i].advance(steps, k)
 
@@ -291,12 +305,23 @@ class Poses:
 
         def form(i: int, st: State) -> Number:
             v, a, j = (part(x, slice(i * BLOCK, (i + 1) * BLOCK), st.many) for x in rates)
+            # what each derivative over the input is weighed with
             if order == 1:
-                return times(get(i, 1), v)
-            if order == 2:
-                return plus(times(get(i, 2), times(v, v)), times(get(i, 1), a))
-            third = plus(times(get(i, 3), times(times(v, v), v)), times(get(i, 2), times(times(3.0, v), a)))
-            return plus(third, times(get(i, 1), j))
+                weights: tuple[Number, ...] = (v,)
+            elif order == 2:
+                weights = a, None if v is None else v * v
+            else:
+                second = None if v is None or a is None else 3.0 * v * a
+                weights = j, second, None if v is None else v * v * v
+            total: Number = None
+            for k in range(order, 0, -1):
+                weight = weights[k - 1]
+                value = None if weight is None else get(i, k)
+                if value is not None:
+                    # a factor of exactly 1 costs nothing
+                    value = value if isinstance(weight, float) and weight == 1.0 else value * weight
+                    total = value if total is None else total + value
+            return total
 
         return self.over(form, kind)
 

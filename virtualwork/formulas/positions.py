@@ -6,7 +6,9 @@ Assur group. The steps do not know what kind of numbers they run on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +26,7 @@ from virtualwork.plan.steps import Angle, Closure, Group, Path, Place, Step, Ter
 
 # poses worked out together: their temporaries stay in the cache
 BLOCK = 8192
+EMPTY: Mapping[str, Any] = MappingProxyType({})
 # from so many poses on, e^{iθ} of a uniform sweep is formed by angle addition
 SWEEP = 256
 
@@ -91,7 +94,8 @@ class State:
         """const + Σ k·input, the part of an angle that needs no other angle."""
         value: Number = angle.const or None
         for j, k in angle.inputs:
-            value = plus(value, self.inputs[j] if k == 1.0 else k * self.inputs[j])
+            turned = self.inputs[j] if k == 1.0 else k * self.inputs[j]
+            value = turned if value is None else value + turned
         return 0.0 if value is None else value
 
     def rotate(self, angle: Angle) -> Number:
@@ -117,14 +121,26 @@ class State:
         return 1.0 + 0j if value is None else value
 
 
-def run(steps: Iterable[Step], st: State, close: Callable[[Group, State], None]) -> None:
-    """Work out positions, step by step; `close` closes the loops of a group on its branch."""
+def run(
+    steps: Iterable[Step],
+    st: State,
+    close: Callable[[Group, State], None] | None = None,
+    plain: Mapping[str, tuple[Case, int, float]] = EMPTY,
+) -> None:
+    """Work out positions, step by step.
+
+    `close` closes the loops of a group on its branch; those of `plain`, (case, sign, size), keep one sign all along.
+    """
     for step in steps:
         if isinstance(step, Place):
             v = st.sum(step.terms)
             st.point[step.node] = v if step.base is None else st.point[step.base] + v
         elif isinstance(step, Group):
-            close(step, st)
+            if step.name in plain:
+                case, sign, size = plain[step.name]
+                case.solve(st, sign, size)
+            elif close is not None:
+                close(step, st)
         elif isinstance(step, Turn):
             turn(step, st)
         else:
@@ -167,7 +183,7 @@ class Case:
             for t in closure.terms
             if t.body not in members and (t.slide is None or t.slide not in group.slides)
         )
-        self.arms: list[complex | None] = []
+        self.arms: list[complex] = []
         self.bent: list[list[tuple[Term, Angle]]] = []
         self.tie = tie
         for angle in group.angles:
@@ -191,7 +207,7 @@ class Case:
 
     def arm(self, i: int, st: State) -> Number:
         """The arm of unknown angle i."""
-        value: Number = self.arms[i]
+        value: Number = st.kind.constant(self.arms[i])
         for t, relative in self.bent[i]:
             v = t.z
             if relative.inputs or relative.const:

@@ -16,7 +16,7 @@ import numpy as np
 
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.linear import singular_poses, solve_columns, solve_determined
-from virtualwork.formulas.numbers import Number, cross, plus, times
+from virtualwork.formulas.numbers import Number, cross
 from virtualwork.formulas.positions import State, columns
 from virtualwork.plan.steps import Angle, Group, Path, Place, Plan, Step, Term, Turn
 
@@ -74,9 +74,9 @@ class Rates:
         total: Number = None
         for j in range(k - 1):
             if theta[j] is not None:
-                total = plus(total, times(comb(k - 1, j), times(theta[j], self.turn(body, k - 1 - j))))
+                total = _plus(total, _times(comb(k - 1, j), _times(theta[j], self.turn(body, k - 1 - j))))
         if top is not None:
-            total = plus(total, times(top, self.st.turn[body]))
+            total = _plus(total, _times(top, self.st.turn[body]))
         return None if total is None else 1j * total
 
     def turn(self, body: str, k: int) -> Number:
@@ -94,7 +94,7 @@ class Rates:
         base, terms = path
         v: Number = None if base is None else self.point[base][k - 1]
         for t in terms:
-            v = plus(v, self._term(t, k))
+            v = _plus(v, self._term(t, k))
         return v
 
     def slim(self) -> None:
@@ -116,10 +116,10 @@ class Rates:
     def _tied(self, angle: Angle, k: int, without: tuple[str, ...] = ()) -> Number:
         value: Number = None
         for j, f in angle.inputs:
-            value = plus(value, times(f, self.rate(j, k)))
+            value = _plus(value, _times(f, self.rate(j, k)))
         for base, r in angle.bases:
             if base not in without:
-                value = plus(value, times(r, self.angle[base][k - 1]))
+                value = _plus(value, _times(r, self.angle[base][k - 1]))
         return value
 
     def _term(
@@ -128,7 +128,7 @@ class Rates:
         """(z·s·e^{iθ})⁽ᵏ⁾; `tops` stand for (e^{iθ})⁽ᵏ⁾, and an unknown slide's k-th derivative is left out."""
         highest = tops[t.body] if tops and t.body in tops else self.turn(t.body, k)
         if t.slide is None:
-            return times(t.z, highest)
+            return _times(t.z, highest)
         s = self.slide.get(t.slide, [])
         total = None if highest is None else self.st.slide[t.slide] * highest
         for j in range(1, k + 1):
@@ -137,8 +137,8 @@ class Rates:
             if s[j - 1] is not None:
                 e = self.turn(t.body, k - j)
                 if e is not None:
-                    total = plus(total, times(comb(k, j), s[j - 1] * e))
-        return times(t.z, total)
+                    total = _plus(total, _times(comb(k, j), s[j - 1] * e))
+        return _times(t.z, total)
 
     def right_side(self, group: Group, k: int) -> list[Number]:
         """The k-th derivative of each loop with the unknowns' own k-th derivatives left out."""
@@ -155,9 +155,9 @@ class Rates:
             if closure.start is not None:
                 w = self.point[closure.start][k - 1]
             if closure.end is not None:
-                w = plus(w, times(-1, self.point[closure.end][k - 1]))
+                w = _plus(w, _times(-1, self.point[closure.end][k - 1]))
             for t in closure.terms:
-                w = plus(w, self._term(t, k, tops, group.slides))
+                w = _plus(w, self._term(t, k, tops, group.slides))
             rows.append(0j if w is None else w)
         return rows
 
@@ -214,3 +214,16 @@ def _put(store: dict[Any, list[Number]], key: Any, k: int, value: Number) -> Non
     series = store.setdefault(key, [])
     del series[k - 1 :]
     series.append(value)
+
+
+# as in `numbers`, but here: the terms of Leibniz's rule are added up by the hundred, and a binomial of 1 costs nothing
+
+
+def _plus(a: Number, b: Number) -> Number:
+    return b if a is None else a if b is None else a + b
+
+
+def _times(f: Number, a: Number) -> Number:
+    if a is None:
+        return None
+    return a if isinstance(f, (int, float)) and f == 1 else f * a

@@ -136,7 +136,8 @@ class Reactions:
         for load in self.scene.friction:
             if load.path is None or load.joint != joint.key:
                 continue
-            if body == GROUND:  # no load stands there: it feels the reverse of the other body's
+            # no load stands there: it feels the reverse of the other body's
+            if body == GROUND:
                 total = minus(total, load.form(block))
             elif load.body == body:
                 total = plus(total, load.form(block))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualwork.describe.parts import GROUND
+from virtualwork.describe.parts import GROUND, Rigid
 from virtualwork.formulas.block import Block, Setting
-from virtualwork.formulas.load_case import LoadCase, Rigid
+from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.loads import FrictionLoad, Load
 from virtualwork.formulas.poses import Poses
@@ -27,8 +27,6 @@ class Scene:
     poses : Poses
     case : LoadCase
         What acts, the same for all motions of an assembly.
-    paths : LoadPaths
-        How the loads bear on what moves, and how joint forces follow.
     moves : bool
         Whether anything moves at all.
     formed : set of str
@@ -42,10 +40,18 @@ class Scene:
         self.moves, self.formed = self.setting.moves, self.setting.formed
         known = poses.branch.prepared
         if self.moves not in known:
-            known[self.moves] = LoadPaths(LoadCase(self.mechanism, self.plan, self.moves))
-        self.paths: LoadPaths = known[self.moves]
-        self.case: LoadCase = self.paths.case
+            known[self.moves] = LoadCase(self.mechanism, self.plan, self.moves)
+        self.case: LoadCase = known[self.moves]
         self._blocks: dict[tuple[str, ...], list[Block]] = {}
+
+    @cached_property
+    def paths(self) -> LoadPaths:
+        """How the loads bear on what moves, and how joint forces follow; made once for an assembly."""
+        known = self.poses.branch.load_paths
+        if self.moves not in known:
+            known[self.moves] = LoadPaths(self.case)
+        found: LoadPaths = known[self.moves]
+        return found
 
     @property
     def loads(self) -> list[Load]:
@@ -58,9 +64,9 @@ class Scene:
         return self.case.friction
 
     @property
-    def rigid(self) -> dict[str, Rigid]:
+    def rigid(self) -> Mapping[str, Rigid]:
         """Mass properties of every link."""
-        return self.case.rigid
+        return self.mechanism.rigid
 
     # --- solving ----------------------------------------------------------------------------------------------
     def _targets(self, keys: Iterable[str]) -> tuple[tuple[str, ...], int]:

@@ -119,7 +119,8 @@ def _refuse_free(
     if not free:
         return
     grown = True
-    while grown:  # what can move with the free coordinates
+    # what can move with the free coordinates
+    while grown:
         grown = False
         for v, i in of_variable.items():
             if v not in free and free.intersection(rows[i].variables):

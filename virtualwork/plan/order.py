@@ -76,6 +76,7 @@ class _Planner:
         self.m, self.merged, self.phases = m, merged, phases
         self.guess = known_by_guess(m)[0] if m.gears else {}
         self.relations = list(relations(m))
+        self.driven = {m.guide_of(e): j for j, e in enumerate(m.inputs) if e.is_slide}
         self.steps: list[Step] = []
         self.angles: dict[str, Angle] = {GROUND: Angle()}
         self.anchors: dict[str, Path] = {GROUND: (None, ())}
@@ -87,9 +88,12 @@ class _Planner:
             set()
         )  # (joint, body) already spent to place a body or to close a loop
         # long chains: what is done is not looked through again for every block
-        self.solved: set[str] = set()  # bodies whose angle the steps written so far give
-        self.settled: set[str] = set()  # placed bodies whose pins are placed too
-        self.joined: set[str] = set()  # bodies all of whose loops are closed
+        # bodies whose angle the steps written so far give
+        self.solved: set[str] = set()
+        # placed bodies whose pins are placed too
+        self.settled: set[str] = set()
+        # bodies all of whose loops are closed
+        self.joined: set[str] = set()
 
     def run(self) -> Plan:
         self.blocks = decompose(self.m)
@@ -113,7 +117,7 @@ class _Planner:
     def _place(self, node: str, body: str, z: complex) -> str:
         if node not in self.nodes and body in self.anchors:
             base, terms = self.anchors[body]
-            self.steps.append(Place(node, base, combined((*terms, Term(z, body)))))
+            self.steps.append(Place(node, base, _longer(terms, Term(z, body))))
             self.nodes.add(node)
             self.used.add((node, body))
         return node
@@ -128,10 +132,9 @@ class _Planner:
     def _block(self, block: tuple[Variable, ...]) -> None:
         fresh = [name for kind, name in block if kind == "angle"]
         slides = sorted(int(name) for kind, name in block if kind == "slide")
-        driven = {self.m.guide_of(e): j for j, e in enumerate(self.m.inputs) if e.is_slide}
         for i in slides:
-            if i in driven:
-                self.steps.append(Slide(i, driven[i]))
+            if i in self.driven:
+                self.steps.append(Slide(i, self.driven[i]))
                 self.slides_known.add(i)
         free, ties = self._eliminate(fresh)
         for tie in ties:
@@ -166,7 +169,8 @@ class _Planner:
         terms = group.closures[0].terms
         held = {own.get(t.body) for t in terms} | {t.slide for t in terms}
         if not held.issuperset((*group.angles, *group.slides)):
-            return "Newton"  # an unknown that its loop does not hold
+            # an unknown that its loop does not hold
+            return "Newton"
         turning = {own.get(t.body) for t in terms if t.slide in group.slides and t.slide is not None}
         if len(group.angles) == 2:
             return "RRR"
@@ -200,7 +204,8 @@ class _Planner:
             unknown = {body: factor for body, factor in c.items() if body in fresh}
             if (
                 right.gears
-            ):  # its constant is that of the guess, at once where no link before it has to be placed
+                # its constant is that of the guess, at once where no link before it has to be placed
+            ):
                 there = known.at(self.m.at)
                 if there is None:
                     known = _plus(known, right, 1.0)
@@ -264,7 +269,7 @@ class _Planner:
 
     def _chain(self, body: str, z: complex, anchors: Mapping[str, Path]) -> Path:
         base, terms = anchors[body]
-        return base, combined((*terms, Term(z, body)))
+        return base, _longer(terms, Term(z, body))
 
     def _attach(
         self, body: str, placed: Collection[str], chain: Callable[[str, complex], Path]
@@ -274,7 +279,7 @@ class _Planner:
         for name, z in points.items():
             if name in self.nodes:
                 self.used.add((name, body))
-                return name, combined([Term(-z, body)])
+                return name, _longer((), Term(-z, body))
         for i in range(len(self.m.guides)):
             if i not in self.slides_known or (f"guide {i}", "") in self.used:
                 continue
@@ -335,7 +340,7 @@ class _Planner:
                     self.used.add((name, body))
             else:
                 base, terms = nodes[name]
-                anchors[body] = base, combined((*terms, Term(-z, body)))
+                anchors[body] = base, _longer(terms, Term(-z, body))
                 self.used.add((name, body))
                 queue.append(body)
 
@@ -416,3 +421,10 @@ def _sums(
 
 def _times(a: Angle, factor: float) -> Angle:
     return _plus(Angle(), a, factor)
+
+
+def _longer(terms: tuple[Term, ...], t: Term) -> tuple[Term, ...]:
+    """Terms and one more, added to that of the same body and slide."""
+    if any(own.body == t.body and own.slide == t.slide for own in terms):
+        return combined((*terms, t))
+    return (*terms, t) if t.z != 0 else terms

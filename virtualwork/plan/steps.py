@@ -117,7 +117,8 @@ class Group:
     angles: tuple[str, ...]
     slides: tuple[int, ...]
     closures: tuple[Closure, ...]
-    ties: tuple[Turn, ...] = ()  # bodies of the group whose angle hangs on the group's own
+    # bodies of the group whose angle hangs on the group's own
+    ties: tuple[Turn, ...] = ()
 
     @property
     def members(self) -> tuple[str, ...]:

@@ -110,7 +110,8 @@ class Cycle:
         integral is no rounding, and not among them.
         """
         error, size = ForceErrors(self.motion.dynamics).effort[:, 0], np.abs(self.effort)
-        last = float(np.finfo(float).eps) * (2 + np.log2(len(size)))  # of a pairwise sum
+        # of a pairwise sum
+        last = float(np.finfo(float).eps) * (2 + np.log2(len(size)))
         q = np.abs(self.input - self.input[0])
         # the weights of a spline exceed those of the trapezoidal rule by less than a half
         work = 1.5 * float(np.trapezoid(error + last * size, q))

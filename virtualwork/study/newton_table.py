@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dalembert.arithmetic.records import record
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.solutions import guessed_unknowns
 from virtualwork.describe.errors import AssemblyError
@@ -16,7 +17,8 @@ from virtualwork.formulas.positions import State, columns
 from virtualwork.plan.guessed import known_by_guess
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class AllAtOnce:
     """Newton-Raphson on all loops of a mechanism together, as Nicoletti, lecture 7, does it.
 
@@ -40,6 +42,10 @@ class AllAtOnce:
     jacobian: Reals
     closed: bool
     difference: float
+
+    def __repr__(self) -> str:
+        end = f"closed, residual {self.iterates[-1].residual:.3g} m" if self.closed else "not closed"
+        return f"AllAtOnce({', '.join(self.unknowns)}: {len(self.iterates)} iterates, {end})"
 
 
 def all_at_once(assembly: Assembly, inputs: tuple[float, ...], limit: int = 50) -> AllAtOnce:

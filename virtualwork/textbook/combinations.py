@@ -1,4 +1,4 @@
-"""The combinations of motion of 000 §1.6–1.11, each with its parts reported apart.
+"""The combinations of motion of Ibrahim §1.6–1.11, each with its parts reported apart.
 
 The plane is complex: a vector is x + iy, i·r is r turned by +90°, so that ω×r is iωr. All functions take numbers or
 arrays (SI, radians) and return a frozen result; `sense(v)` is the direction in which a part points.
@@ -18,11 +18,12 @@ from virtualwork.plan.order import direction
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-Vector = Any  # complex, or an array of complex
+# complex, or an array of complex
+Vector = Any
 
 
 def sense(vector: Vector) -> Any:
-    """Direction in which a vector points, rad in [0, 2π) from the horizontal (000 §1.2); NaN for a zero vector.
+    """Direction in which a vector points, rad in [0, 2π) from the horizontal (Ibrahim §1.2); NaN for a zero vector.
 
     Examples
     --------
@@ -50,7 +51,7 @@ def on_incline(
     acceleration: ArrayLike = 0.0,
     start: complex = 0j,
 ) -> Translation:
-    """Motion of a body that slides on a fixed incline (000 eqs 1.6.1–1.6.8), in components.
+    """Motion of a body that slides on a fixed incline (Ibrahim eqs 1.6.1–1.6.8), in components.
 
     Parameters
     ----------
@@ -88,7 +89,7 @@ def on_moving_ramp(
     ramp_acceleration: Vector = 0j,
     acceleration: ArrayLike = 0.0,
 ) -> Relative:
-    """Motion of a body that slides on a ramp which itself translates (000 eqs 1.7.4–1.7.6).
+    """Motion of a body that slides on a ramp which itself translates (Ibrahim eqs 1.7.4–1.7.6).
 
     Parameters
     ----------
@@ -120,7 +121,7 @@ class Rotation:
 
 
 def rotation(arm: Vector, omega: ArrayLike, alpha: ArrayLike = 0.0) -> Rotation:
-    """Motion of a point of a body that turns about a fixed point (000 eqs 1.8.1–1.8.5): V = ω×R, Aᵗ = α×R, Aⁿ = −ω²R.
+    """Motion of a point of a body that turns about a fixed point (Ibrahim eqs 1.8.1–1.8.5): V = ω×R, Aᵗ = α×R, Aⁿ = −ω²R.
 
     Parameters
     ----------
@@ -154,7 +155,7 @@ class TwoPoints:
 def second_point(
     arm: Vector, omega: ArrayLike, alpha: ArrayLike, velocity: Vector, acceleration: Vector = 0j
 ) -> TwoPoints:
-    """Motion of a second point B of a body from that of its point A (000 eqs 1.9.1–1.9.4).
+    """Motion of a second point B of a body from that of its point A (Ibrahim eqs 1.9.1–1.9.4).
 
     Parameters
     ----------
@@ -182,7 +183,7 @@ def second_point(
 
 @dataclass(frozen=True)
 class SlidingBlock:
-    """The parts of the motion of a block that slides on a turning, translating bar (000 eq. 1.10.7).
+    """The parts of the motion of a block that slides on a turning, translating bar (Ibrahim eq. 1.10.7).
 
     `carried_…` is the bar's own point under the block; velocity = carrier + turning + relative; acceleration =
     carrier + tangential + normal + relative + Coriolis.
@@ -210,7 +211,7 @@ def block_on_bar(
     carrier_acceleration: Vector = 0j,
     along: Vector | None = None,
 ) -> SlidingBlock:
-    """Motion of a block that slides along a bar which turns and translates (000 eqs 1.10.1–1.10.7).
+    """Motion of a block that slides along a bar which turns and translates (Ibrahim eqs 1.10.1–1.10.7).
 
     Parameters
     ----------
@@ -273,7 +274,7 @@ def crank_rod_piston(
     incline: float = 0.0,
     through: complex = 0j,
 ) -> tuple[Piston, Piston]:
-    """Both solution sets of a crank, rod and piston on an inclined line (000 §1.11).
+    """Both solution sets of a crank, rod and piston on an inclined line (Ibrahim §1.11).
 
     The rates come from the linear systems (1.11.8, 10, 11) and (1.11.12–14), with the line's condition written as
     V_By·cos α = V_Bx·sin α: printed with |·| it loses the sign, and with tan α it fails at 90°.

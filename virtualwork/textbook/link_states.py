@@ -20,6 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.records import record
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
@@ -35,7 +37,7 @@ FACTORS = 2 * EPS
 """A bound of what a product of a mass, an acceleration and a velocity collects in roundings, relative."""
 
 
-class Term(NamedTuple):
+class PowerTerm(NamedTuple):
     """The loads of one kind on all links."""
 
     power: Real
@@ -46,7 +48,8 @@ class Term(NamedTuple):
     """(..., n): there is a load, and it does none: it is normal to the velocity, or its point is at rest."""
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class LinkStates:
     """The states of n links at an instant, or at many.
 
@@ -101,7 +104,7 @@ class LinkStates:
         return np.broadcast_shapes(*(np.shape(value) for value in given if value is not None), (1,))
 
     @cached_property
-    def terms(self) -> dict[str, Term]:
+    def terms(self) -> dict[str, PowerTerm]:
         """The power of every load, by kind (see KINDS); a kind of which there is no load is absent.
 
         Kinds without a load are never multiplied out.
@@ -173,20 +176,20 @@ class LinkStates:
     def _vectors(value: ArrayLike) -> Complex:
         return np.asarray(value, dtype=complex)
 
-    def _linear(self, force: Complex, velocity: Complex) -> Term | None:
+    def _linear(self, force: Complex, velocity: Complex) -> PowerTerm | None:
         if not force.any():
             return None
         return self._term(np.abs(force), (force * velocity.conj()).real, self.fastest[0])
 
-    def _angular(self, torque: Real) -> Term | None:
+    def _angular(self, torque: Real) -> PowerTerm | None:
         if not torque.any():
             return None
         return self._term(np.abs(torque), torque * np.asarray(self.omega, dtype=float), self.fastest[1])
 
-    def _term(self, load: Real, power: Real, fastest: Real) -> Term:
+    def _term(self, load: Real, power: Real, fastest: Real) -> PowerTerm:
         works = np.broadcast_to((np.abs(power) > ROUNDING * load * fastest) | np.isinf(power), self.shape)
         there = np.broadcast_to(load > 0, self.shape)
-        return Term(np.where(works, power, 0.0), works, there & ~works)
+        return PowerTerm(np.where(works, power, 0.0), works, there & ~works)
 
 
 def _sizes(load: Any, rate: Any) -> Any:
@@ -199,21 +202,23 @@ def _summed(size: Real) -> Real:
     return np.asarray((FACTORS + EPS / 2 * (2 + np.log2(size.shape[-1]))) * size.sum(axis=-1))
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class UnitLoad:
     """The pattern of an unknown load: what acts on each link per newton or newton-metre of the unknown.
 
     `force` is complex, (..., n), acting where `LinkStates.force` acts; `torque` is (..., n).
 
     >>> UnitLoad(torque=[1, 0, 0])  # an unknown torque on the first of three links
-    UnitLoad(force=0.0, torque=[1, 0, 0])
+    UnitLoad(force=0, torque=[1 0 0])
     """
 
     force: ArrayLike = 0.0
     torque: ArrayLike = 0.0
 
 
-@dataclass(frozen=True)
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class Balance:
     """What balances the known loads; see `balance`. k is the number of unknowns and of velocity fields."""
 
@@ -326,7 +331,8 @@ def balance(states: LinkStates, unknowns: Sequence[UnitLoad]) -> Balance:
         works = coefficient != 0
         value = np.full(works.shape, np.nan)
         np.divide(-states.power[..., None], coefficient, out=value, where=works)
-        value += 0.0  # no −0
+        # no −0
+        value += 0.0
         return Balance(
             value,
             works,

@@ -1,0 +1,243 @@
+"""What is found of a mechanism beside its poses, as the JSON document has it: check, iterates, cycle, equilibria."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cli.errors import DataError
+from cli.mechanism.forces import effort_name
+from cli.mechanism.solve import Analysis
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# read again by the words and tables made of it: of its shape INTERFACE speaks
+Document = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Request:
+    """Which studies are asked for."""
+
+    newton: bool = False
+    check: bool = False
+    forces: bool = False
+    equilibrium: bool = False
+    flywheel: float | None = None
+    counterweights: str | None = None
+    swept: bool = False
+
+    @property
+    def tables(self) -> list[str]:
+        """The options that have a table of their own."""
+        asked = {
+            "--forces": self.forces,
+            "--newton": self.newton,
+            "--check": self.check,
+            "--equilibrium": self.equilibrium,
+            "--flywheel": self.flywheel is not None,
+            "--counterweights": self.counterweights is not None,
+        }
+        return [flag for flag, given in asked.items() if given]
+
+
+@dataclass(frozen=True)
+class Studies:
+    """The studies of an analysis, each worked out once."""
+
+    analysis: Analysis
+    request: Request
+
+    @cached_property
+    def document(self) -> Document:
+        """What the JSON holds beside the poses."""
+        return self._found[0]
+
+    @property
+    def said(self) -> list[str]:
+        """What is to be said of the equilibria."""
+        return self._found[1]
+
+    @cached_property
+    def _found(self) -> tuple[Document, list[str]]:
+        analysis, request = self.analysis, self.request
+        found: Document = {}
+        said: list[str] = []
+        if request.newton:
+            found |= newton_document(analysis)
+        if request.check:
+            found["check"] = check_document(analysis)
+        of_one = request.forces and len(analysis.mechanism.inputs) == 1
+        if (of_one or request.flywheel is not None) and request.swept:
+            found["cycle"] = cycle(analysis, request.flywheel)
+        if request.equilibrium:
+            found["equilibria"], said = equilibria(analysis, request.swept)
+        if request.counterweights:
+            links = [name.strip() for name in request.counterweights.split(",") if name.strip()]
+            found["counterweights"] = counterweights(analysis, links)
+        return found, said
+
+
+def check_document(analysis: Analysis) -> Document:
+    """The character of the mechanism."""
+    from virtualwork.study.check import Check
+
+    check = Check(analysis.mechanism.assembly)
+    slide = bool(analysis.mechanism.inputs) and analysis.mechanism.inputs[0].is_slide
+    unit = "m" if slide else "deg"
+
+    def shown(values: Sequence[float] | None) -> list[float | None] | None:
+        if values is None:
+            return None
+        return [None if not math.isfinite(v) else (v if slide else math.degrees(v)) for v in values]
+
+    return {
+        "mobility": check.mobility,
+        "mobility_by_rank": check.mobility_by_rank,
+        "redundant": list(check.redundant),
+        "groups": list(check.groups),
+        "four_bars": [
+            {
+                "links": list(f.links),
+                "grashof": f.grashof,
+                "transmission_deg": [math.degrees(v) if math.isfinite(v) else None for v in f.transmission],
+            }
+            for f in check.four_bars
+        ],
+        f"input_limits_{unit}": shown(check.input_limits),
+        f"dead_points_{unit}": shown(check.dead_points),
+        f"change_points_{unit}": shown(check.change_points),
+        **({"singular": list(check.singular)} if check.singular else {}),
+    }
+
+
+def newton_document(analysis: Analysis) -> Document:
+    """Newton-Raphson from the guess at every pose; the table of the first, the largest difference of all."""
+    from virtualwork.study.newton_table import all_at_once
+
+    assembly = analysis.assemblies[0]
+    done = [all_at_once(assembly, tuple(row)) for row in analysis.inputs.values.tolist()]
+    first = done[0]
+    names = [
+        *(f"{n}_deg" for n in first.unknowns[: first.angles]),
+        *(f"{n}_m" for n in first.unknowns[first.angles :]),
+    ]
+    iterates = []
+    for it in first.iterates:
+        values = [*np.degrees(it.unknowns[: first.angles]).tolist(), *it.unknowns[first.angles :].tolist()]
+        iterates.append({"k": it.k, **dict(zip(names, values, strict=True)), "residual_m": it.residual})
+    away = [i for i, d in enumerate(done) if not d.closed or not d.difference < 1e-6]
+    for i in away[:3]:
+        why = "did not converge" if not done[i].closed else "found another assembly"
+        analysis.warnings.append(f"newton from the guess {why} at step {analysis.inputs.steps[i]}")
+    if len(away) > 3:
+        analysis.warnings.append(
+            f"newton from the guess missed the assembly at {len(away)} of {len(done)} poses"
+        )
+    differences = [d.difference for d in done if math.isfinite(d.difference)]
+    return {
+        "iterates": iterates,
+        "newton_difference_rad": max(differences) if differences else None,
+        "jacobian": {"unknowns": list(first.unknowns), "at": "the guess", "rows": first.jacobian.tolist()},
+    }
+
+
+def cycle(analysis: Analysis, coefficient: float | None) -> Document:
+    """Mean, peak and RMS effort over the sweep, work, energy error, flywheel."""
+    from virtualwork.study.cycle import Cycle
+
+    motion = analysis.motions[0]
+    m = analysis.mechanism
+    if len(m.inputs) != 1:
+        raise DataError(f"{analysis.file}: a cycle has one input, found {len(m.inputs)}")
+    name = effort_name(m.inputs[0].is_slide)
+    empty: Document = {f"{key}_{name}": None for key in ("mean", "peak", "rms")}
+    empty |= {"work_J": None, "energy_closure_J": None, "flywheel_inertia_kg_m2": None}
+    if motion.n < 2 or not np.isfinite(motion.effort).all():
+        analysis.warnings.append(
+            "cycle: the effort is not finite at every pose of the sweep: no mean, work or flywheel"
+        )
+        return empty
+    c = Cycle(motion)
+    found = {
+        f"mean_{name}": c.mean,
+        f"peak_{name}": c.peak,
+        f"rms_{name}": c.rms,
+        "work_J": c.work,
+        "energy_closure_J": c.closure,
+        "flywheel_inertia_kg_m2": None,
+    }
+    if coefficient is not None:
+        if m.inputs[0].is_slide:
+            raise DataError(f"{analysis.file}: --flywheel: the input is a slide: a flywheel turns")
+        try:
+            found["flywheel_inertia_kg_m2"] = c.flywheel(coefficient)
+        except ValueError as error:
+            raise DataError(f"{analysis.file}: --flywheel: {error}") from None
+        found["energy_fluctuation_J"] = c.fluctuation
+    return found
+
+
+def equilibria(analysis: Analysis, swept: bool) -> tuple[list[Document], list[str]]:
+    """The positions where the loads balance without effort, and what to say of them."""
+    from virtualwork import equilibria as search
+
+    m = analysis.mechanism
+    spans = None
+    if swept:
+        spans = np.stack([analysis.inputs.values.min(axis=0), analysis.inputs.values.max(axis=0)], axis=1)
+        held = spans[:, 0] == spans[:, 1]
+        if held.any():
+            spans = None
+    found = search(m, spans)
+    rows = []
+    for e in found.found:
+        values = {}
+        for entry, value in zip(m.inputs, e.inputs, strict=True):
+            shown = value if entry.is_slide else math.degrees(value) % 360.0
+            values[entry.name] = {"input_m" if entry.is_slide else "input_deg": shown}
+        place = next(iter(values.values())) if len(m.inputs) == 1 else {"inputs": values}
+        rows.append({**place, "stable": e.stable, "potential_J": e.potential})
+    said = []
+    if not found.loaded:
+        said.append("nothing acts at rest: every position is one of equilibrium")
+    elif found.region:
+        said.append("positions of rest fill a part of the range: they are not isolated, and not listed")
+    elif found.everywhere:
+        said.append(
+            "the loads balance in every position: equilibrium everywhere, neither stable nor unstable"
+        )
+    elif not rows:
+        said.append("no equilibrium: the loads balance at no position of the range")
+    if any(row["stable"] is None for row in rows):
+        said.append("stable null: the second variation of the potential vanishes there and does not decide")
+    return rows, said
+
+
+def counterweights(analysis: Analysis, links: list[str]) -> Document:
+    """Counterweights on links that leave the least RMS shaking force over the sweep."""
+    from virtualwork.study.counterweights import least_squares
+
+    weights, before, after = least_squares(analysis.motions[0], links)
+
+    def rms(force: NDArray[np.complex128]) -> float:
+        return float(np.sqrt(np.nanmean(np.abs(force) ** 2)))
+
+    return {
+        "weights": [
+            {
+                "link": link,
+                "mass_radius_kg_m": abs(w),
+                "angle_deg": math.degrees(math.atan2(w.imag, w.real)) % 360.0,
+            }
+            for link, w in weights.items()
+        ],
+        "shaking_rms_before_N": rms(before),
+        "shaking_rms_after_N": rms(after),
+    }

@@ -1,0 +1,192 @@
+"""What is told of a mechanism below the terminal's table: check, iterates, cycle, equilibria, order of solution."""
+
+from __future__ import annotations
+
+import math
+
+from cli.mechanism.solve import ORDERS, Analysis
+from cli.mechanism.studies import Document, Studies
+from cli.show.text import table_text
+from virtualwork.plan.steps import Group, Place, Slide, Turn
+
+
+def afterword(studies: Studies, *, explain: bool) -> str:
+    """All that was asked for, a paragraph each."""
+    analysis, document = studies.analysis, studies.document
+    parts = []
+    if studies.request.newton:
+        parts.append(newton_text(document))
+    if "check" in document:
+        parts.append(check_text(document["check"]))
+    if "cycle" in document:
+        parts.append(cycle_text(document["cycle"]))
+    if "equilibria" in document:
+        parts.append(equilibria_text(document["equilibria"]))
+    if "counterweights" in document:
+        parts.append(counterweights_text(document["counterweights"]))
+    if explain:
+        parts.append(explain_text(analysis))
+        if studies.request.forces:
+            parts.append(explain_forces(analysis))
+    return "\n\n".join(parts)
+
+
+def check_text(document: Document) -> str:
+    """The same as sentences."""
+    d = document
+    lines = [f"mobility {d['mobility']} (Grübler), {d['mobility_by_rank']} by the rank of the Jacobian"]
+    if d["mobility"] != d["mobility_by_rank"]:
+        lines[-1] += ": they differ, because constraints depend on each other"
+    if d["redundant"]:
+        lines.append(f"redundant among themselves: {', '.join(d['redundant'])}")
+    for g in d["groups"]:
+        lines.append(f"group {' + '.join(g['links'])}: {g['kind']}, {g['method']}")
+    for f in d["four_bars"]:
+        low, high = (f"{v:.6g}" if v is not None else "?" for v in f["transmission_deg"])
+        lines.append(
+            f"four-bar {', '.join(f['links'])}: {f['grashof']}, transmission angle {low} to {high} deg"
+        )
+    for key in ("input_limits", "dead_points", "change_points"):
+        unit = "deg" if f"{key}_deg" in d else "m"
+        values = d[f"{key}_{unit}"]
+        text = (
+            "none"
+            if not values
+            else ", ".join("open" if v is None else f"{v:.12g}" for v in values) + f" {unit}"
+        )
+        lines.append(f"{key.replace('_', ' ')}: {text}")
+    if "singular" in d:
+        lines.append(f"singular in every pose: {', '.join(d['singular'])}")
+    return "\n".join(lines)
+
+
+def newton_text(document: Document) -> str:
+    """The table of iterates, the Jacobian at the guess, and the difference to the closed form."""
+    rows = document["iterates"]
+    table = table_text({key: [row[key] for row in rows] for key in rows[0]})
+    jacobian = document["jacobian"]
+    shown = table_text(
+        {name: [row[j] for row in jacobian["rows"]] for j, name in enumerate(jacobian["unknowns"])}
+    )
+    difference = document["newton_difference_rad"]
+    return (
+        f"Newton-Raphson, all loops at once, from the guess:\n{table}\nJacobian at the guess (x and y of each loop):\n"
+        f"{shown}\nlargest difference to the assembly solved group by group: "
+        + ("nothing to compare" if difference is None else f"{difference:.3g} rad")
+    )
+
+
+def explain_text(analysis: Analysis) -> str:
+    """The order of solution, and for this request what was solved and what was skipped."""
+    motion = analysis.motions[0]
+    plan = motion.assembly.plan
+    reached: dict[int, int] = {}
+    for step, order in motion.solved:
+        reached[id(step)] = max(order, reached.get(id(step), 0))
+    lines = ["order of solution:"]
+    for i, step in enumerate(plan.steps, 1):
+        if isinstance(step, Turn):
+            text = f"angle of {step.body}: {_angle_text(analysis, step)}"
+        elif isinstance(step, Slide):
+            text = f"slide at {analysis.mechanism.guides[step.guide].point}: the input"
+        elif isinstance(step, Place):
+            text = f"point {step.node}"
+        else:
+            assert isinstance(step, Group)
+            how = "Newton-Raphson" if step.kind == "Newton" else f"{step.kind}, closed form"
+            text = f"group {step.name}: {how}"
+        done = (
+            f"solved to {ORDERS[reached[id(step)]]}"
+            if id(step) in reached
+            else "skipped: nothing asked for hangs on it"
+        )
+        lines.append(f"{i:4d}  {text}  [{done}]")
+    return "\n".join(lines)
+
+
+def _angle_text(analysis: Analysis, step: Turn) -> str:
+    parts = [
+        f"{k:g}·input {analysis.mechanism.inputs[j].name}"
+        if k != 1
+        else f"input {analysis.mechanism.inputs[j].name}"
+        for j, k in step.angle.inputs
+    ]
+    parts += [f"{r:g}·{base}" if r != 1 else base for base, r in step.angle.bases]
+    if step.angle.const:
+        parts.append(f"{math.degrees(step.angle.const):g} deg")
+    return " + ".join(parts) or "fixed"
+
+
+def cycle_text(part: Document) -> str:
+    """The cycle below the table."""
+    lines = ["cycle:"]
+    for key, value in part.items():
+        if value is not None:
+            name, unit = _split_unit(key)
+            lines.append(f"  {name:<18} {value:.6g} {unit}")
+    return "\n".join(lines)
+
+
+def _split_unit(key: str) -> tuple[str, str]:
+    for suffix in ("_torque_N_m", "_force_N"):
+        if key.endswith(suffix):
+            return key.removesuffix(suffix).replace("_", " ") + suffix.split("_")[1].join([" ", ""]), (
+                "N·m" if "torque" in suffix else "N"
+            )
+    for suffix, unit in (("_kg_m2", "kg·m²"), ("_J", "J")):
+        if key.endswith(suffix):
+            return key.removesuffix(suffix).replace("_", " "), unit
+    return key, ""
+
+
+def equilibria_text(rows: list[Document]) -> str:
+    """The equilibria below the table."""
+    lines = [f"equilibria: {len(rows)}"]
+    for row in rows:
+        word = {True: "stable", False: "unstable", None: "undecided"}[row["stable"]]
+        if "inputs" in row:
+            place = ", ".join(f"{name} {_input_text(value)}" for name, value in row["inputs"].items())
+        else:
+            place = _input_text(row)
+        energy = "" if row["potential_J"] is None else f", potential {row['potential_J']:.6g} J"
+        lines.append(f"  {place}: {word}{energy}")
+    return "\n".join(lines)
+
+
+def counterweights_text(part: Document) -> str:
+    """The counterweights below the table."""
+    lines = ["counterweights (mass times radius from the link's pivot, angle from the link's x-axis):"]
+    lines += [
+        f"  {w['link']}: {w['mass_radius_kg_m']:.6g} kg·m at {w['angle_deg']:.4g}°" for w in part["weights"]
+    ]
+    lines.append(
+        f"  RMS shaking force of inertia {part['shaking_rms_before_N']:.6g} N -> {part['shaking_rms_after_N']:.6g} N"
+    )
+    return "\n".join(lines)
+
+
+def explain_forces(analysis: Analysis) -> str:
+    """Which loads did work, which do none, which are absent, which reactions were formed."""
+    from virtualwork.formulas.effort import ledger
+
+    motion = analysis.motions[0]
+    lines = ["forces:"]
+    for j, entry in enumerate(analysis.mechanism.inputs):
+        works, workless, absent = ledger(motion.dynamics.scene, j)
+        lines.append(f"  virtual work at input {entry.name}: {', '.join(works) or 'no load does any'}")
+        if workless:
+            lines.append(f"  do no work, never evaluated for it: {', '.join(workless)}")
+        if j == 0 and absent:
+            lines += [f"  absent: {line}" for line in absent]
+    lines.append("  joint forces, action and reaction, do no work together: none enters the effort")
+    lines.append(
+        f"  formed for the reactions: {', '.join(sorted(motion.dynamics.reactions.formed)) or 'nothing'}"
+    )
+    if motion.dynamics.scene.friction:
+        lines.append(f"  friction: {motion.dynamics.friction_iterations} iterations")
+    return "\n".join(lines)
+
+
+def _input_text(values: Document) -> str:
+    """The value of an input with its unit."""
+    return f"{values['input_m']:.6g} m" if "input_m" in values else f"{values['input_deg']:.6g}°"

@@ -1,0 +1,208 @@
+"""A header of a table: the quantity and its unit, as `mass_kg`, `mass [kg]`, `mass (kg)` or `Mass, kg`; foreign names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from shlex import quote
+
+import typer
+
+from cli.errors import DataError
+from cli.read.synonyms import quantity_meant
+from cli.read.units import UNITS, dimensions, find_unit, nearest_unit, unit_name
+
+_BRACKETS = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\Z", re.DOTALL)
+_PARTED = re.compile(r"(.*\S)\s*(?:,|\s/\s|\sin\s)\s*(\S.*)\Z", re.DOTALL)
+NO_UNIT = ("", "-", "1")
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A column's header."""
+
+    written: str
+    base: str
+    """Without the unit that stands in brackets, behind a comma or in the row below."""
+    unit: str = ""
+    """That unit, spelled as a suffix; empty where there is none."""
+
+    @property
+    def name(self) -> str:
+        """Quantity and unit: `mass_kg`."""
+        if not self.unit or self.base.lower().endswith(f"_{self.unit.lower()}"):
+            return self.base
+        return f"{self.base}_{self.unit}"
+
+    def of(self, quantity: str) -> str | None:
+        """Return the suffix behind a quantity's name, if the column is called by it."""
+        name = self.name.lower()
+        if name == quantity:
+            return ""
+        return self.name[len(quantity) + 1 :] if name.startswith(f"{quantity}_") else None
+
+    def with_unit(self, cell: str, known: Mapping[str, str]) -> Heading:
+        """Return the heading with the unit of the row below; ValueError with the unit that the header itself has."""
+        unit = "" if cell.strip() in NO_UNIT else unit_name(cell.strip().strip("[]()"))
+        if not unit:
+            return self
+        for quantity, dimension in known.items():
+            suffix = self.of(quantity)
+            own = find_unit(dimension, suffix) if suffix else None
+            if own:
+                if find_unit(dimension, unit) == own:
+                    return self
+                raise ValueError(own)
+        if self.unit and self.unit.lower() != unit.lower():
+            raise ValueError(self.unit)
+        return replace(self, unit=unit)
+
+
+def heading(written: str) -> Heading:
+    """Read a header; `--column` goes first."""
+    written = written.strip()
+    base, unit = _parted(written)
+    for given, foreign in _renamed.items():
+        if foreign.lower() in (written.lower(), base.lower()):
+            _met.add(given)
+            return Heading(written, *_merged(given, unit, written))
+    return Heading(written, base, unit)
+
+
+def _parted(written: str) -> tuple[str, str]:
+    """Split a header into name and unit, both as the suffixes spell them."""
+    base, unit = written, ""
+    if found := _BRACKETS.match(written):
+        base, unit = found.group(1), found.group(2) or found.group(3) or ""
+    elif (found := _PARTED.match(written)) and is_unit(found.group(2)):
+        base, unit = found.groups()
+    base = re.sub(r"\s+", "_", base.strip().replace("°", "deg")).translate(str.maketrans("µμ", "uu"))
+    return base, "" if unit.strip() in NO_UNIT else unit_name(unit)
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is the name of a unit, in brackets or not."""
+    return bool(dimensions(unit_name(text.strip().strip("[]()"))))
+
+
+# name here -> name in the file, as `--column` gives them, and which were met
+_renamed: dict[str, str] = {}
+_met: set[str] = set()
+
+
+def rename(pairs: list[str] | None) -> list[str] | None:
+    """Take the values of `--column` for this call: `mass_kg=Masse`."""
+    _renamed.clear()
+    _met.clear()
+    for pair in pairs or ():
+        name, equals, foreign = pair.partition("=")
+        if not equals or not name.strip():
+            raise typer.BadParameter(
+                f"'{pair}': expected NAME=HEADER, such as mass_kg=Masse", param_hint="--column"
+            )
+        _renamed[name.strip()] = foreign.strip()
+    return pairs
+
+
+def check_renamed() -> None:
+    """Refuse a `--column` that no table of the call has."""
+    for given, foreign in _renamed.items():
+        if given not in _met:
+            raise DataError(f"--column {given}={foreign}: no table has a column '{foreign}'")
+
+
+def _merged(given: str, unit: str, written: str) -> tuple[str, str]:
+    """Return name and unit of a renamed column: the unit stands in the name given, or in the file, or alike in both."""
+    base, own = _parted(given)
+    suffix = own or next((s for s in _suffixes(base) if dimensions(s)), "")
+    if suffix and unit and suffix.lower() != unit.lower():
+        raise DataError(
+            f"--column {given}={written}: found the unit '{unit}' in the file, expected '{suffix}'"
+        )
+    return base, own or ("" if suffix else unit)
+
+
+def _suffixes(name: str) -> list[str]:
+    parts = name.split("_")
+    return ["_".join(parts[k:]) for k in range(1, len(parts))]
+
+
+def spellings(quantity: str, dimension: str) -> str:
+    """List the names a quantity's column may have: `mass_kg, mass_g or mass_lb`."""
+    names = [f"{quantity}_{unit}" if unit else quantity for unit in UNITS[dimension]][:4]
+    return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def find_columns(
+    file: str, headings: Sequence[Heading], known: Mapping[str, str], texts: Sequence[str]
+) -> dict[str, tuple[int, str]]:
+    """Find each quantity's column: its place in the row and its unit."""
+    found: dict[str, tuple[int, str]] = {}
+    lower = [each.name.lower() for each in headings]
+    for name in texts:
+        places = [index for index, header in enumerate(lower) if header == name.lower()]
+        if len(places) > 1:
+            raise DataError(f"{file}: the column {name} stands twice: expected it once")
+        if places:
+            found[name] = (places[0], "")
+    for name, dimension in known.items():
+        good: list[tuple[int, str]] = []
+        bad: list[tuple[int, str]] = []
+        for index, each in enumerate(headings):
+            suffix = each.of(name)
+            if suffix is not None:
+                unit = find_unit(dimension, suffix)
+                (bad if unit is None else good).append((index, unit or suffix))
+        if len(good) > 1:
+            both = " and ".join(headings[index].written for index, _ in good)
+            raise DataError(
+                f"{file}: {name} is given more than once, by the columns {both}: expected one of them"
+            )
+        if good:
+            found[name] = good[0]
+        elif bad:
+            # a column that another quantity claims (`z_rotation` beside `z`) is not an unknown unit
+            others = [other for other in (*known, *texts) if other.startswith(name + "_")]
+            strays = [
+                (i, suffix)
+                for i, suffix in bad
+                if not any(lower[i] == o or lower[i].startswith(o + "_") for o in others)
+            ]
+            if strays:
+                index, suffix = strays[0]
+                problem = f"the unknown unit '{suffix}'" if suffix else "no unit"
+                hint = nearest_unit(suffix, dimension) if suffix else ""
+                raise DataError(
+                    f"{file}: the column {headings[index].written} has {problem}: "
+                    f"expected {spellings(name, dimension)}{hint}"
+                )
+    return found
+
+
+def likeness(headings: Iterable[Heading], known: Mapping[str, str], texts: Sequence[str]) -> int:
+    """Count the columns that a command knows, or may be meant to know: what tells a header from a title."""
+    names = {name.lower() for name in texts}
+    return sum(
+        each.name.lower() in names
+        or any(each.of(quantity) is not None for quantity in known)
+        or bool(quantity_meant(each.base, (*known, *texts)))
+        for each in headings
+        if each.written
+    )
+
+
+def offers(headings: Iterable[Heading], known: Mapping[str, str], texts: Sequence[str]) -> list[str]:
+    """Return for columns that are not known but may be meant the option that takes them: `--column mass_g=Masse`."""
+    out = []
+    for each in headings:
+        base, unit = each.base, each.unit
+        if not unit:
+            unit = next((s for s in _suffixes(base) if dimensions(s)), "")
+            base = base.removesuffix(f"_{unit}") if unit else base
+        quantity = quantity_meant(base, (*known, *texts))
+        if quantity:
+            dimension = known.get(quantity)
+            fit = "" if dimension is None else find_unit(dimension, unit) or next(iter(UNITS[dimension]))
+            out.append(f"--column {quantity}{'_' * bool(fit)}{fit}={quote(each.written)}")
+    return out

@@ -1,0 +1,146 @@
+"""Tables as people have them: foreign headers, units in brackets or in a row, titles, `--column`."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+
+PLANE = ("--plane", "A:20mm")
+PLAIN = "mass_g,radius_mm,angle_deg\n90.5,30,60\n60,50.25,210\n"
+
+SAME = {
+    "brackets": "mass [g],radius [mm],angle [°]\n90.5,30,60\n60,50.25,210\n",
+    "parentheses": "Mass (g),Radius (mm),Angle (deg)\n90.5,30,60\n60,50.25,210\n",
+    "commas": '"Mass, g","radius, mm","angle, °"\n90.5,30,60\n60,50.25,210\n',
+    "semicolons with commas in the header": "Mass, g;Radius, mm;Angle, °\n90,5;30;60\n60;50,25;210\n",
+    "only decimal commas": "Mass, g;Radius, mm;Angle, °\n90,5;30,0;60,0\n60,0;50,25;210,0\n",
+    "in": "mass in g;radius in mm;angle in °\n90,5;30;60\n60;50,25;210\n",
+    "as quotients": "mass / g;radius / mm;angle / deg\n90,5;30;60\n60;50,25;210\n",
+    "a row of units": "mass;radius;angle\ng;mm;°\n90,5;30;60\n60;50,25;210\n",
+    "a row of units in brackets": "mass;radius;angle\n[g];[mm];[deg]\n90,5;30;60\n60;50,25;210\n",
+    "a row of units that agrees": "mass_g\tradius [mm]\tangle\ng\tmm\tdeg\n90,5\t30\t60\n60\t50,25\t210\n",
+    "units of some": "mass_g,radius_mm,angle\n,,deg\n90.5,30,60\n60,50.25,210\n",
+    "an angle with its sign": "mass_g,radius_mm,angle_°\n90.5,30,60\n60,50.25,210\n",
+    "a title": "Rotor 7; hall 2\n\nmass_g;radius_mm;angle_deg\n90,5;30;60\n60;50,25;210\n",
+    "a title with words of quantities": "Mass\nmass [g],radius [mm],angle [°]\n90.5,30,60\n60,50.25,210\n",
+    "a first column without a header": ",mass_g,radius_mm,angle_deg\nW1,90.5,30,60\nW2,60,50.25,210\n",
+    "a header shorter than its rows": "mass_g,radius_mm,angle_deg\nW1,90.5,30,60\nW2,60,50.25,210\n",
+}
+
+
+@pytest.mark.parametrize("table", SAME)
+def test_a_table_means_what_the_plain_one_means(table: str, dalembert: Dalembert) -> None:
+    done = dalembert("balance", "-", *PLANE, stdin=SAME[table])
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == dalembert("balance", "-", *PLANE, stdin=PLAIN).stdout
+    if "title" in table:
+        assert "the header is in line" in done.stderr
+
+
+def test_micro_and_per_minute(dalembert: Dalembert) -> None:
+    head = "run;speed [{}];amplitude [{}];phase [{}];trial plane;trial mass [g];trial angle [{}]"
+    rows = "\n0;1480;3,4;116;;;\n1;1480;1,8;42;A;2;0\n"
+    plain = dalembert("field", "-", "--json", stdin=head.format("rpm", "um", "deg", "deg") + rows)
+    assert plain.returncode == 0, plain.stderr
+    for units in (("1/min", "µm", "°", "°"), ("U/min", "μm", "deg", "°"), ("min⁻¹", "um", "°", "deg")):
+        done = dalembert("field", "-", "--json", stdin=head.format(*units) + rows)
+        assert done.stdout == plain.stdout, done.stderr
+
+
+def test_a_large_table_with_a_row_of_units(dalembert: Dalembert) -> None:
+    rows = "".join(f"R{i};90,5;30;60\nR{i};60;50,25;210\n" for i in range(6000))
+    units = dalembert("balance", "-", *PLANE, stdin=f"rotor;mass;radius;angle\n;g;mm;°\n{rows}")
+    plain = dalembert("balance", "-", *PLANE, stdin=f"rotor;mass_g;radius [mm];angle_deg\n{rows}")
+    assert units.returncode == plain.returncode == 0, units.stderr + plain.stderr
+    assert units.stdout == plain.stdout
+
+
+GERMAN = "Teil;Masse [g];Halbmesser;Winkel\n;;mm;°\nW1;90,5;30;60\nW2;60;50,25;210\n"
+COLUMNS = ("--column", "mass_g=Masse [g]", "--column", "radius=halbmesser", "--column", "angle_deg=Winkel")
+
+
+def test_column_takes_a_foreign_name(dalembert: Dalembert) -> None:
+    plain = dalembert("balance", "-", *PLANE, stdin=PLAIN)
+    done = dalembert("balance", "-", *PLANE, *COLUMNS, stdin=GERMAN)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == plain.stdout
+    short = dalembert("balance", "-", *PLANE, "--column", "mass=Masse", *COLUMNS[2:], stdin=GERMAN)
+    assert short.stdout == plain.stdout
+    named = dalembert(
+        "balance", "-", *PLANE, "--column", "name=", stdin=SAME["a header shorter than its rows"]
+    )
+    assert (named.stdout, named.stderr) == (plain.stdout, "")
+
+
+@pytest.mark.parametrize(
+    ("mass", "radius", "angle"),
+    [
+        ("Mass [g]", "Radius [mm]", "Theta [deg]"),
+        ("Masse [g]", "Halbmesser [mm]", "Winkel [deg]"),
+        ("massa [g]", "raio [mm]", "ângulo [deg]"),
+        ("Masa (g)", "Radio (mm)", "Ángulo (deg)"),
+        ("masse_g", "rayon_mm", "angle_deg"),
+    ],
+)
+def test_synonyms_are_offered_and_never_taken(
+    mass: str, radius: str, angle: str, dalembert: Dalembert
+) -> None:
+    table = f"{mass};{radius};{angle}\n90,5;30;60\n60;50,25;210\n"
+    done = dalembert("balance", "-", *PLANE, stdin=table)
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
+    offered = done.stderr.partition("did you mean ")[2].partition("?")[0]
+    assert "--column " in offered
+    import shlex
+
+    taken = dalembert("balance", "-", *PLANE, *shlex.split(offered), stdin=table)
+    assert taken.returncode == 0, taken.stderr
+    assert taken.stdout == dalembert("balance", "-", *PLANE, stdin=PLAIN).stdout
+
+
+def test_a_column_that_may_be_meant_is_offered_in_the_remark(dalembert: Dalembert) -> None:
+    done = dalembert("balance", "-", *PLANE, stdin="Läufer,mass_g,radius_mm,angle_deg\nA,1,2,3\nB,1,2,3\n")
+    assert done.returncode == 0
+    assert "ignored the column 'Läufer'; to read: --column rotor='Läufer'" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("table", "options", "status", "message"),
+    [
+        (
+            "mass_kg;radius;angle\ng;mm;°\n1;2;3\n",
+            (),
+            1,
+            "row of units (line 2), column mass_kg: found 'g', expected 'kg', the unit in its header",
+        ),
+        ("mass;radius;angle\nkg;mm;V\n1;2;3\n", (), 1, "column angle has the unknown unit 'V'"),
+        ("mass;radius;angle\n1;2;3\n", (), 1, "column mass has no unit: expected mass_kg"),
+        (GERMAN, ("--column", "mass_kg=Masse"), 1, "found the unit 'g' in the file, expected 'kg'"),
+        (PLAIN, ("--column", "mass_kg=Gewicht"), 1, "no table has a column 'Gewicht'"),
+        (PLAIN, ("--column", "mass_kg"), 2, "expected NAME=HEADER, such as mass_kg=Masse"),
+        ("mass_g,radius_mm,angle_deg\n1,2,3,4\n", (), 1, "row 1 (line 2): found 4 cells, expected 3"),
+    ],
+)
+def test_what_contradicts_itself(
+    table: str, options: tuple[str, ...], status: int, message: str, dalembert: Dalembert
+) -> None:
+    done = dalembert("balance", "-", *PLANE, *options, stdin=table)
+    assert done.returncode == status
+    assert message in " ".join(done.stderr.split())
+    assert done.stdout == ""
+
+
+def test_expected_values_under_foreign_headers(dalembert: Dalembert, tmp_path: Path) -> None:
+    expected = "Mass [g];angle\n;deg\n75,554;326,056\n"
+    (tmp_path / "expected.csv").write_text(expected)
+    done = dalembert("balance", "-", *PLANE, "--expect", "expected.csv", stdin=PLAIN)
+    assert done.returncode == 0, done.stderr
+    assert "2 of 2" in done.stdout
+    (tmp_path / "expected.csv").write_text(expected.replace("Mass", "Masse"))
+    mapped = ("--expect", "expected.csv", "--column", "mass_g=Masse")
+    assert dalembert("balance", "-", *PLANE, *mapped, stdin=PLAIN).stdout == done.stdout

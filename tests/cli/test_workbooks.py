@@ -1,0 +1,203 @@
+"""Workbooks as tables: sheets, cells that hold no value, files that are none."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import openpyxl
+import pytest
+
+Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+
+HERE = Path(__file__).parent / "workbooks"
+PLANE = ("--plane", "A:20mm")
+PLAIN = "mass_g,radius_mm,angle_deg\n90.5,30,60\n60,50.25,210\n"
+ROWS = (("mass [g]", "radius (mm)", "Angle, °"), (90.5, 30, 60), (60, 50.25, 210))
+
+
+def book(path: Path, sheets: dict[str, tuple[tuple[object, ...], ...]], *, merge: str = "") -> None:
+    """Write a workbook; of its first sheet some cells may be merged."""
+    made = openpyxl.Workbook()
+    made.remove(made.active)
+    for name, rows in sheets.items():
+        sheet = made.create_sheet(name)
+        for row in rows:
+            sheet.append(row)
+    if merge:
+        made.worksheets[0].merge_cells(merge)
+    made.save(path)
+
+
+@pytest.fixture
+def plain(dalembert: Dalembert) -> str:
+    """What the same table gives as CSV."""
+    return dalembert("balance", "-", *PLANE, stdin=PLAIN).stdout
+
+
+@pytest.mark.parametrize("name", ["masses.xlsx", "masses.xls", "masses.ods"])
+def test_each_kind_of_workbook(name: str, dalembert: Dalembert, plain: str, tmp_path: Path) -> None:
+    book(tmp_path / "masses.xlsx", {"Masses": ROWS})
+    path = tmp_path / name if name.endswith("xlsx") else HERE / name
+    for done in (
+        dalembert("balance", path, *PLANE),
+        dalembert("balance", "-", *PLANE, stdin=path.read_bytes()),
+    ):
+        assert done.returncode == 0, done.stderr
+        assert (done.stdout, done.stderr) == (plain, "")
+
+
+def test_the_first_sheet_or_the_one_named(dalembert: Dalembert, plain: str, tmp_path: Path) -> None:
+    book(
+        tmp_path / "b.xlsx", {"Masses": ROWS, "Fan 2": (ROWS[0], (1, 2, 3)), "Notes": (("none",), ("empty",))}
+    )
+    first = dalembert("balance", "b.xlsx", *PLANE)
+    assert first.stdout == plain
+    assert first.stderr == "warning: b.xlsx: read the sheet 'Masses'; there are also 'Fan 2', 'Notes'\n"
+    named = dalembert("balance", "b.xlsx#masses", *PLANE)
+    assert (named.stdout, named.stderr) == (plain, "")
+    other = dalembert("balance", "b.xlsx#Fan 2", *PLANE)
+    assert other.returncode == 0
+    assert other.stdout != plain
+    missing = dalembert("balance", "b.xlsx#Fan 3", *PLANE)
+    assert missing.returncode == 1
+    assert "no sheet 'Fan 3': expected one of 'Masses', 'Fan 2', 'Notes'" in missing.stderr
+    notes = dalembert("balance", "b.xlsx#Notes", *PLANE)
+    assert notes.returncode == 1
+    assert "sheet 'Notes'; the header is: none; other sheets: 'Masses', 'Fan 2'" in notes.stderr
+    assert len(notes.stderr.splitlines()) == 1
+
+
+BAD = {
+    "merged": (
+        (*ROWS, (1, 2, 3), (None, 2, 3)),
+        "A4:A5",
+        "cell A4: found merged cells A4:A5, expected a value in each cell",
+    ),
+    "a formula": (
+        (*ROWS, ("=A2*2", 2, 3)),
+        "",
+        "cell A4: found the formula '=A2*2' without a stored value, expected a value",
+    ),
+    "an error": ((*ROWS, ("#DIV/0!", 2, 3)), "", "cell A4: found '#DIV/0!', expected a value, not an error"),
+    "a text": ((*ROWS, (1, "wide", 3)), "", "cell B4, column radius (mm): found 'wide', expected a number"),
+    "a blank": ((*ROWS, (1, None, 3)), "", "cell B4, column radius (mm): found '', expected a number"),
+    "negative": (
+        (*ROWS, (-1, 2, 3)),
+        "",
+        "cell A4, column mass [g]: found '-1', expected a mass that is not negative",
+    ),
+    "units": (
+        (("mass [kg]", "radius", "angle"), ("g", "mm", "°"), (1, 2, 3)),
+        "",
+        "cell A2: found 'g', expected 'kg', the unit in its header 'mass [kg]'",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_one_line_with_sheet_and_cell(case: str, dalembert: Dalembert, tmp_path: Path) -> None:
+    rows, merge, message = BAD[case]
+    book(tmp_path / "b.xlsx", {"Sheet 1": rows}, merge=merge)
+    done = dalembert("balance", "b.xlsx", *PLANE, "-o", "out.csv")
+    assert done.returncode == 1
+    assert (done.stdout, len(done.stderr.splitlines())) == ("", 1)
+    assert done.stderr.startswith(f"dalembert: b.xlsx: sheet 'Sheet 1', {message}")
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_what_stands_in_columns_that_are_not_read_is_no_fault(
+    dalembert: Dalembert, plain: str, tmp_path: Path
+) -> None:
+    rows = ((*ROWS[0], "remark"), (*ROWS[1], "=A2"), (*ROWS[2], "#N/A"))
+    book(tmp_path / "b.xlsx", {"Sheet 1": rows})
+    assert dalembert("balance", "b.xlsx", *PLANE).stdout == plain
+
+
+def rewritten(path: Path, change: Callable[[str, bytes], bytes]) -> bytes:
+    """A zip file with its members changed."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(out, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, change(name, old.read(name)))
+    return out.getvalue()
+
+
+def test_an_open_document(dalembert: Dalembert) -> None:
+    def formula(name: str, data: bytes) -> bytes:
+        return data.replace(b'office:value-type="float" office:value="90.5"', b'table:formula="of:=2*3"')
+
+    def merged(name: str, data: bytes) -> bytes:
+        cell = b'<table:table-cell office:value-type="float" office:value="90.5"'
+        return data.replace(cell, cell + b' table:number-rows-spanned="2"')
+
+    def encrypted(name: str, data: bytes) -> bytes:
+        entry = b'<manifest:file-entry manifest:full-path="content.xml"'
+        if name.startswith("META"):
+            assert entry in data
+            return data.replace(entry, b"<manifest:encryption-data/>" + entry)
+        return data[::-1] if name == "content.xml" else data
+
+    for change, message in (
+        (formula, "cell A2: found the formula '=2*3' without a stored value"),
+        (merged, "cell A2: found merged cells A2:A3"),
+        (encrypted, "the workbook is encrypted: expected one without a password"),
+    ):
+        done = dalembert("balance", "-", *PLANE, stdin=rewritten(HERE / "masses.ods", change))
+        assert done.returncode == 1
+        assert message in done.stderr
+
+
+def test_encrypted_and_broken(dalembert: Dalembert, tmp_path: Path) -> None:
+    book(tmp_path / "b.xlsx", {"Masses": ROWS})
+    data = (tmp_path / "b.xlsx").read_bytes()
+    locked = (HERE / "masses.xls").read_bytes() + "EncryptedPackage".encode("utf-16-le")
+    for content, message in (
+        (locked, "the workbook is encrypted"),
+        (data[: len(data) // 2], "broken workbook"),
+        (data[:4] + bytes(200), "broken workbook"),
+        ((HERE / "masses.xls").read_bytes()[:700], "broken workbook"),
+        (rewritten(tmp_path / "b.xlsx", lambda name, old: old[: len(old) // 2]), "broken workbook"),
+    ):
+        done = dalembert("balance", "-", *PLANE, stdin=content)
+        assert done.returncode == 1
+        assert message in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+
+
+def test_no_output_over_the_workbook(dalembert: Dalembert, tmp_path: Path) -> None:
+    book(tmp_path / "b.xlsx", {"Masses": ROWS})
+    before = (tmp_path / "b.xlsx").read_bytes()
+    (tmp_path / "link.csv").symlink_to("b.xlsx")
+    done = dalembert("balance", "b.xlsx#Masses", *PLANE, "-o", "link.csv")
+    assert done.returncode == 2
+    assert (tmp_path / "b.xlsx").read_bytes() == before
+
+
+def test_a_technicians_sheet(dalembert: Dalembert, tmp_path: Path) -> None:
+    """Title, blank row, units below the header, numbers typed as text with a comma, a merged title."""
+    rows = (
+        ("Auswuchten Lüfter 3",),
+        (),
+        ("Lauf", "Messstelle", "Amplitude", "Phase", "Ebene", "Testmasse", "Testwinkel"),
+        (None, None, "mm/s", "°", None, "g", "°"),
+        (0, 1, "3,4", 116),
+        (1, 1, 1.8, 42, "A", 2, 0),
+    )
+    book(tmp_path / "fan.xlsx", {"Tabelle1": rows}, merge="A1:G1")
+    refused = dalembert("field", "fan.xlsx")
+    assert refused.returncode == 1
+    columns = "run=Lauf sensor=Messstelle trial_plane=Ebene trial_mass=Testmasse trial_angle=Testwinkel"
+    options = [word for pair in columns.split() for word in ("--column", pair)]
+    done = dalembert("field", "fan.xlsx", *options, "--json")
+    assert done.returncode == 0, done.stderr
+    csv = "run,sensor,amplitude_mm_s,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,3.4,116,,,\n1,1,1.8,42,A,2,0\n"
+    assert '"mass_kg"' in done.stdout
+    found, wanted = (
+        text.partition('"warnings"')[0]
+        for text in (done.stdout, dalembert("field", "-", "--json", stdin=csv).stdout)
+    )
+    assert found == wanted

@@ -1,0 +1,103 @@
+"""The tables of a TOML description, walked: every complaint names the table and the key."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from virtualwork.describe.checks import hint
+from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe.parts import GROUND, Link
+from virtualwork.describe.tables import rows
+from virtualwork.describe.units import Units, wrong
+
+Load = Callable[[Path], bytes]
+
+
+class Entries:
+    """What is read of every table: entries, quantities, names of links and points."""
+
+    def __init__(self, data: dict[str, Any], folder: Path, load: Load) -> None:
+        self.data, self.folder, self.load = data, folder, load
+        units = data.get("units", {})
+        known_keys(units, {"length", "angle"}, "[units]", "key")
+        self.units = Units(units)
+        self.number, self.pair = self.units.number, self.units.pair
+        self.links: dict[str, Link] = {}
+        self.bodies: dict[str, Mapping[str, complex]] = {GROUND: {}}
+
+    def optional(self, entry: Mapping[str, Any], key: str, kind: str, where: str) -> float:
+        """A quantity that is 0 where it is not given."""
+        return self.number(entry[key], kind, f"{where} {key}") if key in entry else 0.0
+
+    def table(self, name: str) -> dict[str, Any]:
+        """A table of the file; empty where it is not there."""
+        value = self.data.get(name, {})
+        if not isinstance(value, dict):
+            raise wrong(f"[{name}]", value, "a table")
+        return value
+
+    def rows(self, name: str) -> Iterable[tuple[int, dict[str, Any]]]:
+        """An array of tables, counted from 1."""
+        value = self.data.get(name, [])
+        if isinstance(value, dict):
+            value = [value]
+        if not isinstance(value, list) or not all(isinstance(e, dict) for e in value):
+            raise wrong(f"[[{name}]]", value, "an array of tables")
+        return enumerate(value, 1)
+
+    def csv(self, name: Any, where: str) -> list[dict[str, str]]:
+        """The rows of a CSV file beside this one."""
+        try:
+            return rows(self.load(self.folder / str(name)))
+        except (OSError, ValueError, csv.Error):
+            raise wrong(where, name, "a CSV file that can be read") from None
+
+    def body(self, name: Any, where: str, ground: bool = True) -> str:
+        """The name of a link, or of the ground."""
+        names = self.bodies if ground else self.links
+        if not isinstance(name, str) or name not in names:
+            raise DescriptionError(f"{where}: unknown link '{name}'{hint(str(name), names)}")
+        return name
+
+    def place(self, link: str, value: Any, where: str) -> complex:
+        """A point of a link: its name, or [x, y] in the link's axes."""
+        if isinstance(value, str):
+            if value not in self.bodies[link]:
+                raise DescriptionError(
+                    f"{where}: unknown point '{value}' of {link}{hint(str(value), self.bodies[link])}"
+                )
+            return self.bodies[link][value]
+        return self.pair(value, "length", where)
+
+    def point_of(self, name: Any, where: str) -> tuple[str, str]:
+        """`crank.B`, or the plain name of a point that one body alone has: the body and the point."""
+        link, dot, point = str(name).rpartition(".")
+        if dot:
+            return self.body(link, where), point
+        owners = [body for body, points in self.bodies.items() if name in points]
+        if len(owners) != 1:
+            known = {p for points in self.bodies.values() for p in points}
+            expected = " or ".join(f'"{body}.{name}"' for body in owners)
+            raise wrong(
+                where, name, expected or f'a link and its point such as "crank.B"{hint(str(name), known)}'
+            )
+        return owners[0], str(name)
+
+
+def known_keys(entry: Mapping[str, Any], names: set[str], where: str, what: str) -> None:
+    """Refuse keys that are none of the names."""
+    if not isinstance(entry, Mapping):
+        raise wrong(where, entry, "a table")
+    for key in entry:
+        if key not in names:
+            raise DescriptionError(f"{where}: unknown {what} '{key}'{hint(str(key), names)}")
+
+
+def need(entry: Mapping[str, Any], keys: tuple[str, ...], where: str) -> None:
+    """Refuse an entry in which a key is missing."""
+    for key in keys:
+        if key not in entry:
+            raise DescriptionError(f"{where}: '{key}' is missing")

@@ -1,0 +1,147 @@
+"""The loads of a TOML description: gravity, forces, torques, springs, motors, friction."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+from virtualwork.describe.checks import hint
+from virtualwork.describe.entries import Entries, known_keys, need
+from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
+from virtualwork.describe.units import LARGEST, wrong
+
+
+class LoadEntries(Entries):
+    """The tables of loads; `[[springs]] 2` is the second."""
+
+    def gravity(self) -> complex:
+        """Its two components."""
+        value = self.data.get("gravity", [0, 0])
+        if isinstance(value, list) and len(value) == 2:
+            return complex(*(self.number(v, "slide acceleration", "gravity") for v in value))
+        raise wrong("gravity", value, "two accelerations [x, y]")
+
+    def force(self, entry: dict[str, Any], i: int) -> Force:
+        """A force, constant or over the input by a table."""
+        where = f"[[forces]] {i}"
+        known_keys(entry, {"link", "point", "force", "frame", "table"}, where, "key")
+        need(entry, ("link",) if "table" in entry else ("link", "force"), where)
+        link = self.body(entry["link"], f"{where} link", ground=False)
+        point = (
+            self.place(link, entry["point"], f"{where} point")
+            if "point" in entry
+            else self.links[link].center
+        )
+        frame = entry.get("frame", "ground")
+        if frame not in ("ground", "link"):
+            raise wrong(f"{where} frame", frame, "'ground' or 'link'")
+        if "table" in entry:
+            if "force" in entry:
+                raise DescriptionError(f"{where}: found force and table, expected one of them")
+            return Force(link, point, 0j, frame, *self.force_table(entry["table"], where))
+        return Force(link, point, self.pair(entry["force"], "force", f"{where} force"), frame)
+
+    def force_table(self, name: Any, where: str) -> tuple[tuple[tuple[float, complex], ...], bool]:
+        """A force over the input: a CSV of angle_deg (angle_rad, position_m, position_mm), fx_N and fy_N."""
+        inputs = list(self.rows("input"))
+        if len(inputs) != 1:
+            raise wrong(f"{where} table", name, "a mechanism with one input, for the force is given over it")
+        slide = "slider" in inputs[0][1]
+        kinds = (
+            {"position_m": 1.0, "position_mm": 1e-3}
+            if slide
+            else {"angle_rad": 1.0, "angle_deg": math.pi / 180}
+        )
+        rows = self.csv(name, f"{where} table")
+        column = next((c for c in kinds if rows and c in rows[0]), None)
+        if column is None or not {"fx_N", "fy_N"} & set(rows[0]):
+            raise wrong(f"{where} table", name, f"columns {' or '.join(kinds)}, fx_N and fy_N")
+        try:
+            found = [
+                (
+                    float(r[column]) * kinds[column],
+                    complex(float(r.get("fx_N") or 0), float(r.get("fy_N") or 0)),
+                )
+                for r in rows
+            ]
+        except (TypeError, ValueError):
+            raise wrong(f"{where} table", name, "numbers in every row") from None
+        if not all(math.hypot(abs(at), abs(force)) <= LARGEST for at, force in found):
+            raise wrong(f"{where} table", name, "finite numbers in every row")
+        if len(found) < 2 or any(not b[0] > a[0] for a, b in itertools.pairwise(found)):
+            raise wrong(f"{where} table", name, f"at least two rows with rising {column}")
+        turns = (found[-1][0] - found[0][0]) / (2 * math.pi)
+        return tuple(found), not slide and abs(turns - round(turns)) < 1e-9 and round(turns) > 0
+
+    def torque(self, entry: dict[str, Any], i: int) -> Torque:
+        """A torque."""
+        where = f"[[torques]] {i}"
+        known_keys(entry, {"link", "torque"}, where, "key")
+        need(entry, ("link", "torque"), where)
+        return Torque(
+            self.body(entry["link"], f"{where} link", ground=False),
+            self.number(entry["torque"], "torque", f"{where} torque"),
+        )
+
+    def spring(self, entry: dict[str, Any], i: int) -> Spring:
+        """A spring and damper."""
+        where = f"[[springs]] {i}"
+        known_keys(entry, {"between", "stiffness", "free_length", "damping"}, where, "key")
+        need(entry, ("between",), where)
+        ends = entry["between"]
+        if not isinstance(ends, list) or len(ends) != 2:
+            raise wrong(f"{where} between", ends, 'two points such as ["crank.B", "ground.D"]')
+        found = []
+        for end in ends:
+            link, point = self.point_of(end, f"{where} between")
+            found.append((link, self.place(link, point, f"{where} between")))
+        return Spring(
+            (found[0], found[1]),
+            self.optional(entry, "stiffness", "stiffness", where),
+            self.optional(entry, "free_length", "length", where),
+            self.optional(entry, "damping", "damping", where),
+        )
+
+    def torsion(self, entry: dict[str, Any], i: int) -> TorsionSpring:
+        """A torsion spring and damper."""
+        where = f"[[torsion_springs]] {i}"
+        known_keys(entry, {"links", "stiffness", "free_angle", "damping"}, where, "key")
+        need(entry, ("links",), where)
+        links = entry["links"]
+        if not isinstance(links, list) or len(links) != 2:
+            raise wrong(f"{where} links", links, "two links")
+        return TorsionSpring(
+            (self.body(links[0], f"{where} links"), self.body(links[1], f"{where} links")),
+            self.optional(entry, "stiffness", "torsion stiffness", where),
+            self.optional(entry, "free_angle", "angle", where),
+            self.optional(entry, "damping", "torsion damping", where),
+        )
+
+    def motor(self, entry: dict[str, Any], i: int) -> Motor:
+        """A motor that a link carries."""
+        where = f"[[motors]] {i}"
+        known_keys(entry, {"carrier", "drives", "mass", "center"}, where, "key")
+        need(entry, ("carrier", "drives"), where)
+        return Motor(
+            self.body(entry["carrier"], f"{where} carrier"),
+            self.body(entry["drives"], f"{where} drives", ground=False),
+            self.optional(entry, "mass", "mass", where),
+            self.pair(entry.get("center", [0, 0]), "length", f"{where} center"),
+        )
+
+    def joint_friction(self, entry: dict[str, Any], i: int) -> Friction:
+        """Friction in a joint."""
+        where = f"[[friction]] {i}"
+        known_keys(entry, {"joint", "coefficient", "radius"}, where, "key")
+        need(entry, ("joint", "coefficient"), where)
+        joint = str(entry["joint"])
+        names = {p for body in self.bodies.values() for p in body}
+        if joint not in names:
+            raise DescriptionError(f"{where} joint: unknown point '{joint}'{hint(joint, names)}")
+        return Friction(
+            joint,
+            self.number(entry["coefficient"], "number", f"{where} coefficient"),
+            self.optional(entry, "radius", "length", where),
+        )
