@@ -26,6 +26,7 @@ MODULES = tuple(
         "solids",
         "gyroscopes",
         "topology_rates",
+        "equilibria",
     )
 )
 

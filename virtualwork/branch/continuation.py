@@ -336,7 +336,8 @@ def wind_along_lines(track: Along, group: Group, st: State, bodies: Collection[s
                 last[body] = trial.turn[body]
         for body in bodies:
             angle = np.angle(st.turn[body])
-            wound = angle + 2 * np.pi * np.round((total[body] - angle) / (2 * np.pi))
+            # what no input moves is one number for all poses
+            wound = np.broadcast_to(angle + 2 * np.pi * np.round((total[body] - angle) / (2 * np.pi)), n)
             reached = np.isfinite(wound)
             turn, margin = (
                 np.where(reached, st.turn[body], np.nan),
