@@ -47,7 +47,8 @@ def outlier_probability(fit: JointFit) -> Real:
 
 def _chance(share: Real, nu: Real, tests: Real | int) -> Real:
     """Return the probability that one of so many shares is as large as this."""
-    return np.asarray(np.minimum(tests * np.clip(1 - share, 0.0, 1.0) ** (nu - 1), 1.0))
+    chance = np.minimum(tests * np.clip(1 - share, 0.0, 1.0) ** (nu - 1), 1.0)
+    return np.asarray(np.where(np.isfinite(share), chance, np.nan))
 
 
 @record

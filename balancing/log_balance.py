@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -59,10 +60,19 @@ class LogBalance:
     """Those of the channels in the least squares of the corrections, (..., s)."""
     along: Complex | None = None
     """The directions of the corrections as given out, where they are not these ones', (..., p)."""
+    ridge: float = 0.0
+    """Of the least squares of the corrections."""
 
     def __repr__(self) -> str:
         w, errors = numbers(self.corrections), numbers(self.errors.degrees_of_freedom)
         return f"LogBalance(corrections={w}, residual={numbers(self.residual)}, degrees_of_freedom={errors})"
+
+    def machine(self, i: int) -> LogBalance:
+        """Return the balance of one of many machines, along the leading axis."""
+        e = self.errors
+        errors = Errors(e.unit[i], e.along[i], e.across[i], e.degrees_of_freedom[i])
+        weights, along = (None if part is None else part[i] for part in (self.weights, self.along))
+        return LogBalance(self.fit.machine(i), self.corrections[i], errors, weights, along, self.ridge)
 
     @cached_property
     def residual(self) -> Complex:
@@ -89,7 +99,7 @@ class LogBalance:
         fit = self.fit
         weights = np.ones(fit.initial.shape) if self.weights is None else self.weights
         left = fit.fitted(self.corrections[..., None, :])[..., 0, :]
-        linear, antilinear = response(fit.influence, self.corrections, left, weights)
+        linear, antilinear = response(fit.influence, self.corrections, left, weights, self.ridge)
         # θ = gain y: from the unknowns of each channel to its readings
         by_channel = np.moveaxis(linear, -3, -2), np.moveaxis(antilinear, -3, -2)
         of_readings = (
@@ -99,6 +109,16 @@ class LogBalance:
         flat = [part.reshape(*part.shape[:-2], -1) for part in of_readings]
         along = self.corrections if self.along is None else self.along
         return components(flat[0], flat[1], along, *self._each())
+
+    def problem_samples(self, machine: int, n: int = 200, seed: int = 0) -> Iterator[tuple[Complex, Complex]]:
+        """Draw coefficients (s, p) and vibration (s,) of one of the machines (leading axis) from its readings' errors."""
+        unit, along, across = (part[machine] for part in self._by_channel())
+        rng = np.random.default_rng(seed)
+        for _ in range(n):
+            one, other = rng.standard_normal((2, *unit.shape))
+            error = unit * (along * one + 1j * across * other)
+            unknowns = self.fit.unknowns[machine] + np.matvec(self.fit.gain[machine], error)
+            yield unknowns[:, 1:], unknowns[:, 0]
 
     @property
     def deviations(self) -> tuple[Real, Real]:

@@ -66,6 +66,19 @@ class JointFit:
     leverage: Real
     """h, how far a reading is its own fitted value, in [0, 1], (..., r, s)."""
 
+    def machine(self, i: int) -> JointFit:
+        """Return the fit of one of many machines, along the leading axis."""
+        weights = None if self.weights is None else self.weights[i]
+        parts = (self.readings, self.masses, self.unknowns, self.gain, self.leverage)
+        y, t, unknowns, gain, leverage = (part[i] for part in parts)
+        return JointFit(y, t, weights, unknowns, gain, leverage)
+
+    def without(self, runout: Complex) -> JointFit:
+        """Return the fit with the run-out (s,) subtracted from every reading."""
+        unknowns = self.unknowns.copy()
+        unknowns[..., 0] -= runout
+        return JointFit(self.readings - runout, self.masses, self.weights, unknowns, self.gain, self.leverage)
+
     @property
     def initial(self) -> Complex:
         """x₀, the vibration without masses, (..., s)."""

@@ -112,8 +112,7 @@ def document(found: FieldBalancing) -> Document:
             "rotor": rotor,
             "influence": [
                 {
-                    "sensor": channel.sensor,
-                    "speed_rad_s": channel.speed,
+                    **channel.key,
                     "plane": plane,
                     f"magnitude_per_{suffix}": abs(solved.alpha[i, s, p]),
                     "phase_deg": float(degrees(solved.alpha[i, s, p])),
@@ -125,8 +124,7 @@ def document(found: FieldBalancing) -> Document:
             "corrections": corrections,
             "residual": [
                 {
-                    "sensor": channel.sensor,
-                    "speed_rad_s": channel.speed,
+                    **channel.key,
                     "amplitude": abs(residual[s]),
                     "phase_deg": None if found.request.four_run else float(degrees(residual[s])),
                 }

@@ -13,8 +13,9 @@ from cli.show.output import command, suffix_among
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from cli.field.fit import LogFits
     from cli.field.solve import FieldBalancing
-    from cli.show.columns import Result
+    from cli.show.columns import Document, Result, Table
 
 
 @command
@@ -98,6 +99,31 @@ def run(
         str | None, typer.Option(metavar="ANGLES", help="Split them onto these places: 0deg,30deg,60deg.")
     ] = None,
     first: Annotated[str, typer.Option(metavar="ANGLE", help="Angle of the first of --blades.")] = "0deg",
+    fit: Annotated[
+        bool,
+        typer.Option(
+            "--fit",
+            help="Fit all runs at once, the initial one too (implied where runs are more than unknowns).",
+        ),
+    ] = False,
+    exclude: Annotated[
+        list[str] | None, typer.Option(metavar="RUN", help="Leave a run out of the fit; repeatable.")
+    ] = None,
+    predict: Annotated[
+        str | None,
+        typer.Option(
+            metavar="[PLANE=]MASS@ANGLE,…", help="What a run with these masses should read: 10kg@-90deg."
+        ),
+    ] = None,
+    suggest: Annotated[
+        bool,
+        typer.Option(
+            "--suggest", help="The run within --max-mass that would tell most about the correction."
+        ),
+    ] = False,
+    robust: Annotated[
+        bool, typer.Option("--robust", help="Beside the fit one that hardly counts outliers (Huber).")
+    ] = False,
     report: Annotated[
         Path | None,
         typer.Option(
@@ -149,7 +175,10 @@ def run(
 
     from cli.field import request as asked
     from cli.field.files import read_runout, read_stored
-    from cli.field.read import read_runs
+    from cli.field.fit import Asked, LogFits, masses_at
+    from cli.field.layouts import is_log
+    from cli.field.log import read_log
+    from cli.field.read import NotOneInitialRun, read_runs
     from cli.field.solve import FieldBalancing, Request
     from cli.read.tolerance import tolerance_of
 
@@ -161,7 +190,33 @@ def run(
     against = phase_lag != (rotation == "cw")
     stored = read_stored(influence) if influence is not None else None
     stored_unit = None if stored is None else stored.unit
-    measured = read_runs(runs, lagging=against, phaseless=four_run, stored_unit=stored_unit)
+    of_fit = {
+        "--fit": fit,
+        "--exclude": exclude,
+        "--predict": predict,
+        "--suggest": suggest,
+        "--robust": robust,
+    }
+    fit = any(of_fit.values())
+    if four_run or stored is not None:
+        for flag in (flag for flag, given in of_fit.items() if given):
+            raise options.bad(flag, "fits all runs: it does not go with --influence or --method four-run")
+    elif not fit:
+        fit = is_log(runs)
+    measured = None
+    if not fit:
+        try:
+            measured = read_runs(runs, lagging=against, phaseless=four_run, stored_unit=stored_unit)
+        except NotOneInitialRun:
+            if stored is not None or four_run:
+                raise
+            fit = True
+        else:
+            unknowns_beaten = any(len(group.trials) > len(group.planes) for group in measured.groups)
+            fit = unknowns_beaten and stored is None and not four_run
+    if fit or measured is None:
+        said = phase_lag or rotation is not None
+        measured = read_log(runs, lagging=against if said else None, exclude=exclude or [])
     if stored is not None:
         measured.warnings += stored.table.warnings
     if tolerance is not None and measured.per == "mass" and arm is None:
@@ -170,29 +225,41 @@ def run(
         )
     request = Request(
         objective=objective,
-        max_mass=asked.limits_in(limits, measured),
+        max_mass=asked.limits_in(limits, measured) or measured.max_mass,
         max_residual=None if ceiling is None else asked.ceiling_in(ceiling, measured),
         from_here=from_here,
-        runout={} if runout is None else read_runout(runout, measured, lagging=against),
+        runout={} if runout is None else read_runout(runout, measured, lagging=against or measured.lags),
         reading_error=error,
         monte_carlo=monte_carlo,
         four_run=four_run,
         ridge=ridge,
         tolerance=tolerance,
         radius=arm,
-        conventions=asked.conventions(method, phase_lag, rotation),
+        conventions=asked.conventions(method, phase_lag or measured.lags, rotation),
         places=options.places(positions, blades, first),
     )
     found = FieldBalancing(measured, request, stored)
-    return _result(found, "standard input" if runs == "-" else Path(runs).name, save_influence, report)
+    fits = LogFits(found, Asked(masses_at(predict, measured), suggest, robust)) if fit else None
+    source = "standard input" if runs == "-" else Path(runs).name
+    return _result(found, fits, source, save_influence, report)
 
 
-def _result(found: FieldBalancing, source: str, save_influence: Path | None, report: Path | None) -> Result:
-    from cli.field import columns, remarks, words
+def _result(
+    found: FieldBalancing, fits: LogFits | None, source: str, save_influence: Path | None, report: Path | None
+) -> Result:
+    from cli.field import columns, fit, fit_columns, fit_words, remarks, words
     from cli.show.columns import Result
     from cli.show.text import csv_text
 
-    warnings = remarks.warnings(found)
+    warnings = remarks.warnings(found) + list(fit.remarks(found))
+
+    def document() -> Document:
+        whole = columns.document(found)
+        return whole if fits is None else fit_columns.document(fits, whole)
+
+    def residuals() -> Table:
+        assert fits is not None
+        return fit_columns.residuals(fits)
 
     def figure() -> Figure:
         from cli.field.picture import draw
@@ -202,7 +269,7 @@ def _result(found: FieldBalancing, source: str, save_influence: Path | None, rep
     def page() -> bytes:
         from cli.field.report import html
 
-        return html(found, source, warnings)
+        return html(found, source, warnings, fits)
 
     beside = {}
     if save_influence is not None:
@@ -210,13 +277,14 @@ def _result(found: FieldBalancing, source: str, save_influence: Path | None, rep
     if report is not None:
         beside[report] = page
     return Result(
-        document=lambda: columns.document(found),
+        document=document,
         tables={
             "corrections": lambda: columns.corrections(found, warnings),
             "influence": lambda: columns.coefficients(found),
+            **({} if fits is None else {"residuals": residuals}),
         },
-        notes=lambda: words.notes(found),
-        afterword=lambda: words.afterword(found),
+        notes=lambda: (fit_words.notes(fits) if fits is not None else "") + words.notes(found),
+        afterword=lambda: words.afterword(found) + (fit_words.afterword(fits) if fits is not None else ""),
         figure=figure,
         beside=beside,
         warnings=warnings,

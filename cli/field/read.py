@@ -94,6 +94,10 @@ def _layouts(table: Table, rotor: Rows) -> Iterator[tuple[Rows, Rows]]:
             yield rotors[same], rows[same]
 
 
+class NotOneInitialRun(DataError):
+    """A table of runs with no initial run, with several, or with readings that lack: all runs have to be fitted together."""
+
+
 class _Reader:
     """Reads the groups; the first rotor of each tells how it was measured."""
 
@@ -139,6 +143,7 @@ class _Reader:
         trials: list[Trial] = []
         initial: str | None = None
         standing = False
+        again: DataError | None = None
         for run, members in by_run.items():
             trial = self._trial(run, members, first, planes)
             if trial is None and initial is None and not standing:
@@ -151,7 +156,7 @@ class _Reader:
                         f"{self.table.file}: {of}runs {quote(initial or '')} and {quote(run)} both have no trial mass: "
                         "expected one run, for --influence gives the coefficients"
                     )
-                raise self.fail(
+                again = again or self.fail(
                     first[members[0]],
                     "trial_plane",
                     "",
@@ -160,8 +165,12 @@ class _Reader:
             else:
                 trials.append(trial)
                 standing = standing or trial.kept
+        # with runs to spare all of them are fitted together
+        lacking = NotOneInitialRun if len(by_run) > 1 + len(planes) > 1 else DataError
+        if again is not None:
+            raise lacking(str(again))
         if initial is None:
-            raise DataError(
+            raise NotOneInitialRun(
                 f"{self.table.file}: {of}every run has a trial mass: expected an initial run with trial_plane, "
                 "trial_mass and trial_angle empty"
             )
@@ -177,7 +186,10 @@ class _Reader:
         matches = []
         runs = np.empty((len(rotors), len(trials), len(channels)), dtype=complex)
         for j, trial in enumerate(trials):
-            mine = self._match(trial.run, initial, by_run[trial.run], first, channels, of)
+            try:
+                mine = self._match(trial.run, initial, by_run[trial.run], first, channels, of)
+            except DataError as error:
+                raise lacking(str(error)) from None
             matches.append(mine)
             for s, members in enumerate(mine):
                 runs[:, j, s] = self.vibration[rows[:, members]].mean(axis=1)

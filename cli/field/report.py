@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from cli.field import words
-from cli.field.solve import FieldBalancing
+from cli.field import fit_words, words
+from cli.field.fit import LogFits
+from cli.field.solve import FieldBalancing, Solved
 
 if TYPE_CHECKING:
     from cli.show.columns import Cell, Values
@@ -26,8 +27,8 @@ svg { width: 100%; height: auto; max-height: 64mm; } section { break-after: page
 """
 
 
-def html(found: FieldBalancing, source: str, warnings: Sequence[str]) -> bytes:
-    """Return the report of every rotor, a page each."""
+def html(found: FieldBalancing, source: str, warnings: Sequence[str], fits: LogFits | None = None) -> bytes:
+    """Return the report of every rotor, a page each; with `fits` the history of its runs and what to expect."""
     pages = []
     for rotor, (k, i) in enumerate(found.place):
         solved = found.solved[k]
@@ -37,10 +38,7 @@ def html(found: FieldBalancing, source: str, warnings: Sequence[str]) -> bytes:
             f'<p class="small">{escape(source)}. {escape(words.conventions(found))}</p>',
             *([f'<p class="warning">{escape(warning)}</p>' for warning in warnings] if rotor == 0 else []),
             "<h2>Readings</h2>",
-            f'<p class="small">{escape("; ".join(words.trials_lines(found, solved, i)))}</p>',
-            _table(words.runs_table(found, solved, i))
-            if solved.group.trials
-            else "<p>The initial run stands below, beside the predicted vibration.</p>",
+            *(_readings(found, solved, i) if fits is None else _history(fits, solved, i)),
             "<h2>Influence coefficients</h2>",
             _table(words.influence_table(found, solved, i)),
             '<div class="beside"><div><h2>Corrections</h2>',
@@ -53,6 +51,8 @@ def html(found: FieldBalancing, source: str, warnings: Sequence[str]) -> bytes:
         ]
         if lines := words.verdict(found, solved, i):
             parts += ["<h2>Verdict</h2>", "".join(f"<p>{escape(line)}</p>" for line in lines)]
+        if fits is not None and (lines := fit_words.expected(fits, solved, i)):
+            parts += ["<h2>What to expect</h2>", "".join(f"<p>{escape(line)}</p>" for line in lines)]
         parts.append(_picture(found, rotor))
         pages.append(f"<section>{''.join(parts)}</section>")
     document = (
@@ -60,6 +60,20 @@ def html(found: FieldBalancing, source: str, warnings: Sequence[str]) -> bytes:
         f"<title>Balancing: {escape(source)}</title><style>{STYLE}</style></head>\n<body>{''.join(pages)}</body></html>\n"
     )
     return document.encode()
+
+
+def _readings(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
+    return [
+        f'<p class="small">{escape("; ".join(words.trials_lines(found, solved, i)))}</p>',
+        _table(words.runs_table(found, solved, i))
+        if solved.group.trials
+        else "<p>The initial run stands below, beside the predicted vibration.</p>",
+    ]
+
+
+def _history(fits: LogFits, solved: Solved, i: int) -> list[str]:
+    summary = f'<p class="small">{escape(fit_words.summary(fits, solved, i))}</p>'
+    return [summary, _table(fit_words.history(fits, solved, i))]
 
 
 def _table(columns: Mapping[str, Values], kind: str = "") -> str:

@@ -33,6 +33,11 @@ def coefficient_errors(found: FieldBalancing, solved: Solved) -> Real:
 def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]) -> Real:
     """Bound the errors of the corrections, (g, p), SI; NaN where they cannot be bounded."""
     request, group = found.request, solved.group
+    if group.fit is not None:
+        said = "--digits: the corrections are given in full, for no bound of the rounding of a fit of all runs is known"
+        if said not in warnings:
+            warnings.append(said)
+        return np.full(solved.corrections.shape, np.nan)
     of_alpha = coefficient_errors(found, solved)
     initial, _, on = group.errors()
     runout = np.array([abs(request.runout.get(channel.sensor, 0)) for channel in group.channels])

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from balancing import JointFit
 from cli.read.tables import Table
 
 Real = NDArray[np.float64]
@@ -23,9 +24,20 @@ class Channel:
     sensor: str
     speed: float | None
     speed_given: float | None = None
+    state: str | None = None
+    """The operating state, where the table names one."""
 
     def __str__(self) -> str:
-        return self.sensor if self.speed_given is None else f"{self.sensor} at {self.speed_given:g}"
+        named = self.sensor if self.state is None else f"{self.sensor} ({self.state})"
+        return named if self.speed_given is None else f"{named} at {self.speed_given:g}"
+
+    @property
+    def key(self) -> dict[str, str | float | None]:
+        """How the JSON names it: states stand where speeds do."""
+        key: dict[str, str | float | None] = {"sensor": self.sensor}
+        if self.state is not None:
+            key["state"] = self.state
+        return key if self.state is not None and self.speed is None else {**key, "speed_rad_s": self.speed}
 
 
 @dataclass(frozen=True)
@@ -36,6 +48,20 @@ class Trial:
     masses: list[tuple[int, int, int]]
     """(plane, row of the rotor, place in the cell) of each mass."""
     kept: bool
+
+
+@dataclass(frozen=True)
+class Log:
+    """The rows of a rotor's fit: for each the run's name, and which of its repeated readings it holds."""
+
+    rows: list[tuple[str, int]]
+    sense: str | None = None
+    """"lead" or "lag", as the runs show it; None where they cannot tell."""
+
+    @property
+    def runs(self) -> list[str]:
+        """The runs, in order."""
+        return list(dict.fromkeys(run for run, _ in self.rows))
 
 
 @dataclass
@@ -66,6 +92,9 @@ class Group:
     """Σ|reading - mean|² of the repeats, (g, 1 + r, s)."""
     errors: Callable[[], tuple[Real, Real, Real]]
     """Bounds of the errors of `initial`, `runs` and `on` against the decimals of the table; worked out when asked for."""
+    fit: JointFit | None = None
+    """Where all runs were fitted at once: `initial` is fitted then, and there are no trial runs."""
+    logs: list[Log] = field(default_factory=list)
 
     @property
     def repeats(self) -> int:
@@ -113,6 +142,10 @@ class Runs:
     """`mass` or `unbalance`: what the trials are."""
     mass_unit: str
     speed_unit: str
+    max_mass: dict[str, float] = field(default_factory=dict)
+    """The limits that the file states, plane -> SI."""
+    lags: bool = False
+    """Whether the runs themselves told that the phase lags, and it was turned round."""
     warnings: list[str] = field(default_factory=list)
 
 

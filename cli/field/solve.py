@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple, TypeVar
@@ -16,6 +16,8 @@ from balancing import (
     DependentPlanes,
     DependentTrials,
     Infeasible,
+    JointFit,
+    LogBalance,
     Readings,
     condition_number,
     influence_coefficients,
@@ -93,6 +95,8 @@ class Solved:
     covariance: Real | None = None
     residual_95: Real | None = None
     fits: list[AmplitudeFit] = field(default_factory=list)
+    balance: LogBalance | None = None
+    """Where all runs were fitted at once: what the corrections leave, and how sure it is."""
     unbalance: Complex | None = None
     """(g, p): the rotor's own in its initial state; NaN where the readings do not determine it."""
 
@@ -136,6 +140,8 @@ class FieldBalancing:
                 if "rotor" not in self.stored.table.texts:
                     break
             alpha = np.broadcast_to(np.stack(matrices), (len(group.rotors), *matrices[0].shape))
+        elif group.fit is not None:
+            alpha = group.fit.influence
         elif request.four_run:
             fits = self._amplitudes(group)
             alpha = np.stack([fit.influence for fit in fits])[..., None]
@@ -164,7 +170,9 @@ class FieldBalancing:
         if request.tolerance is not None:
             solved.unbalance = initial_unbalance(alpha, initial, group.weights, singular=SINGULAR)
         limited = bool(request.objective == "minimax" or request.max_mass or request.max_residual is not None)
-        if request.reading_error is not None or self._repeats_tell(group, limited):
+        if group.fit is not None:
+            self._doubt(solved, group.fit, runout, limited)
+        elif request.reading_error is not None or self._repeats_tell(group, limited):
             self._confidence(solved, runout, limited)
         return solved
 
@@ -324,7 +332,8 @@ class FieldBalancing:
             total = solved.total[i]
             try:
                 if limited:
-                    samples = self._limited_samples(solved, readings, w)
+                    problems = readings.problem_samples(min(request.monte_carlo or 200, 1000))
+                    samples = self._limited_samples(solved, problems, w, i)
                     covariances.append(spread(samples, solved.corrections[i]))
                 elif request.monte_carlo:
                     samples = readings.correction_samples(w, request.ridge, draws) - solved.standing[i]
@@ -339,12 +348,35 @@ class FieldBalancing:
             residuals.append(np.quantile(left, 0.95))
         solved.covariance, solved.residual_95 = np.stack(covariances), np.array(residuals)
 
-    def _limited_samples(self, solved: Solved, readings: Readings, weights: Real | None) -> Complex:
+    def _doubt(self, solved: Solved, fit: JointFit, runout: Complex, limited: bool) -> None:
+        """Carry the errors of a fit of all runs to the corrections."""
+        request, weights = self.request, solved.group.weights
+        errors = fit.scatter() if request.reading_error is None else fit.stated(*request.reading_error)
+        still = fit.without(runout)
+        balance = LogBalance(still, solved.total, errors, weights, solved.corrections, request.ridge)
+        solved.balance = balance
+        if not np.isfinite(errors.along).any():
+            return
+        if limited and len(solved.corrections) > MANY:
+            self.warn("uncertainties of so many rotors are not worked out under limits or with minimax")
+        elif limited:
+            spreads = []
+            for i, corrections in enumerate(solved.corrections):
+                draws = balance.problem_samples(i, min(request.monte_carlo or 200, 1000))
+                own = None if weights is None else weights[i]
+                spreads.append(spread(self._limited_samples(solved, draws, own, i), corrections))
+            solved.covariance = np.stack(spreads)
+        else:
+            solved.covariance = balance.covariance
+
+    def _limited_samples(
+        self, solved: Solved, problems: Iterable[tuple[Complex, Complex]], weights: Real | None, i: int = 0
+    ) -> Complex:
         """Draw corrections under limits or of the minimax problem: no formula, each draw is solved."""
         limit, request = self.limits(solved.planes), self.request
         samples = []
-        for alpha, v in readings.problem_samples(min(request.monte_carlo or 200, 1000)):
-            standing = solved.standing[0]
+        for alpha, v in problems:
+            standing = solved.standing[i]
             here = v + alpha @ standing
             if request.objective == "minimax":
                 samples.append(minimax(alpha, here, limit, weights=weights).corrections)

@@ -139,11 +139,12 @@ def run(
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
         )
     with _told(file):
-        mechanism = load(file)
-        q = wanted(mechanism, at, sweep, inputs)
+        mechanism, bare, said = load(file)
+        q = wanted(mechanism, at, sweep, inputs, bare)
         analysis = Analysis.of(
             file, mechanism, q, None if order is None else ORDERS.index(order), names, branch
         )
+        analysis.warnings += said
         analysis.check_names()
         others = show.json or show.text or show.plot or show.expect
         if show.as_csv and not others and own in ([], ["--forces"]) and analysis.is_long:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,8 @@ import numpy as np
 
 from cli.errors import DataError, nearest
 from cli.read import options
-from cli.read.units import UNITS, parse_quantity, to_si
+from cli.read.units import UNITS, is_number, parse_number, parse_quantity, to_si
+from virtualwork.describe.units import scaled, unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -101,16 +102,23 @@ class Sweep:
         return self._whole.steps
 
 
-def wanted(m: Mechanism, at: list[str] | None, sweep: str | None, table: str | None) -> Inputs | Sweep:
-    """The inputs that the options ask for."""
+def wanted(
+    m: Mechanism,
+    at: list[str] | None,
+    sweep: str | None,
+    table: str | None,
+    bare: Mapping[str, str] | None = None,
+) -> Inputs | Sweep:
+    """The inputs that the options ask for; `bare`: the units of bare lengths and angles, as the file's `[units]` say."""
+    bare = bare or {}
     if sum(x is not None for x in (sweep, table)) > 1 or (at and table):
         raise options.bad("--inputs", "expected one of --at, --sweep and --inputs")
     if table is not None:
         return _from_table(m, table)
     if sweep is not None:
-        return _sweep(m, sweep, at)
+        return _sweep(m, sweep, at, bare)
     if at:
-        rows = [_at(m, text) for text in at]
+        rows = [_at(m, text, bare) for text in at]
         return _inputs(m, np.array(rows, dtype=float))
     if any(e.history for e in m.inputs):
         return _from_history(m)
@@ -136,16 +144,23 @@ def _inputs(m: Mechanism, shown: NDArray[np.float64]) -> Inputs:
     return Inputs(values, shown, steps=[str(i) for i in range(1, len(shown) + 1)])
 
 
-def _quantity(m: Mechanism, j: int, text: str, flag: str) -> float:
+def _quantity(m: Mechanism, j: int, text: str, flag: str, bare: Mapping[str, str]) -> float:
     """One input's value, in degrees or metres."""
     slide = m.inputs[j].is_slide
+    named = bare.get("length" if slide else "angle")
+    if named is not None and is_number(text):
+        factor = unit(named)
+        if named in ("deg", "°"):
+            return parse_number(text)
+        si = scaled(text.strip(), factor[0] if factor else 1.0)
+        return si if slide else math.degrees(si)
     try:
-        value, unit = parse_quantity(text, "length" if slide else "angle")
+        value, given = parse_quantity(text, "length" if slide else "angle")
     except ValueError as error:
         raise options.bad(flag, error) from None
     if slide:
-        return float(to_si(value, "length", unit))
-    return value if unit == "deg" else math.degrees(value)
+        return float(to_si(value, "length", given))
+    return value if given == "deg" else math.degrees(value)
 
 
 def _named(m: Mechanism, text: str, flag: str) -> dict[int, str]:
@@ -172,16 +187,16 @@ def _named(m: Mechanism, text: str, flag: str) -> dict[int, str]:
     return found
 
 
-def _at(m: Mechanism, text: str) -> list[float]:
+def _at(m: Mechanism, text: str, bare: Mapping[str, str]) -> list[float]:
     given = _named(m, text, "--at")
     home = _home(m)
     return [
-        _quantity(m, j, given[j], "--at") if j in given else _shown(m, j, home[j])
+        _quantity(m, j, given[j], "--at", bare) if j in given else _shown(m, j, home[j])
         for j in range(len(m.inputs))
     ]
 
 
-def _sweep(m: Mechanism, text: str, at: list[str] | None) -> Sweep:
+def _sweep(m: Mechanism, text: str, at: list[str] | None, bare: Mapping[str, str]) -> Sweep:
     """`0deg:360deg:1deg` or `0deg:360deg/3600`; with several inputs one is swept by name and the others held."""
     (j, span), *more = _named(m, text, "--sweep").items()
     if more:
@@ -197,7 +212,7 @@ def _sweep(m: Mechanism, text: str, at: list[str] | None) -> Sweep:
         raise options.bad(
             "--sweep", f"'{span}': expected START:STOP:STEP or START:STOP/COUNT, such as 0deg:360deg:1deg"
         )
-    start, stop = (_quantity(m, j, part, "--sweep") for part in parts[:2])
+    start, stop = (_quantity(m, j, part, "--sweep", bare) for part in parts[:2])
     last = None
     if slash:
         n = options.whole(count)
@@ -211,7 +226,7 @@ def _sweep(m: Mechanism, text: str, at: list[str] | None) -> Sweep:
             return np.asarray(start + (stop - start) * (i / n))
 
     else:
-        step = _quantity(m, j, parts[2], "--sweep")
+        step = _quantity(m, j, parts[2], "--sweep", bare)
         if step == 0 or (stop - start) / step < 0:
             raise options.bad(
                 "--sweep", f"'{span}': a step of {parts[2]} does not lead from {parts[0]} to {parts[1]}"
@@ -226,7 +241,7 @@ def _sweep(m: Mechanism, text: str, at: list[str] | None) -> Sweep:
         def values(i: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.asarray(start + step * i)
 
-    rest = _at(m, at[0]) if at else [_shown(m, i, value) for i, value in enumerate(_home(m))]
+    rest = _at(m, at[0], bare) if at else [_shown(m, i, value) for i, value in enumerate(_home(m))]
     end = float(values(np.array([float(n)]))[0]) if last is None else last
     return Sweep(m, j, rest, values, n + 1, end)
 
@@ -257,9 +272,9 @@ def _from_table(m: Mechanism, path: str) -> Inputs:
         if name.lower() not in columns:
             units = " or ".join(f"{name}_{u}" for u in list(UNITS["length" if e.is_slide else "angle"])[:2])
             raise DataError(f"{path}: no column {units} for the input '{name}' {table.told}")
-        raw, unit, si = columns[name.lower()]
+        raw, its, si = columns[name.lower()]
         values.append(si)
-        shown.append(si if e.is_slide else (raw if unit == "deg" else np.degrees(si)))
+        shown.append(si if e.is_slide else (raw if its == "deg" else np.degrees(si)))
     q = np.array(values).T
     rates = []
     for kind in ("speed", "acceleration"):

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cli.errors import DataError, memory, nearest
 from cli.mechanism.read import Inputs, Sweep
-from cli.read.files import load as load_bytes
+from cli.read.files import read_bytes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,21 +24,35 @@ if TYPE_CHECKING:
 ORDERS = ("position", "velocity", "acceleration", "jerk")
 
 
-def load(path: str) -> Mechanism:
+class Described(NamedTuple):
+    """A mechanism as its file describes it."""
+
+    mechanism: Mechanism
+    bare: dict[str, str]
+    """The units of bare lengths and angles, as far as `[units]` says them."""
+    warnings: list[str]
+    """Remarks about the tables beside the file."""
+
+
+def load(path: str) -> Described:
     """Read a description; - is standard input."""
+    import tomllib
+
+    from cli.mechanism.tables import beside
     from virtualwork import Mechanism
 
-    file = "standard input" if path == "-" else path
+    file, data = read_bytes(path)
+    warnings: list[str] = []
     try:
-        if path == "-":
-            return Mechanism.from_toml_text(load_bytes(path).decode("utf-8-sig"), file, load=load_bytes)
-        return Mechanism.from_toml(path, load_bytes)
+        text = data.decode("utf-8-sig")
+        folder = Path() if path == "-" else Path(path).parent
+        mechanism = Mechanism.from_toml_text(text, file, folder, partial(beside, warnings))
     except UnicodeDecodeError:
         raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
-    except (OSError, ValueError) as error:
-        if isinstance(error, OSError):
-            raise DataError(f"{file}: {error.strerror or error}") from None
+    except ValueError as error:
         raise DataError(str(error)) from None
+    units = tomllib.loads(text).get("units", {})
+    return Described(mechanism, {kind: str(unit) for kind, unit in units.items()}, warnings)
 
 
 @dataclass

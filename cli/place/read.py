@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from cli.read import options
+from cli.read.units import is_number
 
 
 class Vector(NamedTuple):
@@ -57,13 +58,13 @@ class Request:
 
 
 def read_vector(spec: str) -> Vector:
-    """Read `83.5g@308.87deg`."""
+    """Read `83.5g@308.87deg`; a bare angle is in degrees."""
     mass, mark, angle = spec.partition("@")
     if not mark:
         raise options.bad("MASS@ANGLE", f"'{spec}': expected a mass and an angle, such as 83.5g@308.87deg")
     size, turn = (
         options.with_unit("MASS@ANGLE", mass, "mass"),
-        options.with_unit("MASS@ANGLE", angle, "angle"),
+        options.with_unit("MASS@ANGLE", f"{angle}deg" if is_number(angle) else angle, "angle"),
     )
     assert size is not None
     assert turn is not None

@@ -16,11 +16,14 @@ ZIP, OLE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
 SUFFIXES = (".xlsx", ".xlsm", ".xls", ".ods")
 # device and inode: a link to a file is the file
 _read: set[tuple[int, int]] = set()
+# what can be read only once: standard input, pipes
+_held: dict[str, bytes] = {}
 
 
 def forget() -> None:
     """Begin a call: nothing has been read."""
     _read.clear()
+    _held.clear()
 
 
 def note(path: str | Path) -> Path:
@@ -33,7 +36,13 @@ def note(path: str | Path) -> Path:
 
 def load(path: str | Path) -> bytes:
     """Read a file, or standard input for `-`; OSError or ValueError where it cannot be."""
-    return sys.stdin.buffer.read() if path == "-" else note(path).read_bytes()
+    name = str(path)
+    if name in _held:
+        return _held[name]
+    data = sys.stdin.buffer.read() if path == "-" else note(path).read_bytes()
+    if path == "-" or not os.path.isfile(path):
+        _held[name] = data
+    return data
 
 
 def read_bytes(path: str) -> tuple[str, bytes]:

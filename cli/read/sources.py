@@ -12,7 +12,7 @@ from cli.errors import DataError, cell_error, quote
 from cli.read.decoding import LINE, LOOKED_AT, decoded, delimiter
 from cli.read.files import is_workbook, read_bytes, split_sheet
 from cli.read.headers import Heading, heading, is_unit, likeness, offers
-from cli.read.units import parse_number
+from cli.read.units import is_number
 
 if TYPE_CHECKING:
     from cli.read.workbooks import Sheet
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 LARGE = 10_000
 
 
-@dataclass
+@dataclass(eq=False)
 class Source:
     """A table before its cells are read."""
 
@@ -203,8 +203,4 @@ def _take_units(source: Source, line: int, cells: list[str], known: Mapping[str,
 
 
 def _is_number(cell: str) -> bool:
-    try:
-        parse_number(cell.replace(",", "."))
-    except ValueError:
-        return False
-    return True
+    return is_number(cell.replace(",", "."))

@@ -8,7 +8,7 @@ stumbles over is read again by the standard `csv` module, which knows the row of
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import ModuleType
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cli.errors import DataError, quote
-from cli.read.headers import find_columns, offers, spellings
+from cli.read.headers import Heading, find_columns, offers, spellings
 from cli.read.sources import LARGE, Source, open_source
 from cli.read.units import LARGEST, parse_number
 
@@ -116,6 +116,7 @@ def read(
     cells: Mapping[str, str] | None = None,
     blank: Sequence[str] = (),
     marker: str = "",
+    headers: Callable[[list[str]], list[str]] | None = None,
 ) -> Table:
     """Read a CSV file or a workbook (`FILE.xlsx#Sheet`), or standard input for `-`.
 
@@ -133,6 +134,8 @@ def read(
         The quantities of `numbers` whose cells may be empty: they read as NaN.
     marker
         Cells of `numbers` that begin with it are no numbers: NaN, and their text in `Table.marks`.
+    headers
+        What the header as written means: the columns' names by their places.
 
     Raises
     ------
@@ -141,6 +144,12 @@ def read(
     """
     known = {**(numbers or {}), **(cells or {})}
     source = open_source(path, known, texts)
+    if headers is not None:
+        meant = headers([each.name for each in source.headings])
+        source.headings = [
+            each if name == each.name else Heading(each.written, name)
+            for each, name in zip(source.headings, meant, strict=True)
+        ]
     texts = [each.name for each in source.headings] if texts is None else texts
     found = find_columns(source.file, source.headings, known, texts)
     used = {index for index, _ in found.values()}

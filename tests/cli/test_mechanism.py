@@ -255,7 +255,7 @@ def test_a_bad_file_is_one_line_with_its_place(case: str, dalembert: Dalembert, 
 
 @pytest.mark.parametrize(
     "arguments",
-    [("--order", "snap"), ("--at", "60"), ("--at", "60kg"), ("--sweep", "0deg:360deg"), ("--sweep", "0deg:360deg/0"),
+    [("--order", "snap"), ("--at", "60mm"), ("--at", "60kg"), ("--sweep", "0deg:360deg"), ("--sweep", "0deg:360deg/0"),
      ("--sweep", "0deg:10deg:-1deg"), ("--branch", "x"), ("--branch", "0"), ("-o", "x.txt"), ("--plot", "x.gif"),
      ("--at", "rocker=60deg"), ("--only", ","), ("--nonsense",)],
 )  # fmt: skip

@@ -88,7 +88,10 @@ def test_decimal_commas_in_the_tables_of_a_mechanism(dalembert: Run, tmp_path: P
     (tmp_path / "gas.csv").write_text("angle_deg;fx_N\n0;-1,5\n90;2.500\n")
     done = dalembert("mechanism", "m.toml", "--forces")
     assert done.returncode == 1
-    assert "numbers in every row" in done.stderr
+    assert (
+        "gas.csv: row 2 (line 3), column fx_N: found '2.500', expected a number with a decimal comma"
+        in done.stderr
+    )
 
 
 def test_a_spring_between_plain_names(dalembert: Run, tmp_path: Path) -> None:

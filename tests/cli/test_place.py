@@ -92,7 +92,7 @@ def test_wrong_usage(dalembert: Dalembert) -> None:
         [],
         ["10g"],
         ["10@30deg"],
-        ["10g@30"],
+        ["10g@30kg"],
         ["-1g@30deg"],
         ["10g@30deg", "--blades", "0"],
         ["10g@30deg", "--blades", "4", "--positions", "0deg"],

@@ -1,0 +1,144 @@
+"""A fit of all runs as columns, and its part of the JSON document."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cli.field.fit import Fitted, LogFits, polar
+from cli.field.solve import Solved
+from cli.read.units import degrees
+from cli.show.columns import Column, Table
+
+if TYPE_CHECKING:
+    from cli.show.columns import Document
+
+
+def residuals(fits: LogFits) -> Table:
+    """One row per reading: what was read, and how far it lies from the fitted vibration."""
+    found = fits.found
+    unit = found.runs.amplitude_unit
+    names, rows = [], []
+    for solved in found.solved:
+        fitted = Fitted(solved.group)
+        for i, r in enumerate(solved.group.rotors.tolist()):
+            for row in fitted.rows(i):
+                names.append(found.runs.rotors[r])
+                rows.append(row)
+    read, left = (
+        np.array([getattr(row, name) for row in rows], dtype=complex) for name in ("value", "residual")
+    )
+    columns = [
+        Column("rotor", "", names),
+        Column("run", "", [row.run for row in rows]),
+        Column("sensor", "", [row.channel.sensor for row in rows]),
+        Column("state", "", [row.channel.state or "" for row in rows]),
+        Column("amplitude", unit, np.abs(read)),
+        Column("phase", "deg", degrees(read)),
+        Column("residual", unit, np.abs(left)),
+        Column("residual_phase", "deg", degrees(left)),
+        Column("standardized", "", [row.standardized for row in rows]),
+        Column("outlier", "", ["yes" if row.outlier else "" for row in rows]),
+    ]
+    return Table([c for c in columns if c.name != "state" or any(c.values)])
+
+
+def document(fits: LogFits, document: Document) -> Document:
+    """The JSON document of the corrections with the fits, predictions and suggestions of its rotors."""
+    rotors: list[Document] = document["rotors"]  # type: ignore[assignment]
+    for solved in fits.found.solved:
+        fitted = Fitted(solved.group)
+        parts = _of_group(fits, solved)
+        for i, r in enumerate(solved.group.rotors.tolist()):
+            _fill(rotors[r], fits, solved, fitted, i, parts)
+    return document
+
+
+class _Parts:
+    """What of a group is worked out for all rotors together."""
+
+    def __init__(self, fits: LogFits, solved: Solved) -> None:
+        balance = solved.balance
+        assert balance is not None
+        self.of_residual = balance.vibration_deviation(solved.total)
+        self.of_initial = balance.vibration_deviation(np.zeros_like(solved.total))
+        ceiling = fits.found.request.max_residual
+        self.within = None if ceiling is None else balance.probability_within(ceiling)
+        self.predicted = None if fits.asked.predict is None else fits.predicted(solved)
+        self.robust = fits.robust(solved) if fits.asked.robust else None
+
+
+def _of_group(fits: LogFits, solved: Solved) -> _Parts:
+    return _Parts(fits, solved)
+
+
+def _fill(entry: Document, fits: LogFits, solved: Solved, fitted: Fitted, i: int, parts: _Parts) -> None:
+    """Add a rotor's fit to its part of the document."""
+    group, fit = solved.group, fitted.fit
+    log = group.logs[i]
+    key = "kg" if fits.found.runs.per == "mass" else "kg_m"
+    per = fits.found.runs.per
+    keys = [channel.key for channel in group.channels]
+    entry["fit"] = {
+        "runs": len(log.runs),
+        "readings": int(fit.present[i].sum()),
+        "degrees_of_freedom": int(fit.degrees_of_freedom[i]),
+        "residual_sd": _number(fit.residual_sd[i]),
+        "phase_sense": log.sense,
+        "initial": [
+            {**name, **polar(v), "amplitude_uncertainty": _number(sd)}
+            for name, v, sd in zip(keys, fit.initial[i], parts.of_initial[i], strict=True)
+        ],
+        "residuals": [
+            {
+                "run": row.run,
+                **row.channel.key,
+                **polar(row.residual),
+                "standardized": _number(row.standardized),
+                "outlier": row.outlier,
+            }
+            for row in fitted.rows(i)
+        ],
+    }
+    residual: list[Document] = entry["residual"]  # type: ignore[assignment]
+    for s, one in enumerate(residual):
+        one["amplitude_uncertainty"] = _number(parts.of_residual[i, s])
+        if parts.within is not None:
+            one["probability_within"] = _number(parts.within[i, s])
+    if parts.predicted is not None:
+        entry["predict"] = [
+            {**name, **polar(v), "amplitude_uncertainty": _number(sd)}
+            for name, v, sd in zip(keys, parts.predicted[0][i], parts.predicted[1][i], strict=True)
+        ]
+    if fits.asked.suggest:
+        entry["suggest"] = _suggested(fits, solved, i, per, key)
+    if parts.robust is not None:
+        robust, corrections = parts.robust
+        entry["robust"] = {
+            "initial": [{**name, **polar(v)} for name, v in zip(keys, robust.initial[i], strict=True)],
+            "corrections": [
+                {"plane": plane, f"{per}_{key}": abs(w), "angle_deg": float(degrees(complex(w)))}
+                for plane, w in zip(solved.planes, corrections[i], strict=True)
+            ],
+        }
+
+
+def _suggested(fits: LogFits, solved: Solved, i: int, per: str, key: str) -> Document | None:
+    run = fits.suggested(solved, i)
+    if run is None:
+        return None
+    return {
+        "masses": [
+            {"plane": plane, f"{per}_{key}": abs(w), "angle_deg": float(degrees(complex(w)))}
+            for plane, w in zip(solved.planes, run.masses, strict=True)
+        ],
+        f"uncertainty_before_{key}": run.before,
+        f"uncertainty_after_{key}": run.after,
+    }
+
+
+def _number(value: float) -> float | None:
+    """Return a finite number, or None."""
+    number = float(value)
+    return number if np.isfinite(number) else None

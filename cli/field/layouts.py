@@ -1,0 +1,231 @@
+"""The layouts in which logs occur, brought to the columns of a table of runs."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from cli.errors import DataError
+from cli.read.sources import open_source
+from cli.read.tables import Cells, Numbers, Table, read
+from cli.read.units import degrees, parse_number, phasor
+
+NAMES = {
+    "mode": "state",
+    "operating mode": "state",
+    "doublea": "amplitude_um_pp",
+    "amplitude": "amplitude_um",
+    "reference": "ref",
+    "useful": "use",
+    "plane": "trial_plane",
+    "start": "run",
+    "mass": "trial_mass_kg",
+    "unbalance": "trial_unbalance_kg_m",
+    "mass_angle_deg": "trial_angle_deg",
+}
+WITH = re.compile(
+    r"without\b.*|with\s+(?P<mass>[\d.,]+)\s*(?P<unit>[a-z]+)(?:\s*(?:@|at)\s*(?P<angle>[-+\d.,]+)\s*(?:°|deg)?)?"
+)
+
+
+def headed(header: list[str]) -> list[str]:
+    """Return the columns of a table of runs that a log's header means; `phase` is told apart by its place.
+
+    >>> headed(["", "DoubleA", "phase", "mass", "phase", "ref"])
+    ['state', 'amplitude_um_pp', 'phase_deg', 'trial_mass_kg', 'trial_angle_deg', 'ref']
+    """
+    out: list[str] = []
+    of_mass = False
+    for k, name in enumerate(header):
+        word = name.strip().lower()
+        meant = "state" if not word and k == 0 else NAMES.get(word, word)
+        if word.startswith(("mass_", "unbalance_")) and word not in NAMES:
+            meant = f"trial_{word}"
+        if word in ("phase", "angle", "angle_deg"):
+            meant = "trial_angle_deg" if of_mass else "phase_deg"
+        if meant.startswith(("trial_mass", "trial_unbalance", "amplitude")):
+            of_mass = not meant.startswith("amplitude")
+        out.append(name if meant == word else meant)
+    return out
+
+
+def is_log(path: str) -> bool:
+    """Tell by its first line whether a file is a log in a layout of its own, and no table of runs."""
+    source = open_source(path, {}, None)
+    if source.sheet is None and _keyed(source.text):
+        return True
+    columns = {each.name.lower() for each in source.headings}
+    return not source.headings[0].name or bool(columns & {"state", *NAMES} - {"plane", "amplitude"})
+
+
+def log_table(path: str) -> tuple[Table, dict[str, float]]:
+    """Read a log in any of the layouts, and the limits of masses that it states."""
+    source = open_source(path, {}, None)
+    if source.sheet is None and _keyed(source.text):
+        return _vectors(source.file, source.text)
+    table = read(
+        path,
+        numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},
+        texts=["rotor", "run", "sensor", "state", "trial_plane", "trial_kept", "ref", "use"],
+        cells={"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"},
+        blank=["speed", "weight"],
+        headers=headed,
+    )
+    states = [WITH.fullmatch(state.lower()) for state in table.texts.get("state", ())]
+    if states and all(states) and "trial_mass" not in table.cells:
+        _states_are_masses(table, [match for match in states if match])
+    return table, {}
+
+
+def _states_are_masses(table: Table, states: list[re.Match[str]]) -> None:
+    """Read `without` and `with 0.06 g`: the state names the mass that was on."""
+    units = {match["unit"] for match in states if match["unit"]}
+    if len(units) != 1:
+        raise DataError(
+            f"{table.file}: the states name masses in {', '.join(sorted(units)) or 'no unit'}: expected one unit"
+        )
+    header, unit = "state", units.pop()
+    if unit not in ("kg", "g", "mg", "lb", "oz"):
+        raise DataError(f"{table.file}: the states name masses in '{unit}': expected kg, g, mg, lb or oz")
+    table.cells["trial_mass"] = Cells(header, unit, [match["mass"] or "" for match in states])
+    table.cells["trial_angle"] = Cells(header, "deg", [match["angle"] or "0" for match in states])
+    if not any(match["angle"] for match in states):
+        table.warnings.append(
+            f"{table.file}: the states name no angle of the mass: the correction's counts from where it was"
+        )
+    del table.texts["state"]
+
+
+def _keyed(text: str) -> bool:
+    """Tell whether the first line that says something is `KEY:` and a list."""
+    for line in text.splitlines():
+        said = line.split("#")[0].strip()
+        if said and said != "---":
+            return re.match(r"[A-Za-z_]\w*\s*[:=]\s*(\[|$|[-+\d.]+\s*@)", said) is not None
+    return False
+
+
+def _vectors(file: str, text: str) -> tuple[Table, dict[str, float]]:
+    """Read `A`, `B`, `U` … whose cells are `amplitude@phase`."""
+    given = _values(file, text)
+    for key in ("A", "B", "U"):
+        if key not in given:
+            more = ": stored coefficients go to --influence" if key == "B" and "ALPHA" in given else ""
+            raise DataError(
+                f"{file}: no {key}: expected A (initial vectors), B (trial runs) and U (trial masses){more}"
+            )
+    first = [_polar(file, "A", cell) for cell in _flat(given["A"])]
+    trials = [[_polar(file, "B", cell) for cell in _flat(row)] for row in _listed(given["B"])]
+    masses = [_polar(file, "U", cell) for cell in _flat(given["U"])]
+    slow = [_polar(file, "A0", cell) for cell in _flat(given.get("A0", []))]
+    if len(trials) != len(first) or any(len(row) != len(masses) for row in trials):
+        raise DataError(
+            f"{file}: B has {len(trials)} rows of {len(trials[0]) if trials else 0}: expected a row for each of {len(first)} sensors "
+            f"with a column for each of {len(masses)} trial runs"
+        )
+    if slow and len(slow) != len(first):
+        raise DataError(f"{file}: A0 has {len(slow)} vectors: expected one for each of {len(first)} sensors")
+    kept = "yes" if str(given.get("keep_trial", "")).strip().lower() in ("true", "yes", "1") else "no"
+    runs = [(0, s, first[s]) for s in range(len(first))]
+    runs += [(j + 1, s, row[j]) for j in range(len(masses)) for s, row in enumerate(trials)]
+    on = [masses[j - 1] if j else ("", "") for j, _, _ in runs]
+    table = Table(file, list(given), len(runs))
+    table.texts = {
+        "run": [str(j) if j else "initial" for j, _, _ in runs],
+        "sensor": [str(s + 1) for _, s, _ in runs],
+        "trial_plane": [str(j) if j else "" for j, _, _ in runs],
+        "trial_kept": [kept if j else "" for j, _, _ in runs],
+    }
+    table.cells = {
+        "trial_mass": Cells("U", "kg", [size for size, _ in on]),
+        "trial_angle": Cells("U", "deg", [turn for _, turn in on]),
+    }
+    size, turn = (np.array([float(read[k]) for _, _, read in runs]) for k in (0, 1))
+    if slow:
+        at_rest, at_angle = (np.array([float(one[k]) for one in slow]) for k in (0, 1))
+        still = phasor(at_rest, at_angle, "deg")
+        v = phasor(size, turn, "deg") - still[[s for _, s, _ in runs]]
+        size, turn = np.abs(v), degrees(v)
+    table.numbers = {"amplitude": Numbers("A", "um", size), "phase": Numbers("A", "deg", turn)}
+    for key in set(given) - {"A", "B", "U", "A0", "keep_trial", "weight_const"}:
+        table.warnings.append(f"{file}: {key} is not used")
+    limits = re.findall(r"([\d.]+)\s*:\s*([\d.]+)", str(given.get("weight_const", "")))
+    # planes are numbered from 0 there
+    return table, {str(int(float(plane)) + 1): float(limit) for plane, limit in limits}
+
+
+def _values(file: str, text: str) -> dict[str, object]:
+    """Return key -> text, or nested lists of texts: YAML as far as such files use it."""
+    whole = "\n".join(line.split("#")[0].rstrip() for line in text.splitlines())
+    found = re.split(r"^([A-Za-z_]\w*)\s*[:=]", whole, flags=re.MULTILINE)
+    out: dict[str, object] = {}
+    for key, value in zip(found[1::2], found[2::2], strict=True):
+        said = value.strip()
+        if key in out:
+            raise DataError(f"{file}: {key} stands twice: expected it once")
+        if said.startswith("-"):
+            said = _dashed(said)
+        listed = said.startswith("[") or (key in ("A", "B", "U", "A0") and "@" in said)
+        out[key] = _nested(file, key, said if said.startswith("[") else f"[{said}]") if listed else said
+    return out
+
+
+def _dashed(text: str) -> str:
+    """Write a list of dashes, one or two deep, with brackets."""
+    rows: list[list[str]] = []
+    nested = False
+    for line in text.splitlines():
+        said = line.strip()
+        if said.startswith("- -"):
+            rows.append([said[3:].strip()])
+            nested = True
+        elif said.startswith("-"):
+            inner = nested and line.startswith((" ", "\t")) and rows
+            if inner and line.index("-") > 0:
+                rows[-1].append(said[1:].strip())
+            else:
+                rows.append([said[1:].strip()])
+    return "[" + ", ".join(f"[{', '.join(row)}]" if nested else row[0] for row in rows) + "]"
+
+
+def _nested(file: str, key: str, text: str) -> list[object]:
+    """Read brackets and commas."""
+    stack: list[list[object]] = [[]]
+    for token in re.findall(r"[\[\],]|[^\[\],]+", text):
+        if token == "[":
+            inner: list[object] = []
+            stack[-1].append(inner)
+            stack.append(inner)
+        elif token == "]":
+            if len(stack) == 1:
+                raise DataError(f"{file}: {key}: a bracket ']' too many")
+            stack.pop()
+        elif token != "," and token.strip():
+            stack[-1].append(token.strip().strip("'\""))
+    if len(stack) != 1:
+        raise DataError(f"{file}: {key}: a bracket is not closed")
+    (whole,) = stack[0] or [[]]
+    return _listed(whole)
+
+
+def _listed(value: object) -> list[object]:
+    return value if isinstance(value, list) else [value]
+
+
+def _flat(value: object) -> list[str]:
+    """Return the texts of a list, or of a list of lists of one."""
+    return [
+        text for item in _listed(value) for text in (_flat(item) if isinstance(item, list) else [str(item)])
+    ]
+
+
+def _polar(file: str, key: str, cell: str) -> tuple[str, str]:
+    size, mark, turn = cell.partition("@")
+    try:
+        if not mark or parse_number(size) < 0:
+            raise ValueError
+        parse_number(turn)
+    except ValueError:
+        raise DataError(f"{file}: {key}: found '{cell}', expected amplitude@phase, such as 80@40") from None
+    return size.strip(), turn.strip()
