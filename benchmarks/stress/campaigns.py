@@ -27,6 +27,7 @@ MODULES = tuple(
         "gyroscopes",
         "topology_rates",
         "equilibria",
+        "assemblies",
     )
 )
 

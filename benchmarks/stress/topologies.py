@@ -56,6 +56,11 @@ class Topology:
         """Every constraint as data, once."""
         return rows(self)
 
+    @cached_property
+    def kinds(self) -> list[str]:
+        """The kind of each scalar constraint."""
+        return [kind for kind, _ in self.rows for _ in range(2 if kind == "pin" else 1)]
+
     def unknowns(self) -> Reals:
         """The pose as x, y, θ of every link in order, (3·links,)."""
         return np.array(
@@ -358,32 +363,52 @@ def newton(t: Topology, x: Reals, inputs: tuple[float, ...]) -> Reals | None:
     return x if np.abs(step).max() < 1e-9 else None
 
 
-def follow(t: Topology, towards: tuple[float, ...]) -> dict[float, Reals]:
-    """The poses at the distances `OFF` from the guess, in small steps on all constraints at once.
+@dataclass(frozen=True)
+class Way:
+    """Poses along the inputs: x, y, θ of every link by distance from the guess; how far it goes, and what ends it.
+
+    `end` is "" where nothing ends it, "limit" where it can go no further, "singular" where branches may cross, "far"
+    where a link runs away or turns too fast to be followed.
+    """
+
+    poses: dict[float, Reals]
+    reached: float
+    end: str
+
+
+def follow(
+    t: Topology, towards: tuple[float, ...], off: tuple[float, ...] = OFF, finest: float = FINEST
+) -> Way:
+    """The poses at some distances from the guess, in small steps on all constraints at once.
 
     Parameters
     ----------
     towards : tuple of float
         What the inputs change by in a unit of distance.
+    off : tuple of float
+        The distances, rising.
+    finest : float
+        The shortest step.
 
     Returns
     -------
-    dict of distance to x, y, θ of every link
+    Way
         Up to the first singular pose: beyond it a branch is not the only one.
     """
     found: dict[float, Reals] = {}
     at, way = np.array(t.inputs), np.array(towards)
     x, gone, step = t.unknowns(), 0.0, STEP
 
-    def inputs(distance: float) -> tuple[float, ...]:
-        return tuple(float(v) for v in at + distance * way)
+    def inputs(gone: float) -> tuple[float, ...]:
+        return tuple(float(v) for v in at + gone * way)
 
-    side = np.linalg.slogdet(evaluate(t, x, t.inputs)[1])[0]
-    for off in OFF:
-        while gone < off:
-            if step < FINEST:
-                return found
-            to = min(off, gone + step)
+    side, first = np.linalg.slogdet(evaluate(t, x, t.inputs)[1])
+    size = first
+    for distance in off:
+        while gone < distance:
+            if step < finest:
+                return Way(found, gone, "limit" if size - first < math.log(0.1) else "far")
+            to = min(distance, gone + step)
             # a constraint is linear in the inputs: this is its change, without an error
             value, jacobian = evaluate(t, x, inputs(gone))
             moved = constraints(t, x, inputs(to)) - value
@@ -395,11 +420,12 @@ def follow(t: Topology, towards: tuple[float, ...]) -> dict[float, Reals]:
                 continue
             jacobian = evaluate(t, new, inputs(to))[1]
             s = np.linalg.svd(jacobian, compute_uv=False)
-            if s[-1] < END * s[0] or np.linalg.slogdet(jacobian)[0] != side or np.abs(new).max() > FAR:
-                return found
+            sign, size = np.linalg.slogdet(jacobian)
+            if s[-1] < END * s[0] or sign != side or np.abs(new).max() > FAR:
+                return Way(found, to, "far" if np.abs(new).max() > FAR else "singular")
             x, gone, step = new, to, min(STEP, 2 * step)
-        found[off] = x
-    return found
+        found[distance] = x
+    return Way(found, gone, "")
 
 
 def verdict(t: Topology) -> str:
@@ -438,7 +464,9 @@ def _further(t: Topology) -> str:
     """What the program makes of the poses at both sides of the guess."""
     way = (1.0,) if len(t.inputs) == 1 else (0.8, 0.6)
     poses = [
-        (side * off, x) for side in (1.0, -1.0) for off, x in follow(t, tuple(side * w for w in way)).items()
+        (side * off, x)
+        for side in (1.0, -1.0)
+        for off, x in follow(t, tuple(side * w for w in way)).poses.items()
     ]
     if not poses:
         return "put together"

@@ -35,6 +35,8 @@ DIP = 0.05
 SAME = 1e-6
 # turns of the input within which a branch is looked for to come back to itself
 TURNS = 32
+# sizes of the mechanism within which the limits of a slide are looked for
+SLIDES = 4
 # poses of a turn that are compared for it
 COMPARED = 60
 
@@ -414,8 +416,11 @@ class Track:
     # --- limits ---------------------------------------------------------------------------------------------------
     def limits(self) -> list[Limit]:
         """Where the input can go no further, over one period of the branch or what was covered, to full precision."""
-        back = self.length if self.assembly.mechanism.inputs[0].is_slide or not self._repeats else 0.0
-        self.cover(self.start - back, self.start + (self.period or self.length))
+        back = self.length if not self._repeats else 0.0
+        ahead = self.period or self.length
+        if self.assembly.mechanism.inputs[0].is_slide:
+            back = ahead = SLIDES * self.length
+        self.cover(self.start - back, self.start + ahead)
         return self._ends()
 
     def _ends(self) -> list[Limit]:

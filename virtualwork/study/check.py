@@ -125,7 +125,6 @@ class Check:
         track = self.assembly.track
         if not track.active:
             return None
-        slide = self.mechanism.inputs[0].is_slide
         limits = track.limits()
         if not limits:
             return None
@@ -134,11 +133,10 @@ class Check:
         every = sorted((limit.input + t, limit.side) for limit in limits for t in turns)
         above = [q for q, side in every if q > track.start and side < 0]
         below = [q for q, side in every if q < track.start and side > 0]
-        if slide and (not above or not below):
-            return (below[-1] if below else -math.inf, above[0] if above else math.inf)
-        if not above or not below:
+        if not above and not below:
             return None
-        return below[-1], above[0]
+        # on the other side it goes on as far as it was looked for
+        return (below[-1] if below else -math.inf, above[0] if above else math.inf)
 
     @cached_property
     def dead_points(self) -> tuple[float, ...]:
