@@ -113,8 +113,8 @@ def rows(analysis: Analysis) -> list[tuple[Place, dict[str, Any]]]:
                     for j, e in enumerate(analysis.mechanism.inputs)
                 ]
         several_fields = bool(fields[0][0])
-        for i in range(motion.n):
-            head: dict[str, Any] = {"step": analysis.inputs.steps[i]}
+        for i, (step, assembled) in enumerate(zip(analysis.inputs.steps, motion.assembled, strict=True)):
+            head: dict[str, Any] = {"step": step}
             if several:
                 head["branch"] = str(assembly.number)
             for j, (field, velocities, marks) in enumerate(fields):
@@ -125,7 +125,7 @@ def rows(analysis: Analysis) -> list[tuple[Place, dict[str, Any]]]:
                     for name, part in parts.items()
                 }
                 extra: list[tuple[Place, dict[str, Any]]] = []
-                for mark in marks if motion.assembled[i] else ():
+                for mark in marks if assembled else ():
                     if mark.link not in here:
                         continue
                     wanted = {key: values[i] for key, values in mark.cells.items() if values[i] != ""}

@@ -13,8 +13,9 @@ from cli.errors import DataError
 from cli.read.synonyms import quantity_meant
 from cli.read.units import UNITS, dimensions, find_unit, nearest_unit, unit_name
 
-_BRACKETS = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\Z", re.DOTALL)
-_PARTED = re.compile(r"(.*\S)\s*(?:,|\s/\s|\sin\s)\s*(\S.*)\Z", re.DOTALL)
+# compiled where a header is so written
+_BRACKETS = r"(?s)(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\Z"
+_PARTED = r"(?s)(.*\S)\s*(?:,|\s/\s|\sin\s)\s*(\S.*)\Z"
 NO_UNIT = ("", "-", "1")
 
 
@@ -73,9 +74,9 @@ def heading(written: str) -> Heading:
 def _parted(written: str) -> tuple[str, str]:
     """Split a header into name and unit, both as the suffixes spell them."""
     base, unit = written, ""
-    if found := _BRACKETS.match(written):
+    if written.endswith(("]", ")")) and (found := re.match(_BRACKETS, written)):
         base, unit = found.group(1), found.group(2) or found.group(3) or ""
-    elif (found := _PARTED.match(written)) and is_unit(found.group(2)):
+    elif re.search(r"[,\s]", written) and (found := re.match(_PARTED, written)) and is_unit(found.group(2)):
         base, unit = found.groups()
     base = re.sub(r"\s+", "_", base.strip().replace("°", "deg")).translate(str.maketrans("µμ", "uu"))
     return base, "" if unit.strip() in NO_UNIT else unit_name(unit)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 LARGE = 10_000
 
 
-@dataclass
+@dataclass(eq=False)
 class Source:
     """A table before its cells are read."""
 

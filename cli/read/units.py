@@ -106,13 +106,14 @@ _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\
 _SIGNS = str.maketrans(
     {"µ": "u", "μ": "u", "°": "deg", "²": "2", "³": "3", "^": ""} | dict.fromkeys("·⋅×* /", "_")
 )
-_PER_MINUTE = re.compile(r"(?:1|r|rev|u|tr|giri|rot)\s*/\s*min|min\s*(?:\^?-1|⁻¹)", re.IGNORECASE)
+# compiled where a unit may be one: that takes longer than to read a small table
+_PER_MINUTE = r"(?:1|r|rev|u|tr|giri|rot)\s*/\s*min|min\s*(?:\^?-1|⁻¹)"
 
 
 def unit_name(written: str) -> str:
     """Return a unit as the suffixes spell it: `mm/s` is mm_s, `g·mm` g_mm, `µm` um, `°` deg, `1/min` rpm."""
     written = written.strip()
-    if _PER_MINUTE.fullmatch(written):
+    if "min" in written.lower() and re.fullmatch(_PER_MINUTE, written.lower()):
         return "rpm"
     return re.sub("_+", "_", written.translate(_SIGNS)).strip("_")
 

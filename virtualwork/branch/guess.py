@@ -11,7 +11,7 @@ import numpy as np
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.solutions import every_solution, guessed_unknowns
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError
+from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
 from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
 from virtualwork.formulas.linear import stack, stack_rows
 from virtualwork.formulas.newton import gaps, newton, write_unknowns
@@ -56,6 +56,8 @@ class _Chooser:
             if loose or not self.plan.anchors.keys() >= self.m.links.keys():
                 raise MobilityError("[input]: constraints that depend on each other leave a part free")
             found = self._choose(make, st)
+        except ParallelGuidesError:
+            raise
         except (MechanismError, ZeroDivisionError) as error:
             self._refuse_floating()
             if isinstance(error, MechanismError):
@@ -238,7 +240,7 @@ class _Chooser:
             try:
                 case.solve(st, 1, self.m.size)
             except ZeroDivisionError:
-                raise AssemblyError(
+                raise ParallelGuidesError(
                     f"{group.name}: its two guides are parallel, so that its position is not determined; expected "
                     "guides of different directions (`angle`)"
                 ) from None

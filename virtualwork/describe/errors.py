@@ -17,3 +17,7 @@ class MobilityError(MechanismError):
 
 class AssemblyError(MechanismError):
     """No assembly, or none that the guess would choose: names the choices."""
+
+
+class ParallelGuidesError(AssemblyError):
+    """The two guides of a group are parallel: its position is not determined."""
