@@ -57,7 +57,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "cli": (
         ("__main__",),
         ("app",),
-        ("balance", "body", "examples", "field", "mechanism", "place", "spin", "work"),
+        ("balance", "body", "completion", "examples", "field", "mechanism", "place", "spin", "work"),
         ("show",),
         ("read",),
         ("errors",),
