@@ -16,7 +16,18 @@ import numpy as np
 # the modules that have a dict CAMPAIGNS: name -> (what it does, trial(rng) -> [(error, bound), ...])
 MODULES = tuple(
     f"benchmarks.stress.{name}"
-    for name in ("rotors", "linkages", "groups", "vibration", "placing", "rotation", "solids", "gyroscopes")
+    for name in (
+        "rotors",
+        "linkages",
+        "groups",
+        "vibration",
+        "placing",
+        "rotation",
+        "solids",
+        "gyroscopes",
+        "topology_rates",
+        "equilibria",
+    )
 )
 
 Trial = Callable[[np.random.Generator], list[tuple[float, float]]]

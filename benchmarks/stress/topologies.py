@@ -11,6 +11,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,11 @@ REGULAR = (
 )
 LINKS = (2, 6)
 REGULAR_SHARE = 0.85  # of the mechanisms
+# how far from the guess poses are compared, rad or m, and the steps to them
+OFF = (0.02, 0.3, 1.0)
+STEP, FINEST = 0.1, 1e-3
+# a pose less regular than this, or with a link this far out, m, is followed no further
+END, FAR = 1e-4, 100.0
 
 
 @dataclass(frozen=True)
@@ -44,6 +50,11 @@ class Topology:
     def inputs(self) -> tuple[float, ...]:
         """The inputs of the pose."""
         return self.mechanism.at
+
+    @cached_property
+    def rows(self) -> list[tuple[str, tuple[Any, ...]]]:
+        """Every constraint as data, once."""
+        return rows(self)
 
     def unknowns(self) -> Reals:
         """The pose as x, y, θ of every link in order, (3·links,)."""
@@ -294,7 +305,7 @@ def evaluate(t: Topology, x: Reals, inputs: tuple[float, ...]) -> tuple[Reals, R
         turned = (along.conjugate() * 1j * arm).real
         return [(i, sign * along.real), (i + 1, sign * along.imag), (i + 2, sign * turned)]
 
-    for kind, data in rows(t):
+    for kind, data in t.rows:
         if kind == "pin":
             (p, arm_p, i), (q, arm_q, k) = _seat(t, x, *data[:2]), _seat(t, x, *data[2:])
             for along in (1 + 0j, 1j):
@@ -347,14 +358,59 @@ def newton(t: Topology, x: Reals, inputs: tuple[float, ...]) -> Reals | None:
     return x if np.abs(step).max() < 1e-9 else None
 
 
+def follow(t: Topology, towards: tuple[float, ...]) -> dict[float, Reals]:
+    """The poses at the distances `OFF` from the guess, in small steps on all constraints at once.
+
+    Parameters
+    ----------
+    towards : tuple of float
+        What the inputs change by in a unit of distance.
+
+    Returns
+    -------
+    dict of distance to x, y, θ of every link
+        Up to the first singular pose: beyond it a branch is not the only one.
+    """
+    found: dict[float, Reals] = {}
+    at, way = np.array(t.inputs), np.array(towards)
+    x, gone, step = t.unknowns(), 0.0, STEP
+
+    def inputs(distance: float) -> tuple[float, ...]:
+        return tuple(float(v) for v in at + distance * way)
+
+    side = np.linalg.slogdet(evaluate(t, x, t.inputs)[1])[0]
+    for off in OFF:
+        while gone < off:
+            if step < FINEST:
+                return found
+            to = min(off, gone + step)
+            # a constraint is linear in the inputs: this is its change, without an error
+            value, jacobian = evaluate(t, x, inputs(gone))
+            moved = constraints(t, x, inputs(to)) - value
+            guess = x - np.linalg.solve(jacobian, moved)
+            new = newton(t, guess, inputs(to))
+            change = np.inf if new is None else np.abs(new - x).max()
+            if new is None or change > 0.3 or np.abs(new - guess).max() > max(0.1 * change, 1e-9):
+                step /= 2
+                continue
+            jacobian = evaluate(t, new, inputs(to))[1]
+            s = np.linalg.svd(jacobian, compute_uv=False)
+            if s[-1] < END * s[0] or np.linalg.slogdet(jacobian)[0] != side or np.abs(new).max() > FAR:
+                return found
+            x, gone, step = new, to, min(STEP, 2 * step)
+        found[off] = x
+    return found
+
+
 def verdict(t: Topology) -> str:
-    """What the program makes of a mechanism at the very pose that its guess gives.
+    """What the program makes of a mechanism at the very pose that its guess gives, and further along its inputs.
 
     Returns
     -------
     str
-        "put together" where every link stands within rounding of where it was drawn; "refused" where the constraints do
-        not determine the pose and the program says so; everything else is a fault and says what is wrong.
+        "put together" where every link stands within rounding of where it was drawn, and where the inputs then bring it
+        in small steps; "refused" where the constraints do not determine the pose and the program says so; everything
+        else is a fault and says what is wrong.
     """
     regular = regularity(t)
     at = np.array([t.inputs]) if len(t.inputs) > 1 else np.array(t.inputs)
@@ -362,13 +418,39 @@ def verdict(t: Topology) -> str:
         motion = t.mechanism.motion(at)
         closed = bool(motion.assembled[0])
         away = _away(t, motion, 0, t.unknowns()) if closed else math.nan
+        if closed and away < _rounding(regular):
+            return _further(t) if regular > END else "put together"
     except MechanismError as error:
         return "refused" if regular <= REGULAR else f"refused though regular: {error}"
     except Exception as error:
         return f"internal error: {error!r}"
     if not closed:
         return "refused" if regular <= REGULAR else "not assembled at its own guess"
-    return "put together" if away < 1e-10 / max(regular, 1e-5) else f"{away:.2g} away from its guess"
+    return f"{away:.2g} away from its guess"
+
+
+def _rounding(regular: float) -> float:
+    """How far apart two solutions of one pose may be."""
+    return 1e-10 / max(regular, 1e-5)
+
+
+def _further(t: Topology) -> str:
+    """What the program makes of the poses at both sides of the guess."""
+    way = (1.0,) if len(t.inputs) == 1 else (0.8, 0.6)
+    poses = [
+        (side * off, x) for side in (1.0, -1.0) for off, x in follow(t, tuple(side * w for w in way)).items()
+    ]
+    if not poses:
+        return "put together"
+    at = np.array(t.inputs) + np.multiply.outer([off for off, _ in poses], way)
+    motion = t.mechanism.motion(at if len(way) > 1 else at[:, 0])
+    for i, (off, x) in enumerate(poses):
+        if not motion.assembled[i]:
+            return f"not assembled {off:+g} from its guess"
+        away = _away(t, motion, i, x)
+        if away > _rounding(END):
+            return f"{away:.2g} away, {off:+g} from its guess"
+    return "put together"
 
 
 def _away(t: Topology, motion: Any, i: int, x: Reals) -> float:

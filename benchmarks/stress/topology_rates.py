@@ -8,7 +8,7 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 
-from benchmarks.stress.topologies import Topology, evaluate, generate, regularity, rows
+from benchmarks.stress.topologies import Topology, evaluate, generate, regularity
 from virtualwork import GROUND
 
 DIGITS = 40
@@ -61,7 +61,7 @@ def _exact_rows(t: Topology, x: list[_Series], inputs: list[_Series]) -> list[_S
         return there
 
     out = []
-    for kind, data in rows(t):
+    for kind, data in t.rows:
         if kind == "pin":
             gap = seat(*data[:2]) - seat(*data[2:])
             out += [_Series([mp.re(c) for c in gap.c]), _Series([mp.im(c) for c in gap.c])]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -12,7 +12,7 @@ VARIABLE = "_DALEMBERT_COMPLETE"
 """The shell asks through this environment variable."""
 
 
-class Shell(str, Enum):
+class Shell(StrEnum):
     """The shells that are known."""
 
     bash = "bash"

@@ -11,7 +11,8 @@ import pytest
 from benchmarks.stress.topologies import generate, verdict
 from benchmarks.stress.topology_rates import rates
 
-LONG = 100_000
+# some two minutes
+LONG = 1500
 
 # of 0.1.0: what was wrong with each of these
 FAULTS = {
@@ -31,6 +32,14 @@ FAULTS = {
     895: "the same, in another assembly",
     1159: "two pins in one place",
     5095: "two links that no joint holds in place",
+    705: "2 s: a slide that runs away",
+    2910: "the same",
+    6547: "the same",
+    8529: "the same, 4 s",
+    12435: "a limit at the seam of two turns, of a group behind another, where there is none",
+    12837: "two inputs: in steps of one length over to another branch",
+    13522: "two inputs: a gear of fractional ratio where its base's angle wraps",
+    15007: "two inputs: over to a branch 0.6° away",
 }
 
 
@@ -40,7 +49,7 @@ def test_a_fault_of_the_campaign(seed: int) -> None:
     verdict(mechanism)
     start = process_time()
     assert verdict(generate(seed)) in ("put together", "refused")
-    assert process_time() - start < 3, FAULTS[seed]
+    assert process_time() - start < 1, FAULTS[seed]
 
 
 def _tally(seeds: range) -> None:
@@ -58,8 +67,8 @@ def test_mechanisms_of_any_topology_stand_at_their_guess_or_are_refused() -> Non
 
 
 @pytest.mark.slow
-def test_a_hundred_thousand_of_them() -> None:
-    _tally(range(LONG))
+def test_many_more_of_them() -> None:
+    _tally(range(120, LONG))
 
 
 @pytest.mark.parametrize("seed", [4, 26, 43, 71])

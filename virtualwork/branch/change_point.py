@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from virtualwork.branch.choice import Along
+from virtualwork.branch.roots import chebyshev_nodes
 from virtualwork.formulas.linear import stack, stack_rows
 from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.positions import State
@@ -146,7 +147,7 @@ def through(way: Along, group: Group, q0: float) -> ChangePoint:
 def _nearest(way: Along, group: Group, q0: float, span: float) -> tuple[ChangePoint, float]:
     """The series that the closed form follows within a span around a change point, and how far they are apart."""
     choice = way.assembly
-    nodes = span * np.cos(np.pi * (np.arange(12) + 0.5) / 12) * way.length / (2 * np.pi)
+    nodes = span * chebyshev_nodes(12) * way.length / (2 * np.pi)
     st = State([q0 + nodes], many=True)
     way.run(choice.needed(choice.plan.writes(group)), st)
     weights = _at_centre(nodes)

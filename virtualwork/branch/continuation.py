@@ -6,23 +6,28 @@ corrected by Newton-Raphson on all poses together, so that no error accumulates.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 
 from virtualwork.branch.choice import Along
+from virtualwork.branch.roots import chebyshev_nodes, real_roots
+from virtualwork.describe.description import Description
 from virtualwork.formulas.double_roots import settle, singular
 from virtualwork.formulas.linear import solve, stack, stack_rows
 from virtualwork.formulas.newton import newton, write_unknowns
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import State, columns
 from virtualwork.formulas.rates import Rates
-from virtualwork.plan.steps import Group
+from virtualwork.plan.steps import Group, Step
 
 # of one turn
 NODES = 120
 # of one turn: a step this short has met a limit
 FINEST = 1e-7
+# of one turn: nodes this near to where they are to end have reached it
+SEAM = 2 * FINEST
 
 
 class Continuation:
@@ -68,12 +73,13 @@ class Continuation:
     def extend(self, a: float, b: float) -> None:
         """Go on until the nodes cover a to b."""
         h = self.track.length / NODES
-        while not self.stopped[1] and self.q[-1] < b + h:
-            self._advance(1, h)
-        while not self.stopped[-1] and self.q[0] > a - h:
-            self._advance(-1, h)
+        while not self.stopped[1] and b + h - self.q[-1] > SEAM * self.track.length:
+            self._advance(1, min(h, b + h - self.q[-1]))
+        while not self.stopped[-1] and self.q[0] - (a - h) > SEAM * self.track.length:
+            self._advance(-1, min(h, self.q[0] - (a - h)))
 
     def _advance(self, side: int, h: float) -> None:
+        """Lay down one more node, at most h away: what the group hangs on is known no farther."""
         end = -1 if side > 0 else 0
         q, x, rate = self.q[end], self.x[end], self.rate[end]
         if not np.isfinite(rate).all():
@@ -86,7 +92,7 @@ class Continuation:
             guess = x + side * step * rate
             st = self._state(to)
             with np.errstate(all="ignore"):
-                found, closed = newton(self.group, st, guess[None], self.size, limit=12)
+                found, closed = newton(self.group, st, guess[None], self.size, limit=8)
             if closed[0]:
                 new, det = self._rate(to, found[0])
                 # a slide that runs away is measured by itself
@@ -104,7 +110,9 @@ class Continuation:
                     self.rate.insert(place, new)
                     self.det.insert(place, det)
                     self._crossed += crossed
-                    self.step[side] = step
+                    # the last one before the end is short by the end alone
+                    if step < h or not step < self.step[side] < np.inf:
+                        self.step[side] = step
                     return
             step /= 2
         self.stopped[side] = True
@@ -130,15 +138,14 @@ class Continuation:
         for a, b in self._crossed:
             if (a, b) not in self._found:
                 centre, half = (a + b) / 2, (b - a) / 2
-                nodes = np.cos(np.pi * (np.arange(12) + 0.5) / 12)
+                nodes = chebyshev_nodes(12)
                 x = self.unknowns(centre + half * nodes)
                 det = [self._rate(q, row)[1] for q, row in zip(centre + half * nodes, x, strict=True)]
                 # a pose between the two that does not close: no more is known
                 if not np.isfinite(det).all():
                     self._found[a, b] = centre
                     continue
-                roots = np.polynomial.Chebyshev.fit(nodes, det, 10, domain=[-1, 1]).roots()
-                real = np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= 1.1)])
+                real = real_roots(np.polynomial.Chebyshev.fit(nodes, det, 10, domain=[-1, 1]), 1.1)
                 self._found[a, b] = (
                     centre + half * float(real[np.argmin(np.abs(real))]) if len(real) else centre
                 )
@@ -157,7 +164,7 @@ class Continuation:
         """The unknowns' derivative across a removable singularity of the Jacobian: of the polynomial through poses
         on both sides of it (Chebyshev points, so that it holds some 12 digits of a velocity)."""
         half = 0.06 * self.track.length / (2 * np.pi)
-        nodes = np.cos(np.pi * (np.arange(14) + 0.5) / 14)
+        nodes = chebyshev_nodes(14)
         self.extend(q - half, q + half)
         x = self.unknowns(q + half * nodes)
         out = np.full(x.shape[1], np.nan)
@@ -209,7 +216,8 @@ class Continuation:
             i = np.clip(np.searchsorted(nodes, q) - 1, 0, len(nodes) - 2)
             h = nodes[i + 1] - nodes[i]
             t = ((q - nodes[i]) / h)[:, None]
-            inside = (q >= nodes[0] - 1e-9) & (q <= nodes[-1] + 1e-9)
+            low, high = (0.0 if self.stopped[side] else 2 * SEAM * self.track.length for side in (-1, 1))
+            inside = (q >= nodes[0] - low) & (q <= nodes[-1] + high)
             a, b, h = x[i], x[i + 1], h[:, None]
             start = (
                 a * (1 + 2 * t) * (1 - t) ** 2
@@ -243,24 +251,98 @@ def along_lines(track: Along, group: Group, st: State) -> None:
     """With several inputs: every pose on its own straight line of inputs from the guess, all poses together."""
     assembly = track.assembly
     m = assembly.mechanism
-    q = [np.atleast_1d(np.asarray(v, dtype=float)) for v in st.inputs]
-    n = max(len(v) for v in q)
-    at = m.at
+    n = max(np.size(v) for v in st.inputs)
     before = assembly.before(group)
-    far = max(float(np.abs(v - at[j]).max()) for j, v in enumerate(q))
-    steps = max(1, int(np.ceil(far / (2 * np.pi / NODES))))
+    at = np.array(m.at)
+    way = np.array([np.broadcast_to(np.asarray(v, dtype=float), n) for v in st.inputs]).T - at
+    longest = 1 / np.maximum(1.0, _steps(m, way))
     x: Any = np.tile(np.asarray(assembly.starts[group.name], dtype=float), (n, 1))
-    closed = np.ones(n, dtype=bool)
-    last: Any = None
-    for i in range(1, steps + 1):
-        t = i / steps
-        trial = State([at[j] + t * (np.broadcast_to(v, n) - at[j]) for j, v in enumerate(q)], many=True)
+    # of each pose: the share of its way that is gone, the next step, and dx of the whole way
+    gone, step = np.zeros(n), longest.copy()
+    slope = _slope(track, group, before, at + 0 * way, way, x)
+    angles = np.arange(x.shape[1]) < len(group.angles)
+    left = np.isfinite(way).all(axis=1)
+    closed = left.copy()
+    while left.any():
+        i = np.flatnonzero(left)
+        to = np.minimum(gone[i] + step[i], 1.0)
+        trial = State(list((at + to[:, None] * way[i]).T), many=True)
+        moved = (to - gone[i])[:, None]
         with np.errstate(all="ignore"):
             track.run(before, trial)
-            start = x if last is None else 2 * x - last
-            found, ok = newton(group, trial, start, m.size)
-        closed &= ok
-        last, x = x, np.where(ok[:, None], found, x)
+            start = x[i] + moved * slope[i]
+            found, ok = newton(group, trial, start, m.size, limit=8)
+            far = np.where(angles, 1.0, np.maximum(np.abs(x[i]), m.size))
+            change = np.abs((found - x[i]) / far).max(axis=1, initial=0.0)
+            new = _slope(track, group, before, at + to[:, None] * way[i], way[i], found)
+            # the cubic's own defect, as along one input
+            defect = np.abs((found - x[i] - moved * 0.5 * (slope[i] + new)) / far).max(axis=1, initial=0.0)
+            ok &= (defect <= 0.05 * np.maximum(change, 1e-6)) & (change < 0.5)
+        some = i[ok]
+        x[some], slope[some], gone[some] = found[ok], new[ok], to[ok]
+        step[some] = np.minimum(2 * step[some], longest[some])
+        step[i[~ok]] /= 2
+        closed &= step > FINEST * longest
+        left &= closed & (gone < 1)
     x[~closed] = np.nan
     write_unknowns(group, st, x)
     st.margin[group.name] = np.where(closed, 1.0, -1.0) if st.many else (1.0 if closed[0] else -1.0)
+
+
+def _slope(track: Along, group: Group, before: Sequence[Step], inputs: Reals, way: Reals, x: Reals) -> Reals:
+    """dx of a group's unknowns where every input changes by its way; none where it is singular."""
+    st, n = State(list(inputs.T), many=True), len(x)
+    with np.errstate(all="ignore"):
+        track.run(before, st)
+        write_unknowns(group, st, x)
+        d = Rates(track.assembly.plan, st, [[rate] for rate in way.T])
+        d.advance(before, 1)
+        return np.nan_to_num(solve(stack(columns(group, st), n), -stack_rows(d.right_side(group, 1), n)))
+
+
+def _steps(m: Description, way: Reals) -> Reals:
+    """How many steps of a march each way of the inputs takes, (n,)."""
+    unit = np.array([m.size if e.is_slide else 2 * np.pi for e in m.inputs])
+    return np.asarray(np.abs(way / unit).max(axis=1) * NODES)
+
+
+def wind_along_lines(track: Along, group: Group, st: State, bodies: Collection[str]) -> None:
+    """With several inputs: the angles of some bodies of a closed form, with the whole turns made on the same lines.
+
+    A pose that is not reached on its line has no number of turns, and is not assembled.
+    """
+    if not bodies:
+        return
+    assembly = track.assembly
+    n = max(np.size(v) for v in st.inputs)
+    before = assembly.before(group)
+    at = np.array(assembly.mechanism.at)
+    way = np.array([np.broadcast_to(np.asarray(v, dtype=float), n) for v in st.inputs]).T - at
+    steps = max(1, int(np.ceil(np.max(_steps(assembly.mechanism, way), initial=0.0))))
+    start = State(list(assembly.mechanism.at))
+    track.run(before, start)
+    assembly.cases[group.name].solve(start, assembly.signs[group.name], assembly.mechanism.size)
+    last: dict[str, Any] = {body: start.turn[body] for body in bodies}
+    total: dict[str, Any] = {body: np.angle(last[body]) for body in bodies}
+    with np.errstate(all="ignore"):
+        for i in range(1, steps + 1):
+            trial = State(list((at + i / steps * way).T), many=True)
+            track.run(before, trial)
+            assembly.cases[group.name].solve(trial, assembly.signs[group.name], assembly.mechanism.size)
+            closed = np.asarray(trial.margin[group.name]) >= 0
+            for body in bodies:
+                turned = np.angle(trial.turn[body] / last[body])
+                total[body] = total[body] + np.where(closed, turned, np.nan)
+                last[body] = trial.turn[body]
+        for body in bodies:
+            angle = np.angle(st.turn[body])
+            # what no input moves is one number for all poses
+            wound = np.broadcast_to(angle + 2 * np.pi * np.round((total[body] - angle) / (2 * np.pi)), n)
+            reached = np.isfinite(wound)
+            turn, margin = (
+                np.where(reached, st.turn[body], np.nan),
+                np.where(reached, st.margin[group.name], -1.0),
+            )
+            st.angle[body] = wound if st.many else float(wound[0])
+            st.turn[body] = turn if st.many else complex(turn[0])
+            st.margin[group.name] = margin if st.many else float(margin[0])

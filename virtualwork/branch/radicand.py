@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from virtualwork.branch.roots import chebyshev_nodes, real_roots
 from virtualwork.formulas.numbers import EPS, Number, Reals
 from virtualwork.formulas.positions import Case
 
@@ -20,15 +21,14 @@ def lowest(margin: Radicand, a: float, b: float, rounding: float) -> tuple[float
     """
     centre, half = (a + b) / 2, (b - a) / 2
     for widen in (1.0, 4.0):
-        nodes = np.cos(np.pi * (np.arange(14) + 0.5) / 14)
+        nodes = chebyshev_nodes(14)
         m = margin(centre + widen * half * nodes)
         if not np.isfinite(m).all():
             if widen == 1.0:
                 return None
             break
         fit = np.polynomial.Chebyshev.fit(nodes, m, 11, domain=[-1, 1])
-        roots = fit.deriv().roots()
-        real = np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= 1.2)])
+        real = real_roots(fit.deriv(), 1.2)
         if not len(real):
             return None
         best = real[np.argmin(np.abs(fit(real)))]

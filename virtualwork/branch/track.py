@@ -20,7 +20,7 @@ import numpy as np
 
 from virtualwork.branch.change_point import ChangePoint, near_by, put, through
 from virtualwork.branch.choice import Choice
-from virtualwork.branch.continuation import Continuation, along_lines
+from virtualwork.branch.continuation import Continuation, along_lines, wind_along_lines
 from virtualwork.branch.radicand import crossing, lowest, rounding, vanishes
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.numbers import Complexes, Number, Reals
@@ -98,7 +98,11 @@ class Track:
             self.mend(group, st)
         else:
             case.solve(st, self.assembly.signs[group.name], size, group.name in self.folded)
-        for body in self.assembly.geared.intersection(group.members):
+        bodies = self.assembly.geared.intersection(group.members)
+        if not self.active:
+            wind_along_lines(self, group, st, bodies)
+            return
+        for body in bodies:
             st.angle[body] = self.unwound(body, st.inputs[0], np.angle(st.turn[body]))
 
     def cover(self, low: float, high: float) -> None:

@@ -99,9 +99,10 @@ def through_carriers(scene: Scene, force: Reals) -> Reals:
             return np.asarray(force / matrix[:, 0])
     good: Any = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(force).all(axis=1)
     out = np.full_like(force, np.nan)
-    regular: Any = np.asarray(
-        good & (np.abs(np.linalg.det(np.where(good[:, None, None], matrix, np.eye(k)))) > 1e-14)
-    )
+    safe = np.where(good[:, None, None], matrix, np.eye(k))
+    # the volume of the rows over the product of their lengths (Hadamard): a slide's row has a unit of its own
+    lengths = np.sqrt((safe * safe).sum(axis=2)).prod(axis=1)
+    regular: Any = np.asarray(good & (np.abs(np.linalg.det(safe)) > 1e-14 * lengths))
     out[regular] = np.linalg.solve(matrix[regular], force[regular][..., None])[..., 0]
     return out
 

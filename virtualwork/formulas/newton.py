@@ -66,7 +66,7 @@ def newton(
     start : array (n, unknowns)
         Angles in rad, then slides in m.
     size : float
-        The mechanism's size, m; a loop is closed when its gap is at rounding of it.
+        The mechanism's size, m; a loop is closed when its gap is at rounding of it, or of a slide beyond it.
     table : list, optional
         Receives the iterates of the first pose, from the first guess on.
 
@@ -80,10 +80,16 @@ def newton(
     write_unknowns(group, st, x)
     f = stack_rows(gaps(group, st), n)
     norm = np.sqrt((f * f).sum(axis=1))
+
+    def reach() -> Reals:
+        """What a loop's rounding is relative to: the mechanism's size, or a slide that runs beyond it."""
+        return np.asarray(np.abs(x[:, len(group.angles) :]).max(axis=1, initial=size))
+
+    far = reach()
     if table is not None:
         table.append(Iterate(1, x[0].copy(), float(norm[0])))
     done = ~np.isfinite(norm)
-    scale = np.array([1.0] * len(group.angles) + [size] * len(group.slides))
+    slides = np.arange(x.shape[1]) >= len(group.angles)
     for k in range(2, limit + 2):
         if done.all():
             break
@@ -91,7 +97,7 @@ def newton(
         dx = solve(jacobian, -f)
         dx[done | ~np.isfinite(dx).all(axis=1)] = 0.0
         # a group may have no unknown of its own
-        big = np.abs(dx / scale).max(axis=1, initial=0.0)
+        big = np.abs(dx / np.where(slides, far[:, None], 1.0)).max(axis=1, initial=0.0)
         # no angle turns by more than some 60° in a step
         if damped:
             dx *= np.minimum(1.0, 1.0 / np.maximum(big, 1e-300))[:, None]
@@ -101,18 +107,19 @@ def newton(
             write_unknowns(group, st, trial)
             g = stack_rows(gaps(group, st), n)
             after = np.sqrt((g * g).sum(axis=1))
-            worse = ~(after <= norm * (1 + 1e-12)) & ~done & (norm > 64 * EPS * size)
+            worse = ~(after <= norm * (1 + 1e-12)) & ~done & (norm > 64 * EPS * far)
             if not worse.any() or not damped:
                 break
             factor[worse] *= 0.5
         x, f, norm = trial, g, after
+        far = reach()
         if table is not None:
             table.append(Iterate(k, x[0].copy(), float(norm[0])))
         # of dependent constraints rounding leaves a gap that no step makes less: it is closed, and stays as it is
         # and a pose that no part of the step brings nearer to closing will not close
         done = done | worse if damped else done
-        small = (norm <= 64 * EPS * size) & (big <= 1e-7)
+        small = (norm <= 64 * EPS * far) & (big <= 1e-7)
         done = done | small | ~np.isfinite(norm)
     write_unknowns(group, st, x)
-    closed = np.isfinite(norm) & (norm <= 1e-12 * size)
+    closed = np.isfinite(norm) & (norm <= 1e-12 * far)
     return x, closed

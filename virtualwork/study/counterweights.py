@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe.errors import AssemblyError, DescriptionError
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.dynamics import Moving
 from virtualwork.formulas.numbers import Complexes
@@ -73,7 +73,14 @@ def least_squares(motion: Moving, links: Sequence[str]) -> tuple[dict[str, compl
         columns.append(-poses.point_derivative(link, z + 1.0, 2))
     matrix = np.stack(columns, axis=1)
     rows = np.isfinite(before) & np.isfinite(matrix).all(axis=1) & poses.assembled
+    if not rows.any():
+        raise AssemblyError("counterweights: assembled at no pose of the motion")
     size = np.linalg.norm(matrix[rows], axis=0)
+    if not size.all():
+        still = ", ".join(link for link, own in zip(links, size, strict=True) if not own)
+        raise DescriptionError(
+            f"counterweights: {still} does not turn in this motion: expected links that do"
+        )
     u, s, vh = np.linalg.svd(matrix[rows] / size, full_matrices=False)
     if not s[-1] > 1e-10 * s[0]:
         part = np.abs(vh[-1]) > 1e-6

@@ -13,7 +13,7 @@ from itertools import combinations, product
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.bounds.forces import ForceErrors
 from virtualwork.describe.parts import GROUND
@@ -24,6 +24,8 @@ from virtualwork.formulas.scene import Scene
 from virtualwork.plan.steps import path_reads
 
 SAMPLES = 1440
+# halvings of the way from the last sample to a limit
+NEARER = 30
 
 
 @dataclass(frozen=True)
@@ -199,6 +201,12 @@ def _one(assembly: Branch, span: Reals, samples: int) -> Equilibria:
     # Q is analytic: where it vanishes on half of the samples it vanishes everywhere, singular poses apart
     if not np.median(np.abs(force[good])) > 1e-12 * scale:
         return Equilibria((), everywhere=True, loaded=scale > 0)
+    ends = _towards_limits(assembly, q, good)
+    if len(ends):
+        q = np.sort(np.concatenate([q, ends]))
+        rest = Rest(assembly, q[:, None])
+        force, size = (values[:, 0] for values in rest.force())
+        good = np.isfinite(force)
     slope = rest.along(np.ones(1))
     # what the rounding of the terms, or of the input itself, makes of zero: the end of a range may be a root
     shift = 2 * EPS * np.abs(q * np.where(np.isfinite(slope), slope, 0.0))
@@ -214,13 +222,34 @@ def _one(assembly: Branch, span: Reals, samples: int) -> Equilibria:
     if len(touch):
         flat = _refine(assembly, q[touch], q[touch + 1], slope[touch], order=1)
         value, around = (v[:, 0] for v in Rest(assembly, flat[:, None]).force())
-        roots += list(flat[np.abs(value) <= 1e-13 * np.maximum(around, scale)])
+        double = np.abs(value) <= 1e-13 * np.maximum(around, scale)
+        roots += list(flat[double])
+        # or that it crosses twice between two samples
+        twice = ~double & (np.sign(value) == -sign[touch])
+        if twice.any():
+            low, middle, high = q[touch][twice], flat[twice], q[touch + 1][twice]
+            roots += list(_refine(assembly, low, middle, force[touch][twice]))
+            roots += list(_refine(assembly, middle, high, value[twice]))
     roots = sorted(roots)
     if whole and len(roots) > 1 and roots[-1] - roots[0] > 2 * np.pi - 1e-9:
         roots.pop()
     unit = 1.0 if not assembly.mechanism.inputs[0].is_slide else assembly.mechanism.size
     distinct = [root for i, root in enumerate(roots) if i == 0 or root - roots[i - 1] > 1e-8 * unit]
     return _judged(assembly, np.array(distinct)[:, None], scale)
+
+
+def _towards_limits(assembly: Branch, q: Reals, good: NDArray[np.bool_]) -> Reals:
+    """Inputs ever nearer to where the mechanism ends: the force grows there like 1/√distance, and may change its sign."""
+    gap = np.flatnonzero(good[:-1] != good[1:])
+    found: list[Reals] = []
+    if len(gap):
+        inside, outside = np.where(good[gap], q[gap], q[gap + 1]), np.where(good[gap], q[gap + 1], q[gap])
+        for _ in range(NEARER):
+            middle = (inside + outside) / 2
+            ok = np.isfinite(Rest(assembly, middle[:, None]).force()[0][:, 0])
+            found.append(middle[ok])
+            inside, outside = np.where(ok, middle, inside), np.where(ok, outside, middle)
+    return np.concatenate(found) if found else np.empty(0)
 
 
 def _refine(assembly: Branch, low: Reals, high: Reals, at_low: Reals, order: int = 0) -> Reals:

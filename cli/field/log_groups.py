@@ -1,0 +1,268 @@
+"""The rotors of a log fitted: those of like shape and names side by side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from balancing import JointFit, determined, joint_fit, phase_sense
+from cli.errors import DataError
+from cli.field.read import NO, SHOWN, YES
+from cli.field.runs import Channel, Complex, Group, Log, Rows, Runs
+from cli.read.tables import Table
+
+
+@dataclass
+class LogRows:
+    """What each row of the table says, by row."""
+
+    table: Table
+    rotor: Rows
+    rotors: list[str]
+    vibration: list[complex]
+    channel: list[Channel]
+    """The sensor, state and speed of each row."""
+    masses: list[dict[str, complex] | None]
+    """Plane -> what this row puts on, SI; None where the row says nothing of masses."""
+    run: list[str]
+    """Its name, in each row."""
+
+
+class _Rotor(NamedTuple):
+    """A rotor's part of the table, in plain lists: there may be many rotors."""
+
+    rotor: int
+    rows: list[tuple[str, int]]
+    """Of each row of readings the run, and which of its repeats it holds."""
+    channels: list[Channel]
+    planes: list[str]
+    readings: list[list[complex]]
+    """(r, s)."""
+    masses: list[list[complex]]
+    """(r, p)."""
+    kept: list[complex]
+    """What stays on after the last run, (p,)."""
+    weights: list[float]
+    """(s,)."""
+
+
+class Logs:
+    """The logs of all rotors; those of like shape and names become a group."""
+
+    def __init__(self, rows: LogRows, runs: Runs, lagging: bool | None) -> None:
+        self.rows, self.runs, self.lagging = rows, runs, lagging
+        self.several = len(rows.rotors) > 1
+        self.lost = 0
+
+    def read(self, by_rotor: list[list[int]]) -> None:
+        """Read and fit the rotors whose rows are given."""
+        self._fit([self._rotor(r, members) for r, members in enumerate(by_rotor)])
+        if self.lost > SHOWN:
+            self.runs.warnings.append(
+                f"… and {self.lost - SHOWN} further channels that the runs do not determine"
+            )
+
+    def _fit(self, rotors: list[_Rotor]) -> None:
+        alike: dict[tuple[object, ...], list[_Rotor]] = {}
+        for one in rotors:
+            alike.setdefault((*one.channels, len(one.channels), *one.planes, len(one.masses)), []).append(one)
+        less = []
+        for mine in alike.values():
+            readings, masses = (
+                np.array([one.readings for one in mine]),
+                np.array([one.masses for one in mine]),
+            )
+            keep = determined(masses, np.isfinite(readings))
+            whole = np.asarray(keep.all(axis=1))
+            less += [self._without(mine[i], keep[i]) for i in np.flatnonzero(~whole).tolist()]
+            if whole.any():
+                self._group(
+                    [one for one, yes in zip(mine, whole, strict=True) if yes], readings[whole], masses[whole]
+                )
+        if less:
+            self._fit(less)
+
+    def _group(self, mine: list[_Rotor], readings: Complex, masses: Complex) -> None:
+        rotors = np.array([one.rotor for one in mine])
+        channels, planes = mine[0].channels, mine[0].planes
+        fit = joint_fit(readings, masses)
+        fit, senses = self._sense(rotors, fit)
+        g, s, p = len(mine), len(channels), len(planes)
+        none = np.zeros((g, 0, p), dtype=complex)
+        self.runs.groups.append(
+            Group(
+                rotors,
+                channels,
+                planes,
+                [],
+                fit.initial,
+                np.zeros((g, 0, s), dtype=complex),
+                none,
+                none,
+                np.array([one.kept for one in mine]),
+                [],
+                np.array([one.weights for one in mine]) if "weight" in self.rows.table.numbers else None,
+                np.ones((1, s), dtype=np.intp),
+                np.zeros((g, 1, s)),
+                lambda: (np.zeros((g, s)), np.zeros((g, 0, s)), np.zeros((g, 0, p))),
+                fit=fit,
+                logs=[Log(one.rows, sense) for one, sense in zip(mine, senses, strict=True)],
+            )
+        )
+
+    def _sense(self, rotors: Rows, fit: JointFit) -> tuple[JointFit, list[str | None]]:
+        """Tell the sense of the phase, and fit again where the runs tell another than was taken and no option says it."""
+        told, taken, other = phase_sense(fit)
+        turn = -1 if self.lagging else 1
+        against = np.flatnonzero(told < 0)
+        nu = np.maximum(fit.degrees_of_freedom, 1)
+        for i in against[:SHOWN].tolist():
+            of = f"rotor {self.rows.rotors[rotors[i]]}: " if self.several else ""
+            sds = [float(np.sqrt(square[i] / nu[i])) for square in (taken, other)]
+            word = "lags" if turn > 0 else "leads"
+            said = (
+                f"{of}the runs say that the instrument's phase {word}: residuals of {sds[1]:.4g} {self.runs.amplitude_unit} (standard "
+                f"deviation), in the other sense {sds[0]:.4g}"
+            )
+            self.runs.warnings.append(
+                f"{said}: it was turned round"
+                if self.lagging is None
+                else f"{said}; the option says otherwise, and was obeyed"
+            )
+        if self.lagging is None and len(against):
+            turned = np.where((told < 0)[:, None, None], fit.readings.conj(), fit.readings)
+            fit = joint_fit(turned, fit.masses)
+            self.runs.lags = True
+        words = {1: "lead", -1: "lag", 0: None}
+        return fit, [words[int(turn * sense)] for sense in told.tolist()]
+
+    def _rotor(self, r: int, members: list[int]) -> _Rotor:
+        rows = self.rows
+        of = f"rotor {rows.rotors[r]}: " if self.several else ""
+        if not members:
+            raise DataError(f"{rows.table.file}: {of}every run is excluded: expected runs to fit")
+        standing, on = self._on(members)
+        planes = list(dict.fromkeys(plane for masses in on.values() for plane in masses))
+        if not any(mass for masses in on.values() for mass in masses.values()):
+            raise DataError(
+                f"{rows.table.file}: {of}no mass ever changed: what a mass does to the vibration is not known; expected a "
+                "run with a mass on the rotor"
+            )
+        first: dict[Channel, int] = {}
+        lines: dict[tuple[str, int], list[complex]] = {}
+        again: dict[tuple[str, Channel], int] = {}
+        for i in members:
+            first.setdefault(rows.channel[i], i)
+        place = {channel: s for s, channel in enumerate(first)}
+        nothing = [complex(np.nan)] * len(place)
+        for i in members:
+            run, channel = rows.run[i], rows.channel[i]
+            k = again[run, channel] = again.get((run, channel), -1) + 1
+            lines.setdefault((run, k), nothing.copy())[place[channel]] = rows.vibration[i]
+        masses = [[on[run].get(plane, 0j) for plane in planes] for run, _ in lines]
+        weights = [1.0] * len(first)
+        if "weight" in rows.table.numbers:
+            given = rows.table.numbers["weight"].values[list(first.values())]
+            weights = np.where(np.isnan(given), 1.0, given).tolist()
+            if not any(weights) or min(weights) < 0:
+                raise DataError(
+                    f"{rows.table.file}: {of}the weights are zero or negative: expected one that is positive"
+                )
+        last = [standing.get(plane, 0j) for plane in planes]
+        return _Rotor(r, list(lines), list(first), planes, list(lines.values()), masses, last, weights)
+
+    def _on(self, members: list[int]) -> tuple[dict[str, complex], dict[str, dict[str, complex]]]:
+        """Return what stays on after the last run, and what was on in each run."""
+        rows = self.rows
+        kept = rows.table.texts.get("trial_kept")
+        on: dict[str, dict[str, complex]] = {}
+        told: dict[str, int] = {}
+        stays: set[str] = set()
+        for i in members:
+            run, masses = rows.run[i], rows.masses[i]
+            on.setdefault(run, {})
+            if kept is not None:
+                word = kept[i].lower()
+                if word not in (*YES, *NO):
+                    raise rows.table.error(i, "trial_kept", kept[i], "yes or no")
+                if word in YES:
+                    stays.add(run)
+            if masses is None:
+                continue
+            if run in told and masses != rows.masses[told[run]]:
+                size = next(iter(rows.table.cells.values()))
+                raise rows.table.error(
+                    i, size.header, size.values[i], f"the masses as elsewhere in run {run}"
+                )
+            told.setdefault(run, i)
+            on[run] = masses
+        if not stays:
+            # masses written as on the rotor: where runs are told apart by them the last ones are still on
+            last = {} if "run" in rows.table.texts else on[rows.run[members[-1]]]
+            return last, on
+        standing: dict[str, complex] = {}
+        for run, masses in on.items():
+            total = dict(standing)
+            for plane, mass in masses.items():
+                total[plane] = total.get(plane, 0) + mass
+            on[run] = total
+            if run in stays:
+                standing = total
+        return standing, on
+
+    def _without(self, one: _Rotor, keep: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> _Rotor:
+        """Return a rotor without the channels that its runs do not determine: they are said, and what would help them."""
+        of = f"rotor {self.rows.rotors[one.rotor]}: " if self.several else ""
+        planes, readings = one.planes, np.array(one.readings)
+        present, masses = np.isfinite(readings), np.array(one.masses)
+        said = []
+        for s in np.flatnonzero(~keep).tolist():
+            read = np.flatnonzero(present[:, s])
+            runs = [one.rows[j][0] for j in read]
+            known = "its vibration without masses is known, " if not masses[read].any() else ""
+            missing = self._missing(planes, masses[read])
+            times = "once" if len(read) == 1 else f"{len(read)} times"
+            said.append(
+                f"{of}sensor {one.channels[s]} was read {times} (run{'s' * (len(runs) > 1)} {', '.join(runs)}), which does not determine {1 + len(planes)} "
+                f"unknowns: {known}{missing}"
+            )
+        if not keep.any():
+            raise DataError(f"{self.rows.table.file}: {said[0]}")
+        for text in said:
+            self.lost += 1
+            if self.lost <= SHOWN:
+                self.runs.warnings.append(f"{text}; it takes no part in the fit")
+        left = present[:, keep].any(axis=1)
+
+        def of_rows(values: list[Any]) -> list[Any]:
+            return [value for value, yes in zip(values, left, strict=True) if yes]
+
+        def of_channels(values: list[Any]) -> list[Any]:
+            return [value for value, yes in zip(values, keep, strict=True) if yes]
+
+        return one._replace(
+            rows=of_rows(one.rows),
+            channels=of_channels(one.channels),
+            readings=of_rows([of_channels(row) for row in one.readings]),
+            masses=of_rows(one.masses),
+            weights=of_channels(one.weights),
+        )
+
+    def _missing(self, planes: list[str], masses: Complex) -> str:
+        """Say what is not known, and which run would tell it."""
+        if masses.all(axis=0).any() and len(masses):
+            return (
+                "every run has a trial mass, and what it does is not told from the vibration without it; a run without, or "
+                "with another mass there, would tell"
+            )
+        dark = [
+            plane
+            for plane, on in zip(planes, masses.T, strict=True)
+            if np.ptp(on.real) == np.ptp(on.imag) == 0
+        ]
+        if dark:
+            named = f"plane{'s' * (len(dark) > 1)} {' and '.join(dark)}"
+            return f"what a mass in {named} does is not; a run with another mass there would tell"
+        return "the masses of these runs do not tell the planes apart; a run with one plane's mass alone changed would"
