@@ -70,7 +70,7 @@ def _words() -> list[str]:
     """Return the words of the command line; where a shell completes it, those that it has so far."""
     if "_DALEMBERT_COMPLETE" not in os.environ:
         return sys.argv[1:]
-    from typer.completion import completion_init
+    from typer.completion import completion_init  # type: ignore[attr-defined]
 
     completion_init()
     return (os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS") or "").split()[1:]
