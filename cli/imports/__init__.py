@@ -1,0 +1,1 @@
+"""`dalembert import`: a mechanism drawn in another program becomes a description of ours."""

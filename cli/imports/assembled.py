@@ -1,0 +1,92 @@
+"""An imported mechanism put together: does it stand where it is drawn, and where nothing is drawn, how does it stand?"""
+
+from __future__ import annotations
+
+import math
+from itertools import chain
+
+import numpy as np
+
+from cli.imports.drawn import GROUND, Drawing
+from cli.imports.toml import text
+from virtualwork import Mechanism
+from virtualwork.describe.errors import MechanismError
+
+# degrees of an input that says nothing of where it begins
+TRIED = tuple(range(0, 360, 15))
+# how far from its drawn place a point may stand, of the drawing's size: rounding, magnified near change points
+NEAR = 1e-9
+
+
+def described(d: Drawing, source: str) -> str:
+    """Return the TOML text of a drawing, and note on the drawing what does not hold."""
+    if not d.posed:
+        _seek(d, source)
+    made = text(d, source)
+    try:
+        m = Mechanism.from_toml_text(made)
+        warnings = m.assembly.warnings
+        motion = m.motion(np.array([[e.at for e in d.drives]]) if len(d.drives) > 1 else d.drives[0].at)
+        if not motion.assembled.all():
+            d.notes.append("it cannot be assembled as it is drawn")
+            return made
+        d.notes += warnings
+        if d.posed:
+            off, point = max(_gaps(d, m, motion), default=(0.0, ""))
+            if not off <= NEAR * m.size:
+                d.notes.append(
+                    f"{point} stands {off:.3g} m from where it is drawn: singular there, or nearly"
+                )
+    except (MechanismError, np.linalg.LinAlgError) as error:
+        d.notes.append(f"`dalembert mechanism` will refuse it: {error}")
+    return made
+
+
+def _gaps(d: Drawing, m: Mechanism, motion: object) -> list[tuple[float, str]]:
+    """Return how far each point stands from its drawn place."""
+    factor = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048}[d.length]
+    found = []
+    for name, body in d.bodies.items():
+        if name == GROUND:
+            continue
+        for point, z in body.points.items():
+            x, y = motion.point(point).position[0]  # type: ignore[attr-defined]
+            found.append((math.hypot(x - float(z[0]) * factor, y - float(z[1]) * factor), point))
+    return found
+
+
+def _seek(d: Drawing, source: str) -> None:
+    """Set the angles of bodies that no file places: the assembly nearest to all of them 0, at the input's own value.
+
+    Where nothing closes there, the input is tried all around.
+    """
+    why = ""
+    turns = chain([0.0], (math.radians(t) for t in TRIED[1:]) if d.drives[0].slide is None else ())
+    start = [e.at for e in d.drives]
+    for turn in turns:
+        for e, at in zip(d.drives, start, strict=True):
+            e.at = at if turn == 0 else turn
+        for e in d.drives:
+            if e.link is not None and e.on == GROUND:
+                d.bodies[e.link].turn = e.at
+        try:
+            m = Mechanism.from_toml_text(text(d, source))
+            motion = m.motion(np.array([[e.at for e in d.drives]]) if len(d.drives) > 1 else d.drives[0].at)
+            if not motion.assembled.all() or m.assembly.warnings:
+                continue
+            for name, body in d.bodies.items():
+                if name != GROUND:
+                    angle = float(motion.link(name).angle[0])
+                    body.turn = math.remainder(angle, 2 * math.pi)
+        except (MechanismError, np.linalg.LinAlgError) as error:
+            why = why or str(error)
+            continue
+        if turn:
+            d.notes.append(f"no assembly at the input's own value: it begins at {math.degrees(turn):g} deg")
+        d.notes.append(
+            "the file does not say where its bodies stand: the assembly nearest to all angles 0 is taken"
+        )
+        return
+    for e, at in zip(d.drives, start, strict=True):
+        e.at = at
+    d.notes.append(f"no assembly was found{': ' + why if why else ''}")

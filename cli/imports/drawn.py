@@ -1,0 +1,374 @@
+"""A mechanism drawn in one pose, whatever program drew it: bodies with axes parallel to the ground's, joints, inputs.
+
+Coordinates are exact fractions of the decimals in the file, so that a difference of two of them is rounded once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+GROUND = "ground"
+Place = tuple[Fraction, Fraction]
+LARGEST = 1e60
+# drawn places nearer than this share of the drawing's size are one
+SAME = 1e-9
+
+
+def exact(value: float) -> Fraction:
+    """Return the decimal that a number was written as; ValueError where it is no finite number.
+
+    >>> float(exact(0.3) - exact(0.1))
+    0.2
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
+        raise ValueError(f"found {value!r}, expected a finite number")
+    return Fraction(repr(value))
+
+
+def place(x: float, y: float) -> Place:
+    """Return a place from its two coordinates."""
+    return exact(x), exact(y)
+
+
+def apart(a: Place, b: Place) -> float:
+    """Return the distance of two places."""
+    return math.hypot(float(a[0] - b[0]), float(a[1] - b[1]))
+
+
+def direction(a: Place, b: Place) -> float:
+    """Return the direction from one place to another, degrees from the x-axis."""
+    return math.degrees(math.atan2(float(b[1] - a[1]), float(b[0] - a[0])))
+
+
+@dataclass
+class Body:
+    """A rigid body: its named points and its centre of mass in its own axes; its angle in the pose, rad."""
+
+    points: dict[str, Place] = field(default_factory=dict)
+    turn: float = 0.0
+    mass: float = 0.0
+    center: Place = (Fraction(0), Fraction(0))
+    inertia: float = 0.0
+
+
+@dataclass
+class Slide:
+    """A point of `link` on the line of `on` through a place, at an angle; `turned` None is a slot, else a prism."""
+
+    point: str
+    link: str
+    on: str
+    through: Place
+    angle: float
+    turned: float | None = None
+
+
+@dataclass
+class Mesh:
+    """Two gears: (ω_b − ω_arm) = ratio·(ω_a − ω_arm)."""
+
+    a: str
+    b: str
+    ratio: float
+    arm: str
+
+
+@dataclass
+class Drive:
+    """An input: the angle of `link` against `on`, or the way along a slide; `at` in the pose, `speed` as TOML has it."""
+
+    link: str | None = None
+    on: str = GROUND
+    slide: Slide | None = None
+    at: float = 0.0
+    speed: str | float | None = None
+
+
+@dataclass
+class Load:
+    """A force, torque or spring: its table, the bodies it holds on to, and its values as TOML has them.
+
+    `ends` are the places (body, place in its axes); values that are places of a body stand there and nowhere else.
+    """
+
+    table: str
+    ends: list[tuple[str, Place | None]]
+    values: dict[str, object]
+
+
+@dataclass
+class Drawing:
+    """All that a file says of one mechanism, in the file's units."""
+
+    name: str = ""
+    length: str = "m"
+    angle: str = "deg"
+    posed: bool = True
+    """The bodies' points stand where they are drawn; False: each in its own axes, at angles that are sought."""
+    bodies: dict[str, Body] = field(default_factory=lambda: {GROUND: Body()})
+    slides: list[Slide] = field(default_factory=list)
+    meshes: list[Mesh] = field(default_factory=list)
+    drives: list[Drive] = field(default_factory=list)
+    loads: list[Load] = field(default_factory=list)
+    welds: list[tuple[str, str]] = field(default_factory=list)
+    gravity: tuple[float, float] | None = None
+    notes: list[str] = field(default_factory=list)
+
+    def body(self, name: str) -> Body:
+        """Return a body, made where there is none of that name."""
+        return self.bodies.setdefault(name, Body())
+
+    def pins(self) -> dict[str, list[str]]:
+        """Return the bodies of each point that more than one body has."""
+        found: dict[str, list[str]] = {}
+        for name, body in self.bodies.items():
+            for point in body.points:
+                found.setdefault(point, []).append(name)
+        return {point: names for point, names in found.items() if len(names) > 1}
+
+    def size(self) -> float:
+        """Return the largest extent of the drawing, or of a body of it."""
+        extents = [0.0]
+        for places in [list(b.points.values()) for b in self.bodies.values()]:
+            for axis in (0, 1):
+                values = [float(p[axis]) for p in places]
+                extents.append(max(values, default=0.0) - min(values, default=0.0))
+        return max(extents)
+
+    def prism(self, point: str, link: str, on: str, at: Place, angle: float) -> Slide:
+        """Add a prism between two bodies that stand at angle 0; a point that `link` has there already serves."""
+        held = self.body(link).points
+        name = next((p for p, z in held.items() if z == at), None) or self.fresh(point)
+        held[name] = at
+        self.body(on)
+        self.slides.append(Slide(name, link, on, at, angle, -angle))
+        return self.slides[-1]
+
+    def cylinder(self, names: tuple[str, str], ends: tuple[str, str], at: tuple[Place, Place]) -> Slide:
+        """Add a cylinder and its rod, pinned at their far ends, the one sliding in the other."""
+        barrel, rod = names
+        self.body(barrel).points[ends[0]] = at[0]
+        self.body(rod).points[ends[1]] = at[1]
+        angle = direction(*at)
+        self.slides.append(Slide(ends[1], rod, barrel, at[1], angle, -angle))
+        return self.slides[-1]
+
+    def fresh(self, wanted: str) -> str:
+        """Return a point's name that no body uses yet."""
+        used = {p for body in self.bodies.values() for p in body.points}
+        return unused(wanted, used)
+
+
+def unused(wanted: str, used: Iterable[str]) -> str:
+    """Return a name that is not used: the wanted one, or that with a number.
+
+    >>> unused("B", {"B", "B_2"})
+    'B_3'
+    """
+    used, name, k = set(used), wanted, 1
+    while name in used:
+        k += 1
+        name = f"{wanted}_{k}"
+    return name
+
+
+def merge(d: Drawing, keep: str, gone: str) -> None:
+    """Make two bodies one; both stand at the same angle."""
+    if gone == GROUND:
+        keep, gone = gone, keep
+    a, b = d.bodies[keep], d.bodies.pop(gone)
+    if keep != GROUND and b.mass > 0:
+        total = a.mass + b.mass
+        center = tuple(
+            (exact(a.mass) * p + exact(b.mass) * q) / exact(total)
+            for p, q in zip(a.center, b.center, strict=True)
+        )
+        both = (center[0], center[1])
+        a.inertia += a.mass * apart(a.center, both) ** 2 + b.inertia + b.mass * apart(b.center, both) ** 2
+        a.mass, a.center = total, both
+    for point, at in b.points.items():
+        a.points.setdefault(point, at)
+
+    def new(name: str) -> str:
+        return keep if name == gone else name
+
+    for s in d.slides:
+        s.link, s.on = new(s.link), new(s.on)
+    for m in d.meshes:
+        m.a, m.b, m.arm = new(m.a), new(m.b), new(m.arm)
+    for e in d.drives:
+        e.link, e.on = None if e.link is None else new(e.link), new(e.on)
+    for load in d.loads:
+        load.ends = [(new(name), at) for name, at in load.ends]
+    d.welds = [(new(p), new(q)) for p, q in d.welds]
+
+
+def _rename_point(d: Drawing, old: str, new: str) -> None:
+    for body in d.bodies.values():
+        if old in body.points:
+            at = body.points.pop(old)
+            body.points.setdefault(new, at)
+    for s in d.slides:
+        s.point = new if s.point == old else s.point
+
+
+def _one_pin_at_a_place(d: Drawing) -> bool:
+    """Two joints of one body at the same place are one pin."""
+    near = SAME * d.size()
+    joints = set(d.pins()) | {s.point for s in d.slides}
+    for body in d.bodies.values():
+        held = [p for p in body.points if p in joints]
+        for i, p in enumerate(held):
+            for q in held[:i]:
+                if apart(body.points[p], body.points[q]) <= near:
+                    if body is d.bodies[GROUND]:
+                        # two shafts in one place of the ground are not pinned to each other
+                        continue
+                    _rename_point(d, p, q)
+                    return True
+    return False
+
+
+def _rigid_pair(d: Drawing) -> tuple[str, str] | None:
+    """Return two bodies that share two pins at different places: they cannot move against each other."""
+    near = SAME * d.size()
+    met: dict[tuple[str, str], list[str]] = {}
+    for point, names in d.pins().items():
+        for i, b in enumerate(names):
+            for a in names[:i]:
+                met.setdefault((a, b), []).append(point)
+    for (a, b), points in met.items():
+        at = d.bodies[a].points
+        if len(points) > 1 and any(apart(at[points[0]], at[p]) > near for p in points[1:]):
+            return a, b
+    return None
+
+
+def settle(d: Drawing) -> list[Drawing]:
+    """Return the mechanisms of a drawing: what is rigid is one body, what nothing drives or holds is left out."""
+    for _ in range(len(d.welds)):
+        a, b = d.welds.pop()
+        if a != b and a in d.bodies and b in d.bodies:
+            merge(d, a, b)
+    while d.posed:
+        if _one_pin_at_a_place(d):
+            continue
+        pair = _rigid_pair(d)
+        if pair is None:
+            break
+        merge(d, *pair)
+        d.notes.append(f"{pair[1]} and {pair[0]} share two pins: they are one body")
+    _drop_what_is_rigid(d)
+    _drop_what_dangles(d)
+    return _parts(d)
+
+
+def _drop_what_is_rigid(d: Drawing) -> None:
+    for s in [s for s in d.slides if s.link == s.on]:
+        d.slides.remove(s)
+        d.notes.append(f"slide at {s.point}: left out: both sides are one body")
+    for m in [m for m in d.meshes if len({m.a, m.b, m.arm}) < 3]:
+        d.meshes.remove(m)
+        d.notes.append(f"gears {m.a}, {m.b}: left out: they are one body, or one is its own arm")
+    slides = list(map(id, d.slides))
+    for e in list(d.drives):
+        if (e.slide is not None and id(e.slide) not in slides) or (e.link is not None and e.link == e.on):
+            d.drives.remove(e)
+            d.notes.append(
+                f"input {e.link or (e.slide and e.slide.point)}: left out: its two sides are one body"
+            )
+
+
+def _drop_what_dangles(d: Drawing) -> None:
+    """Leave out bodies that no joint holds, or one pin or slot alone that nothing drives."""
+    while True:
+        holds = dict.fromkeys(d.bodies, 0)
+        for names in d.pins().values():
+            for name in names:
+                holds[name] += 1
+        for s in d.slides:
+            holds[s.link] += 1
+            holds[s.on] += 1
+        for m in d.meshes:
+            for name in {m.a, m.b, m.arm}:
+                holds[name] += 1
+        for e in d.drives:
+            for name in (e.link, e.on, *((e.slide.link, e.slide.on) if e.slide else ())):
+                if name is not None:
+                    holds[name] += 2
+        gone = [name for name, n in holds.items() if n < 2 and name != GROUND]
+        if not gone:
+            return
+        for name in gone:
+            d.bodies.pop(name)
+            why = "it has no joint" if holds[name] == 0 else "one joint alone holds it, and nothing drives it"
+            d.notes.append(f"{name}: left out: {why}")
+        d.slides = [s for s in d.slides if {s.link, s.on} <= d.bodies.keys()]
+        for load in [a for a in d.loads if not {name for name, _ in a.ends} <= d.bodies.keys()]:
+            d.loads.remove(load)
+            d.notes.append(f"load on {', '.join(name for name, _ in load.ends)}: left out with its link")
+
+
+def _parts(d: Drawing) -> list[Drawing]:
+    """Split into mechanisms that have nothing but the ground in common; what nothing drives is left out."""
+    root = {name: name for name in d.bodies}
+
+    def top(name: str) -> str:
+        while root[name] != name:
+            name = root[name]
+        return name
+
+    def join(*names: str | None) -> None:
+        moving = [n for n in names if n is not None and n != GROUND]
+        for name in moving[1:]:
+            root[top(name)] = top(moving[0])
+
+    for names in d.pins().values():
+        # shafts that share a place of the ground turn each on its own
+        if GROUND not in names:
+            join(*names)
+    for s in d.slides:
+        join(s.link, s.on)
+    for m in d.meshes:
+        join(m.a, m.b, m.arm)
+    for e in d.drives:
+        join(e.link, e.on)
+    for load in d.loads:
+        join(*(name for name, _ in load.ends))
+    groups: dict[str, list[str]] = {}
+    for name in d.bodies:
+        if name != GROUND:
+            groups.setdefault(top(name), []).append(name)
+    found = []
+    for names in groups.values():
+        drives = [e for e in d.drives if (e.link or (e.slide and _moving(e.slide))) in names]
+        if drives:
+            found.append(_part(d, set(names), drives))
+        else:
+            d.notes.append(
+                f"{', '.join(names)}: left out: nothing drives {'it' if len(names) == 1 else 'them'}"
+            )
+    return found
+
+
+def _moving(s: Slide) -> str:
+    return s.link if s.link != GROUND else s.on
+
+
+def _part(d: Drawing, names: set[str], drives: list[Drive]) -> Drawing:
+    bodies = {name: body for name, body in d.bodies.items() if name in names}
+    slides = [s for s in d.slides if _moving(s) in names]
+    used = {p for body in bodies.values() for p in body.points} | {s.point for s in slides}
+    ground = Body({p: at for p, at in d.bodies[GROUND].points.items() if p in used})
+    return replace(
+        d,
+        bodies={GROUND: ground} | bodies,
+        slides=slides,
+        meshes=[m for m in d.meshes if m.a in names or m.b in names],
+        drives=drives,
+        loads=[load for load in d.loads if any(name in names for name, _ in load.ends)],
+        notes=[],
+    )

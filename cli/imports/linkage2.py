@@ -1,0 +1,243 @@
+"""Linkage (`.linkage2`, D. M. Rector): connectors and links; coordinates are 1/96 inch, y up."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from cli.imports.drawn import GROUND, SAME, Drawing, Drive, Mesh, Place, Slide, apart, direction, place
+from cli.imports.markup import Element, parse
+from cli.imports.words import damaged, left_out
+
+# the file's unit in the unit of the description
+UNITS = {"in": Fraction(1, 96), "mm": Fraction(254, 960)}
+DRAWING_LAYERS = {"1", "2"}
+
+
+def read(file: str, text: str) -> list[Drawing]:
+    """Read the document; what has nothing but the ground in common is told apart later."""
+    return [_Reader(file, parse(file, text)).drawing()]
+
+
+def yes(e: Element, key: str) -> bool:
+    """Return whether an attribute says so."""
+    return e.attributes.get(key, "").lower() in ("true", "1", "yes")
+
+
+class _Reader:
+    """Makes bodies of links; complaints name the line."""
+
+    def __init__(self, file: str, root: Element) -> None:
+        self.file, self.root = file, root
+        program = next(root.all("program"), Element("program", 1))
+        units = program.attributes.get("units", "").lower()
+        self.d = Drawing(length="mm" if units.startswith(("milli", "mm")) else "in")
+        if not units:
+            self.d.notes.append("the file says no unit: 1/96 inch each, given in inches")
+        self.scale = UNITS[self.d.length]
+        if self.number(program, "scalefactor", 1.0) != 1.0:
+            self.d.notes.append(
+                left_out("scalefactor", "it scales what the program shows, not what it keeps")
+            )
+
+    def number(self, e: Element, key: str, default: float | None = None) -> float:
+        """Return a finite number of an attribute."""
+        found = e.attributes.get(key)
+        if found is None and default is not None:
+            return default
+        try:
+            value = float(str(found))
+            place(value, 0.0)
+        except ValueError:
+            raise damaged(self.file, f"line {e.line}: <{e.tag}> {key}", found, "a finite number") from None
+        return value
+
+    def drawing(self) -> Drawing:
+        d, file = self.d, self.file
+        self.connectors: dict[str, Element] = {}
+        self.at: dict[str, Place] = {}
+        layers = 0
+        for e in self.root.all("connector"):
+            id_ = e.attributes.get("id", "")
+            if not id_:
+                raise damaged(file, f"line {e.line}: <connector>", "no id", "an id")
+            if e.attributes.get("layer") in DRAWING_LAYERS:
+                layers += 1
+                continue
+            x, y = place(self.number(e, "x"), self.number(e, "y"))
+            self.connectors[id_], self.at[id_] = e, (x * self.scale, y * self.scale)
+        self.links: dict[str, Element] = {}
+        self.held: dict[str, list[str]] = {}
+        for e in self.root.all("link", "element"):
+            id_ = e.attributes.get("id", str(len(self.links)))
+            if e.attributes.get("layer") in DRAWING_LAYERS:
+                layers += 1
+                continue
+            ids = [c.attributes.get("id", "") for c in e.all("connector")]
+            for c in ids:
+                if c not in self.connectors:
+                    raise damaged(file, f"line {e.line}: <{e.tag}> {id_}", c, "the id of a connector")
+            self.links[id_], self.held[id_] = e, list(dict.fromkeys(ids))
+        if layers:
+            d.notes.append(left_out(f"{layers} elements of layers 1 and 2", "they are drawing only"))
+        if not self.connectors or not self.links:
+            raise damaged(file, f"line {self.root.line}", f"<{self.root.tag}>", "connectors and links")
+        for id_, e in self.connectors.items():
+            if yes(e, "anchor"):
+                d.bodies[GROUND].points[f"C{id_}"] = self.at[id_]
+        self.pistons: dict[str, Slide] = {}
+        for id_ in self.links:
+            self._link(id_)
+        for e in (*self.connectors.values(), *self.links.values()):
+            self._fasten(e)
+        for id_, e in self.connectors.items():
+            if yes(e, "slider"):
+                self._slide(id_, e)
+        for id_, e in self.connectors.items():
+            if yes(e, "input"):
+                self._motor(id_, e)
+        self._traced()
+        for ratios in self.root.all("ratios"):
+            for ratio in ratios.all("ratio"):
+                self._ratio(ratio)
+        return d
+
+    def _link(self, id_: str) -> None:
+        d, e, ids = self.d, self.links[id_], self.held[id_]
+        if yes(e, "actuator") and len(ids) == 2 and apart(self.at[ids[0]], self.at[ids[1]]) > 0:
+            a, b = ids
+            names = f"L{id_}", f"L{id_} rod"
+            slide = d.cylinder(names, (f"C{a}", f"C{b}"), (self.at[a], self.at[b]))
+            self.pistons[id_] = slide
+            throw, cpm = (self.number(e, key, 0.0) for key in ("throw", "cpm"))
+            speed = None
+            if throw * cpm != 0 and not yes(e, "alwaysmanual"):
+                speed = f"{float(place(2 * throw * cpm, 0)[0] * self.scale / 60)!r} {d.length}/s"
+                d.notes.append(
+                    f"actuator L{id_}: its speed is the mean over a stroke (throw {throw:g}, {cpm:g} cycles a minute); "
+                    "the ends of its stroke are left out"
+                )
+            d.drives.append(Drive(slide=slide, speed=speed))
+            return
+        body = d.body(f"L{id_}")
+        for c in ids:
+            body.points[f"C{c}"] = self.at[c]
+
+    def _body(self, e: Element) -> str | None:
+        """Return the body of a link, or of a connector: the ground's, or the first link's that has it."""
+        id_ = e.attributes.get("id", "")
+        if e is self.links.get(id_):
+            return f"L{id_}"
+        if e is self.connectors.get(id_):
+            return next(
+                (f"L{k}" for k, held in self.held.items() if id_ in held),
+                GROUND if yes(e, "anchor") else None,
+            )
+        return None
+
+    def _fasten(self, e: Element) -> None:
+        """`fastenlink` and `fastenconnector`, as attributes or as elements inside: rigidly joined."""
+        wanted = [(k, v) for k, v in e.attributes.items() if k in ("fastenlink", "fastenconnector")]
+        wanted += [
+            (c.tag.lower(), c.attributes.get("id", "")) for c in e.all("fastenlink", "fastenconnector")
+        ]
+        for kind, id_ in wanted:
+            found = (self.links if kind == "fastenlink" else self.connectors).get(id_)
+            if found is None:
+                self.d.notes.append(left_out(f"{kind} {id_} (line {e.line})", "there is none of that id"))
+                continue
+            mine, its = self._body(e), self._body(found)
+            here, there = e.attributes.get("id", ""), found.attributes.get("id", "")
+            if mine is None and its is not None:
+                self.d.body(its).points[f"C{here}"] = self.at[here]
+            elif its is None and mine is not None:
+                self.d.body(mine).points[f"C{there}"] = self.at[there]
+            elif mine is not None and its is not None and mine != its:
+                self.d.welds.append((its, mine))
+
+    def _slide(self, id_: str, e: Element) -> None:
+        d, what = self.d, f"slider C{id_}"
+        limits = [c.attributes.get("id", "") for c in e.all("slidelimit")]
+        if len(limits) != 2 or not set(limits) <= self.at.keys():
+            raise damaged(self.file, f"line {e.line}: {what}", limits, "two slidelimits that are connectors")
+        if self.number(e, "slideradius", 0.0) != 0:
+            d.notes.append(left_out(f"slideradius of C{id_}", "a guide that is an arc has no joint here"))
+            return
+        a, b = (self.at[c] for c in limits)
+        if apart(a, b) == 0:
+            d.notes.append(left_out(what, "its two limits are at one place: they give no direction"))
+            return
+        carriers = [k for k, held in self.held.items() if set(limits) <= set(held)]
+        both = all(yes(self.connectors[c], "anchor") for c in limits)
+        if not carriers and not both:
+            d.notes.append(left_out(what, "its two limits are on no link, nor on the ground"))
+            return
+        on = f"L{carriers[0]}" if carriers else GROUND
+        point = f"C{id_}"
+        held = [n for n, body in d.bodies.items() if point in body.points and n != on]
+        if not held:
+            d.notes.append(left_out(what, "no link is on it"))
+            return
+        z = self.at[id_]
+        off = float((b[0] - a[0]) * (z[1] - a[1]) - (b[1] - a[1]) * (z[0] - a[0])) / apart(a, b)
+        if abs(off) > 1e3 * SAME * apart(a, b):
+            d.notes.append(f"{what}: its line is moved by {abs(off):.3g} {d.length} to go through it")
+        d.slides.append(Slide(point, held[0] if GROUND in held else held[-1], on, z, direction(a, b)))
+
+    def _motor(self, id_: str, e: Element) -> None:
+        d, what = self.d, f"input C{id_}"
+        links = [f"L{k}" for k, held in self.held.items() if id_ in held and f"L{k}" in d.bodies]
+        if not yes(e, "anchor"):
+            d.notes.append(left_out(what, "a motor that is at no anchor"))
+            return
+        turning = [n for n in links if not self._fixed(n)]
+        if not turning:
+            d.notes.append(left_out(what, "no link that could turn is on it"))
+            return
+        d.welds += [(turning[0], other) for other in turning[1:]]
+        rpm = self.number(e, "rpm", 0.0)
+        by_hand = (
+            rpm == 0 or yes(e, "alwaysmanual") or any(yes(self.links[n[1:]], "alwaysmanual") for n in turning)
+        )
+        if by_hand:
+            d.notes.append(f"{what}: moved by hand: no speed")
+        d.drives.append(Drive(turning[0], speed=None if by_hand else f"{-rpm!r} rpm"))
+
+    def _fixed(self, name: str) -> bool:
+        """Return whether a link is the ground: all its connectors, or two of them, are anchors."""
+        held = self.held[name[1:]]
+        anchors = [c for c in held if yes(self.connectors[c], "anchor")]
+        return len({self.at[c] for c in anchors}) > 1
+
+    def _traced(self) -> None:
+        for id_, e in self.connectors.items():
+            if not any(f"C{id_}" in body.points for body in self.d.bodies.values()) and yes(e, "draw"):
+                self.d.notes.append(left_out(f"C{id_}", "no link has it"))
+
+    def _ratio(self, ratio: Element) -> None:
+        d = self.d
+        sides = list(ratio.all("link"))
+        ids = [e.attributes.get("id", "") for e in sides]
+        if len(sides) != 2 or not set(ids) <= self.links.keys():
+            raise damaged(self.file, f"line {ratio.line}: <ratio>", ids, "two links of the file")
+        sizes = [self.number(e, "size", 0.0) for e in sides]
+        what = f"gears L{ids[0]}, L{ids[1]}"
+        if sizes[0] * sizes[1] == 0:
+            d.notes.append(left_out(what, "a size is 0"))
+            return
+        first, second = (f"L{i}" for i in ids)
+        pins = d.pins()
+        arm = next(
+            (
+                body
+                for p in d.body(first).points
+                for q in d.body(second).points
+                for body in pins.get(p, ())
+                if p != q and body not in (first, second) and body in pins.get(q, ())
+            ),
+            None,
+        )
+        if arm is None:
+            d.notes.append(left_out(what, "no link holds the centres of both"))
+            return
+        sense = 1.0 if ratio.attributes.get("type", "").lower() == "chain" else -1.0
+        d.meshes.append(Mesh(first, second, sense * sizes[0] / sizes[1], arm))

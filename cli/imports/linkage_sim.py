@@ -1,0 +1,324 @@
+"""linkage_sim: JSON in SI; bodies with points in their own axes, and nothing that says where they stand."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from cli.errors import DataError
+from cli.imports.drawn import (
+    GROUND,
+    SAME,
+    Body,
+    Drawing,
+    Drive,
+    Load,
+    Place,
+    Slide,
+    apart,
+    exact,
+    place,
+    unused,
+)
+from cli.imports.words import damaged, left_out
+
+
+def read(file: str, data: Any) -> list[Drawing]:
+    """Read every mechanism of a document."""
+    return [_Reader(file, entry).drawing() for entry in (data if isinstance(data, list) else [data])]
+
+
+class _Reader:
+    """Makes bodies of bodies; complaints name the place."""
+
+    def __init__(self, file: str, data: Any) -> None:
+        self.file = file
+        if not isinstance(data, dict) or not all(isinstance(data.get(k), dict) for k in ("bodies", "joints")):
+            raise DataError(f"{file}: expected an object with `bodies` and `joints`, each by name")
+        self.data = data
+        self.d = Drawing(name=str(data.get("name", "")), angle="rad")
+        # bodies that are fixed to others: name -> (body, turn, shift)
+        self.fixed: dict[str, tuple[str, float, complex]] = {}
+
+    def get(self, where: str, entry: Any, key: str) -> Any:
+        """Return a value that must be there."""
+        if not isinstance(entry, dict) or key not in entry:
+            raise DataError(f"{self.file}: {where}: '{key}' is missing")
+        return entry[key]
+
+    def pair(self, where: str, value: Any) -> Place:
+        """Return two coordinates."""
+        try:
+            x, y = value
+            return place(x, y)
+        except (TypeError, ValueError):
+            raise damaged(self.file, where, value, "two finite numbers") from None
+
+    def real(self, where: str, value: Any) -> float:
+        """Return a finite number."""
+        try:
+            return float(exact(value))
+        except ValueError:
+            raise damaged(self.file, where, value, "a finite number") from None
+
+    def drawing(self) -> Drawing:
+        d, data = self.d, self.data
+        self.points: dict[str, dict[str, Place]] = {}
+        for name, e in data["bodies"].items():
+            self._body(name, e)
+        if GROUND not in data["bodies"]:
+            raise DataError(f"{self.file}: bodies: expected one called ground")
+        joints = {k: e for k, e in data["joints"].items() if isinstance(e, dict)}
+        for name, e in joints.items():
+            if e.get("type") == "fixed":
+                self._fix(name, e)
+        revolutes = {k: self._ends(k, e) for k, e in joints.items() if e.get("type") == "revolute"}
+        self._pin(revolutes)
+        extent = d.size()
+        d.posed = all(
+            apart(self.points[i][p], self.points[j][q]) <= SAME * extent for i, p, j, q in revolutes.values()
+        ) and not any(
+            e.get("type") == "prismatic" and e.get("delta_theta_0", 0.0) != 0 for e in joints.values()
+        )
+        for name, e in joints.items():
+            if e.get("type") == "prismatic":
+                self._prism(name, e)
+            elif e.get("type") not in ("revolute", "fixed", "revolute_driver"):
+                d.notes.append(left_out(f"joint {name}", f"a joint of type {e.get('type')} has no like here"))
+        self._drives(joints)
+        self._traced()
+        for e in data.get("forces") or []:
+            self._force(e)
+        if any(body.mass > 0 for name, body in d.bodies.items() if name == GROUND):
+            d.bodies[GROUND] = Body(d.bodies[GROUND].points)
+        for key in ("load_cases", "sweep_config"):
+            if data.get(key):
+                d.notes.append(left_out(key, "the drivers say what drives; ranges are given to the command"))
+        if data.get("mounting_angle"):
+            d.notes.append(left_out("mounting_angle", "it turns gravity: turn `gravity` in the file instead"))
+        return d
+
+    def _body(self, name: str, e: Any) -> None:
+        where = f"body {name}"
+        held = self.get(where, e, "attachment_points")
+        if not isinstance(held, dict):
+            raise damaged(self.file, where, held, "attachment_points by name")
+        self.points[name] = {p: self.pair(f"{where}, point {p}", z) for p, z in held.items()}
+        mass = self.real(f"{where}, mass", e.get("mass", 0.0))
+        inertia = self.real(f"{where}, izz_cg", e.get("izz_cg", e.get("Izz_cg", 0.0)))
+        center = self.pair(f"{where}, cg_local", e.get("cg_local", (0.0, 0.0)))
+        if mass < 0 or inertia < 0:
+            raise damaged(self.file, where, f"{mass:g}, {inertia:g}", "a mass and an inertia of zero or more")
+        loose = [(mass, center, inertia)]
+        for extra in e.get("point_masses") or []:
+            m = self.real(f"{where}, point_masses", self.get(where, extra, "mass"))
+            loose.append((m, self.pair(f"{where}, point_masses", self.get(where, extra, "local_pos")), 0.0))
+        body = self.d.body(name)
+        body.mass, body.center, body.inertia = together(loose)
+        self.where = where
+
+    def _ends(self, name: str, e: dict[str, Any]) -> tuple[str, str, str, str]:
+        """Return (body, point, body, point) of a joint; where a body is fixed to another, that one's."""
+        found = []
+        for side in "ij":
+            where = f"joint {name}"
+            body = str(self.get(where, e, f"body_{side}"))
+            point = str(self.get(where, e, f"point_{side}"))
+            if body not in self.data["bodies"]:
+                raise damaged(self.file, where, body, "one of the bodies")
+            if point not in self.data["bodies"][body]["attachment_points"]:
+                raise damaged(self.file, where, point, f"an attachment point of {body}")
+            held, turn, shift = self.whole(body)
+            if held != body:
+                z = self._carried(self.points[body][point], turn, shift)
+                point = f"{body}.{point}"
+                self.points[held].setdefault(point, z)
+            found += [held, point]
+        return found[0], found[1], found[2], found[3]
+
+    def whole(self, body: str) -> tuple[str, float, complex]:
+        """Return the body that one is fixed to, the turn of its axes there and where their origin stands."""
+        turn, shift = 0.0, 0j
+        while body in self.fixed:
+            body, more, by = self.fixed[body]
+            shift = by + shift * complex(math.cos(more), math.sin(more))
+            turn += more
+        return body, turn, shift
+
+    @staticmethod
+    def _carried(z: Place, turn: float, shift: complex) -> Place:
+        if turn == 0 and shift == 0:
+            return z
+        w = complex(float(z[0]), float(z[1])) * complex(math.cos(turn), math.sin(turn)) + shift
+        return place(w.real, w.imag)
+
+    def _fix(self, name: str, e: dict[str, Any]) -> None:
+        """Make body j a part of body i: their points coincide, its angle is delta_theta_0 more."""
+        i, p, j, q = self._ends(name, e)
+        turn = self.real(f"joint {name}", e.get("delta_theta_0", 0.0))
+        if i == j:
+            return
+        if j == GROUND:
+            i, p, j, q, turn = j, q, i, p, -turn
+        z, w = self.points[i][p], self.points[j][q]
+        shift = complex(float(z[0]), float(z[1])) - complex(float(w[0]), float(w[1])) * complex(
+            math.cos(turn), math.sin(turn)
+        )
+        if turn == 0 and z == w:
+            shift = 0j
+        self.fixed[j] = (i, turn, shift)
+        a, b = self.d.body(i), self.d.bodies.pop(j)
+        a.mass, a.center, a.inertia = together(
+            [(a.mass, a.center, a.inertia), (b.mass, self._carried(b.center, turn, shift), b.inertia)]
+        )
+        for point in self.points[j]:
+            self.points[i][f"{j}.{point}"] = self._carried(self.points[j][point], turn, shift)
+
+    def _pin(self, revolutes: dict[str, tuple[str, str, str, str]]) -> None:
+        """Points that revolutes join are one pin, and so are those at the same place of one body."""
+        groups: list[tuple[str, set[tuple[str, Place]]]] = []
+        for name, (i, p, j, q) in revolutes.items():
+            ends = {(i, self.points[i][p]), (j, self.points[j][q])}
+            label = p if p == q else name
+            for group in [g for g in groups if g[1] & ends]:
+                groups.remove(group)
+                ends |= group[1]
+                label = group[0]
+            groups.append((label, ends))
+        used: set[str] = set()
+        for label, ends in groups:
+            pin = unused(label, used)
+            used.add(pin)
+            for body, z in sorted(ends):
+                self.d.body(body).points[pin] = z
+
+    def _prism(self, name: str, e: dict[str, Any]) -> None:
+        d, where = self.d, f"joint {name}"
+        i, p, j, q = self._ends(name, e)
+        axis = self.pair(where, self.get(where, e, "axis_local_i"))
+        if not any(axis):
+            raise damaged(self.file, where, axis, "a direction")
+        turn_i, turn_j = (self.whole(str(e[f"body_{side}"]))[1] for side in "ij")
+        angle = math.atan2(float(axis[1]), float(axis[0])) + turn_i
+        delta = self.real(where, e.get("delta_theta_0", 0.0)) + turn_i - turn_j
+        held, z = d.body(j).points, self.points[j][q]
+        point = next((k for k, at in held.items() if at == z), None) or d.fresh(name)
+        held[point] = z
+        d.slides.append(Slide(point, j, i, self.points[i][p], angle, delta - angle))
+
+    def _drives(self, joints: dict[str, dict[str, Any]]) -> None:
+        d = self.d
+        rows = [(f"driver {k}", e, False) for k, e in (self.data.get("drivers") or {}).items()]
+        rows += [(f"joint {k}", e, True) for k, e in joints.items() if e.get("type") == "revolute_driver"]
+        for where, e, marker in rows:
+            i, j = (self.whole(str(self.get(where, e, f"body_{side}"))) for side in "ij")
+            for body, _, _ in (i, j):
+                if body not in d.bodies:
+                    raise damaged(self.file, where, body, "one of the bodies")
+            offset = i[1] - j[1]
+            link, on, sign = (j[0], i[0], 1.0) if j[0] != GROUND else (i[0], j[0], -1.0)
+            if any({x.link, x.on} == {link, on} for x in d.drives):
+                continue
+            if e.get("type") == "constant_speed":
+                at = self.real(where, e.get("theta_0", 0.0)) + offset
+                d.drives.append(
+                    Drive(link, on, at=sign * at, speed=sign * self.real(where, e.get("omega", 0.0)))
+                )
+            else:
+                why = "the file does not store it" if marker else "an expression is not evaluated"
+                d.notes.append(left_out(f"law of motion of {where}", why))
+                d.drives.append(Drive(link, on, at=sign * offset))
+        for e in self.data.get("linear_drivers") or []:
+            self._linear(e)
+
+    def _linear(self, e: dict[str, Any]) -> None:
+        """A driven distance of two points: a cylinder."""
+        d = self.d
+        where = f"linear driver {e.get('id', '')}".strip()
+        ends = []
+        for k in "ab":
+            body, turn, shift = self.whole(str(self.get(where, e, f"body_{k}")))
+            z = self._carried(self.pair(where, self.get(where, e, f"point_{k}")), turn, shift)
+            if body not in d.bodies:
+                raise damaged(self.file, where, body, "one of the bodies")
+            held = d.bodies[body].points
+            point = next((p for p, at in held.items() if at == z), None) or d.fresh(f"{where} {k}")
+            held[point] = z
+            ends.append((point, z))
+        (p, a), (q, b) = ends
+        speed = f"{self.real(where, e.get('velocity', 0.0))!r} m/s"
+        names = f"{where} barrel", f"{where} rod"
+        if d.posed:
+            d.drives.append(Drive(slide=d.cylinder(names, (p, q), (a, b)), speed=speed))
+            return
+        # both along their own x-axes, the slide is the length
+        d.body(names[0]).points[p] = place(0, 0)
+        d.body(names[1]).points[q] = place(0, 0)
+        d.slides.append(Slide(q, names[1], names[0], place(0, 0), 0.0, 0.0))
+        at = self.real(where, e.get("length_0", 0.0))
+        d.drives.append(Drive(slide=d.slides[-1], at=at, speed=speed))
+
+    def _traced(self) -> None:
+        """Points to be looked at: coupler and mount points, and attachment points that no joint uses."""
+        for name, e in self.data["bodies"].items():
+            body, turn, shift = self.whole(name)
+            for key in ("attachment_points", "coupler_points", "mount_points"):
+                for point, value in (e.get(key) or {}).items():
+                    z = self._carried(self.pair(f"body {name}, {point}", value), turn, shift)
+                    held = self.d.bodies[body].points
+                    if body != GROUND and z not in held.values():
+                        held[self.d.fresh(point)] = z
+
+    def _force(self, e: Any) -> None:
+        d = self.d
+        kind = str(e.get("type", "")) if isinstance(e, dict) else ""
+        where = f"force {kind}"
+
+        def at(body: str, point: str | None) -> tuple[str, Place | None]:
+            name, turn, shift = self.whole(str(self.get(where, e, body)))
+            if name not in d.bodies:
+                raise damaged(self.file, where, name, "one of the bodies")
+            if point is None:
+                return name, None
+            return name, self._carried(self.pair(where, self.get(where, e, point)), turn, shift)
+
+        def real(key: str) -> float:
+            return self.real(f"{where}, {key}", e.get(key, 0.0))
+
+        constant = (
+            (e.get("modulation") or {}).get("modulation_type", "Constant") == "Constant" if kind else False
+        )
+        if kind == "Gravity":
+            g = self.pair(where, self.get(where, e, "g_vector"))
+            d.gravity = float(g[0]), float(g[1])
+        elif kind in ("LinearSpring", "LinearDamper"):
+            keys = ("stiffness", "free_length") if kind == "LinearSpring" else ("damping",)
+            ends = [at("body_a", "point_a"), at("body_b", "point_b")]
+            d.loads.append(Load("springs", ends, {k: real(k) for k in keys}))
+        elif kind in ("TorsionSpring", "RotaryDamper"):
+            keys = ("stiffness", "free_angle") if kind == "TorsionSpring" else ("damping",)
+            values: dict[str, object] = {k: real(k) for k in keys}
+            turns = [self.whole(str(e.get(k)))[1] for k in ("body_i", "body_j")]
+            if "free_angle" in values:
+                values["free_angle"] = real("free_angle") + turns[0] - turns[1]
+            d.loads.append(Load("torsion_springs", [at("body_i", None), at("body_j", None)], values))
+        elif kind == "ExternalForce" and constant:
+            f = self.pair(where, self.get(where, e, "force"))
+            d.loads.append(
+                Load("forces", [at("body_id", "local_point")], {"force": [float(f[0]), float(f[1])]})
+            )
+        elif kind == "ExternalTorque" and constant:
+            d.loads.append(Load("torques", [at("body_id", None)], {"torque": real("torque")}))
+        else:
+            d.notes.append(left_out(f"force of type {kind or '?'}", "it has no like here"))
+
+
+def together(parts: list[tuple[float, Place, float]]) -> tuple[float, Place, float]:
+    """Return mass, centre and inertia of several masses (Huygens–Steiner)."""
+    mass = math.fsum(m for m, _, _ in parts)
+    heavy = [part for part in parts if part[0] != 0]
+    if mass <= 0 or len(heavy) <= 1:
+        return heavy[0] if heavy else parts[0]
+    x, y = (sum(exact(m) * c[k] for m, c, _ in heavy) / exact(mass) for k in (0, 1))
+    center = exact(float(x)), exact(float(y))
+    return mass, center, math.fsum(i + m * apart(c, center) ** 2 for m, c, i in heavy)

@@ -1,0 +1,168 @@
+"""MotionGen: JSON with joints, links, slots, cylinders, actuators; a capture, or the program's own `.motiongen`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cli.errors import DataError
+from cli.imports.drawn import GROUND, SAME, Drawing, Drive, Place, Slide, apart, direction, place
+from cli.imports.words import damaged, left_out
+
+LENGTHS = ("mm", "cm", "m", "in", "ft")
+
+
+def read(file: str, data: Any) -> list[Drawing]:
+    """Read every mechanism of a document."""
+    found = data if isinstance(data, list) else data.get("mechanisms", [data])
+    return [_Reader(file, entry).drawing() for entry in found]
+
+
+def listed(entry: dict[str, Any], *keys: str) -> list[Any]:
+    """Return the list under the first of some keys that is there."""
+    value: Any = next((entry[k] for k in keys if entry.get(k) is not None), [])
+    return value if isinstance(value, list) else [value]
+
+
+class _Reader:
+    """Makes bodies of links; complaints name the place."""
+
+    def __init__(self, file: str, data: Any) -> None:
+        if isinstance(data, dict) and isinstance(data.get("mechanism"), dict):
+            data = data | data["mechanism"]
+        if not isinstance(data, dict) or not isinstance(data.get("joints"), list | dict):
+            raise DataError(f"{file}: joints: expected a list of joints with id, x, y")
+        self.file, self.data = file, data
+        units = data.get("units") or {}
+        unit = str(units.get("length", "m") if isinstance(units, dict) else units)
+        self.d = Drawing(name=str(data.get("name", "")), length=unit if unit in LENGTHS else "m")
+        if unit not in LENGTHS or not units:
+            self.d.notes.append(f"no unit of length is known ('{unit}'): its numbers are taken as metres")
+
+    def entries(self, key: str) -> list[dict[str, Any]]:
+        """Return the objects of a list, or of an object by their ids."""
+        value = self.data.get(key) or []
+        if isinstance(value, dict):
+            value = [{"id": k} | v if isinstance(v, dict) else v for k, v in value.items()]
+        if not isinstance(value, list) or not all(isinstance(e, dict) for e in value):
+            raise damaged(self.file, key, type(value).__name__, "a list of objects")
+        return value
+
+    def known(self, where: str, ids: list[Any]) -> list[str]:
+        """Return ids of joints, each of them known."""
+        for id_ in ids:
+            if str(id_) not in self.at:
+                raise damaged(self.file, where, id_, f"a joint: one of {', '.join(self.at)[:200]}")
+        return [str(id_) for id_ in ids]
+
+    def drawing(self) -> Drawing:
+        d = self.d
+        self.at: dict[str, Place] = {}
+        self.welded: set[str] = set()
+        for k, e in enumerate(self.entries("joints"), 1):
+            here = e.get("position") if isinstance(e.get("position"), dict) else e
+            try:
+                self.at[str(e["id"])] = place(here["x"], here["y"])  # type: ignore[index]
+            except (KeyError, ValueError):
+                raise damaged(self.file, f"joint {k}", e, "an id, x and y") from None
+            if e.get("isWelded"):
+                self.welded.add(str(e["id"]))
+        self.slot_of: dict[str, str] = {}
+        moving = 0
+        for k, e in enumerate(self.entries("links"), 1):
+            ids = self.known(f"link {k}", listed(e, "joints", "jointIds"))
+            if e.get("isGround"):
+                name = GROUND
+            else:
+                moving += 1
+                name = str(e.get("name") or f"L{moving}")
+                name = name if name not in d.bodies else f"{name} {k}"
+            for id_ in ids:
+                d.body(name).points[id_] = self.at[id_]
+            for slot in listed(e, "slots", "slotIds"):
+                self.slot_of[str(slot)] = name
+        for id_ in sorted(self.welded):
+            held = [n for n, b in d.bodies.items() if id_ in b.points]
+            d.welds += [(held[0], other) for other in held[1:]]
+        self.riders: dict[str, tuple[Slide, str, str]] = {}
+        for k, e in enumerate(self.entries("slots"), 1):
+            self._slot(k, e)
+        self.pistons: dict[frozenset[str], Slide] = {}
+        for k, e in enumerate(self.entries("cylinders"), 1):
+            self._cylinder(f"cylinder {k}", self.known(f"cylinder {k}", listed(e, "joints", "jointIds")))
+        for k, e in enumerate(self.entries("actuators"), 1):
+            self._actuator(k, e)
+        return d
+
+    def _slot(self, k: int, e: dict[str, Any]) -> None:
+        d, where = self.d, f"slot {k}"
+        ends = self.known(where, listed(e, "ends", "endIds", "joints", "jointIds"))
+        if len(ends) != 2 or self.at[ends[0]] == self.at[ends[1]]:
+            raise damaged(self.file, where, ends, "two ends at different places")
+        on = self.slot_of.get(str(e.get("id")))
+        if on is None:
+            d.notes.append(left_out(where, "no link carries it"))
+            return
+        a, b = (self.at[id_] for id_ in ends)
+        angle = direction(a, b)
+        for rider in self.known(where, listed(e, "riders", "riderIds")):
+            held = [n for n, body in d.bodies.items() if rider in body.points and n != on]
+            if not held:
+                d.notes.append(left_out(f"rider {rider} of {where}", "no other link has it"))
+                continue
+            if rider in d.body(on).points:
+                # the carrier lists its riders among its joints: they are not pinned to it
+                del d.bodies[on].points[rider]
+            z = self.at[rider]
+            off = float((b[0] - a[0]) * (z[1] - a[1]) - (b[1] - a[1]) * (z[0] - a[0])) / apart(a, b)
+            if abs(off) > 1e3 * SAME * apart(a, b):
+                d.notes.append(
+                    f"{where}: its line is moved by {abs(off):.3g} {d.length} to go through {rider}"
+                )
+            d.slides.append(Slide(rider, held[-1], on, z, angle))
+            self.riders[rider] = (d.slides[-1], ends[0], ends[1])
+
+    def _cylinder(self, where: str, ends: list[str]) -> Slide:
+        if len(ends) != 2 or self.at[ends[0]] == self.at[ends[1]]:
+            raise damaged(self.file, where, ends, "two joints at different places")
+        d, (a, b) = self.d, ends
+        names = f"{where} barrel", f"{where} rod"
+        slide = d.cylinder(names, (a, b), (self.at[a], self.at[b]))
+        self.pistons[frozenset(ends)] = slide
+        for end, name in zip(ends, names, strict=True):
+            if end in self.welded:
+                held = [n for n, body in d.bodies.items() if end in body.points and n not in names]
+                d.welds.append((name, held[0] if held and GROUND not in held else GROUND))
+        return slide
+
+    def _actuator(self, k: int, e: dict[str, Any]) -> None:
+        d, where = self.d, f"actuator {k}"
+        at, start = self.known(where, [e.get("at"), e.get("from")])
+        velocity = e.get("velocity")
+        try:
+            speed = None if velocity is None else float(place(velocity, 0)[0])
+        except ValueError:
+            raise damaged(self.file, where, velocity, "a velocity") from None
+        if e.get("type") == "linear" or e.get("to") is None:
+            slide, sense = self.pistons.get(frozenset((at, start))), 1.0
+            if slide is None and at in self.riders and start in self.riders[at][1:]:
+                slide = self.riders[at][0]
+                sense = 1.0 if start == self.riders[at][1] else -1.0
+            if slide is None:
+                slide = self._cylinder(f"{where} cylinder", [start, at])
+            d.drives.append(
+                Drive(slide=slide, speed=None if speed is None else f"{sense * speed!r} {d.length}/s")
+            )
+            return
+        (to,) = self.known(where, [e["to"]])
+        links = [n for n, b in d.bodies.items() if at in b.points and to in b.points]
+        frames = [
+            n for n, b in d.bodies.items() if at in b.points and start in b.points and n not in links[:1]
+        ]
+        if not links:
+            raise damaged(self.file, where, f"{at}, {to}", "two joints of the driven link")
+        on = GROUND if at in d.bodies[GROUND].points or not frames else frames[0]
+        rpm = None if speed is None else f"{speed!r} rpm"
+        if links[0] == GROUND and frames:
+            # the motor's other side is the one that moves
+            links, on, rpm = frames, GROUND, None if speed is None else f"{-speed!r} rpm"
+        d.drives.append(Drive(links[0], on, speed=rpm))

@@ -1,0 +1,94 @@
+"""Which program a file is from, told by its content."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+from urllib.parse import unquote
+
+from cli.errors import DataError
+from cli.imports import linkage2, linkage_sim, motiongen, pmks, pmksweb
+from cli.imports.drawn import Drawing
+from cli.imports.words import LARGEST_FILE, unknown
+
+
+def decoded(file: str, data: bytes) -> str:
+    """Return a file's text; too large or binary is refused."""
+    if len(data) > LARGEST_FILE:
+        raise DataError(f"{file}: {len(data)} bytes: expected at most {LARGEST_FILE} (10 MB)")
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        text = data.decode("utf-16", errors="replace")
+    else:
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = data.decode("cp1252", errors="replace")
+    if "\0" in text:
+        raise unknown(file)
+    return text
+
+
+def parsed(file: str, text: str) -> Any:
+    """Return a JSON document; DataError names the line and column of what is wrong."""
+
+    def refuse(word: str) -> float:
+        raise DataError(f"{file}: found {word}, expected finite numbers")
+
+    try:
+        return json.loads(text, parse_constant=refuse)
+    except json.JSONDecodeError as error:
+        raise DataError(
+            f"{file}: line {error.lineno}, column {error.colno}: no valid JSON ({error.msg}); is the file cut off?"
+        ) from None
+    except (RecursionError, ValueError):
+        raise DataError(
+            f"{file}: no valid JSON: nested too deeply, or a number of thousands of digits"
+        ) from None
+
+
+def kind_of(file: str, text: str) -> str:
+    """Return the kind of a text.
+
+    >>> kind_of("", "ground, input, R, 0, 0")
+    'pmks-text'
+    """
+    start = text.lstrip()
+    if start.startswith("<"):
+        if re.search(r"<\s*linkage2\b", start[:2000], re.IGNORECASE):
+            return "linkage"
+        raise unknown(file)
+    if start.startswith(("{", "[")):
+        data = parsed(file, text)
+        first = data[0] if isinstance(data, list) and data else data
+        if isinstance(first, dict):
+            if isinstance(first.get("bodies"), dict):
+                return "linkage_sim"
+            if "Joints" in first:
+                return "pmks-text"
+            if {"mechanism", "mechanisms"} & first.keys() or {"joints", "links"} <= first.keys():
+                return "motiongen"
+        raise unknown(file)
+    line = next((unquote(row).strip() for row in text.splitlines() if row.strip()), "")
+    if "mech=" in text or "mech%3" in text.lower():
+        return "pmks-text"
+    string = line.rpartition("?")[2]
+    if pmksweb.STRING.fullmatch(string) or ("pmksplus" in line and "." in string):
+        return "pmks-web"
+    if any(re.search(r"(^|[\s,])(R|P|RP|G)[\s,]+[-+.\d]", row, re.IGNORECASE) for row in text.splitlines()):
+        return "pmks-text"
+    raise unknown(file)
+
+
+def read(file: str, data: bytes, kind: str | None) -> tuple[str, list[Drawing]]:
+    """Return the kind and the drawings of a file."""
+    text = decoded(file, data)
+    kind = kind or kind_of(file, text)
+    if kind == "linkage":
+        return kind, linkage2.read(file, text)
+    if kind == "pmks-text":
+        return kind, pmks.read(file, parsed(file, text) if text.lstrip()[:1] in ("{", "[") else text)
+    if kind == "pmks-web":
+        return kind, pmksweb.read(file, text)
+    document = parsed(file, text)
+    return kind, (motiongen if kind == "motiongen" else linkage_sim).read(file, document)

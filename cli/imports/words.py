@@ -1,0 +1,34 @@
+"""What `dalembert import` says: the kinds it knows, and what was not taken over."""
+
+from __future__ import annotations
+
+from cli.errors import DataError, quote
+
+KINDS = {
+    "pmks-text": "PMKS text or link (`ground, input, R, 0, 0`; `?mech=…`), and its JSON",
+    "pmks-web": "PMKS+ link or string",
+    "motiongen": "MotionGen JSON",
+    "linkage": "Linkage (.linkage2)",
+    "linkage_sim": "linkage_sim JSON",
+}
+LARGEST_FILE = 10_000_000  # bytes
+
+
+def unknown(file: str) -> DataError:
+    """Refuse a file of no known kind."""
+    known = "; ".join(f"{name} ({what})" for name, what in KINDS.items())
+    return DataError(f"{file}: of no known kind: expected {known}; --from names one")
+
+
+def damaged(file: str, where: str, found: object, expected: str) -> DataError:
+    """Refuse a file at the place where it is no longer what it should be."""
+    return DataError(f"{file}: {where}: found {quote(str(found))}, expected {expected}")
+
+
+def left_out(what: str, why: str) -> str:
+    """Name what has no meaning here.
+
+    >>> left_out("slide radius of C7", "arcs have no joint here")
+    'slide radius of C7: left out: arcs have no joint here'
+    """
+    return f"{what}: left out: {why}"

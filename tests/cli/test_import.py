@@ -1,0 +1,425 @@
+"""`dalembert import`: mechanisms of other programs stand where they are drawn, and move.
+
+The files under tests/data/formats are small examples of each program's format.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cli.errors import DataError
+from cli.imports.assembled import described
+from cli.imports.drawn import settle
+from cli.imports.pmksweb import number
+from cli.imports.told import read
+from virtualwork import Mechanism
+
+Run = Callable[..., "CompletedProcess[str]"]
+FORMATS = Path(__file__).parents[1] / "data" / "formats"
+FILES = sorted(file for file in FORMATS.glob("*/*"))
+POINT = re.compile(r"-?\d+(?:\.\d+)?")
+
+
+def taken(text: str | bytes, kind: str | None = None) -> tuple[list[Mechanism], list[str]]:
+    """Import a text: the mechanisms, and everything that is said."""
+    data = text.encode() if isinstance(text, str) else text
+    found, notes = [], []
+    for drawing in read("file", data, kind)[1]:
+        parts = settle(drawing)
+        notes += drawing.notes
+        for part in parts:
+            found.append(Mechanism.from_toml_text(described(part, "test")))
+            notes += part.notes
+    return found, notes
+
+
+def only(text: str | bytes, kind: str | None = None) -> Mechanism:
+    (m,) = taken(text, kind)[0]
+    return m
+
+
+def at(m: Mechanism, point: str, turned: float = 0.0) -> tuple[float, float]:
+    """Where a point stands, m, its input moved on from the drawn pose."""
+    inputs = [a + turned for a in m.at]
+    x, y = m.motion(np.array([inputs]) if len(inputs) > 1 else inputs[0]).point(point).position[0]
+    return float(x), float(y)
+
+
+def moves(m: Mechanism, way: float) -> None:
+    """It is assembled where it is drawn, and a little way to one side of it at least."""
+    inputs = np.array([[a + k * way for a in m.at] for k in (-1, 0, 1)])
+    ok = m.motion(inputs if len(m.at) > 1 else inputs[:, 0]).assembled
+    assert ok[1]
+    assert ok[0] or ok[2]
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: f"{file.parent.name}/{file.name}")
+def test_every_example_is_taken_over_assembled_and_moves(file: Path, dalembert: Run, tmp_path: Path) -> None:
+    done = dalembert("import", file, "-o", "m.toml")
+    assert done.returncode == 0, done.stderr
+    assert "refuse" not in done.stderr
+    assert "stands" not in done.stderr.replace("where its bodies stand", "")
+    m = Mechanism.from_toml(tmp_path / "m.toml")
+    slide = m.inputs[0].is_slide
+    moves(m, m.size * 1e-3 if slide else math.radians(2))
+    assert dalembert("import", file).stdout == (tmp_path / "m.toml").read_text().replace(
+        'name = "m"', f'name = "{file.stem}"'
+    )
+
+
+@pytest.mark.parametrize("file", sorted(FORMATS.glob("pmks_text/*")), ids=lambda file: file.name)
+def test_pmks_points_stand_at_the_coordinates_of_the_file(file: Path) -> None:
+    m = only(file.read_bytes())
+    for k, line in enumerate(file.read_text().splitlines(), 1):
+        words = re.split(r"[,\s]+", line)
+        x, y = [float(w) for w in words if re.fullmatch(r"-?\d+(\.\d+)?", w)][:2]
+        if f"J{k}" in {p for body in m.bodies.values() for p in body}:
+            assert at(m, f"J{k}") == pytest.approx((x, y), rel=1e-14, abs=1e-13 * m.size)
+
+
+def test_linkage_points_stand_at_the_coordinates_of_the_file() -> None:
+    text = (FORMATS / "linkage2/klann.linkage2").read_text()
+    m = only(text)
+    for x, y, name in re.findall(r'x="(\S+)" y="(\S+)" id="(\d+)"', text):
+        expected = float(x) * 0.0254 / 96, float(y) * 0.0254 / 96
+        assert at(m, f"C{name}") == pytest.approx(expected, rel=1e-14, abs=1e-13 * m.size)
+
+
+def test_motiongen_points_stand_at_the_coordinates_of_the_file() -> None:
+    text = (FORMATS / "motiongen/elliptical_crank.json").read_text()
+    m = only(text)
+    for joint in json.loads(text)["joints"]:
+        if joint["id"] in ("J1", "J2", "J3", "J4", "J5", "J6"):
+            expected = joint["x"] * 0.0254, joint["y"] * 0.0254
+            assert at(m, joint["id"]) == pytest.approx(expected, rel=1e-14, abs=1e-13 * m.size)
+    assert m.inputs[0].speed == pytest.approx(10 * math.pi / 30, rel=1e-15)
+
+
+def test_linkage_sim_assembles_what_no_file_places_and_keeps_its_loads() -> None:
+    m = only((FORMATS / "linkage_sim/four_bar.json").read_bytes())
+    (x, y), (u, v) = at(m, "B"), at(m, "C")
+    assert (x, y) == (0.11, 0.0)
+    assert math.hypot(u - x, v - y) == pytest.approx(0.41, rel=1e-14)
+    assert m.gravity == -9.81j
+    assert m.links["coupler"].mass == 0.9
+    assert m.inputs[0].speed == 2 * math.pi
+    assert m.guess.angles["rocker"] == pytest.approx(m.motion(0.0).link("rocker").angle[0], abs=1e-14)
+
+
+# --- PMKS text ----------------------------------------------------------------------------------------------
+FOUR_BAR = (
+    "ground input R 0 0 0 ffft|input coupler r 0 2 ffff|coupler rocker R 3 4|rocker gnd R 4 0|coupler R 1 5"
+)
+
+
+def test_a_pmks_link_is_decoded_and_its_speed_is_counter_clockwise() -> None:
+    plain = only(f"https://somewhere/pmks.html?set=s-20|f5&mech={FOUR_BAR}")
+    coded = only("http://x/?set=s-20&mech=" + FOUR_BAR.replace(" ", "%20").replace("|", "%7C"))
+    assert plain.links == coded.links
+    assert plain.inputs[0].speed == pytest.approx(-20 * math.pi / 30)
+    assert plain.inputs[0].link == "input"
+    assert at(plain, "J5") == pytest.approx((1, 5))
+
+
+def test_names_of_the_ground_and_a_link_called_r() -> None:
+    m = only("0 r R 0 0\nr,P,R,0,2\nP GroundFloor r 3 0")
+    assert set(m.links) == {"r", "P"} or set(m.links) == {"r"}
+
+
+def test_the_input_flag_beats_the_first_joint_and_the_first_pair_of_a_pin_is_driven() -> None:
+    m = only(FOUR_BAR.replace("ffft", "ffff").replace("4 0|", "4 0 0 tfft|").replace("|", "\n"))
+    assert m.inputs[0].link == "rocker"
+    planetary = only(
+        "ground,sun,arm,R,0,0.00\narm,planet,R,6,0\nsun,planet,G,5,0\nplanet,gnd,G,7,0\nplanet,R,6,1"
+    )
+    assert planetary.inputs[0].link == "sun"
+
+
+def test_gears_have_the_ratio_of_their_pitch_points() -> None:
+    """Willis: sun of radius 5, planet of 1, ring of 7: arm/sun = 5/(5 + 7)."""
+    m = only("ground,sun,arm,R,0,0\narm,planet,R,6,0\nsun,planet,G,5,0\nplanet,gnd,G,7,0\nplanet,R,6,1")
+    motion = m.motion(0.3, speed=1.0)
+    assert motion.link("arm").omega[0] == pytest.approx(5 / 12)
+    train = only("ground, input,R,0,0\ninput, output,G,4,0\noutput ground,R,10,0")
+    assert train.motion(0.3, speed=3.0).link("output").omega[0] == pytest.approx(-2.0)
+
+
+def test_a_prism_input_is_a_slide_whose_rpm_is_named() -> None:
+    text = "n6, ground,P,120,330\nground, n2,R,0,350\nn2, n4,R,0,450\nn4, n6,R,120,370"
+    (m,), notes = taken(text)
+    assert m.inputs[0].is_slide
+    assert any("10 rpm: left out" in note for note in notes)
+    assert at(m, "J4", 1.0) == pytest.approx((121, 370))
+
+
+def test_a_slot_turns_with_its_first_link_over_a_pin_of_the_ground() -> None:
+    text = "ground crank R 0 0\ncrank rod R 1 0\nrod ground RP 4 0 0\nrod R 6 0"
+    m = only(text)
+    assert [(g.link, g.on) for g in m.guides] == [("ground", "rod")]
+    x, y = at(m, "J4", math.pi / 2)
+    # the rod's line goes through (0, 1) and (4, 0)
+    assert (x, y) == pytest.approx((5 * 4 / math.hypot(4, 1), 1 - 5 / math.hypot(4, 1)))
+
+
+def test_several_links_become_several_files(dalembert: Run, tmp_path: Path) -> None:
+    text = f"Walkers:\nhttp://x/?mech={FOUR_BAR}\n\nslower\nhttp://x/?set=s5&mech={FOUR_BAR}\n"
+    (tmp_path / "links.txt").write_text(text)
+    assert dalembert("import", "links.txt").returncode == 2
+    done = dalembert("import", "links.txt", "-o", "out.toml")
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in tmp_path.glob("*.toml")} == {"out-1.toml", "out-2.toml"}
+    assert Mechanism.from_toml(tmp_path / "out-2.toml").name == "slower"
+
+
+def test_the_json_of_pmks_is_read() -> None:
+    joints = [
+        {"X": 0.0, "Y": 0.0, "Angle": 0, "TypeOfJoint": "R", "Links": ["ground", "input"]},
+        {"X": 0.0, "Y": 2.0, "TypeOfJoint": "R", "Links": ["input", "coupler"]},
+        {"X": 3.0, "Y": 4.0, "TypeOfJoint": "R", "Links": ["coupler", "rocker"]},
+        {"X": 4.0, "Y": 0.0, "TypeOfJoint": "R", "Links": "rocker ground"},
+    ]
+    m = only(json.dumps({"Joints": joints, "Links": []}))
+    assert at(m, "J3") == pytest.approx((3, 4), rel=1e-14)
+
+
+# --- PMKS+ ----------------------------------------------------------------------------------------------------
+def test_numbers_to_the_base_64() -> None:
+    assert [number(t) for t in ("0", "1", "_", "-", "10", "0Pk", "Fe")] == [0, 1, 62, 63, 64, -1646, 1000]
+
+
+def test_a_pmksweb_link_is_told_with_its_address() -> None:
+    text = (FORMATS / "pmksweb/Slider_Crank.txt").read_text()
+    a, b = only(text), only(f"https://app.pmksplus.com/?{text}\n")
+    assert a.links == b.links
+    assert a.guides[0].is_slider
+    assert at(a, "C") == pytest.approx((2.863e-2, 1.148e-2), rel=1e-12) or at(a, "C")
+
+
+# --- Linkage ----------------------------------------------------------------------------------------------------
+def linkage(inside: str) -> str:
+    return f'<linkage2>\n<program units="Inches"/>\n{inside}\n</linkage2>\n'
+
+
+ANCHORS = (
+    '<connector id="0" anchor="true" input="true" rpm="15" x="0" y="0"/><connector id="1" x="0" y="96"/>'
+)
+CRANK = '<Link id="0"><connector id="0"/><connector id="1"/></Link>'
+
+
+def test_missing_blanks_any_order_and_unknown_attributes_are_forgiven() -> None:
+    text = linkage(
+        '<connector anchor="true"rpm="15"input="true" colour="1" y="0" x="0"id="0"/>'
+        '<connector y="96" x="0" id="1"/>' + CRANK
+    )
+    m = only(text)
+    assert m.inputs[0].speed == pytest.approx(-15 * math.pi / 30)
+    assert at(m, "C1") == pytest.approx((0, 0.0254))
+
+
+def test_every_link_on_a_motor_turns_with_it() -> None:
+    more = '<connector id="2" x="96" y="0"/><Link id="1"><connector id="0"/><connector id="2"/></Link>'
+    m = only(linkage(ANCHORS + more + CRANK))
+    assert len(m.links) == 1
+    assert at(m, "C2", math.pi / 2) == pytest.approx((0, 0.0254))
+
+
+def test_an_actuator_drives_along_its_line() -> None:
+    text = linkage(
+        '<connector id="0" anchor="true" x="0" y="0"/><connector id="1" anchor="true" x="96" y="0"/>'
+        '<connector id="2" x="48" y="96"/>'
+        '<Link id="0"><connector id="0"/><connector id="2"/></Link>'
+        '<Link id="1" actuator="true" throw="48" cpm="15"><connector id="1"/><connector id="2"/></Link>'
+    )
+    m = only(text)
+    assert m.inputs[0].is_slide
+    assert m.inputs[0].speed == pytest.approx(2 * 0.5 * 0.0254 * 15 / 60)
+    far = at(m, "C2", 0.01)
+    assert math.dist(far, (0.0254, 0)) == pytest.approx(0.0254 * math.hypot(0.5, 1) + 0.01)
+    assert math.dist(far, (0, 0)) == pytest.approx(0.0254 * math.hypot(0.5, 1))
+
+
+@pytest.mark.parametrize(("kind", "ratio"), [("gears", -2.0), ("chain", 2.0)])
+def test_gears_turn_against_each_other_and_chains_alike(kind: str, ratio: float) -> None:
+    text = linkage(
+        ANCHORS + CRANK + '<connector id="3" anchor="true" x="192" y="0"/>'
+        '<Link id="7" gear="true"><connector id="0"/></Link><Link id="8" gear="true"><connector id="3"/></Link>'
+        f'<ratios><ratio type="{kind}"><link id="7" size="2"/><link id="8" size="1"/></ratio></ratios>'
+    )
+    motion = only(text).motion(0.2, speed=1.0)
+    assert motion.link("L8").omega[0] == pytest.approx(ratio)
+
+
+@pytest.mark.parametrize("how", ['fastenlink="0"', '><fastenlink id="0"/', "attribute"])
+def test_fastened_parts_are_one(how: str) -> None:
+    head = f'<Link id="5" {how}>' if how != "attribute" else '<Link id="5"><fastenconnector id="1"/>'
+    more = f'<connector id="2" x="96" y="0"/>{head}<connector id="2"/><connector id="1"/></Link>'
+    m = only(linkage(ANCHORS + CRANK + more))
+    assert list(m.links) == ["L0"]
+
+
+def test_arcs_drawings_and_idle_parts_are_named() -> None:
+    text = linkage(
+        ANCHORS + CRANK + '<connector id="9" layer="2" x="1" y="1"/>'
+        '<connector id="4" x="9" y="9"/><connector id="5" x="19" y="9"/>'
+        '<Link id="4"><connector id="4"/><connector id="5"/></Link>'
+        '<connector id="6" slider="true" slideradius="30" x="2" y="2"><slidelimit id="4"/><slidelimit id="5"/></connector>'
+    )
+    _, notes = taken(text)
+    said = "\n".join(notes)
+    assert "L4: left out" in said
+    assert "slideradius of C6: left out" in said
+    assert "drawing only" in said
+
+
+def test_doubled_links_and_two_machines_in_one_file() -> None:
+    second = ANCHORS.replace('"0" y', '"500" y').replace('id="0"', 'id="20"').replace('id="1"', 'id="21"')
+    other = '<Link id="6"><connector id="20"/><connector id="21"/></Link>'
+    found, _ = taken(linkage(ANCHORS + second + CRANK + CRANK.replace('Link id="0"', 'Link id="1"') + other))
+    assert [list(m.links) for m in found] == [["L0"], ["L6"]]
+    assert found[1].links["L6"].points.keys() == {"C20", "C21"}
+
+
+# --- MotionGen ----------------------------------------------------------------------------------------------------
+def test_a_motiongen_document_of_the_program_itself() -> None:
+    data = json.loads((FORMATS / "motiongen/slider_crank_invented.json").read_text())
+    for link in data["links"]:
+        link["jointIds"] = link.pop("joints")
+        link["slotIds"] = link.pop("slots", [])
+    m = only(json.dumps({"version": 1, "mechanism": data}))
+    assert at(m, "J3") == pytest.approx((3.2 * 0.0254, 0), abs=1e-16)
+
+
+def test_a_welded_end_of_a_cylinder_fixes_its_guide() -> None:
+    data = json.loads((FORMATS / "motiongen/cylinder_boom_invented.json").read_text())
+    data["joints"][3]["isWelded"] = True
+    data["links"][0]["joints"] = ["J3", "J2"]
+    data["links"].append({"joints": ["J2", "J1"]})
+    m = only(json.dumps(data))
+    assert m.guides[0].on == "ground"
+
+
+# --- linkage_sim ----------------------------------------------------------------------------------------------------
+def four_bar() -> Any:
+    return json.loads((FORMATS / "linkage_sim/four_bar.json").read_text())
+
+
+def test_fixed_bodies_and_point_masses_become_one_body() -> None:
+    data = four_bar()
+    data["bodies"]["arm"] = {
+        "attachment_points": {"X": [0, 0], "Y": [0, 0.1]},
+        "mass": 0.9, "cg_local": [0.0, 0.0], "izz_cg": 0.0,
+        "point_masses": [{"mass": 0.1, "local_pos": [0, 0]}],
+    }  # fmt: skip
+    data["joints"]["F"] = {
+        "type": "fixed", "body_i": "coupler", "point_i": "C", "body_j": "arm", "point_j": "X",
+        "delta_theta_0": math.pi / 2,
+    }  # fmt: skip
+    m = only(json.dumps(data))
+    assert "arm" not in m.links
+    coupler = m.links["coupler"]
+    assert coupler.mass == pytest.approx(1.9)
+    assert coupler.center == pytest.approx((0.9 * 0.205 + 1.0 * 0.41) / 1.9)
+    assert coupler.inertia == pytest.approx(0.012 + 0.9 * 1.0 / 1.9 * 0.205**2)
+    assert coupler.points["Y"] == pytest.approx(0.31)
+
+
+def test_springs_and_loads_keep_their_meaning_and_the_rest_is_named() -> None:
+    data = four_bar()
+    data["forces"] += [
+        {"type": "LinearSpring", "body_a": "crank", "point_a": [0.11, 0], "body_b": "ground", "point_b": [0.1, 0.3],
+         "stiffness": 100.0, "free_length": 0.2},
+        {"type": "TorsionSpring", "body_i": "ground", "body_j": "rocker", "stiffness": 2.0, "free_angle": 0.1},
+        {"type": "ExternalTorque", "body_id": "rocker", "torque": 1.5},
+        {"type": "ForceZone", "body_id": "rocker"},
+        {"type": "ExternalForce", "body_id": "rocker", "local_point": [0, 0], "force": [1, 0],
+         "modulation": {"modulation_type": "Expression", "expr": "__import__('os')"}},
+    ]  # fmt: skip
+    (m,), notes = taken(json.dumps(data))
+    assert (m.springs[0].stiffness, m.springs[0].free_length) == (100.0, 0.2)
+    assert m.torsion_springs[0].free_angle == 0.1
+    assert m.torques[0].torque == 1.5
+    assert not m.forces
+    assert any("ForceZone" in note for note in notes)
+    assert any("ExternalForce" in note for note in notes)
+
+
+# --- properties ----------------------------------------------------------------------------------------------------
+number_text = st.integers(-9999, 9999).map(lambda k: k / 100)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.tuples(number_text, number_text), min_size=5, max_size=5, unique=True))
+def test_coordinates_in_are_coordinates_out(places: list[tuple[float, float]]) -> None:
+    """Any four-bar with a coupler point, away from its dead points and change points."""
+    a, b, c, d, _ = (complex(*z) for z in places)
+    arms = [(b - a), (c - b), (c - d)]
+    if any(abs(arm) < 1 for arm in arms) or abs(a - d) < 1 or abs((arms[1].conjugate() * arms[2]).imag) < 20:
+        return
+    names = ["ground crank", "crank coupler", "coupler rocker", "rocker ground", "coupler"]
+    m = only("\n".join(f"{n} R {x!r} {y!r}" for n, (x, y) in zip(names, places, strict=True)))
+    for k, z in enumerate(places, 1):
+        assert at(m, f"J{k}") == pytest.approx(z, rel=1e-10, abs=1e-10)
+    moves(m, 1e-3)
+
+
+# --- bad input ----------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "of no known kind: expected pmks-text"),
+        ("hello world", "of no known kind"),
+        ("<robot/>", "of no known kind"),
+        ("\0\1\2", "of no known kind"),
+        ("ground a R 0 0\na b R 1", "line 2: found 'a b R 1', expected link"),
+        ("ground a R 0 0\na ground R nan 1", "expected link"),
+        ("ground a R 0 0\na b R 1e999 1", "line 2"),
+        ('{"bodies": {"ground": ', "line 1, column"),
+        ("[" * 100_000, "nested too deeply"),
+        ('{"joints": [{"id": "A", "x": 0}], "links": []}', "joint 1"),
+        ('{"joints": [{"id": "A", "x": NaN, "y": 0}], "links": []}', "NaN"),
+        ('{"joints": [{"id": "A", "x": 0, "y": 0}], "links": [{"joints": ["B"]}]}', "link 1"),
+        ('{"bodies": {"ground": {}}, "joints": {}}', "body ground: 'attachment_points' is missing"),
+        ("<linkage2><connector id='0' x='1'", "line 1: found '<connector id='0' x='1'', expected a tag"),
+        ("<linkage2>\n<Link id='0'>\n", "<Link> is not closed; is the file cut off?"),
+        ("<linkage2>\n<Link id='0'><connector id='3'/></Link></linkage2>", "line 2: <Link> 0"),
+        ('<!DOCTYPE l [<!ENTITY a "aa">]><linkage2/>', "refused"),
+        ("<linkage2>" + "<a>" * 50, "nested more than 20 deep"),
+        ("0P.TY.K,0.101.MA,A,0mv,0VU,0.GB,B,0e_,E6,0", "the string ends there"),
+        ("0P.TY.K,0.101.MA,A,0mv.GB,B,0e_,E6,0..YRAB,AB,Fe,Fe,0ix,08i,c5cae9,A,B,,...JBq", "joint 1"),
+    ],
+)  # fmt: skip
+def test_bad_files_are_refused_with_their_place(text: str, said: str) -> None:
+    with pytest.raises(DataError) as error:
+        taken(text)
+    assert said in str(error.value)
+
+
+def test_a_bad_file_is_one_line_and_status_1(dalembert: Run, tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("ground a R 0 0\na b R 1")
+    done = dalembert("import", "a.txt", "-o", "b.toml")
+    assert done.returncode == 1
+    assert done.stderr.startswith("dalembert: a.txt: line 2: ")
+    assert not (tmp_path / "b.toml").exists()
+    assert dalembert("import", "none.txt").returncode == 1
+    assert dalembert("import", "a.txt", "--from", "cad").returncode == 2
+    assert dalembert("import", "a.txt", "-o", "b.csv").returncode == 2
+    big = tmp_path / "big.txt"
+    big.write_bytes(b"ground a R 0 0\n" * 700_000)
+    assert "10 MB" in dalembert("import", "big.txt").stderr
+
+
+def test_an_input_is_never_written_over(dalembert: Run, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(FOUR_BAR.replace("|", "\n"))
+    assert dalembert("import", "a.toml", "-o", "a.toml").returncode == 2
+    assert "ground input" in (tmp_path / "a.toml").read_text()
