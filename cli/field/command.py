@@ -191,7 +191,7 @@ def run(
     from cli.field.layouts import is_log
     from cli.field.log import read_log
     from cli.field.read import NotOneInitialRun, read_runs
-    from cli.field.solve import FieldBalancing, Request
+    from cli.field.solve import FieldBalancing
     from cli.read.tolerance import tolerance_of
 
     error = asked.reading_error(reading_error)
@@ -235,7 +235,7 @@ def run(
         raise options.bad(
             "--radius", "the tolerance is of unbalances: expected the radius of the trial masses"
         )
-    request = Request(
+    request = asked.Request(
         objective=objective,
         max_mass=asked.limits_in(limits, measured) or measured.max_mass,
         max_residual=None if ceiling is None else asked.ceiling_in(ceiling, measured),
