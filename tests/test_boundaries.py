@@ -28,7 +28,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("optimality",),
         ("limited", "rounding", "run_log"),
         ("influence", "propagation", "qr"),
-        ("cone_problem", "dependence", "phase", "rotor"),
+        ("cone_problem", "dependence", "phase", "rotor", "synchronous"),
     ),
     "virtualwork": (
         ("__init__",),

@@ -124,6 +124,12 @@ def run(
     robust: Annotated[
         bool, typer.Option("--robust", help="Beside the fit one that hardly counts outliers (Huber).")
     ] = False,
+    signal: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE.csv", help="Once-per-turn vectors of a recording: t_s, mark, A_um …; no RUNS."
+        ),
+    ] = None,
     report: Annotated[
         Path | None,
         typer.Option(
@@ -170,6 +176,12 @@ def run(
         from cli.field.trial import suggestion
 
         return suggestion(rotor_mass, speed, arm, planes)
+    if signal is not None:
+        if runs is not None:
+            raise options.bad("--signal", "reads a recording: expected no RUNS")
+        from cli.field.signal import signal as recorded
+
+        return recorded(signal)
     if runs is None:
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
 
