@@ -38,7 +38,7 @@ def read(file: str, text: Any) -> list[Drawing]:
         return [_json(file, entry) for entry in (text if isinstance(text, list) else [text])]
     lines = [unquote(line) if "mech=" in line else line for line in text.splitlines()]
     starts = [i for i, line in enumerate(lines) if "mech=" in line]
-    if len(starts) <= 1:
+    if len(starts) <= 1 and not any(line.partition("mech=")[2].strip() for line in lines):
         return [_one(file, "\n".join(lines), 1)]
     found = []
     titles: list[str] = []
@@ -57,13 +57,13 @@ def _one(file: str, text: str, first: int) -> Drawing:
     head, _, body = text.rpartition("mech=")
     d = Drawing()
     speed = SPEED
-    settings = re.search(r"set=([^&\n]*)", head)
+    settings = re.search(r"(?:^|[?&])set=([^&\n]*)", head, re.MULTILINE)
     for word in re.split(r"[|,\s]+", settings[1] if settings else ""):
         if word[:1] == "s":
             speed = _number(file, "set", word[1:])
         elif word:
             d.notes.append(left_out(f"setting {word}", "it is the other program's step or tolerance"))
-    if re.search(r"ts=[^&\s]", head):
+    if re.search(r"(?:^|[?&])ts=[^&\s]", head, re.MULTILINE):
         d.notes.append(left_out("ts", "a target shape is no part of the mechanism"))
     body, *more = body.split("&")
     for rest in more:
@@ -183,10 +183,11 @@ def mesh(d: Drawing, a: str, b: str, at: Place, what: str) -> None:
     """Two gears that touch at a pitch point: their centres are pins that one arm holds (R. Willis, 1841)."""
     best: tuple[float, Mesh] | None = None
     pins = d.pins()
-    for p, first in pins.items():
-        for q, second in pins.items():
+    centers = {p: _at_a_center(d, pins, p) for p, names in pins.items() if a in names or b in names}
+    for p, first in centers.items():
+        for q, second in centers.items():
             arms = [n for n in first if n in second and n not in (a, b)]
-            if p == q or a not in first or b not in second or not arms:
+            if p == q or a not in pins[p] or b not in pins[q] or not arms:
                 continue
             zp, zq = d.bodies[a].points[p], d.bodies[b].points[q]
             between = apart(zp, zq)
@@ -208,6 +209,17 @@ def mesh(d: Drawing, a: str, b: str, at: Place, what: str) -> None:
             f"{what}: its pitch point is off the line of the centres; the nearest point of it serves"
         )
     d.meshes.append(best[1])
+
+
+def _at_a_center(d: Drawing, pins: dict[str, list[str]], point: str) -> list[str]:
+    """Return the bodies that turn about a pin: those of other pins in the same place of one of its bodies too."""
+    found = dict.fromkeys(pins[point])
+    for body in pins[point]:
+        held = d.bodies[body].points
+        for other, names in pins.items():
+            if other in held and held[other] == held[point]:
+                found |= dict.fromkeys(names)
+    return list(found)
 
 
 def _json(file: str, data: Any) -> Drawing:
