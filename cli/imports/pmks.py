@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from cli.errors import DataError, quote
-from cli.imports.drawn import GROUND, Drawing, Drive, Mesh, Place, Slide, apart, direction, place
+from cli.imports.drawn import GROUND, Drawing, Drive, Mesh, Place, Slide, apart, direction, place, turning_at
 from cli.imports.words import damaged, left_out
 
 TYPES = ("R", "P", "RP", "G")
@@ -183,7 +183,7 @@ def mesh(d: Drawing, a: str, b: str, at: Place, what: str) -> None:
     """Two gears that touch at a pitch point: their centres are pins that one arm holds (R. Willis, 1841)."""
     best: tuple[float, Mesh] | None = None
     pins = d.pins()
-    centers = {p: _at_a_center(d, pins, p) for p, names in pins.items() if a in names or b in names}
+    centers = {p: turning_at(d, pins, p) for p, names in pins.items() if a in names or b in names}
     for p, first in centers.items():
         for q, second in centers.items():
             arms = [n for n in first if n in second and n not in (a, b)]
@@ -209,17 +209,6 @@ def mesh(d: Drawing, a: str, b: str, at: Place, what: str) -> None:
             f"{what}: its pitch point is off the line of the centres; the nearest point of it serves"
         )
     d.meshes.append(best[1])
-
-
-def _at_a_center(d: Drawing, pins: dict[str, list[str]], point: str) -> list[str]:
-    """Return the bodies that turn about a pin: those of other pins in the same place of one of its bodies too."""
-    found = dict.fromkeys(pins[point])
-    for body in pins[point]:
-        held = d.bodies[body].points
-        for other, names in pins.items():
-            if other in held and held[other] == held[point]:
-                found |= dict.fromkeys(names)
-    return list(found)
 
 
 def _json(file: str, data: Any) -> Drawing:
