@@ -371,6 +371,13 @@ def test_text_and_report_tell_the_history(dalembert: Dalembert, tmp_path: Any) -
     ):
         assert words in done.stdout
     page = (tmp_path / "r.html").read_text()
+    # a dot for each reading
+    drawn = dalembert("field", "-", "--plot", "p.svg", stdin=text)
+    assert drawn.returncode == 0, drawn.stderr
+    plain = dalembert("field", "-", "--plot", "q.svg", stdin=standard(MASSES[:2], ERRORS[:2]))
+    assert plain.returncode == 0
+    used = [(tmp_path / name).read_text().count("<use ") for name in ("p.svg", "q.svg")]
+    assert used[0] >= used[1] + 12
     assert "12 readings fitted together" in page
     assert "standardised" in page
 
