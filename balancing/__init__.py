@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from balancing.rotor import by_size
     from balancing.rounding import influence_error
     from balancing.run_log import JointFit, Undetermined, determined, joint_fit
+    from balancing.synchronous import OncePerTurn, once_per_turn
     from balancing.tolerance import GRADES, allocate, grade_value, permissible_unbalance
     from balancing.trial import (
         ErrorBudget,
@@ -53,6 +54,7 @@ _HOMES = {
     "balancing.limited": "Infeasible",
     "balancing.log_balance": "LogBalance region_factor",
     "balancing.next_run": "NextRun suggest_run",
+    "balancing.synchronous": "OncePerTurn once_per_turn",
     "balancing.placement": "Placement drill_depth place place_from_stock transfer",
     "balancing.rotor": "by_size",
     "balancing.rounding": "influence_error",
@@ -87,6 +89,7 @@ __all__ = [
     "JointFit",
     "LogBalance",
     "NextRun",
+    "OncePerTurn",
     "Placement",
     "Readings",
     "TrialEffect",
@@ -108,6 +111,7 @@ __all__ = [
     "joint_fit",
     "least_squares",
     "minimax",
+    "once_per_turn",
     "outlier_probability",
     "permissible_unbalance",
     "phase_sense",

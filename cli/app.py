@@ -25,6 +25,7 @@ COMMANDS = {
     "body": ("cli.body.command", "Put a body together: inertia, angular momentum, shaft reactions."),
     "spin": ("cli.spin.command", "Turn a body through time: free, under gravity, under a torque."),
     "import": ("cli.imports.command", "Take over a mechanism drawn in another program."),
+    "completion": ("cli.completion.command", "Print the completion script for bash, zsh or fish."),
     "examples": ("cli.examples.command", "List the worked examples, or write one into the current folder."),
 }
 
@@ -65,6 +66,16 @@ def build(called: str | None) -> typer.Typer:
     return app
 
 
+def _words() -> list[str]:
+    """Return the words of the command line; where a shell completes it, those that it has so far."""
+    if "_DALEMBERT_COMPLETE" not in os.environ:
+        return sys.argv[1:]
+    from typer.completion import completion_init  # type: ignore[attr-defined]
+
+    completion_init()
+    return (os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS") or "").split()[1:]
+
+
 def main(front: Callable[[str | None], Callable[..., object]] = build) -> None:
     """Run the command; a data error is one line on standard error and status 1, never a traceback.
 
@@ -73,7 +84,7 @@ def main(front: Callable[[str | None], Callable[..., object]] = build) -> None:
     # Small matrices only: a pool of BLAS threads costs more to start than it gives. The user's word goes first.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     forget()
-    called = next((word for word in sys.argv[1:] if not word.startswith("-")), None)
+    called = next((word for word in _words() if not word.startswith("-")), None)
     try:
         front(called)(prog_name="dalembert")
     except DataError as error:

@@ -109,7 +109,8 @@ def _wrapped(rng: np.random.Generator) -> Pairs:
     """Single-plane balancing from a written table to the columns of the command."""
     from cli.field.columns import corrections
     from cli.field.read import read_runs
-    from cli.field.solve import FieldBalancing, Request
+    from cli.field.request import Request
+    from cli.field.solve import FieldBalancing
 
     v0, t, v1 = _written(rng), _written(rng), _written(rng)
     if rng.random() < 0.4:  # a trial run that hardly differs from the initial one

@@ -124,6 +124,12 @@ def run(
     robust: Annotated[
         bool, typer.Option("--robust", help="Beside the fit one that hardly counts outliers (Huber).")
     ] = False,
+    signal: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE.csv", help="Once-per-turn vectors of a recording: t_s, mark, A_um …; no RUNS."
+        ),
+    ] = None,
     report: Annotated[
         Path | None,
         typer.Option(
@@ -170,6 +176,12 @@ def run(
         from cli.field.trial import suggestion
 
         return suggestion(rotor_mass, speed, arm, planes)
+    if signal is not None:
+        if runs is not None:
+            raise options.bad("--signal", "reads a recording: expected no RUNS")
+        from cli.field.signal import signal as recorded
+
+        return recorded(signal)
     if runs is None:
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
 
@@ -179,7 +191,7 @@ def run(
     from cli.field.layouts import is_log
     from cli.field.log import read_log
     from cli.field.read import NotOneInitialRun, read_runs
-    from cli.field.solve import FieldBalancing, Request
+    from cli.field.solve import FieldBalancing
     from cli.read.tolerance import tolerance_of
 
     error = asked.reading_error(reading_error)
@@ -223,7 +235,7 @@ def run(
         raise options.bad(
             "--radius", "the tolerance is of unbalances: expected the radius of the trial masses"
         )
-    request = Request(
+    request = asked.Request(
         objective=objective,
         max_mass=asked.limits_in(limits, measured) or measured.max_mass,
         max_residual=None if ceiling is None else asked.ceiling_in(ceiling, measured),

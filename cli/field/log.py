@@ -61,11 +61,9 @@ def read_log(path: str, *, lagging: bool | None, exclude: Sequence[str] = ()) ->
         if name not in rows.run:
             raise bad("--exclude", f"no run {quote(name)} in {table.file}")
     by_rotor: list[list[int]] = [[] for _ in names]
-    left_out = set(exclude)
-    for i, (r, run) in enumerate(zip(rotor.tolist(), rows.run, strict=True)):
-        if run not in left_out:
-            by_rotor[r].append(i)
-    Logs(rows, runs, lagging).read(by_rotor)
+    for i, r in enumerate(rotor.tolist()):
+        by_rotor[r].append(i)
+    Logs(rows, runs, lagging, set(exclude)).read(by_rotor)
     runs.warnings = [*table.warnings, *runs.warnings]
     return runs
 

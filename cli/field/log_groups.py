@@ -51,8 +51,8 @@ class _Rotor(NamedTuple):
 class Logs:
     """The logs of all rotors; those of like shape and names become a group."""
 
-    def __init__(self, rows: LogRows, runs: Runs, lagging: bool | None) -> None:
-        self.rows, self.runs, self.lagging = rows, runs, lagging
+    def __init__(self, rows: LogRows, runs: Runs, lagging: bool | None, exclude: set[str]) -> None:
+        self.rows, self.runs, self.lagging, self.exclude = rows, runs, lagging, exclude
         self.several = len(rows.rotors) > 1
         self.lost = 0
 
@@ -141,9 +141,13 @@ class Logs:
     def _rotor(self, r: int, members: list[int]) -> _Rotor:
         rows = self.rows
         of = f"rotor {rows.rotors[r]}: " if self.several else ""
+        # what a run that is left out has put on stays on all the same
+        standing, on = self._on(members)
+        if self.exclude:
+            members = [i for i in members if rows.run[i] not in self.exclude]
+            on = {run: masses for run, masses in on.items() if run not in self.exclude}
         if not members:
             raise DataError(f"{rows.table.file}: {of}every run is excluded: expected runs to fit")
-        standing, on = self._on(members)
         planes = list(dict.fromkeys(plane for masses in on.values() for plane in masses))
         if not any(mass for masses in on.values() for mass in masses.values()):
             raise DataError(

@@ -2,12 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from cli.field.files import convert_amplitude
 from cli.field.runs import Runs
 from cli.read import options
+from cli.read.tolerance import Tolerance
 from cli.read.units import UNITS, amplitude_kind, parse_number, to_si
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the options ask for."""
+
+    objective: str = "least-squares"
+    max_mass: dict[str, float] = field(default_factory=dict)
+    """Limit of each plane, SI; the key "" is for all."""
+    max_residual: float | None = None
+    """In the table's amplitude unit."""
+    from_here: bool = False
+    runout: dict[str, complex] = field(default_factory=dict)
+    reading_error: tuple[float, float] | None = None
+    """Relative, rad."""
+    monte_carlo: int = 0
+    four_run: bool = False
+    ridge: float = 0.0
+    tolerance: Tolerance | None = None
+    radius: float | None = None
+    conventions: str = ""
+    places: list[float] | None = None
+    """Where masses can go, degrees: the corrections are split onto them."""
 
 
 def conventions(method: str, phase_lag: bool, rotation: str | None) -> str:

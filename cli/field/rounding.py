@@ -81,6 +81,8 @@ def uncertainty_share(found: FieldBalancing, solved: Solved, bound: Real) -> Rea
     To first order: the pseudo-inverses of coefficients and trial masses are right to their condition numbers times
     the relative errors of what they are of, and the corrections they are for to their own.
     """
+    if solved.group.fit is not None:
+        return np.full(bound.shape, np.nan)
     of_alpha = np.linalg.norm(coefficient_errors(found, solved), axis=-2)
     norms = np.linalg.norm(solved.alpha, axis=-2)
     relative = 8 * EPS + (of_alpha / np.where(norms > 0, norms, 1.0)).max(axis=-1)

@@ -32,9 +32,9 @@ from balancing import (
 from cli.errors import DataError
 from cli.field.files import Stored
 from cli.field.refusals import planes_say, trials_say
+from cli.field.request import Request
 from cli.field.runs import Complex, Group, Real, Runs
 from cli.read.options import bad
-from cli.read.tolerance import Tolerance
 from cli.read.units import Scaled, from_si
 
 Value = TypeVar("Value", np.float64, np.complex128)
@@ -43,29 +43,6 @@ SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
 MANY = 200  # rotors whose uncertainties are worked out unasked
 SHOWN = 5  # of so many rotors the same is said, of the others together
 UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
-
-
-@dataclass(frozen=True)
-class Request:
-    """What the options ask for."""
-
-    objective: str = "least-squares"
-    max_mass: dict[str, float] = field(default_factory=dict)
-    """Limit of each plane, SI; the key "" is for all."""
-    max_residual: float | None = None
-    """In the table's amplitude unit."""
-    from_here: bool = False
-    runout: dict[str, complex] = field(default_factory=dict)
-    reading_error: tuple[float, float] | None = None
-    """Relative, rad."""
-    monte_carlo: int = 0
-    four_run: bool = False
-    ridge: float = 0.0
-    tolerance: Tolerance | None = None
-    radius: float | None = None
-    conventions: str = ""
-    places: list[float] | None = None
-    """Where masses can go, degrees: the corrections are split onto them."""
 
 
 class Verdict(NamedTuple):

@@ -16,6 +16,8 @@ from virtualwork.describe.errors import MechanismError
 TRIED = tuple(range(0, 360, 15))
 # how far from its drawn place a point may stand, of the drawing's size: rounding, magnified near change points
 NEAR = 1e-9
+# a little way of an input: rad, or of the mechanism's size
+LITTLE = 1e-3
 
 
 def described(d: Drawing, source: str) -> str:
@@ -31,6 +33,8 @@ def described(d: Drawing, source: str) -> str:
             d.notes.append("it cannot be assembled as it is drawn")
             return made
         d.notes += warnings
+        if not _moves(d, m):
+            d.notes.append("its input moves to neither side of the drawn pose: it stands at a limit there")
         if d.posed:
             off, point = max(_gaps(d, m, motion), default=(0.0, ""))
             if not off <= NEAR * m.size:
@@ -40,6 +44,13 @@ def described(d: Drawing, source: str) -> str:
     except (MechanismError, np.linalg.LinAlgError) as error:
         d.notes.append(f"`dalembert mechanism` will refuse it: {error}")
     return made
+
+
+def _moves(d: Drawing, m: Mechanism) -> bool:
+    """Return whether it is assembled a little way to one side of the drawn pose at least."""
+    ways = [m.size * LITTLE if e.slide is not None else LITTLE for e in d.drives]
+    inputs = np.array([[e.at + side * w for e, w in zip(d.drives, ways, strict=True)] for side in (-1, 1)])
+    return bool(m.motion(inputs if len(ways) > 1 else inputs[:, 0]).assembled.any())
 
 
 def _gaps(d: Drawing, m: Mechanism, motion: object) -> list[tuple[float, str]]:

@@ -175,6 +175,17 @@ def unused(wanted: str, used: Iterable[str]) -> str:
     return name
 
 
+def turning_at(d: Drawing, pins: dict[str, list[str]], point: str) -> list[str]:
+    """Return the bodies that turn about a pin: those of other pins in the same place of one of its bodies too."""
+    found = dict.fromkeys(pins[point])
+    for body in pins[point]:
+        held = d.bodies[body].points
+        for other, names in pins.items():
+            if other in held and held[other] == held[point]:
+                found |= dict.fromkeys(names)
+    return list(found)
+
+
 def merge(d: Drawing, keep: str, gone: str) -> None:
     """Make two bodies one; both stand at the same angle."""
     if gone == GROUND:

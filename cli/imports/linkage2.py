@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from cli.imports.drawn import GROUND, SAME, Drawing, Drive, Mesh, Place, Slide, apart, direction, place
+from cli.imports.drawn import (
+    GROUND,
+    SAME,
+    Drawing,
+    Drive,
+    Mesh,
+    Place,
+    Slide,
+    apart,
+    direction,
+    place,
+    turning_at,
+)
 from cli.imports.markup import Element, parse
 from cli.imports.words import damaged, left_out
 
@@ -231,8 +243,9 @@ class _Reader:
                 body
                 for p in d.body(first).points
                 for q in d.body(second).points
-                for body in pins.get(p, ())
-                if p != q and body not in (first, second) and body in pins.get(q, ())
+                if p != q and p in pins and q in pins
+                for body in turning_at(d, pins, p)
+                if body not in (first, second) and body in turning_at(d, pins, q)
             ),
             None,
         )

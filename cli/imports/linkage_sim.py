@@ -46,6 +46,20 @@ class _Reader:
             raise DataError(f"{self.file}: {where}: '{key}' is missing")
         return entry[key]
 
+    def named(self, entry: dict[str, Any], key: str, where: str = "") -> dict[str, Any]:
+        """Return an object by names; empty where it is not there."""
+        value = entry.get(key) or {}
+        if not isinstance(value, dict):
+            raise damaged(self.file, f"{where}{key}", value, "an object by names")
+        return value
+
+    def listed(self, entry: dict[str, Any], key: str, where: str = "") -> list[dict[str, Any]]:
+        """Return a list of objects; empty where it is not there."""
+        value = entry.get(key) or []
+        if not isinstance(value, list) or not all(isinstance(e, dict) for e in value):
+            raise damaged(self.file, f"{where}{key}", value, "a list of objects")
+        return value
+
     def pair(self, where: str, value: Any) -> Place:
         """Return two coordinates."""
         try:
@@ -87,7 +101,7 @@ class _Reader:
                 d.notes.append(left_out(f"joint {name}", f"a joint of type {e.get('type')} has no like here"))
         self._drives(joints)
         self._traced()
-        for e in data.get("forces") or []:
+        for e in self.listed(data, "forces"):
             self._force(e)
         if any(body.mass > 0 for name, body in d.bodies.items() if name == GROUND):
             d.bodies[GROUND] = Body(d.bodies[GROUND].points)
@@ -110,7 +124,7 @@ class _Reader:
         if mass < 0 or inertia < 0:
             raise damaged(self.file, where, f"{mass:g}, {inertia:g}", "a mass and an inertia of zero or more")
         loose = [(mass, center, inertia)]
-        for extra in e.get("point_masses") or []:
+        for extra in self.listed(e, "point_masses", f"{where}, "):
             m = self.real(f"{where}, point_masses", self.get(where, extra, "mass"))
             loose.append((m, self.pair(f"{where}, point_masses", self.get(where, extra, "local_pos")), 0.0))
         body = self.d.body(name)
@@ -208,7 +222,7 @@ class _Reader:
 
     def _drives(self, joints: dict[str, dict[str, Any]]) -> None:
         d = self.d
-        rows = [(f"driver {k}", e, False) for k, e in (self.data.get("drivers") or {}).items()]
+        rows = [(f"driver {k}", e, False) for k, e in self.named(self.data, "drivers").items()]
         rows += [(f"joint {k}", e, True) for k, e in joints.items() if e.get("type") == "revolute_driver"]
         for where, e, marker in rows:
             i, j = (self.whole(str(self.get(where, e, f"body_{side}"))) for side in "ij")
@@ -221,14 +235,17 @@ class _Reader:
                 continue
             if e.get("type") == "constant_speed":
                 at = self.real(where, e.get("theta_0", 0.0)) + offset
+                if d.posed and at != 0:
+                    d.notes.append(f"{where}: theta_0 is left out: the drawn pose is that of angle 0")
+                    at = 0.0
                 d.drives.append(
                     Drive(link, on, at=sign * at, speed=sign * self.real(where, e.get("omega", 0.0)))
                 )
             else:
                 why = "the file does not store it" if marker else "an expression is not evaluated"
                 d.notes.append(left_out(f"law of motion of {where}", why))
-                d.drives.append(Drive(link, on, at=sign * offset))
-        for e in self.data.get("linear_drivers") or []:
+                d.drives.append(Drive(link, on, at=0.0 if d.posed else sign * offset))
+        for e in self.listed(self.data, "linear_drivers"):
             self._linear(e)
 
     def _linear(self, e: dict[str, Any]) -> None:
@@ -263,15 +280,14 @@ class _Reader:
         for name, e in self.data["bodies"].items():
             body, turn, shift = self.whole(name)
             for key in ("attachment_points", "coupler_points", "mount_points"):
-                for point, value in (e.get(key) or {}).items():
+                for point, value in self.named(e, key, f"body {name}, ").items():
                     z = self._carried(self.pair(f"body {name}, {point}", value), turn, shift)
                     held = self.d.bodies[body].points
                     if body != GROUND and z not in held.values():
                         held[self.d.fresh(point)] = z
 
-    def _force(self, e: Any) -> None:
-        d = self.d
-        kind = str(e.get("type", "")) if isinstance(e, dict) else ""
+    def _force(self, e: dict[str, Any]) -> None:
+        d, kind = self.d, str(e.get("type", ""))
         where = f"force {kind}"
 
         def at(body: str, point: str | None) -> tuple[str, Place | None]:
@@ -285,9 +301,7 @@ class _Reader:
         def real(key: str) -> float:
             return self.real(f"{where}, {key}", e.get(key, 0.0))
 
-        constant = (
-            (e.get("modulation") or {}).get("modulation_type", "Constant") == "Constant" if kind else False
-        )
+        constant = self.named(e, "modulation", f"{where}, ").get("modulation_type", "Constant") == "Constant"
         if kind == "Gravity":
             g = self.pair(where, self.get(where, e, "g_vector"))
             d.gravity = float(g[0]), float(g[1])

@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from cli.errors import DataError, quote
-from cli.imports.drawn import GROUND, Drawing, Drive, Mesh, Place, Slide, apart, direction, place
+from cli.imports.drawn import GROUND, Drawing, Drive, Mesh, Place, Slide, apart, direction, place, turning_at
 from cli.imports.words import damaged, left_out
 
 TYPES = ("R", "P", "RP", "G")
@@ -38,7 +38,7 @@ def read(file: str, text: Any) -> list[Drawing]:
         return [_json(file, entry) for entry in (text if isinstance(text, list) else [text])]
     lines = [unquote(line) if "mech=" in line else line for line in text.splitlines()]
     starts = [i for i, line in enumerate(lines) if "mech=" in line]
-    if len(starts) <= 1:
+    if len(starts) <= 1 and not any(line.partition("mech=")[2].strip() for line in lines):
         return [_one(file, "\n".join(lines), 1)]
     found = []
     titles: list[str] = []
@@ -57,13 +57,13 @@ def _one(file: str, text: str, first: int) -> Drawing:
     head, _, body = text.rpartition("mech=")
     d = Drawing()
     speed = SPEED
-    settings = re.search(r"set=([^&\n]*)", head)
+    settings = re.search(r"(?:^|[?&])set=([^&\n]*)", head, re.MULTILINE)
     for word in re.split(r"[|,\s]+", settings[1] if settings else ""):
         if word[:1] == "s":
             speed = _number(file, "set", word[1:])
         elif word:
             d.notes.append(left_out(f"setting {word}", "it is the other program's step or tolerance"))
-    if re.search(r"ts=[^&\s]", head):
+    if re.search(r"(?:^|[?&])ts=[^&\s]", head, re.MULTILINE):
         d.notes.append(left_out("ts", "a target shape is no part of the mechanism"))
     body, *more = body.split("&")
     for rest in more:
@@ -183,10 +183,11 @@ def mesh(d: Drawing, a: str, b: str, at: Place, what: str) -> None:
     """Two gears that touch at a pitch point: their centres are pins that one arm holds (R. Willis, 1841)."""
     best: tuple[float, Mesh] | None = None
     pins = d.pins()
-    for p, first in pins.items():
-        for q, second in pins.items():
+    centers = {p: turning_at(d, pins, p) for p, names in pins.items() if a in names or b in names}
+    for p, first in centers.items():
+        for q, second in centers.items():
             arms = [n for n in first if n in second and n not in (a, b)]
-            if p == q or a not in first or b not in second or not arms:
+            if p == q or a not in pins[p] or b not in pins[q] or not arms:
                 continue
             zp, zq = d.bodies[a].points[p], d.bodies[b].points[q]
             between = apart(zp, zq)

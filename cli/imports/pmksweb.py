@@ -65,7 +65,7 @@ def number(digits: str) -> int:
 
 def flags(digits: str, count: int) -> list[bool]:
     """Return truth values: one digit for each six of them, the lowest bit first."""
-    bits = [bool(DIGITS.index(c) >> k & 1) for c in digits for k in range(6)]
+    bits = [bool(DIGITS.index(c) >> k & 1) for c in digits if c in DIGITS for k in range(6)]
     return (bits + [False] * count)[:count]
 
 
@@ -181,7 +181,7 @@ class _String:
                 body.mass = mass
                 factor = {"in": 0.0254, "cm": 0.01, "m": 1.0}[self.d.length]
                 body.inertia = inertia * factor**2
-                body.center = place(x, y) if kind[1:] == "R" else joints[ids[0]].at
+                body.center = place(x, y) if kind[1:] == "R" or not ids else joints[ids[0]].at
         self.members = {
             joint: [
                 tokens[0] for _, kind, tokens, ids, _ in rows if joint in ids and tokens[0] in self.d.bodies

@@ -225,7 +225,7 @@ def _read_small(source: Source, table: Table, plan: _Plan, marker: str) -> None:
             for i, cell in enumerate(column):
                 text = cell.strip()
                 if marker and text.startswith(marker):
-                    table.marks[i, name] = text
+                    table.marks[i, name] = text.replace(",", ".") if decimal_comma else text
                     values[i] = np.nan
                 elif not text and may_be_blank:
                     values[i] = np.nan
@@ -297,6 +297,8 @@ def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
             if marker:
                 marked = frame[index].str.startswith(marker).to_numpy(dtype=bool)
                 marks |= {(int(row), name): text[row].strip() for row in np.flatnonzero(marked)}
+                if source.has_commas([text[marked]]):
+                    return False
                 empty |= marked
             try:
                 values = np.where(empty, "0", text).astype(float)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
@@ -100,7 +101,7 @@ def _is_number(column: Values) -> bool:
 
 def is_input(name: str) -> bool:
     """Whether a column holds a pose's input: a key that is a number."""
-    return name.endswith(("input_deg", "input_m"))
+    return re.search(r"(?:^|_)input_[a-z]+$", name) is not None
 
 
 def _match(

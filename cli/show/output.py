@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache, wraps
 from inspect import Parameter, signature
 from pathlib import Path
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -43,8 +44,8 @@ class ShowOptions:
             "-o",
             "--output",
             metavar="FILE",
-            help="Write the result to FILE (.csv or .json).",
-            callback=suffix_among(".csv", ".json"),
+            help="Write the result to FILE (.csv, .json, .xlsx, .md, .tex or .html).",
+            callback=suffix_among(".csv", ".json", ".xlsx", ".md", ".tex", ".html"),
         ),
     ] = None
     plot: Annotated[
@@ -77,6 +78,12 @@ class ShowOptions:
         typer.Option(
             metavar="NAME=HEADER",
             help="Read the column HEADER of a table as NAME, such as mass_kg=Masse; repeatable.",
+        ),
+    ] = None
+    units: Annotated[
+        str | None,
+        typer.Option(
+            metavar="UNIT,...", help="Units of the columns, such as mm,g,deg,N_mm,rpm; JSON stays SI."
         ),
     ] = None
 
@@ -135,6 +142,7 @@ def show(result: Result, options: ShowOptions) -> None:
     from cli.show.files import write
     from cli.show.text import csv_text, json_parts, paragraphs, table_text
 
+    result = _in_chosen_units(result, options.units)
     if result.blocks is not None:
         check_renamed()
         _stream(result, result.blocks(), options)
@@ -162,8 +170,14 @@ def show(result: Result, options: ShowOptions) -> None:
         write(options.plot, drawn(result.figure, options.plot.suffix.lower()[1:]))
     if output is not None and output.suffix.lower() == ".csv":
         write(output, csv_text(first().cells).encode())
-    elif output is not None:
+    elif output is not None and output.suffix.lower() == ".json":
         write(output, (part.encode() for part in json_parts(_document(result))))
+    elif output is not None:
+        from cli.show.handed_on import handed_on
+
+        (name, _), *others = result.tables.items()
+        formed = {name.strip("-"): first()} | {name.strip("-"): table() for name, table in others}
+        write(output, handed_on(output.suffix.lower(), formed, result.warnings))
     _warn(result.warnings)
     if options.json:
         sys.stdout.writelines(json_parts(_document(result)))
@@ -173,12 +187,37 @@ def show(result: Result, options: ShowOptions) -> None:
         print(checked)
     elif options.text or (sys.stdout.isatty() and output is None):
         table = (result.screen or first)()
-        sys.stdout.write(paragraphs(result.notes(), table_text(table.cells), result.afterword()))
+        width = get_terminal_size().columns if sys.stdout.isatty() else None
+        text = table_text(table.cells, table.keys, width)
+        sys.stdout.write(paragraphs(result.notes(), text, result.afterword()))
     elif output is None:
         sys.stdout.write(csv_text(first().cells))
     sys.stdout.flush()
     if result.failed() or (report is not None and not report.passed):
         raise typer.Exit(1)
+
+
+def _in_chosen_units(result: Result, units: str | None) -> Result:
+    """Return the result with its tables in the units of --units."""
+    if units is None:
+        return result
+    from cli.show.in_units import chosen_units, in_units
+
+    chosen = chosen_units(units)
+
+    def of(table: Callable[[], Table]) -> Callable[[], Table]:
+        return lambda: in_units(table(), chosen)
+
+    def of_blocks() -> Iterator[Table]:
+        assert result.blocks is not None
+        return (in_units(table, chosen) for table in result.blocks())
+
+    return replace(
+        result,
+        tables={name: of(table) for name, table in result.tables.items()},
+        screen=None if result.screen is None else of(result.screen),
+        blocks=None if result.blocks is None else of_blocks,
+    )
 
 
 def _stream(result: Result, blocks: Iterator[Table], options: ShowOptions) -> None:

@@ -38,16 +38,34 @@ def plain(value: object) -> str | float:
     return str(value).lower() if isinstance(value, bool) else value  # type: ignore[return-value]
 
 
-def table_text(columns: Mapping[str, Values]) -> str:
-    """Return an aligned table, numbers to 6 significant digits and to the right, names to the left."""
-    printed = []
+def printed(name: str, column: Values) -> list[str]:
+    """Return a column's cells as they are shown: numbers to 6 significant digits."""
+    values = [plain(value) for value in column]
+    return [_six_digits(name, value) if isinstance(value, float) else str(value) for value in values]
+
+
+def table_text(columns: Mapping[str, Values], keys: Sequence[str] = (), width: int | None = None) -> str:
+    """Return an aligned table, numbers to the right, names to the left.
+
+    What is wider than `width` is laid out in blocks one below the other, each with the key columns in front.
+    """
+    laid: dict[str, list[str]] = {}
     for name, column in columns.items():
-        values = [plain(value) for value in column]
-        cells = [_six_digits(name, value) if isinstance(value, float) else str(value) for value in values]
-        width = max(map(len, [name, *cells]))
-        left = any(isinstance(value, str) and value for value in values)
-        printed.append([cell.ljust(width) if left else cell.rjust(width) for cell in [name, *cells]])
-    return "".join("  ".join(row).rstrip() + "\n" for row in zip(*printed, strict=True))
+        cells = [name, *printed(name, column)]
+        longest = max(map(len, cells))
+        left = any(isinstance(value, str) and value for value in map(plain, column))
+        laid[name] = [cell.ljust(longest) if left else cell.rjust(longest) for cell in cells]
+    blocks: list[list[list[str]]] = [[]]
+    front = [laid[name] for name in columns if name in keys]
+    for name, cells in laid.items():
+        last = blocks[-1]
+        wide = sum(len(other[0]) + 2 for other in last) + len(cells[0])
+        if width is not None and wide > width and len(last) > len(front) and name not in keys:
+            blocks.append(list(front))
+        blocks[-1].append(cells)
+    return "\n".join(
+        "".join("  ".join(row).rstrip() + "\n" for row in zip(*block, strict=True)) for block in blocks
+    )
 
 
 def _six_digits(name: str, value: float) -> str:

@@ -89,3 +89,27 @@ def test_a_name_keeps_its_comma(dalembert: Dalembert, tmp_path: Path) -> None:
     done = dalembert("balance", "-", "--plane", "A:20mm", "--expect", "expected.csv", stdin=table)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "no 1,5" in done.stdout
+
+
+STATES = """link,vx_m_s,vy_m_s,fx_N,torque_N_m,omega_rad_s
+1,1.5,0,?F*0.5,,
+2,2.25,0,?F*-1.5,,
+3,0,0,,10.5,2.5
+"""
+
+
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_factors_of_an_unknown(mark: str, dalembert: Dalembert) -> None:
+    with_points = dalembert("work", "-", stdin=STATES)
+    assert with_points.returncode == 0, with_points.stderr
+    text = STATES.replace(",", mark).replace(".", ",")
+    with_commas = dalembert("work", "-", stdin=text)
+    assert with_commas.returncode == 0, with_commas.stderr
+    assert with_commas.stdout == with_points.stdout
+    long = "".join(
+        mark.join([str(step), row]) + "\n" for step in range(4000) for row in text.splitlines()[1:]
+    )
+    done = dalembert("work", "-", stdin=f"step{mark}{text.splitlines()[0]}\n{long}")
+    assert done.returncode == 0, done.stderr
+    last = done.stdout.splitlines()[-1].split(",")
+    assert last[1:] == with_points.stdout.splitlines()[-1].split(",")[1:]

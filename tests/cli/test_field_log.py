@@ -371,6 +371,13 @@ def test_text_and_report_tell_the_history(dalembert: Dalembert, tmp_path: Any) -
     ):
         assert words in done.stdout
     page = (tmp_path / "r.html").read_text()
+    # a dot for each reading
+    drawn = dalembert("field", "-", "--plot", "p.svg", stdin=text)
+    assert drawn.returncode == 0, drawn.stderr
+    plain = dalembert("field", "-", "--plot", "q.svg", stdin=standard(MASSES[:2], ERRORS[:2]))
+    assert plain.returncode == 0
+    used = [(tmp_path / name).read_text().count("<use ") for name in ("p.svg", "q.svg")]
+    assert used[0] >= used[1] + 12
     assert "12 readings fitted together" in page
     assert "standardised" in page
 
@@ -401,3 +408,29 @@ def test_a_table_with_runs_to_spare_may_repeat_the_base_run_and_lack_a_reading(d
         rotor, _ = found(dalembert("field", "-", "--json", stdin=table))
         assert rotor["fit"]["readings"] == readings
         assert rotor["fit"]["residual_sd"] < 1e-12
+
+
+def test_a_kept_mass_stays_on_where_its_run_is_left_out(dalembert: Dalembert) -> None:
+    x0, alpha = 40 + 9j, np.array([2 + 1j, -1 + 3j])
+    runs = [(0, 0, ""), (5, 0, "yes"), (5, 4j, ""), (5, -3, ""), (5 + 2j, 0, ""), (5, 1, "")]
+    lines = [TABLE.strip() + ",trial_kept\n"]
+    for k, (a, b, kept) in enumerate(runs):
+        v = x0 + alpha @ np.array([a, b])
+        put = a if k == 1 else a - 5 if k > 1 and a != 5 else b
+        plane = "" if k == 0 else "A" if k == 1 or a != 5 else "B"
+        on = f"{abs(put):.17g},{np.degrees(np.angle(put)):.17g}" if k else ","
+        lines.append(f"{k},1,{abs(v):.17g},{np.degrees(np.angle(v)):.17g},{plane},{on},{kept}\n")
+    text = "".join(lines)
+    rotor, _ = found(dalembert("field", "-", "--json", "--exclude", "1", "--ridge", "0.1", stdin=text))
+    assert rotor["fit"]["residual_sd"] < 1e-12
+    for one, a in zip(rotor["influence"], alpha, strict=True):
+        assert polar(one["magnitude_per_kg"], one["phase_deg"]) / 1000 == pytest.approx(a, rel=1e-11)
+
+
+def test_digits_of_a_fit_are_given_in_full_and_it_is_said(dalembert: Dalembert) -> None:
+    done = dalembert("field", "-", "--digits", stdin=standard(MASSES, ERRORS))
+    assert done.returncode == 0
+    assert "given in full" in done.stderr
+    whole = dalembert("field", "-", stdin=standard(MASSES, ERRORS)).stdout
+    cut, given = (text.splitlines()[1].split(",")[2:] for text in (done.stdout, whole))
+    assert [float(cell) for cell in cut] == pytest.approx([float(cell) for cell in given], rel=1e-14)

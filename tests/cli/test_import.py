@@ -155,6 +155,20 @@ def test_gears_have_the_ratio_of_their_pitch_points() -> None:
     assert train.motion(0.3, speed=3.0).link("output").omega[0] == pytest.approx(-2.0)
 
 
+def test_gears_on_concentric_shafts_have_the_arm_that_goes_through_both() -> None:
+    """Willis: a planet of 43 in the fixed ring of 44, beside it one of 45 in the output's ring of 46."""
+    m = only(
+        "ground,arm,R,0,0\narm,gears,R,1,0\ngears,ground,G,44,0\ngears,output,G,46,0\nground,output,R,0,0\ngears,R,-43,0"
+    )
+    ratio = 1 - (44 / 43) * (45 / 46)
+    assert m.motion(0.1, speed=1.0).link("output").omega[0] == pytest.approx(ratio, rel=1e-12)
+
+
+def test_a_drawing_at_a_limit_is_named() -> None:
+    _, notes = taken("ground a R 0 0\na b R 1 0\nb c R 3 0\nc ground R 4 0")
+    assert any("change point" in note or "limit" in note for note in notes)
+
+
 def test_a_prism_input_is_a_slide_whose_rpm_is_named() -> None:
     text = "n6, ground,P,120,330\nground, n2,R,0,350\nn2, n4,R,0,450\nn4, n6,R,120,370"
     (m,), notes = taken(text)
@@ -260,6 +274,34 @@ def test_gears_turn_against_each_other_and_chains_alike(kind: str, ratio: float)
     assert motion.link("L8").omega[0] == pytest.approx(ratio)
 
 
+def test_a_planet_meshes_with_a_gear_on_the_motors_shaft() -> None:
+    text = linkage(
+        ANCHORS
+        + CRANK
+        + '<connector id="9" anchor="true" x="0" y="0"/><connector id="8" anchor="true" x="300" y="0"/>'
+        '<Link id="5" gear="true"><connector id="9"/><connector id="8"/></Link>'
+        '<Link id="6" gear="true"><connector id="1"/></Link>'
+        '<ratios><ratio type="gears"><link id="5" size="2"/><link id="6" size="1"/></ratio></ratios>'
+    )
+    assert only(text).motion(0.2, speed=1.0).link("L6").omega[0] == pytest.approx(3.0)
+
+
+def test_a_fixed_pin_in_a_moving_slot_and_a_rider_on_a_moving_link() -> None:
+    over = '<slidelimit id="1"/><slidelimit id="2"/></connector>'
+    text = linkage(
+        ANCHORS
+        + CRANK
+        + '<connector id="2" x="400" y="96"/><Link id="1"><connector id="1"/><connector id="2"/></Link>'
+        + f'<connector id="3" anchor="true" slider="true" x="200" y="96">{over}'
+    )
+    m = only(text)
+    assert [(g.link, g.on, g.point) for g in m.guides] == [("ground", "L1", "C3")]
+    x, y = at(m, "C2", -math.pi / 2)
+    assert (x / 0.0254 * 96, y / 0.0254 * 96) == pytest.approx(
+        (96 + 400 * 104 / math.hypot(104, 96), 400 * 96 / math.hypot(104, 96))
+    )
+
+
 @pytest.mark.parametrize("how", ['fastenlink="0"', '><fastenlink id="0"/', "attribute"])
 def test_fastened_parts_are_one(how: str) -> None:
     head = f'<Link id="5" {how}>' if how != "attribute" else '<Link id="5"><fastenconnector id="1"/>'
@@ -332,6 +374,37 @@ def test_fixed_bodies_and_point_masses_become_one_body() -> None:
     assert coupler.center == pytest.approx((0.9 * 0.205 + 1.0 * 0.41) / 1.9)
     assert coupler.inertia == pytest.approx(0.012 + 0.9 * 1.0 / 1.9 * 0.205**2)
     assert coupler.points["Y"] == pytest.approx(0.31)
+
+
+def test_bodies_drawn_in_the_axes_of_the_ground_stand_there() -> None:
+    data = four_bar()
+    places = {
+        "A": (0, 0),
+        "B": (0.0, 0.11),
+        "C": (0.3, 0.27),
+        "D": (0.38, 0.0),
+        "O2": (0, 0),
+        "O4": (0.38, 0),
+    }
+    for body in data["bodies"].values():
+        body["attachment_points"] = {p: places[p] for p in body["attachment_points"]}
+    data["drivers"]["D1"]["theta_0"] = 0.3
+    (m,), notes = taken(json.dumps(data))
+    assert at(m, "C") == pytest.approx(places["C"], rel=1e-13)
+    assert any("theta_0 is left out" in note for note in notes)
+
+
+def test_a_driven_distance_is_a_cylinder() -> None:
+    data = four_bar()
+    del data["drivers"]
+    data["linear_drivers"] = [
+        {"id": "L", "body_a": "ground", "point_a": [0.2, -0.1], "body_b": "crank", "point_b": [0.06, 0.02],
+         "velocity": 0.01, "length_0": 0.19}
+    ]  # fmt: skip
+    m = only(json.dumps(data))
+    (x, y), (u, v) = at(m, "linear driver L b", 0.005), (0.2, -0.1)
+    assert math.hypot(x - u, y - v) == pytest.approx(0.195, rel=1e-13)
+    assert m.inputs[0].speed == 0.01
 
 
 def test_springs_and_loads_keep_their_meaning_and_the_rest_is_named() -> None:

@@ -1,0 +1,138 @@
+"""The vibration at once per turn, out of a signal and a mark on the shaft."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dalembert.arithmetic.records import record
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+HARMONICS = 3
+"""So many orders are fitted beside one another, where a turn has samples enough."""
+
+
+@record
+class OncePerTurn(NamedTuple):
+    """V of V e^{iωt}, t = 0 at the mark, and the turns it is the mean of."""
+
+    vector: Complex
+    """Mean over the turns, complex (s,)."""
+    deviation: Real
+    """Standard deviation of each component of the mean as the turns scatter, (s,); NaN with one turn."""
+    speed: float
+    """Mean speed, rad/s."""
+    speed_deviation: float
+    """Standard deviation of the speeds of single turns, rad/s; NaN with one turn."""
+    turns: int
+
+
+def marks(t: ArrayLike, mark: ArrayLike) -> Real:
+    """Return the times at which a mark rises through half its height, (n,).
+
+    A mark of two levels rises at its first high sample, or shortly before: where the marks come as evenly as the samples
+    can tell they are taken as even, and as early as all of them allow. Any other mark rises between two samples, by linear
+    interpolation.
+
+    >>> marks([0, 1, 2, 3], [0, 0, 1, 0]), marks([0, 1, 2, 3], [0, 0, 3, 4])
+    (array([2.]), array([1.66666667]))
+    """
+    time, level = np.asarray(t, dtype=float), np.asarray(mark, dtype=float)
+    low, high = float(level.min()), float(level.max())
+    half = (low + high) / 2
+    rises = np.flatnonzero((level[:-1] < half) & (level[1:] >= half))
+    if ((level == low) | (level == high)).all():
+        rises = rises + 1
+        falls = np.flatnonzero((level[:-1] >= half) & (level[1:] < half)) + 1
+        whole = rises[rises < falls[-1:].max(initial=0)]
+        pulses = falls[np.searchsorted(falls, whole, side="right")] - whole
+        if level[0] >= half and len(pulses) and falls[0] >= pulses.min():
+            # the recording begins with a whole pulse
+            rises = np.concatenate([[0], rises])
+        return _even(time[rises], float(np.diff(time).max()))
+    share = (half - level[rises]) / (level[rises + 1] - level[rises])
+    return np.asarray(time[rises] + share * (time[rises + 1] - time[rises]))
+
+
+def _even(at: Real, step: float) -> Real:
+    """Return marks that are late by less than a step as even ones, where they can be."""
+    if len(at) < 3:
+        return at
+    k = np.arange(len(at))
+    slope = float(np.polynomial.Polynomial.fit(k, at, 1).convert().coef[1])
+    late = at - slope * k
+    if np.ptp(late) >= step:
+        return at
+    return np.asarray(late.min() + slope * k)
+
+
+def once_per_turn(t: ArrayLike, signal: ArrayLike, mark: ArrayLike) -> OncePerTurn:
+    """Find the once-per-turn vectors of signals, turn by turn between marks, and their mean.
+
+    Parameters
+    ----------
+    t
+        Times, rising, (n,), s.
+    signal
+        Vibration, (n, s).
+    mark
+        Once per turn, any unit, (n,).
+
+    Raises
+    ------
+    ValueError
+        Times that do not rise, not finite, fewer than two marks, or fewer than four samples in a turn.
+
+    Notes
+    -----
+    The angle grows evenly from mark to mark. In each turn the signal is fitted by a constant and up to three orders of
+    cos and sin of that angle (least squares), so that neither the sampling nor other orders leak into the first;
+    the mean over turns is the synchronous average of the first order.
+
+    Examples
+    --------
+    >>> t = np.arange(0, 1, 0.001)
+    >>> found = once_per_turn(t, 3 * np.cos(2 * np.pi * 20 * t + 0.5)[:, None], np.arange(1000) % 50 == 0)
+    >>> np.abs(found.vector).round(9), np.angle(found.vector).round(9), round(found.speed / np.pi, 9), found.turns
+    (array([3.]), array([0.5]), 40.0, 19)
+    """
+    time, x = np.asarray(t, dtype=float), np.asarray(signal, dtype=float)
+    level = np.asarray(mark, dtype=float)
+    if time.ndim != 1 or x.ndim != 2 or x.shape[0] != len(time) or level.shape != time.shape or len(time) < 2:
+        raise ValueError(f"shapes do not fit: t {time.shape}, signal {x.shape}, mark {level.shape}")
+    if not (np.isfinite(time).all() and np.isfinite(x).all() and np.isfinite(level).all()):
+        raise ValueError("times, signal and mark must be finite")
+    if not (np.diff(time) > 0).all():
+        raise ValueError("the times must rise from row to row")
+    at = marks(time, level)
+    if len(at) < 2:
+        raise ValueError(f"the mark rises {len(at)} times: expected two at least, a turn apart")
+    each = np.diff(at)
+    vectors = np.array([_turn(time, x, start, length) for start, length in zip(at[:-1], each, strict=True)])
+    turns = len(each)
+    mean = vectors.mean(axis=0)
+    deviation, of_speed = np.full(mean.shape, np.nan), np.nan
+    if turns > 1:
+        scatter = np.square(np.abs(vectors - mean)).sum(axis=0) / (turns - 1)
+        deviation = np.sqrt(scatter / 2 / turns)
+        of_speed = float(np.std(2 * np.pi / each, ddof=1))
+    return OncePerTurn(mean, deviation, float(2 * np.pi * turns / (at[-1] - at[0])), of_speed, turns)
+
+
+def _turn(t: Real, x: Real, start: float, length: float) -> Complex:
+    """Return the first order of one turn, (s,)."""
+    first, last = np.searchsorted(t, [start, start + length])
+    samples = int(last - first)
+    if samples < 4:
+        raise ValueError(f"the turn at {start:g} s has {samples} samples: expected four at least")
+    angle = 2 * np.pi * (t[first:last] - start) / length
+    orders = np.arange(1, min(HARMONICS, (samples - 1) // 2) + 1)
+    grown = angle[:, None] * orders
+    rows = np.concatenate([np.ones((samples, 1)), np.cos(grown), np.sin(grown)], axis=1)
+    q, r = np.linalg.qr(rows)
+    found = np.linalg.solve(r, q.T @ x[first:last])
+    return np.asarray(found[1] - 1j * found[1 + len(orders)])

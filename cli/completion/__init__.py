@@ -1,0 +1,1 @@
+"""`dalembert completion`: the script that lets a shell complete commands and options."""

@@ -1,0 +1,112 @@
+"""`--signal`: the once-per-turn vectors of a recorded vibration, a row for the log each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from balancing.synchronous import OncePerTurn, once_per_turn
+from cli.errors import DataError
+from cli.read.sources import open_source
+from cli.read.tables import read
+from cli.read.units import degrees, find_unit, from_si, to_si
+from cli.show.columns import Column, Result, Table
+
+MARKS = ("mark", "tacho", "keyphasor", "pulse", "trigger")
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What was found in a recording."""
+
+    sensors: list[str]
+    unit: str
+    found: OncePerTurn
+    warnings: list[str]
+
+
+def read_signal(path: str) -> Recorded:
+    """Read `t_s`, a mark and columns of vibration such as `A_um`, and find the vectors."""
+    header = [each.name for each in open_source(path, {}, None).headings]
+    mark = next((name.lower() for name in header if name.lower() in MARKS), None)
+    if mark is None:
+        raise DataError(
+            f"{path}: no column mark (or {', '.join(MARKS[1:])}); the header is: {', '.join(header)}"
+        )
+    time = "time" if any(name.lower().startswith("time_") for name in header) else "t"
+    units: dict[str, str] = {}
+    for name in header:
+        parts = name.split("_")
+        for k in range(1, len(parts)):
+            unit = find_unit("amplitude", "_".join(parts[k:]))
+            if unit and parts[0].lower() not in (time, mark):
+                units["_".join(parts[:k]).lower()] = unit
+                break
+    if not units:
+        raise DataError(
+            f"{path}: no column of vibration, such as A_um or acceleration_g; the header is: {', '.join(header)}"
+        )
+    if len(set(units.values())) > 1:
+        raise DataError(
+            f"{path}: the vibration is in {', '.join(sorted(set(units.values())))}: expected one unit"
+        )
+    table = read(path, numbers={time: "time", mark: "number", **dict.fromkeys(units, "amplitude")})
+    t = table.require(time, "time")
+    signal = np.stack([table.numbers[name].values for name in units], axis=1)
+    try:
+        found = once_per_turn(to_si(t.values, "time", t.unit), signal, table.numbers[mark].values)
+    except ValueError as error:
+        raise DataError(f"{table.file}: {error}") from None
+    written = {name.lower(): name for name in header}
+    sensors = [
+        "1" if name == "amplitude" else written[f"{name}_{unit.lower()}"][: len(name)]
+        for name, unit in units.items()
+    ]
+    return Recorded(sensors, next(iter(units.values())), found, table.warnings)
+
+
+def signal(path: str) -> Result:
+    """Return the vectors of a recording in every form."""
+    recorded = read_signal(path)
+    found = recorded.found
+    size, turn, deviation = np.abs(found.vector), degrees(found.vector), found.deviation
+    rows = len(recorded.sensors)
+
+    def table() -> Table:
+        rpm = from_si(found.speed, "speed", "rpm")
+        return Table(
+            [
+                Column("sensor", "", recorded.sensors),
+                Column("speed", "rpm", [rpm] * rows),
+                Column("amplitude", recorded.unit, size),
+                Column("phase", "deg", turn),
+                Column("amplitude_uncertainty", recorded.unit, deviation),
+                Column("turns", "", [found.turns] * rows),
+            ],
+            keys=("sensor",),
+        )
+
+    def document() -> dict[str, object]:
+        return {
+            "signal": [
+                {
+                    "sensor": sensor,
+                    "amplitude": float(size[s]),
+                    "phase_deg": float(turn[s]),
+                    "amplitude_uncertainty": float(deviation[s]) if np.isfinite(deviation[s]) else None,
+                    "speed_rad_s": found.speed,
+                    "speed_sd_rad_s": found.speed_deviation if np.isfinite(found.speed_deviation) else None,
+                    "turns": found.turns,
+                }
+                for s, sensor in enumerate(recorded.sensors)
+            ],
+            "amplitude_unit": recorded.unit,
+        }
+
+    return Result(
+        document=document,  # type: ignore[arg-type]
+        tables={"signal": table},
+        notes=lambda: "amplitude of a·cos(ωt + phase), t = 0 at the mark; the mean of single turns",
+        warnings=recorded.warnings,
+    )

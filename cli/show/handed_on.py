@@ -1,0 +1,127 @@
+"""Tables as files that are handed on: workbooks, Markdown, LaTeX, HTML."""
+
+from __future__ import annotations
+
+import html
+import io
+import re
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from cli.errors import DataError
+from cli.show.text import plain, printed
+
+if TYPE_CHECKING:
+    from cli.show.columns import Table
+
+Cells = tuple[list[str], list[list[str]], list[bool]]
+"""Header, rows, and which columns are numbers."""
+
+
+def handed_on(suffix: str, tables: Mapping[str, Table], warnings: list[str]) -> bytes:
+    """Return the file of this suffix: all tables, each with its name where there are several."""
+    if suffix == ".xlsx":
+        return _workbook(tables)
+    form: Callable[[Cells], str] = {".md": _markdown, ".tex": _latex, ".html": _html}[suffix]
+    title = {".md": "## {}\n\n", ".tex": "% {}\n", ".html": "<h2>{}</h2>\n"}[suffix]
+    several = len(tables) > 1
+    parts = [title.format(name) * several + form(_cells(table)) for name, table in tables.items()]
+    remarks = {
+        ".md": [f"- {text}\n" for text in warnings],
+        ".tex": [f"% {text}\n" for text in warnings],
+        ".html": [f"<p>{html.escape(text)}</p>\n" for text in warnings],
+    }[suffix]
+    text = "\n".join([*parts, *(["".join(remarks)] if remarks else [])])
+    return (_PAGE.format(text) if suffix == ".html" else text).encode()
+
+
+def _cells(table: Table) -> Cells:
+    columns = table.cells
+    texts = [printed(name, values) for name, values in columns.items()]
+    numbers = [not any(isinstance(plain(v), str) and plain(v) for v in values) for values in columns.values()]
+    return list(columns), [list(row) for row in zip(*texts, strict=True)], numbers
+
+
+def _markdown(cells: Cells) -> str:
+    header, rows, numbers = cells
+
+    def line(row: list[str]) -> str:
+        return "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |\n"
+
+    rule = ["---:" if number else "---" for number in numbers]
+    return "".join(map(line, [header, rule, *rows]))
+
+
+_LATEX = {**{c: f"\\{c}" for c in "&%$#_{}"}, "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+
+
+def _latex(cells: Cells) -> str:
+    """A tabular, to be put into a document by `\\input`."""
+    header, rows, numbers = cells
+
+    def escaped(cell: str) -> str:
+        return re.sub(r"[&%$#_{}~^]", lambda found: _LATEX[found.group()], cell.replace("\\", "/"))
+
+    def line(row: list[str]) -> str:
+        return " & ".join(map(escaped, row)) + r" \\" + "\n"
+
+    form = "".join("r" if number else "l" for number in numbers)
+    body = f"\\hline\n{line(header)}\\hline\n{''.join(map(line, rows))}\\hline\n"
+    return f"\\begin{{tabular}}{{{form}}}\n{body}\\end{{tabular}}\n"
+
+
+_PAGE = """<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<title>dalembert</title>
+<style>
+body {{ font: 11pt sans-serif; margin: 2em }}
+table {{ border-collapse: collapse; margin: 1em 0 }}
+th, td {{ padding: .2em .8em; border-bottom: 1px solid #ccc; text-align: left }}
+.n {{ text-align: right; font-variant-numeric: tabular-nums }}
+</style>
+{}</html>
+"""
+
+
+def _html(cells: Cells) -> str:
+    header, rows, numbers = cells
+
+    def line(row: list[str], tag: str) -> str:
+        each = zip(row, numbers, strict=True)
+        inner = "".join(f"<{tag}{' class=n' * number}>{html.escape(cell)}</{tag}>" for cell, number in each)
+        return f"<tr>{inner}</tr>\n"
+
+    return f"<table>\n{line(header, 'th')}{''.join(line(row, 'td') for row in rows)}</table>\n"
+
+
+def _workbook(tables: Mapping[str, Table]) -> bytes:
+    """A sheet for each table, numbers with every digit."""
+    try:
+        from openpyxl import Workbook
+        from openpyxl.styles import Font
+        from openpyxl.utils import get_column_letter
+    except ImportError:
+        raise DataError(
+            "-o .xlsx needs openpyxl: install dalembert with its extra, dalembert[excel]"
+        ) from None
+    book = Workbook()
+    book.remove(book.worksheets[0])
+    for name, table in tables.items():
+        sheet = book.create_sheet(re.sub(r"[\[\]:*?/\\']", " ", name)[:31])
+        sheet.freeze_panes = "A2"
+        for k, column in enumerate(table.columns, 1):
+            sheet.cell(1, k, column.header).font = Font(bold=True)
+            longest = len(column.header)
+            for i, value in enumerate(map(plain, column.values), 2):
+                if isinstance(value, str):
+                    value = re.sub(r"[\0-\x08\x0b\x0c\x0e-\x1f]", " ", value)
+                if value != "":
+                    # a number as its text: openpyxl keeps 16 digits of a float; a name that begins with = is no formula
+                    cell = sheet.cell(i, k, value if isinstance(value, str) else repr(value))
+                    cell.data_type = "s" if isinstance(value, str) else "n"
+                longest = max(longest, len(f"{value:.6g}" if isinstance(value, float) else str(value)))
+            sheet.column_dimensions[get_column_letter(k)].width = min(longest + 2, 40)
+    stream = io.BytesIO()
+    book.save(stream)
+    return stream.getvalue()

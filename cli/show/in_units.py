@@ -1,0 +1,80 @@
+"""`--units`: a table's columns in units of choice; JSON stays SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import typer
+
+from cli.errors import nearest
+from cli.read.units import UNITS, Scaled, find_unit, from_si, to_si, unit_name
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cli.show.columns import Column, Table, Values
+
+# amplitudes keep the unit they were measured in, and what is per such a unit with them
+_DIMENSIONS = [dimension for dimension in UNITS if dimension not in ("number", "amplitude", "per")]
+_MEASURED = ("amplitude", "magnitude")
+
+
+def chosen_units(text: str) -> dict[str, str]:
+    """Read `mm,g,deg,N_mm,rpm`: dimension -> unit.
+
+    Raises
+    ------
+    typer.BadParameter
+        An unknown unit, or two of one dimension.
+    """
+    chosen: dict[str, str] = {}
+    for part in text.split(","):
+        word = unit_name(part)
+        found = {d: unit for d in _DIMENSIONS if (unit := find_unit(d, word))}
+        if not word or not found:
+            known = sorted({unit for d in _DIMENSIONS for unit in UNITS[d]})
+            raise typer.BadParameter(
+                f"'{part.strip()}' is no unit of a column: expected such as mm,g,deg,N_mm,rpm{nearest(word, known)}",
+                param_hint="--units",
+            )
+        for dimension, unit in found.items():
+            if chosen.setdefault(dimension, unit) != unit:
+                raise typer.BadParameter(
+                    f"{chosen[dimension]} and {unit} are both units of {dimension}: expected one of them",
+                    param_hint="--units",
+                )
+    return chosen
+
+
+def in_units(table: Table, chosen: Mapping[str, str]) -> Table:
+    """Return the table with its columns in the units chosen, as far as they fit."""
+    columns = [_in_unit(column, chosen) for column in table.columns]
+    renamed = {old.header: new.header for old, new in zip(table.columns, columns, strict=True)}
+    return replace(table, columns=columns, keys=[renamed.get(key, key) for key in table.keys])
+
+
+def _in_unit(column: Column, chosen: Mapping[str, str]) -> Column:
+    fits = [d for d in _DIMENSIONS if d in chosen and column.unit in UNITS[d]]
+    if not fits or chosen[fits[0]] == column.unit or column.name.startswith(_MEASURED):
+        return column
+    dimension = fits[0]
+    old, new, error = column.unit, chosen[dimension], column.error
+
+    def convert(value: Scaled) -> Scaled:
+        return from_si(to_si(value, dimension, old), dimension, new)
+
+    def cells(values: Values) -> Values:
+        if not isinstance(values, Sequence):
+            return convert(values)
+        return [
+            value if value is None or isinstance(value, str) else convert(float(value)) for value in values
+        ]
+
+    def errors() -> Sequence[float] | NDArray[np.float64]:
+        assert error is not None
+        return convert(np.asarray(error(), dtype=float))
+
+    return replace(column, unit=new, values=cells(column.values), error=None if error is None else errors)

@@ -1,0 +1,41 @@
+"""`dalembert field --signal`: a recording becomes rows of a log."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+
+
+def test_the_command_gives_the_rows_of_a_log(dalembert: Dalembert, tmp_path: Path) -> None:
+    t = np.arange(3000) / 1000
+    lines = ["t_s,mark,A_um,B_um"]
+    for k, s in enumerate(t.tolist()):
+        angle = 2 * np.pi * 10 * s
+        values = [s, 4 * np.cos(angle + 1), 2 * np.cos(angle - 2)]
+        time, a, b = (f"{value:.17g}" for value in values)
+        lines.append(f"{time},{int(k % 100 == 0)},{a},{b}")
+    (tmp_path / "s.csv").write_text("\n".join(lines) + "\n")
+    done = dalembert("field", "--signal", "s.csv", "--json")
+    assert done.returncode == 0, done.stderr
+    first, second = json.loads(done.stdout)["signal"]
+    assert (first["sensor"], second["sensor"]) == ("A", "B")
+    assert first["amplitude"] == pytest.approx(4, rel=1e-9)
+    assert first["phase_deg"] == pytest.approx(np.degrees(1), rel=1e-9)
+    assert second["phase_deg"] == pytest.approx(360 - np.degrees(2), rel=1e-9)
+    assert first["speed_rad_s"] == pytest.approx(20 * np.pi, rel=1e-9)
+    assert first["turns"] == 29
+    head, row = dalembert("field", "--signal", "s.csv").stdout.splitlines()[:2]
+    assert head == "sensor,speed_rpm,amplitude_um,phase_deg,amplitude_uncertainty_um,turns"
+    assert float(row.split(",")[1]) == pytest.approx(600)
+    (tmp_path / "bad.csv").write_text("t_s,A_um\n0,1\n")
+    bad = dalembert("field", "--signal", "bad.csv")
+    assert bad.returncode == 1
+    assert "no column mark" in bad.stderr
+    assert dalembert("field", "s.csv", "--signal", "s.csv").returncode == 2
