@@ -48,7 +48,8 @@ SLOT: Keys = {
     "angle": Key("angle", "the direction of the line against the carrier's x-axis", default=0),
 }
 
-SLIDER: Keys = SLOT | {
+SLIDER: Keys = {
+    **SLOT,
     "turned": Key("angle", "the link's x-axis against the line", default=0),
 }
 
