@@ -133,12 +133,14 @@ def forces(analysis: Analysis) -> Table:
             stack.input(j)
             prefix, name = f"{entry.name}_" if several else "", effort_name(entry.is_slide)
             euler, work = d.newton_euler[:, j], d.effort[:, j]
-            of_euler, of_work = partial(_effort, motion, j, 1.0, 0.0), partial(_effort, motion, j, 0.0, 1.0)
+            of_euler, of_work = (
+                partial(_effort, motion, j, "newton_euler"),
+                partial(_effort, motion, j, "effort"),
+            )
             stack.put(f"{prefix}input_{name}", cells(euler), of_euler)
             stack.put(f"{prefix}virtual_work_{name}", cells(work), of_work)
-            stack.put(
-                f"{prefix}difference_{name}", cells(euler - work), partial(_effort, motion, j, 1.0, 1.0)
-            )
+            of_both = partial(_effort, motion, j, "newton_euler", "effort")
+            stack.put(f"{prefix}difference_{name}", cells(euler - work), of_both)
         for joint, on, of in rows_of(analysis, motion):
             lead = f"{joint.name}_{of}_on_{on}"
             of_force, of_moment = partial(_joint, motion, joint, on, 0), partial(_joint, motion, joint, on, 1)
@@ -156,9 +158,10 @@ def forces(analysis: Analysis) -> Table:
     return stack.table()
 
 
-def _effort(motion: Motion, j: int, euler: float, work: float) -> Reals:
+def _effort(motion: Motion, j: int, *ways: str) -> Reals:
+    """Bounds of an input's effort by one way, or of the difference of two."""
     bounds = motion.dynamics.error_estimate()
-    return np.asarray(euler * bounds.newton_euler[:, j] + work * bounds.effort[:, j])
+    return np.asarray(sum(getattr(bounds, way)[:, j] for way in ways))
 
 
 def _shaking(motion: Motion, moment: int) -> Reals:
