@@ -22,6 +22,16 @@ if TYPE_CHECKING:
     from cli.show.columns import Document, Result, Table
 
 
+def _print_schema(asked: bool) -> None:
+    if asked:
+        import json
+
+        from virtualwork.describe.schema import schema
+
+        typer.echo(json.dumps(schema(), indent=2, ensure_ascii=False))
+        raise typer.Exit
+
+
 @command
 def run(
     file: Annotated[str, typer.Argument(metavar="FILE.toml", help="The mechanism; - is standard input.")],
@@ -94,6 +104,15 @@ def run(
             callback=suffix_among(".csv"),
         ),
     ] = None,
+    schema: Annotated[
+        bool,
+        typer.Option(
+            "--schema",
+            help="Print the JSON Schema of FILE.toml, for editors; needs no FILE.",
+            is_eager=True,
+            callback=_print_schema,
+        ),
+    ] = False,
     *,
     show: ShowOptions,
 ) -> Result:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from virtualwork.describe.checks import hint
 from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe.keys import UNITS, Keys
 from virtualwork.describe.parts import GROUND, Link
 from virtualwork.describe.tables import rows
 from virtualwork.describe.units import Units, wrong
@@ -22,15 +23,15 @@ class Entries:
     def __init__(self, data: dict[str, Any], folder: Path, load: Load) -> None:
         self.data, self.folder, self.load = data, folder, load
         units = data.get("units", {})
-        known_keys(units, {"length", "angle"}, "[units]", "key")
+        known_keys(units, UNITS, "[units]", "key")
         self.units = Units(units)
         self.number, self.pair = self.units.number, self.units.pair
         self.links: dict[str, Link] = {}
         self.bodies: dict[str, Mapping[str, complex]] = {GROUND: {}}
 
-    def optional(self, entry: Mapping[str, Any], key: str, kind: str, where: str) -> float:
+    def optional(self, entry: Mapping[str, Any], keys: Keys, key: str, where: str) -> float:
         """A quantity that is 0 where it is not given."""
-        return self.number(entry[key], kind, f"{where} {key}") if key in entry else 0.0
+        return self.number(entry[key], keys[key].kind, f"{where} {key}") if key in entry else 0.0
 
     def table(self, name: str) -> dict[str, Any]:
         """A table of the file; empty where it is not there."""
@@ -87,7 +88,7 @@ class Entries:
         return owners[0], str(name)
 
 
-def known_keys(entry: Mapping[str, Any], names: set[str], where: str, what: str) -> None:
+def known_keys(entry: Mapping[str, Any], names: Collection[str], where: str, what: str) -> None:
     """Refuse keys that are none of the names."""
     if not isinstance(entry, Mapping):
         raise wrong(where, entry, "a table")
@@ -101,3 +102,9 @@ def need(entry: Mapping[str, Any], keys: tuple[str, ...], where: str) -> None:
     for key in keys:
         if key not in entry:
             raise DescriptionError(f"{where}: '{key}' is missing")
+
+
+def proper(entry: Mapping[str, Any], keys: Keys, where: str) -> None:
+    """Refuse unknown keys, and an entry in which one is missing that must be there."""
+    known_keys(entry, keys, where, "key")
+    need(entry, tuple(name for name, key in keys.items() if key.needed), where)

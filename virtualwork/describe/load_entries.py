@@ -7,8 +7,9 @@ import math
 from typing import Any
 
 from virtualwork.describe.checks import hint
-from virtualwork.describe.entries import Entries, known_keys, need
+from virtualwork.describe.entries import Entries, need, proper
 from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe.keys import FORCE, FRICTION, MOTOR, SPRING, TORQUE, TORSION_SPRING
 from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.describe.units import LARGEST, wrong
 
@@ -26,8 +27,9 @@ class LoadEntries(Entries):
     def force(self, entry: dict[str, Any], i: int) -> Force:
         """A force, constant or over the input by a table."""
         where = f"[[forces]] {i}"
-        known_keys(entry, {"link", "point", "force", "frame", "table"}, where, "key")
-        need(entry, ("link",) if "table" in entry else ("link", "force"), where)
+        proper(entry, FORCE, where)
+        if "table" not in entry:
+            need(entry, ("force",), where)
         link = self.body(entry["link"], f"{where} link", ground=False)
         point = (
             self.place(link, entry["point"], f"{where} point")
@@ -78,8 +80,7 @@ class LoadEntries(Entries):
     def torque(self, entry: dict[str, Any], i: int) -> Torque:
         """A torque."""
         where = f"[[torques]] {i}"
-        known_keys(entry, {"link", "torque"}, where, "key")
-        need(entry, ("link", "torque"), where)
+        proper(entry, TORQUE, where)
         return Torque(
             self.body(entry["link"], f"{where} link", ground=False),
             self.number(entry["torque"], "torque", f"{where} torque"),
@@ -88,8 +89,7 @@ class LoadEntries(Entries):
     def spring(self, entry: dict[str, Any], i: int) -> Spring:
         """A spring and damper."""
         where = f"[[springs]] {i}"
-        known_keys(entry, {"between", "stiffness", "free_length", "damping"}, where, "key")
-        need(entry, ("between",), where)
+        proper(entry, SPRING, where)
         ends = entry["between"]
         if not isinstance(ends, list) or len(ends) != 2:
             raise wrong(f"{where} between", ends, 'two points such as ["crank.B", "ground.D"]')
@@ -99,43 +99,40 @@ class LoadEntries(Entries):
             found.append((link, self.place(link, point, f"{where} between")))
         return Spring(
             (found[0], found[1]),
-            self.optional(entry, "stiffness", "stiffness", where),
-            self.optional(entry, "free_length", "length", where),
-            self.optional(entry, "damping", "damping", where),
+            self.optional(entry, SPRING, "stiffness", where),
+            self.optional(entry, SPRING, "free_length", where),
+            self.optional(entry, SPRING, "damping", where),
         )
 
     def torsion(self, entry: dict[str, Any], i: int) -> TorsionSpring:
         """A torsion spring and damper."""
         where = f"[[torsion_springs]] {i}"
-        known_keys(entry, {"links", "stiffness", "free_angle", "damping"}, where, "key")
-        need(entry, ("links",), where)
+        proper(entry, TORSION_SPRING, where)
         links = entry["links"]
         if not isinstance(links, list) or len(links) != 2:
             raise wrong(f"{where} links", links, "two links")
         return TorsionSpring(
             (self.body(links[0], f"{where} links"), self.body(links[1], f"{where} links")),
-            self.optional(entry, "stiffness", "torsion stiffness", where),
-            self.optional(entry, "free_angle", "angle", where),
-            self.optional(entry, "damping", "torsion damping", where),
+            self.optional(entry, TORSION_SPRING, "stiffness", where),
+            self.optional(entry, TORSION_SPRING, "free_angle", where),
+            self.optional(entry, TORSION_SPRING, "damping", where),
         )
 
     def motor(self, entry: dict[str, Any], i: int) -> Motor:
         """A motor that a link carries."""
         where = f"[[motors]] {i}"
-        known_keys(entry, {"carrier", "drives", "mass", "center"}, where, "key")
-        need(entry, ("carrier", "drives"), where)
+        proper(entry, MOTOR, where)
         return Motor(
             self.body(entry["carrier"], f"{where} carrier"),
             self.body(entry["drives"], f"{where} drives", ground=False),
-            self.optional(entry, "mass", "mass", where),
+            self.optional(entry, MOTOR, "mass", where),
             self.pair(entry.get("center", [0, 0]), "length", f"{where} center"),
         )
 
     def joint_friction(self, entry: dict[str, Any], i: int) -> Friction:
         """Friction in a joint."""
         where = f"[[friction]] {i}"
-        known_keys(entry, {"joint", "coefficient", "radius"}, where, "key")
-        need(entry, ("joint", "coefficient"), where)
+        proper(entry, FRICTION, where)
         joint = str(entry["joint"])
         names = {p for body in self.bodies.values() for p in body}
         if joint not in names:
@@ -143,5 +140,5 @@ class LoadEntries(Entries):
         return Friction(
             joint,
             self.number(entry["coefficient"], "number", f"{where} coefficient"),
-            self.optional(entry, "radius", "length", where),
+            self.optional(entry, FRICTION, "radius", where),
         )

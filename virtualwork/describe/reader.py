@@ -8,9 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from virtualwork.describe import keys
 from virtualwork.describe.checks import hint
 from virtualwork.describe.description import Description
-from virtualwork.describe.entries import Load, known_keys, need
+from virtualwork.describe.entries import Load, known_keys, proper
 from virtualwork.describe.errors import DescriptionError, MechanismError
 from virtualwork.describe.load_entries import LoadEntries
 from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link
@@ -19,10 +20,7 @@ from virtualwork.describe.units import LARGEST, wrong
 D = TypeVar("D", bound=Description)
 P = TypeVar("P")
 
-TABLES = {
-    "name", "units", "ground", "links", "input", "guess", "slots", "sliders", "gears", "gravity", "forces",
-    "torques", "springs", "torsion_springs", "motors", "friction", "source", "note",
-}  # fmt: skip
+TABLES = {*keys.FILE, *keys.ENTRIES}
 
 
 def read(path: Path, make: Callable[..., D], load: Load = Path.read_bytes) -> D:
@@ -104,7 +102,7 @@ class _Reader(LoadEntries):
         where = f"[links.{name}]"
         if not isinstance(entry, dict):
             raise wrong(where, entry, "a table with points")
-        known_keys(entry, {"points", "mass", "center", "inertia"}, where, "key")
+        known_keys(entry, keys.LINK, where, "key")
         points: dict[str, complex] = {}
         given = entry.get("points", {})
         if not isinstance(given, dict):
@@ -128,16 +126,15 @@ class _Reader(LoadEntries):
             for p in ready:
                 v, at = waiting.pop(p), f"{where} points.{p}"
                 if isinstance(v, dict):
-                    known_keys(v, {"from", "length", "angle"}, at, "key")
-                    need(v, ("length", "angle"), at)
+                    proper(v, keys.POINT, at)
                     angle = self.number(v["angle"], "angle", f"{at} angle")
                     length = self.number(v["length"], "length", f"{at} length")
                     points[p] = points[v["from"]] + length * complex(math.cos(angle), math.sin(angle))
                 else:
                     points[p] = self.pair(v, "length", at)
         ordered = {p: points[p] for p in given}
-        mass = self.optional(entry, "mass", "mass", where)
-        inertia = self.optional(entry, "inertia", "inertia", where)
+        mass = self.optional(entry, keys.LINK, "mass", where)
+        inertia = self.optional(entry, keys.LINK, "inertia", where)
         center = self.pair(entry["center"], "length", f"{where} center") if "center" in entry else 0j
         if mass < 0:
             raise wrong(f"{where} mass", entry["mass"], "a mass of zero or more")
@@ -147,13 +144,7 @@ class _Reader(LoadEntries):
 
     def guide(self, entry: dict[str, Any], i: int, table: str) -> Guide:
         where = f"[[{table}]] {i}"
-        known_keys(
-            entry,
-            {"point", "link", "on", "through", "angle"} | ({"turned"} if table == "sliders" else set()),
-            where,
-            "key",
-        )
-        need(entry, ("point",), where)
+        proper(entry, keys.ENTRIES[table], where)
         point = str(entry["point"])
         link = entry.get("link")
         if link is None:
@@ -173,16 +164,15 @@ class _Reader(LoadEntries):
             raise DescriptionError(
                 f"{where} through: unknown point '{through}' of {on}{hint(through, self.bodies[on])}"
             )
-        angle = self.optional(entry, "angle", "angle", where)
+        angle = self.optional(entry, keys.SLIDER, "angle", where)
         turned = None
         if table == "sliders":
-            turned = self.optional(entry, "turned", "angle", where)
+            turned = self.optional(entry, keys.SLIDER, "turned", where)
         return Guide(point, str(link), on, through, angle, turned)
 
     def gear(self, entry: dict[str, Any], i: int) -> Gear:
         where = f"[[gears]] {i}"
-        known_keys(entry, {"links", "ratio", "arm"}, where, "key")
-        need(entry, ("links", "ratio"), where)
+        proper(entry, keys.GEAR, where)
         links = entry["links"]
         if not isinstance(links, list) or len(links) != 2:
             raise wrong(f"{where} links", links, "two links")
@@ -199,8 +189,7 @@ class _Reader(LoadEntries):
             raise DescriptionError("[input]: missing; nothing drives the mechanism")
         for i, entry in rows:
             where = "[input]" if len(rows) == 1 else f"[[input]] {i}"
-            keys = {"link", "on", "slider", "angle", "position", "speed", "acceleration", "jerk", "law"}
-            known_keys(entry, keys, where, "key")
+            known_keys(entry, keys.INPUT, where, "key")
             slide = "slider" in entry
             wrong = {"link", "on", "angle"} & set(entry) if slide else {"position"} & set(entry)
             if wrong or not (slide or "link" in entry):
@@ -276,7 +265,7 @@ class _Reader(LoadEntries):
         slides = {e.name for e in inputs if e.is_slide}
         for key, value in table.items():
             where = f"[guess] {key}"
-            if key == "at":
+            if key in keys.GUESS:
                 continue
             if key in slides and not isinstance(value, list):
                 continue
