@@ -10,7 +10,6 @@ MEMORY = 900e6  # bytes that a result may take: what takes more is refused befor
 
 def memory() -> float:
     """Bytes that a result may take: four fifths of what the machine has free, or of what the process is allowed."""
-    import resource
     from contextlib import suppress
     from pathlib import Path
 
@@ -22,9 +21,13 @@ def memory() -> float:
         group = Path("/sys/fs/cgroup")
         used = float((group / "memory.current").read_text())
         free.append(float((group / "memory.max").read_text()) - used)
-    allowed = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if allowed != resource.RLIM_INFINITY:
-        free.append(float(allowed) - 0.5e9)
+    # Windows has no such limits
+    with suppress(ImportError):
+        import resource
+
+        allowed = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if allowed != resource.RLIM_INFINITY:
+            free.append(float(allowed) - 0.5e9)
     least = max(0.0, min(free))
     return 0.8 * least if least < float("inf") else MEMORY
 

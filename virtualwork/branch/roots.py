@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.polynomial import Chebyshev
 
 from virtualwork.formulas.numbers import Reals
 
@@ -16,11 +15,12 @@ def chebyshev_nodes(n: int) -> Reals:
     return np.cos(np.pi * (np.arange(n) + 0.5) / n)
 
 
-def real_roots(series: Chebyshev, within: float) -> Reals:
+def real_roots(series: np.polynomial.Chebyshev, within: float) -> Reals:
     """The real roots of a series within ±`within`; none of a series that is zero or not finite.
 
     Examples
     --------
+    >>> from numpy.polynomial import Chebyshev
     >>> nodes = chebyshev_nodes(8)
     >>> real_roots(Chebyshev.fit(nodes, 1e-300 * (nodes - 0.25), 6, domain=[-1, 1]), 1.0).round(12)
     array([0.25])
@@ -31,6 +31,6 @@ def real_roots(series: Chebyshev, within: float) -> Reals:
     if not (np.isfinite(largest) and largest > 0):
         return np.empty(0)
     # by a power of two, which rounds nothing
-    scaled = Chebyshev(np.ldexp(series.coef, -int(np.frexp(largest)[1]))).trim(NONE)
+    scaled = type(series)(np.ldexp(series.coef, -int(np.frexp(largest)[1]))).trim(NONE)
     roots = scaled.roots()
     return np.asarray(np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= within)]))
