@@ -417,11 +417,19 @@ class Track:
     def limits(self) -> list[Limit]:
         """Where the input can go no further, over one period of the branch or what was covered, to full precision."""
         back = self.length if not self._repeats else 0.0
-        ahead = self.period or self.length
-        if self.assembly.mechanism.inputs[0].is_slide:
-            back = ahead = SLIDES * self.length
-        self.cover(self.start - back, self.start + ahead)
-        return self._ends()
+        self.cover(self.start - back, self.start + (self.period or self.length))
+        found, sizes = self._ends(), 1
+        slide = self.assembly.mechanism.inputs[0].is_slide
+        # on, until there is an end on either side of the guess
+        while (
+            slide
+            and sizes < SLIDES
+            and len({v.side for v in found if (v.input - self.start) * v.side < 0}) < 2
+        ):
+            sizes *= 2
+            self.cover(self.start - sizes * self.length, self.start + sizes * self.length)
+            found = self._ends()
+        return found
 
     def _ends(self) -> list[Limit]:
         """The limits in what was covered."""
