@@ -36,7 +36,7 @@ SAME = 1e-6
 # turns of the input within which a branch is looked for to come back to itself
 TURNS = 32
 # sizes of the mechanism within which the limits of a slide are looked for
-SLIDES = 4
+SLIDES = 4.0
 # poses of a turn that are compared for it
 COMPARED = 60
 
@@ -418,18 +418,12 @@ class Track:
         """Where the input can go no further, over one period of the branch or what was covered, to full precision."""
         back = self.length if not self._repeats else 0.0
         self.cover(self.start - back, self.start + (self.period or self.length))
-        found, sizes = self._ends(), 1
-        slide = self.assembly.mechanism.inputs[0].is_slide
-        # on, until there is an end on either side of the guess
-        while (
-            slide
-            and sizes < SLIDES
-            and len({v.side for v in found if (v.input - self.start) * v.side < 0}) < 2
-        ):
-            sizes *= 2
-            self.cover(self.start - sizes * self.length, self.start + sizes * self.length)
-            found = self._ends()
-        return found
+        for reach in (1.0, 2.0, SLIDES) if self.assembly.mechanism.inputs[0].is_slide else ():
+            self.cover(self.start - reach * self.length, self.start + reach * self.length)
+            # on, until there is an end on either side of the guess
+            if len({v.side for v in self._ends() if (v.input - self.start) * v.side < 0}) == 2:
+                break
+        return self._ends()
 
     def _ends(self) -> list[Limit]:
         """The limits in what was covered."""
