@@ -383,11 +383,6 @@ class Poses:
             return self.over(lambda i, st: st.slide[guide])  # type: ignore[no-any-return]
         return self.in_time(order, lambda i, k: rates[i].slide[guide][k - 1])  # type: ignore[no-any-return]
 
-    def slide_coefficient(self, guide: int, j: int = 0) -> Reals:
-        """ds/dq_j, (n,)."""
-        rates = self.solve((f"slide:{guide}",), 1, self._which(j))
-        return self.over(lambda i, st: rates[i].slide[guide][0])  # type: ignore[no-any-return]
-
     def columns(self, group: Group) -> list[list[Complexes]]:
         """The Jacobian of one Assur group: for each of its loops, the column of each of its unknowns, (n,) complex."""
         rates = self.solve([*self.plan.writes(group), *self.plan.reads(group)], 1)
