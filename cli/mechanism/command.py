@@ -158,20 +158,20 @@ def run(
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
         )
     with _told(file):
-        mechanism, bare, said = load(file)
+        mechanism, bare, said, about = load(file)
         q = wanted(mechanism, at, sweep, inputs, bare)
         analysis = Analysis.of(
             file, mechanism, q, None if order is None else ORDERS.index(order), names, branch
         )
         analysis.warnings += said
         analysis.check_names()
-        others = show.json or show.text or show.plot or show.expect
+        others = show.json or show.text or show.plot or show.expect or show.report
         if show.as_csv and not others and own in ([], ["--forces"]) and analysis.is_long:
             return _long(analysis, forces, states)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not show.json or show.expect is not None or show.output is not None
         analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces)
-        return _result(analysis, request, states, explain, graph)
+        return _result(analysis, request, states, explain, graph, about)
 
 
 def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
@@ -196,13 +196,18 @@ def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
 
 
 def _result(
-    analysis: Analysis, request: Request, states: Path | None, explain: bool, graph: str | None
+    analysis: Analysis,
+    request: Request,
+    states: Path | None,
+    explain: bool,
+    graph: str | None,
+    about: dict[str, str],
 ) -> Result:
-    from cli.mechanism import columns, graphs, poses, remarks
+    from cli.mechanism import columns, graphs, poses, remarks, words
     from cli.mechanism import forces as of_forces
     from cli.mechanism.states import table as link_states
     from cli.mechanism.studies import Studies
-    from cli.show.columns import Result
+    from cli.show.columns import Result, Sheet
 
     studies = Studies(analysis, request)
     found = studies.document
@@ -219,11 +224,6 @@ def _result(
         if request.forces:
             listed = [pose | part for pose, part in zip(listed, of_forces.poses(analysis), strict=True)]
         return {"name": analysis.mechanism.name, "poses": listed, **found}
-
-    def afterword() -> str:
-        from cli.mechanism import words
-
-        return words.afterword(studies, explain=explain)
 
     def figure() -> Figure:
         from cli.mechanism import force_picture, picture
@@ -242,13 +242,17 @@ def _result(
     own = columns.studies(studies)
     # the table of a study asked for alone stands in place of the poses
     alone = bool(own) and len(request.tables) == 1
+    tables = {**own, "poses": of_poses} if alone else {"poses": of_poses, **own}
     return Result(
         document=document,
-        tables={**own, "poses": of_poses} if alone else {"poses": of_poses, **own},
+        tables=tables,
         screen=of_poses if alone else None,
         notes=lambda: analysis.mechanism.name,
-        afterword=afterword,
+        afterword=lambda: words.afterword(studies, explain=explain),
         figure=figure,
+        method=words.METHOD,
+        sheets=lambda: [Sheet("", words.sections(studies, tables, explain=explain), figure)],
+        about={"title": analysis.mechanism.name or "Mechanism"} | about,
         beside={} if states is None else {states: beside},
         warnings=remarks.warnings(studies),
         failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),
