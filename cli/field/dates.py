@@ -34,7 +34,8 @@ def _year(table: Table, row: int, text: str) -> float:
     first, month, last, *clock = found.groups()
     year, day = (first, last or "1") if iso else (last, first)
     try:
-        at = datetime(int(year), int(month), int(day), *(int(part or 0) for part in clock))
+        hour, minute, second = (int(part or 0) for part in clock)
+        at = datetime(int(year), int(month), int(day), hour, minute, second)
     except ValueError:
         raise table.error(row, "date", text, EXPECTED) from None
     # in days first, so that no digit is lost
