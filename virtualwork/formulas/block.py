@@ -18,6 +18,7 @@ from virtualwork.formulas.numbers import Number, Reals, plus, times
 from virtualwork.formulas.poses import Poses, part
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.rates import Rates
+from virtualwork.formulas.winding import Samples, follow, whole
 from virtualwork.plan.steps import Path
 
 
@@ -37,7 +38,7 @@ class Setting:
         self.mechanism, self.plan = poses.mechanism, poses.plan
         self.formed: set[str] = set()
         self.drive: Reals | None = None
-        self._followed: dict[TorsionSpring, tuple[Reals, Reals]] = {}
+        self._followed: dict[TorsionSpring, Samples] = {}
 
     @cached_property
     def moves(self) -> bool:
@@ -64,29 +65,26 @@ class Setting:
         relative = st.turn[b] * np.conj(st.turn[a]) * complex(np.exp(-1j * spring.free_angle))
         within = np.angle(relative)
         if len(st.inputs) == 1:
-            q, unwrapped = self._unwrapped(spring)
-            rough = np.interp(np.asarray(st.inputs[0], dtype=float), q, unwrapped)
-            within = within + 2 * np.pi * np.round((rough - within) / (2 * np.pi))
+            within = whole(self._counted(spring), st.inputs[0], within)
         return within if st.many else float(within)
 
-    def _unwrapped(self, spring: TorsionSpring) -> tuple[Reals, Reals]:
-        """The twist of a torsion spring followed from the guess, roughly: only its whole turns are used."""
+    def _counted(self, spring: TorsionSpring) -> Samples:
+        """The twist of a torsion spring followed from the guess over all poses asked for."""
         if spring not in self._followed:
             m = self.mechanism
             inputs, at = self.poses.inputs[:, 0], m.at[0]
             low, high = min(float(np.nanmin(inputs)), at), max(float(np.nanmax(inputs)), at)
-            step = m.size / 720 if m.inputs[0].is_slide else 2 * np.pi / 720
-            q = np.linspace(low, high, min(20000, 2 + int((high - low) / step)))
-            along = self.poses.again(q[:, None])
-            a, b = (along.angle(body) if body != GROUND else np.zeros(len(q)) for body in spring.links)
-            relative = np.angle(np.exp(1j * (b - a - spring.free_angle)))
-            there = np.isfinite(relative)
-            path = np.unwrap(relative[there])
-            if len(path):
-                start = int(np.argmin(np.abs(q[there] - at)))
-                path = path + (relative[there][start] - path[start])
-                q = q[there]
-            self._followed[spring] = (q, path) if len(path) else (q, np.zeros(len(q)))
+            turn = m.size if m.inputs[0].is_slide else 2 * np.pi
+            # of very many turns fewer samples each
+            samples = int(min(720.0, max(24.0, 20000 * turn / max(high - low, turn))) * (high - low) / turn)
+
+            def angle(q: Reals) -> Reals:
+                along = self.poses.again(q[:, None])
+                a, b = (along.angle(body) if body != GROUND else np.zeros(len(q)) for body in spring.links)
+                relative: Reals = np.angle(np.exp(1j * (b - a - spring.free_angle)))
+                return relative
+
+            self._followed[spring] = follow(angle, np.linspace(low, high, 2 + samples), at, turn)
         return self._followed[spring]
 
 
