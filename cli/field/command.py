@@ -274,9 +274,10 @@ def _result(
         return fit_columns.residuals(fits)
 
     def figure() -> Figure:
-        from cli.field.picture import draw
+        from cli.field import fit_picture, picture
 
-        return draw(found, range(min(len(found.runs.rotors), 3)))
+        few = range(min(len(found.runs.rotors), 3))
+        return picture.draw(found, few) if fits is None else fit_picture.draw(fits, few)
 
     def page() -> bytes:
         from cli.field.report import html

@@ -22,7 +22,7 @@ th, td { padding: .15mm 2mm; text-align: right; border-bottom: 1px solid #ddd; }
 td.text, th.text { text-align: left; } table.main td { font-size: 12pt; font-weight: 600; }
 .beside { display: flex; gap: 8mm; } .beside > div { flex: 1 1 auto; }
 p, ul { margin: 1mm 0; } .small { font-size: 9pt; color: #333; } .warning { border-left: 3px solid #b00; padding-left: 2mm; }
-svg { width: 100%; height: auto; max-height: 64mm; } section { break-after: page; } section:last-of-type { break-after: auto; }
+figure { margin: 0; } svg { width: 100%; height: auto; max-height: 64mm; } .history svg { max-height: none; } section { break-after: page; } section:last-of-type { break-after: auto; }
 @page { size: A4; margin: 10mm; } @media print { body { margin: 0; max-width: none; } }
 """
 
@@ -53,7 +53,7 @@ def html(found: FieldBalancing, source: str, warnings: Sequence[str], fits: LogF
             parts += ["<h2>Verdict</h2>", "".join(f"<p>{escape(line)}</p>" for line in lines)]
         if fits is not None and (lines := fit_words.expected(fits, solved, i)):
             parts += ["<h2>What to expect</h2>", "".join(f"<p>{escape(line)}</p>" for line in lines)]
-        parts.append(_picture(found, rotor))
+        parts.append(_picture(found, rotor, fits))
         pages.append(f"<section>{''.join(parts)}</section>")
     document = (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
@@ -93,17 +93,19 @@ def _table(columns: Mapping[str, Values], kind: str = "") -> str:
     return f'<table class="{kind}"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
 
 
-def _picture(found: FieldBalancing, rotor: int) -> str:
+def _picture(found: FieldBalancing, rotor: int, fits: LogFits | None) -> str:
     """Return the polar pictures as SVG, or a sentence where matplotlib is not installed."""
     try:
         import matplotlib
     except ImportError:
         return '<p class="small">(No picture: matplotlib is not installed.)</p>'
-    from cli.field.picture import draw
+    from cli.field import fit_picture, picture
 
     matplotlib.use("Agg")
     matplotlib.rcParams["svg.hashsalt"] = f"dalembert-{rotor}"
     stream = io.StringIO()
-    draw(found, [rotor]).savefig(stream, format="svg", metadata={"Date": None})
+    figure = picture.draw(found, [rotor]) if fits is None else fit_picture.draw(fits, [rotor])
+    figure.savefig(stream, format="svg", metadata={"Date": None})
     drawing = stream.getvalue()
-    return drawing[drawing.index("<svg") :]
+    kind = "" if fits is None else ' class="history"'
+    return f"<figure{kind}>{drawing[drawing.index('<svg') :]}</figure>"

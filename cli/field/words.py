@@ -113,6 +113,14 @@ def residual_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
         f"before {amplitude_unit(found)}": [float(abs(v)) for v in before],
         f"predicted {amplitude_unit(found)}": [float(abs(v)) for v in after],
     }
+    if solved.balance is not None:
+        spread = solved.balance.vibration_deviation(solved.total)[i]
+        if np.isfinite(spread).any():
+            columns[f"± {amplitude_unit(found)}"] = [_known(x) for x in spread]
+        ceiling = found.request.max_residual
+        if ceiling is not None:
+            within = solved.balance.probability_within(ceiling)[i]
+            columns[f"within {ceiling:g}: probability"] = [_known(x) for x in within]
     if not found.request.four_run:
         columns["phase°"] = [round(float(degrees(v)), 2) for v in after]
     return columns
