@@ -42,7 +42,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("branch",),
         ("bounds",),
         ("formulas",),
-        ("plan",),
+        ("drawing", "plan"),
         ("describe",),
     ),
     "rigidbody3d": (
