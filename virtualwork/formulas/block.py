@@ -20,9 +20,8 @@ from virtualwork.formulas.numbers import Number, Reals, plus, times
 from virtualwork.formulas.poses import Poses, part
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.rates import Rates
+from virtualwork.formulas.winding import Samples, follow, whole
 from virtualwork.plan.steps import Path, Plan
-
-TURN = 2 * np.pi
 
 
 class Shared:
@@ -45,8 +44,8 @@ class Shared:
         """q̇ and q̈ of the one input over a block, None where zero."""
         raise NotImplementedError
 
-    def turns(self, spring: TorsionSpring, st: State, within: Number) -> Number:
-        """How many whole turns a torsion spring's twist has beyond what lies within half a turn of free."""
+    def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
+        """A torsion spring's twist with its whole turns, from what lies within half a turn of free."""
         raise NotImplementedError
 
     def twist(self, st: State, spring: TorsionSpring) -> Number:
@@ -60,7 +59,7 @@ class Shared:
         if all(not angle.bases for angle in known):
             return (st.affine(known[1]) - spring.free_angle) - st.affine(known[0])
         within = st.kind.angle(st.turn[b] * st.turn[a].conjugate() * rotation(-spring.free_angle))
-        return within + TURN * self.turns(spring, st, within)
+        return within if len(st.inputs) > 1 else self.wound(spring, st, within)
 
 
 class Setting(Shared):
@@ -69,7 +68,7 @@ class Setting(Shared):
     def __init__(self, poses: Poses, at_rest: bool) -> None:
         super().__init__(poses.mechanism, poses.plan)
         self.poses, self.at_rest = poses, at_rest
-        self._followed: dict[TorsionSpring, tuple[Reals, Reals]] = {}
+        self._followed: dict[TorsionSpring, Samples] = {}
 
     @cached_property
     def moves(self) -> bool:
@@ -83,33 +82,28 @@ class Setting(Shared):
         speed, acceleration, _ = self.poses.rates
         return part(speed[0], rows, many), part(acceleration[0], rows, many)
 
-    def turns(self, spring: TorsionSpring, st: State, within: Number) -> Number:
-        """How many whole turns a torsion spring's twist has beyond what lies within half a turn of free."""
-        if len(st.inputs) > 1:
-            return 0.0
-        q, unwrapped = self._unwrapped(spring)
-        rough = np.interp(np.asarray(st.inputs[0], dtype=float), q, unwrapped)
-        whole = np.round((rough - within) / TURN)
-        return whole if st.many else float(whole)
+    def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
+        """A torsion spring's twist with its whole turns, from what lies within half a turn of free."""
+        found = whole(self._counted(spring), st.inputs[0], within)
+        return found if st.many else float(found)
 
-    def _unwrapped(self, spring: TorsionSpring) -> tuple[Reals, Reals]:
-        """The twist of a torsion spring followed from the guess, roughly: only its whole turns are used."""
+    def _counted(self, spring: TorsionSpring) -> Samples:
+        """The twist of a torsion spring followed from the guess over all poses asked for."""
         if spring not in self._followed:
             m = self.mechanism
             inputs, at = self.poses.inputs[:, 0], m.at[0]
             low, high = min(float(np.nanmin(inputs)), at), max(float(np.nanmax(inputs)), at)
-            step = m.size / 720 if m.inputs[0].is_slide else 2 * np.pi / 720
-            q = np.linspace(low, high, min(20000, 2 + int((high - low) / step)))
-            along = self.poses.again(q[:, None])
-            a, b = (along.angle(body) if body != GROUND else np.zeros(len(q)) for body in spring.links)
-            relative = np.angle(np.exp(1j * (b - a - spring.free_angle)))
-            there = np.isfinite(relative)
-            path = np.unwrap(relative[there])
-            if len(path):
-                start = int(np.argmin(np.abs(q[there] - at)))
-                path = path + (relative[there][start] - path[start])
-                q = q[there]
-            self._followed[spring] = (q, path) if len(path) else (q, np.zeros(len(q)))
+            turn = m.size if m.inputs[0].is_slide else 2 * np.pi
+            # of very many turns fewer samples each
+            samples = int(min(720.0, max(24.0, 20000 * turn / max(high - low, turn))) * (high - low) / turn)
+
+            def angle(q: Reals) -> Reals:
+                along = self.poses.again(q[:, None])
+                a, b = (along.angle(body) if body != GROUND else np.zeros(len(q)) for body in spring.links)
+                relative: Reals = np.angle(np.exp(1j * (b - a - spring.free_angle)))
+                return relative
+
+            self._followed[spring] = follow(angle, np.linspace(low, high, 2 + samples), at, turn)
         return self._followed[spring]
 
 

@@ -16,6 +16,7 @@ Inputs of a tape
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -25,7 +26,7 @@ from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
 from virtualwork.describe.loads import TorsionSpring
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.block import TURN, Block, Shared, Table
+from virtualwork.formulas.block import Block, Shared, Table
 from virtualwork.formulas.dynamics import resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.kinds import WRITTEN
@@ -42,6 +43,7 @@ from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
 # (kind, of what …): see `Recording.value`
 Key = tuple[Any, ...]
 NAMES = ("q", "v", "a", "j")
+TURN = 2 * math.pi
 
 
 class Recording:
@@ -354,12 +356,10 @@ class _Setting(Shared):
         speed, acceleration, _ = self.recording.rates
         return speed[0], acceleration[0]
 
-    def turns(self, spring: TorsionSpring, st: State, within: Number) -> Number:
-        """With several inputs a twist lies within half a turn of free."""
-        if len(st.inputs) > 1:
-            return 0.0
+    def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
+        """A twist with the whole turns that enter."""
         number = self.mechanism.torsion_springs.index(spring)
-        return self.recording.recorder.input(f"turns spring {number}")
+        return within + TURN * self.recording.recorder.input(f"turns spring {number}")
 
 
 class _Block(Block):
