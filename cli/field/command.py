@@ -266,9 +266,10 @@ def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | 
         return fit_columns.residuals(fits)
 
     def figure() -> Figure:
-        from cli.field.picture import draw
+        from cli.field import fit_picture, picture
 
-        return draw(found, range(min(len(found.runs.rotors), 3)))
+        few = range(min(len(found.runs.rotors), 3))
+        return picture.draw(found, few) if fits is None else fit_picture.draw(fits, few)
 
     beside = {}
     if save_influence is not None:

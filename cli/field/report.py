@@ -7,9 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from cli.field import columns, fit_words, words
+from cli.field import columns, fit_picture, fit_words, picture, words
 from cli.field.fit import LogFits
-from cli.field.picture import draw
 from cli.field.runs import Complex, Real
 from cli.field.solve import FieldBalancing, Solved
 from cli.field.tolerance import LastRun, Verdict, first_reading, last_run, measured_verdicts, verdicts
@@ -31,7 +30,8 @@ def sheets(found: FieldBalancing, fits: LogFits | None) -> Iterator[Sheet]:
     """Yield for each rotor what to do and what it does, and on a page of its own how it was found."""
     for rotor, (name, solved, i) in enumerate(found.each(MOST)):
         title = f"Rotor {name}" if name else ""
-        yield Sheet(title, list(_sections(found, fits, solved, i)), partial(draw, found, [rotor]))
+        figure = partial(picture.draw, found) if fits is None else partial(fit_picture.draw, fits)
+        yield Sheet(title, list(_sections(found, fits, solved, i)), partial(figure, [rotor]))
         yield Sheet(title, [Section("How it was found", _found(found, fits, solved, i))])
     if len(found.runs.rotors) > MOST:
         yield Sheet("", [Section("Further rotors", [f"{len(found.runs.rotors) - MOST} are not shown here."])])

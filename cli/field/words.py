@@ -114,6 +114,14 @@ def residual_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
         f"before {amplitude_unit(found)}": [float(abs(v)) for v in before],
         f"predicted {amplitude_unit(found)}": [float(abs(v)) for v in after],
     }
+    if solved.balance is not None:
+        spread = solved.balance.vibration_deviation(solved.total)[i]
+        if np.isfinite(spread).any():
+            columns[f"± {amplitude_unit(found)}"] = [_known(x) for x in spread]
+        ceiling = found.request.max_residual
+        if ceiling is not None:
+            within = solved.balance.probability_within(ceiling)[i]
+            columns[f"within {ceiling:g}: probability"] = [_known(x) for x in within]
     if not found.request.four_run:
         columns["phase°"] = [round(float(degrees(v)), 2) for v in after]
     return columns
@@ -141,11 +149,13 @@ def summary(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
             f"repeated readings scatter by {solved.group.reading_sd[i]:.4g} {amplitude_unit(found)} (standard deviation of one reading as a "
             f"vector, {solved.group.repeats} complex degree{'s' * (solved.group.repeats > 1)} of freedom)"
         )
-    if solved.residual_95 is not None:
+    if solved.residual_95 is not None and np.isfinite(solved.residual_95[i]):
         known = []
         if found.request.reading_error is not None:
             relative, angle = found.request.reading_error
             known.append(f"of {100 * relative:.3g} % and {np.degrees(angle):.3g}°")
+        elif solved.balance is not None:
+            known.append("as the residuals of the fit scatter")
         if solved.group.reading_sd[i]:
             known.append(
                 f"{'or ' if known else ''}as the repeats scatter{' where that is more' if known else ''}"

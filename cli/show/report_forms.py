@@ -27,7 +27,7 @@ th, td { padding: .5mm 1.6mm; text-align: left; vertical-align: top; border-bott
 th { background: #eee; font-weight: 600; vertical-align: bottom } .n { text-align: right; font-variant-numeric: tabular-nums }
 td.n { white-space: nowrap } th { overflow-wrap: break-word } .good { color: #06632f; font-weight: 600 } .bad { color: #b00020; font-weight: 700 }
 .warning { border-left: 1mm solid #b00020; padding-left: 2mm } footer { margin-top: 4mm; font-size: 8.5pt; color: #444 }
-figure { margin: 3mm 0; break-inside: avoid } svg { display: block; max-width: 100%; height: auto; max-height: 95mm; margin: 0 auto }
+figure { margin: 3mm 0; break-inside: avoid } svg { display: block; max-width: 100%; height: auto; max-height: 95mm; margin: 0 auto } .rows svg { max-height: 220mm }
 section + section { break-before: page }
 @page { margin: 13mm 12mm } @media print { body { margin: 0; padding: 0; max-width: none } }
 """
@@ -71,9 +71,18 @@ def _html(report: Report) -> Iterator[str]:
             yield f"<h3>{html.escape(name)}</h3>\n"
             yield from map(_html_part, parts)
         if page.figure is not None:
-            yield f"<figure>{_picture(page) or f'<p>{_NO_PICTURE}</p>'}</figure>\n"
+            yield _figure(_picture(page))
         yield "</section>\n"
     yield f"<footer>{''.join(f'<p>{html.escape(text)}</p>' for text in report.closing)}</footer>\n</body></html>\n"
+
+
+def _figure(drawing: str | None) -> str:
+    """A picture; one of several rows of panels, which is wide and high, may fill the page."""
+    if drawing is None:
+        return f"<p>{_NO_PICTURE}</p>\n"
+    sides = [float(side) for side in re.findall(r'(?:width|height)="([\d.]+)pt"', drawing[:1000])]
+    kind = ' class="rows"' if min(sides, default=0.0) > 500 else ""
+    return f"<figure{kind}>{drawing}</figure>\n"
 
 
 def _html_part(part: Part) -> str:
