@@ -15,10 +15,20 @@ import typer
 
 from cli.errors import one_line
 from cli.read.files import named, refuse_inputs
+from cli.show.colour import coloured
 
 if TYPE_CHECKING:
     from cli.show.columns import Document, Result, Table
     from cli.show.expect import Comparison
+
+
+PANELS = {
+    "What": "column",
+    "Output": "json output units digits plot report expect rtol",
+    "Head of the report": "title machine customer date author",
+    "Terminal": "text no_color help",
+}
+"""Heading of the help -> the options below it that every command shares."""
 
 
 def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
@@ -67,7 +77,10 @@ class ShowOptions:
         ),
     ] = None
     rtol: Annotated[
-        float, typer.Option("--rtol", min=0.0, help="Relative tolerance of --expect (for angles: radians).")
+        float,
+        typer.Option(
+            "--rtol", metavar="NUMBER", min=0.0, help="Relative tolerance of --expect (for angles: radians)."
+        ),
     ] = 1e-3
     text: Annotated[bool, typer.Option("--text", help="Print the aligned table even into a pipe.")] = False
     digits: Annotated[
@@ -100,6 +113,10 @@ class ShowOptions:
     customer: Annotated[str | None, typer.Option(metavar="TEXT", help="Whom it is for.")] = None
     date: Annotated[str | None, typer.Option(metavar="TEXT", help="Its date, if not today's.")] = None
     author: Annotated[str | None, typer.Option(metavar="TEXT", help="Who made it.")] = None
+    no_color: Annotated[
+        bool,
+        typer.Option("--no-color", help="No colours on a terminal; so does NO_COLOR in the environment."),
+    ] = False
 
     @property
     def head(self) -> dict[str, str]:
@@ -221,21 +238,27 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         (name, _), *others = result.tables.items()
         formed = {name.strip("-"): first()} | {name.strip("-"): table() for name, table in others}
         write(output, handed_on(output.suffix.lower(), formed, result.warnings))
-    _warn(result.warnings)
+    # a long table would carry the warnings out of sight
+    at_the_end = output is None and not options.json and sys.stdout.isatty()
+    if not at_the_end:
+        _warn(result.warnings, options)
     if options.json:
         sys.stdout.writelines(json_parts(_document(result)))
         if checked is not None:
             print(verdict, file=sys.stderr)
     elif checked is not None:
-        print(verdict)
+        print(coloured(verdict, sys.stdout, not options.no_color))
     elif options.text or (sys.stdout.isatty() and output is None):
         table = (result.screen or first)()
         width = get_terminal_size().columns if sys.stdout.isatty() else None
         text = table_text(table.cells, table.keys, width)
-        sys.stdout.write(paragraphs(result.notes(), text, result.afterword()))
+        said = paragraphs(result.notes(), text, result.afterword())
+        sys.stdout.write(coloured(said, sys.stdout, not options.no_color))
     elif output is None:
         sys.stdout.write(csv_text(first().cells))
     sys.stdout.flush()
+    if at_the_end:
+        _warn(result.warnings, options)
     if result.failed() or (checked is not None and not checked.passed):
         raise typer.Exit(1)
 
@@ -320,14 +343,15 @@ def _stream(result: Result, blocks: Iterator[Table], options: ShowOptions) -> No
     else:
         sys.stdout.writelines(parts())
         sys.stdout.flush()
-    _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)])
+    _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)], options)
     if result.failed():
         raise typer.Exit(1)
 
 
-def _warn(warnings: Iterable[str]) -> None:
+def _warn(warnings: Iterable[str], options: ShowOptions) -> None:
     for warning in warnings:
-        print(f"warning: {one_line(warning)}", file=sys.stderr)
+        line = coloured(f"warning: {one_line(warning)}", sys.stderr, not options.no_color)
+        print(line, file=sys.stderr)
 
 
 def _unknown(count: int) -> list[str]:
