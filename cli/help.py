@@ -18,7 +18,7 @@ class Command(TyperCommand):
 
     def format_options(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
         rows: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}
-        place = {}
+        place: dict[str, str] = {}
         for panels in (self.panels, PANELS):
             for heading, names in panels.items():
                 rows.setdefault(heading, [])
