@@ -34,6 +34,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("__init__",),
         ("mechanism",),
         ("motion",),
+        ("parts_of_motion",),
         ("forces",),
         ("family",),
         ("intime",),
