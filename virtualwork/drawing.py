@@ -124,7 +124,7 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
     Parameters
     ----------
     travel : sequence of (least, largest)
-        Of each guide, m: over which slides it is drawn. Default: some way about its `through`.
+        Of each guide, m: over which slides it is drawn. Default, and where NaN: some way about its `through`.
     """
     s = SYMBOL * mechanism.size
     reach = UNKNOWN_TRAVEL * mechanism.size
@@ -295,5 +295,4 @@ def _labels(mechanism: Description) -> Iterator[Label]:
                 yield Label("point", body, z, name)
             seen.add(name)
     for name, link in mechanism.links.items():
-        if len(link.points) > 1:
-            yield Label("link", name, sum(link.points.values()) / len(link.points), name)
+        yield Label("link", name, sum(link.points.values()) / len(link.points), name)

@@ -104,6 +104,14 @@ def run(
             callback=suffix_among(".csv"),
         ),
     ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.html",
+            help="Write a page that moves to FILE: play, slider, curves, values; with --forces their arrows.",
+            callback=suffix_among(".html"),
+        ),
+    ] = None,
     schema: Annotated[
         bool,
         typer.Option(
@@ -165,13 +173,16 @@ def run(
         )
         analysis.warnings += said
         analysis.check_names()
-        others = show.json or show.text or show.plot or show.expect
+        others = show.json or show.text or show.plot or show.expect or html
         if show.as_csv and not others and own in ([], ["--forces"]) and analysis.is_long:
             return _long(analysis, forces, states)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not show.json or show.expect is not None or show.output is not None
         analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces)
-        return _result(analysis, request, states, explain, graph)
+        result = _result(analysis, request, states, explain, graph)
+        if html is None:
+            return result
+        return replace(result, beside={**result.beside, html: lambda: _page(analysis, forces, show.units)})
 
 
 def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
@@ -254,6 +265,12 @@ def _result(
         failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),
         within=lambda: _told(analysis.file),
     )
+
+
+def _page(analysis: Analysis, forces: bool, units: str | None) -> bytes:
+    from cli.mechanism.animation import page
+
+    return page(analysis, forces, units).html.encode()
 
 
 @contextmanager

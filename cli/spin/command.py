@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.read import options
-from cli.show.output import command
+from cli.show.output import ShowOptions, command, suffix_among
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,6 +50,16 @@ def run(
     integrator: Annotated[
         Integrator, typer.Option(help="For integration; the splitting is for a symmetric top.")
     ] = Integrator.dop853,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.html",
+            help="Write a page that moves to FILE: play, slider, curves, values.",
+            callback=suffix_among(".html"),
+        ),
+    ] = None,
+    *,
+    show: ShowOptions,
 ) -> Result:
     """Turn a body through time: angular velocity, attitude, momentum and energy at any instant.
 
@@ -76,11 +87,17 @@ def run(
 
         return draw(found)
 
+    def page() -> bytes:
+        from cli.spin.animation import page
+
+        return page(found, show.units).html.encode()
+
     return Result(
         document=lambda: columns.document(found),
         tables={"states": lambda: columns.states(found)},
         notes=lambda: words.notes(found),
         figure=figure,
+        beside={} if html is None else {html: page},
         warnings=[*given.warnings, *words.warnings(found)],
     )
 
