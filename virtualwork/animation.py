@@ -84,9 +84,11 @@ class Series:
             k = self._add(name, shown.values, shown.header, owner, exact=bool(_PLACE.search(name)))
             if shown.si != 1:
                 self._packed[k]["si"] = shown.si
-        moving = any(np.any(rate) for rate in self.poses.rates[0])
-        unit = not moving and len(m.inputs) == 1
         names = list(dict.fromkeys(p for body in m.bodies.values() for p in body))
+        timed = any(np.any(rate) for rate in self.poses.rates[0]) and all(
+            f"{name}_vx_m_s" in self._index for name in names if name not in m.ground
+        )
+        unit = not timed and len(m.inputs) == 1
         points = [self._point(name, unit) for name in names]
         paths = self._paths([name for name in names if name not in m.ground])
         for point in points:
@@ -143,8 +145,7 @@ class Series:
         found: dict[str, Any] = {
             "name": name,
             "moves": body != GROUND,
-            # a point that draws a path from the first: one of a link alone, that no guide holds
-            "trace": name not in m.ground and name not in m.pins and name not in {g.point for g in m.guides},
+            "trace": _draws(m, name),
             "x": self._column(f"{name}_x_m", lambda: part(0)),
             "y": self._column(f"{name}_y_m", lambda: part(1)),
         }
@@ -269,13 +270,16 @@ def moving_page(
     return page(title, "plane", documents, **rest)
 
 
+def _draws(m: Description, point: str) -> bool:
+    """Say whether a point draws its path from the first: one of a link alone, that no guide holds."""
+    return point not in (*m.ground, *m.pins, *(guide.point for guide in m.guides))
+
+
 def _first_plots(series: Series) -> list[str]:
     """Return the columns to begin with: an effort where there is one, and the place of a point that draws a path."""
     m = series.mechanism
-    loose = [p for link in m.links.values() for p in link.points if p not in m.pins and p not in m.ground]
-    moving = dict.fromkeys(
-        [*loose, *(p for link in m.links.values() for p in link.points if p not in m.ground)]
-    )
+    free = [p for link in m.links.values() for p in link.points if p not in m.ground]
+    moving = dict.fromkeys([*(p for p in free if _draws(m, p)), *free])
     efforts = [name for name in series.columns if "virtual_work" in name]
     names = [*efforts[:1], *(f"{p}_{axis}_m" for p in moving for axis in "yx"), *series.columns]
     return [series.columns[name].header for name in names if name in series.columns][:2]

@@ -173,6 +173,10 @@ def run(
         )
         analysis.warnings += said
         analysis.check_names()
+        if html is not None:
+            from cli.show.page import refuse_long
+
+            refuse_long(q.n)
         others = show.json or show.text or show.plot or show.expect or html
         if show.as_csv and not others and own in ([], ["--forces"]) and analysis.is_long:
             return _long(analysis, forces, states)

@@ -78,6 +78,10 @@ def run(
     if time is not None and at:
         raise options.bad("--at", "expected --time or --at, not both")
     times = options.time_range("--time", time) if time is not None else [_time(text) for text in at or ["0"]]
+    if html is not None:
+        from cli.show.page import refuse_long
+
+        refuse_long(len(times))
     given = read_body(body)
     found = Rotation(given, np.array(times), method.value if method else None, integrator.value)
     found.states  # noqa: B018  faults of the data are found before anything is shown

@@ -253,16 +253,16 @@ function labels(stands, i) {
     if (k >= 0 && !label.b) towards.push([0, 1.4]);
     let [du, dv] = [0, 1].map((axis) => -towards.reduce((sum, way) => sum + way[axis], 0));
     if (k < 0 && towards.length > 2) [du, dv] = [0, 0];
-    else if (k < 0 && towards.length < 2) [du, dv] = [1.2 + 0.25 * label.t.length, 0];
+    else if (k < 0 && towards.length < 2) [du, dv] = [1.6, 0];
     else if (Math.hypot(du, dv) < 0.35) {
       const [first] = towards.length ? towards : [[-1, 0]];
       [du, dv] = first[0] > 0 ? [first[1], -first[0]] : [-first[1], first[0]];
-      if (k < 0) [du, dv] = [-0.75 * du, -0.75 * dv];
+      if (k < 0) [du, dv] = [-du, -dv];
     }
     const r = k < 0 ? 1 : Math.hypot(du, dv) || 1;
     // a long name stands farther aside
-    const aside = k < 0 ? 15 : 15 + Math.abs(du / r) * Math.max(0, 3 * (label.t.length - 2));
-    words.put(u + (aside * du) / r, v + (15 * dv) / r, label.t, k < 0 ? `body ${classOf(label.b)}` : "point");
+    const aside = (k < 0 ? 12 : 15) + Math.abs(du / r) * Math.max(0, 3 * (label.t.length - 2));
+    words.put(u + (aside * du) / r, v + ((k < 0 ? 12 : 15) * dv) / r, label.t, k < 0 ? `body ${classOf(label.b)}` : "point");
   }
 }
 function legend() {
