@@ -32,8 +32,8 @@ TURN = 6.0
 """A turn of the input takes so many seconds at speed 1."""
 FINE = 181
 """A path is drawn through so many poses a turn at least."""
-# what keeps every digit: places, angles, times; of rates and forces the page keeps seven
-_PLACE = re.compile(r"_(m|deg|rad|s)\Z")
+# what keeps every digit, with inputs and times; of rates and forces the page keeps seven
+_PLACE = re.compile(r"_([xy]_m|position_m|deg|rad)\Z")
 _RATES = {"v": "v{}_m_s", "a": "a{}_m_s2"}
 
 
@@ -81,7 +81,8 @@ class Series:
         owners = sorted({*m.links, *(p for body in m.bodies.values() for p in body)}, key=len, reverse=True)
         for name, shown in self.columns.items():
             owner = next((o for o in owners if name.startswith(f"{o}_")), "")
-            k = self._add(name, shown.values, shown.header, owner, exact=bool(_PLACE.search(name)))
+            exact = name in self.over or bool(_PLACE.search(name))
+            k = self._add(name, shown.values, shown.header, owner, exact)
             if shown.si != 1:
                 self._packed[k]["si"] = shown.si
         names = list(dict.fromkeys(p for body in m.bodies.values() for p in body))

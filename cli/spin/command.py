@@ -102,7 +102,7 @@ def run(
         notes=lambda: words.notes(found),
         figure=figure,
         beside={} if html is None else {html: page},
-        warnings=[*given.warnings, *words.warnings(found)],
+        warnings=[*given.warnings, *words.warnings(found), *(words.coarse(found) if html else ())],
     )
 
 

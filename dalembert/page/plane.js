@@ -98,9 +98,12 @@ function arrows(kind, tails) {
   const group = put(layers.over, "g");
   const parts = tails.map((tail) => put(group, "path", { class: kind }));
   const size = (i) => Math.max(0, ...tails.map(([, x, y]) => Math.hypot(at(whole, x, i), at(whole, y, i))).filter(Number.isFinite));
-  longest[kind] = Math.max(0, ...Array.from({ length: n }, (_, i) => size(i)));
+  const sizes = Array.from({ length: n }, (_, i) => size(i));
+  longest[kind] = Math.max(0, ...sizes);
+  // one scale for all poses; a short peak may reach half across the picture
+  const usual = 2 * Math.sqrt(sizes.reduce((sum, x) => sum + x * x, 0) / n);
   return (i, on) => {
-    const length = (0.2 * Math.min(width, height)) / (longest[kind] || 1);
+    const length = (0.2 * Math.min(width, height)) / (Math.max(usual, longest[kind] / 2.5) || 1);
     for (const [k, [point, x, y]] of tails.entries()) {
       const d = on ? arrow(px(at(whole, point.x, i)), py(at(whole, point.y, i)), length * at(whole, x, i), -length * at(whole, y, i)) : "";
       parts[k].setAttribute("d", d);
@@ -236,33 +239,47 @@ for (const series of data.series) {
 }
 
 // --- all of a pose ----------------------------------------------------------------------------------------------------
-// beside a point, on the side where none of its links leads away; beside the middle of a bar, in the middle of a plate
+// beside a point, on the side where none of its links leads away; a link's name in the middle of a plate or beside a bar,
+// where no other name stands
 const neighbours = whole.points.map((_, k) => [...new Set(whole.bodies.slice(1).filter((b) => b.points.includes(k)).flatMap((b) => b.points))].filter((other) => other !== k));
+const LETTER = [3.4, 8]; // half a letter's width; a line's height
 function labels(stands, i) {
   if (!stands || !drawn.names) return;
   const places = whole.points.map((p) => [px(at(whole, p.x, i)), py(at(whole, p.y, i))]);
-  for (const label of whole.labels) {
-    const [x, y] = carried(stands[label.b], ...label.z);
-    const [u, v] = [px(x), py(y)];
-    const k = label.of === "point" ? whole.points.findIndex((p) => p.name === label.t) : -1;
-    // unit vectors towards what a label is to keep away from
-    const towards = (k < 0 ? whole.bodies[label.b].points : neighbours[k])
-      .map((p) => [places[p][0] - u, places[p][1] - v])
-      .map(([du, dv]) => [du / (Math.hypot(du, dv) || 1), dv / (Math.hypot(du, dv) || 1)]);
+  const taken = places.map(([u, v]) => [u, v, 5, 5]);
+  const free = ([u, v, w, h]) => taken.every(([x, y, a, b]) => Math.abs(u - x) > w + a || Math.abs(v - y) > h + b);
+  const unit = ([du, dv]) => [du / (Math.hypot(du, dv) || 1), dv / (Math.hypot(du, dv) || 1)];
+  const set = (label, places, kind) => {
+    const [w, h] = [LETTER[0] * label.t.length, LETTER[1]];
+    const boxes = places.map(([u, v]) => [u, v, w, h]);
+    const box = boxes.find(free) ?? boxes[0];
+    taken.push(box);
+    words.put(box[0], box[1], label.t, kind);
+  };
+  // how far aside the middle of a name stands: a long one farther to the left or right
+  const aside = (label, [du, dv], gap) => [du * (gap + Math.max(0, LETTER[0] * (label.t.length - 2))), dv * gap];
+  const across = ([du, dv]) => (du > 0 ? [dv, -du] : [-dv, du]);
+  for (const label of whole.labels.filter((one) => one.of === "point")) {
+    const k = whole.points.findIndex((p) => p.name === label.t);
+    const [u, v] = places[k];
+    const towards = neighbours[k].map((p) => unit([places[p][0] - u, places[p][1] - v]));
     // the foot of a fixed pivot
-    if (k >= 0 && !label.b) towards.push([0, 1.4]);
-    let [du, dv] = [0, 1].map((axis) => -towards.reduce((sum, way) => sum + way[axis], 0));
-    if (k < 0 && towards.length > 2) [du, dv] = [0, 0];
-    else if (k < 0 && towards.length < 2) [du, dv] = [1.6, 0];
-    else if (Math.hypot(du, dv) < 0.35) {
-      const [first] = towards.length ? towards : [[-1, 0]];
-      [du, dv] = first[0] > 0 ? [first[1], -first[0]] : [-first[1], first[0]];
-      if (k < 0) [du, dv] = [-du, -dv];
-    }
-    const r = k < 0 ? 1 : Math.hypot(du, dv) || 1;
-    // a long name stands farther aside
-    const aside = (k < 0 ? 12 : 15) + Math.abs(du / r) * Math.max(0, 3 * (label.t.length - 2));
-    words.put(u + (aside * du) / r, v + ((k < 0 ? 12 : 15) * dv) / r, label.t, k < 0 ? `body ${classOf(label.b)}` : "point");
+    if (!label.b) towards.push([0, 1.4]);
+    let way = [0, 1].map((axis) => -towards.reduce((sum, one) => sum + one[axis], 0));
+    if (Math.hypot(...way) < 0.35) way = across(towards[0] ?? [-1, 0]);
+    const [du, dv] = aside(label, unit(way), 15);
+    set(label, [[u + du, v + dv]], "point");
+  }
+  for (const label of whole.labels.filter((one) => one.of === "link")) {
+    const [u, v] = carried(stands[label.b], ...label.z).map((x, axis) => [px, py][axis](x));
+    const ends = whole.bodies[label.b].points.map((p) => places[p]);
+    const along = ends.length > 1 ? [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]] : [0, 50];
+    const side = across(unit(along)).map((x) => -x);
+    const beside = [1, -1].flatMap((sign) => [0, 0.2, -0.2].map((share) => {
+      const [du, dv] = aside(label, side.map((x) => sign * x), 12);
+      return [u + du + share * along[0], v + dv + share * along[1]];
+    }));
+    set(label, ends.length > 2 ? [[u, v], ...beside] : beside, `body ${classOf(label.b)}`);
   }
 }
 function legend() {
