@@ -19,6 +19,7 @@ from itertools import chain
 from math import isfinite, pi
 
 from virtualwork.describe.description import Description
+from virtualwork.describe.loads import Spring
 from virtualwork.describe.parts import GROUND, Gear, Guide
 
 ROLES = {
@@ -156,11 +157,16 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
             if w.body != GROUND and len(mechanism.bodies[w.body]) < 2
         ],
         *(_block(mechanism, guide, s) for guide, _ in guides if guide.is_slider),
-        (Coil(spring.between, 1.6 * s) for spring in mechanism.springs),
+        (_coil(mechanism, spring, s) for spring in mechanism.springs),
         *(_mass(body, own.center, s) for body, own in mechanism.rigid.items() if own.mass),
         _points(mechanism, s),
     ]
     return Drawing(tuple(chain.from_iterable(layers)), tuple(_labels(mechanism)), s)
+
+
+def _coil(mechanism: Description, spring: Spring, s: float) -> Coil:
+    a, b = ((body, mechanism.place(body, point)) for body, point in spring.between)
+    return Coil((a, b), 1.6 * s)
 
 
 def _ends(mechanism: Description, guide: Guide, span: tuple[float, float], beyond: float) -> list[complex]:

@@ -31,6 +31,10 @@ class Integrator(StrEnum):
     splitting = "splitting"
 
 
+EXAMPLE = "tennis-racket"
+PANELS = {"What": "time at", "How": "method integrator", "Output: of the rotation": "html"}
+
+
 @command
 def run(
     body: Annotated[
@@ -102,6 +106,8 @@ def run(
         notes=lambda: words.notes(found),
         figure=figure,
         beside={} if html is None else {html: page},
+        method=words.METHOD,
+        about={"title": given.name or "Rotation in time"} | given.about,
         warnings=[*given.warnings, *words.warnings(found), *(words.coarse(found) if html else ())],
     )
 

@@ -18,6 +18,8 @@ function stand(series, b, i) {
 function carried([x, y, c, s], u, v) {
   return [x + c * u - s * v, y + s * u + c * v];
 }
+// whether a pose can be assembled
+const real = (stands) => stands.every((where) => where.every(Number.isFinite));
 // the points of a shape where its bodies stand
 function outline(shape, stands) {
   const found = [];
@@ -43,9 +45,9 @@ function room() {
     const step = Math.max(1, Math.floor(series.n / 90));
     for (let i = 0; i < series.n; i += step) {
       const stands = series.bodies.map((_, b) => stand(series, b, i));
+      if (!real(stands)) continue;
       for (const shape of series.shapes) {
         for (const [x, y] of outline(shape, stands)) {
-          if (!Number.isFinite(x + y)) continue;
           const r = shape.s ?? 0;
           [left, right, low, high] = [Math.min(left, x - r), Math.max(right, x + r), Math.min(low, y - r), Math.max(high, y + r)];
         }
@@ -76,9 +78,8 @@ const traced = new Set(whole.points.filter((p) => p.trace).map((p) => p.name));
 
 function drawFigure({ series, group, parts }, i) {
   const stands = series.bodies.map((_, b) => stand(series, b, i));
-  const whole = stands.every((where) => where.every(Number.isFinite));
-  group.style.display = whole ? "" : "none";
-  if (!whole) return null;
+  group.style.display = real(stands) ? "" : "none";
+  if (!real(stands)) return null;
   for (const [k, shape] of series.shapes.entries()) {
     const points = outline(shape, stands);
     if (shape.s === undefined) parts[k].setAttribute("d", `M${points.map(([x, y]) => fixed(px(x), py(y))).join("L")}${shape.c ? "Z" : ""}`);
@@ -284,6 +285,8 @@ function labels(stands, i) {
 }
 function legend() {
   const said = [];
+  const [first, ...others] = data.series.map((series) => series.name);
+  if (others.length) said.push(`in full: ${first}; faint: ${others.slice(0, 4).join("; ")}${others.length > 4 ? ` and ${others.length - 4} more` : ""}`);
   const of = (kind, unit) => longest[kind] && said.push(`longest arrow of ${kind}: ${short(longest[kind])} ${unit}`);
   if (drawn.velocity) of("velocity", data.units.v);
   if (drawn.acceleration) of("acceleration", data.units.a);

@@ -350,6 +350,26 @@ def test_a_six_bar_takes_less_than_300_kB(dalembert: Run, tmp_path: Path) -> Non
     assert len(page.encode()) <= 300_000
 
 
+def test_variants_are_ghosts_over_the_first(dalembert: Run, tmp_path: Path, browser: Any) -> None:
+    """Cranks of 40, 35 and 30 mm; with 500 mm it cannot be put together."""
+    (tmp_path / "m.toml").write_text(FOUR_BAR)
+    (tmp_path / "v.csv").write_text("links.crank.B.x_mm\n40\n35\n30\n500\n")
+    done = dalembert(
+        "mechanism", "m.toml", "--sweep", "0:90:1", "--variants", "v.csv", "--html", "m.html", "-o", "m.csv"
+    )
+    assert done.returncode == 0, done.stderr
+    opened = Opened(browser, tmp_path / "m.html")
+    opened.set(40)
+    (full,) = opened.paths("#view g:not(.ghost) > g > .link.b0")
+    ghosts = opened.paths("#view .ghost .link.b0")
+    lengths = [float(np.hypot(*(p[1] - p[0]))) for p in (full, *ghosts)]
+    assert [40 * length / lengths[0] for length in lengths] == pytest.approx([40, 35, 30], rel=1e-3)
+    assert opened.text("legend").startswith("in full: variant 1; faint: variant 2; variant 3")
+    # the plot shows them too
+    assert len(opened.paths(".plot:first-child .curve.ghost")) == len(ghosts)
+    assert opened.faults() == []
+
+
 @pytest.mark.parametrize(
     ("example", "file", "options"),
     [
