@@ -23,7 +23,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
         ("next_run",),
-        ("amplitudes", "confidence", "doubt", "log_balance", "placement", "tolerance", "trial"),
+        ("amplitudes", "confidence", "doubt", "log_balance", "placement", "prior", "tolerance", "trial"),
         ("balance", "correction", "run_log"),
         ("optimality",),
         ("limited", "rounding"),
