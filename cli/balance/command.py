@@ -73,7 +73,7 @@ def run(
     from cli.balance.solve import Balancing, Request
     from cli.read.planes import from_options, from_table
     from cli.read.tolerance import tolerance_of
-    from cli.show.columns import Result
+    from cli.show.columns import Result, Sheet
 
     if (plane is None) == (planes is None):
         raise options.bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
@@ -102,5 +102,8 @@ def run(
         notes=lambda: words.notes(found),
         afterword=lambda: words.verdicts(found),
         figure=figure,
+        method=words.METHOD,
+        sheets=lambda: [Sheet("", words.sections(found), figure)],
+        about={"title": "Balancing of known masses"},
         warnings=[*rotors.table.warnings, *words.warnings(found)],
     )

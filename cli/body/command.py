@@ -116,6 +116,12 @@ def run(
         screen=lambda: columns.quantities(found),
         notes=lambda: words.notes(found),
         figure=figure,
+        method=words.METHOD,
+        about={
+            "title": "A shaft on two bearings"
+            if shaft is not None
+            else "Mass properties and motion of a body"
+        },
         warnings=[*found.parts.warnings, *words.warnings(found)],
     )
 

@@ -130,12 +130,6 @@ def run(
             metavar="FILE.csv", help="Once-per-turn vectors of a recording: t_s, mark, A_um …; no RUNS."
         ),
     ] = None,
-    report: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.html", help="Write a report to print.", callback=suffix_among(".html", ".htm")
-        ),
-    ] = None,
 ) -> Result:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
@@ -249,17 +243,15 @@ def run(
         radius=arm,
         conventions=asked.conventions(method, phase_lag or measured.lags, rotation),
         places=options.places(positions, blades, first),
+        against=against or measured.lags,
     )
     found = FieldBalancing(measured, request, stored)
     fits = LogFits(found, Asked(masses_at(predict, measured), suggest, robust)) if fit else None
-    source = "standard input" if runs == "-" else Path(runs).name
-    return _result(found, fits, source, save_influence, report)
+    return _result(found, fits, save_influence)
 
 
-def _result(
-    found: FieldBalancing, fits: LogFits | None, source: str, save_influence: Path | None, report: Path | None
-) -> Result:
-    from cli.field import columns, fit, fit_columns, fit_words, remarks, words
+def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | None) -> Result:
+    from cli.field import columns, fit, fit_columns, fit_words, remarks, report, words
     from cli.show.columns import Result
     from cli.show.text import csv_text
 
@@ -279,26 +271,25 @@ def _result(
         few = range(min(len(found.runs.rotors), 3))
         return picture.draw(found, few) if fits is None else fit_picture.draw(fits, few)
 
-    def page() -> bytes:
-        from cli.field.report import html
-
-        return html(found, source, warnings, fits)
-
     beside = {}
     if save_influence is not None:
         beside[save_influence] = lambda: csv_text(columns.coefficients(found).cells).encode()
-    if report is not None:
-        beside[report] = page
     return Result(
         document=document,
         tables={
             "corrections": lambda: columns.corrections(found, warnings),
             "influence": lambda: columns.coefficients(found),
+            "prediction": lambda: columns.prediction(found),
+            **({} if found.request.places is None else {"split": lambda: columns.split(found)}),
             **({} if fits is None else {"residuals": residuals}),
         },
         notes=lambda: (fit_words.notes(fits) if fits is not None else "") + words.notes(found),
         afterword=lambda: words.afterword(found) + (fit_words.afterword(fits) if fits is not None else ""),
         figure=figure,
+        method=report.METHOD,
+        sheets=lambda: report.sheets(found, fits),
+        shows_input=True,
+        about={"title": "Balancing in the field"},
         beside=beside,
         warnings=warnings,
     )

@@ -150,6 +150,7 @@ def run(
     from cli.mechanism.solve import ORDERS, Analysis, load
     from cli.mechanism.studies import Request
     from cli.mechanism.variants import asked, assigned
+    from cli.mechanism.words import METHOD
 
     if order is not None and order not in ORDERS:
         raise options.bad("--order", f"'{order}': expected {', '.join(ORDERS)}")
@@ -191,7 +192,7 @@ def run(
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
         )
     with _told(file):
-        mechanism, bare, said = load(file)
+        mechanism, bare, said, about = load(file)
         mechanism = assigned(mechanism, bare, change) if change else mechanism
         several = asked(mechanism, bare, vary, variants, said)
         q = wanted(mechanism, at, sweep, inputs, bare)
@@ -199,7 +200,7 @@ def run(
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)
         analysis.warnings += said
         analysis.check_names()
-        others = show.json or show.text or show.plot or show.expect
+        others = show.json or show.text or show.plot or show.expect or show.report
         streams = show.as_csv and not others
         if several is None and streams and own in ([], ["--forces"]) and analysis.is_long:
             return _long(analysis, forces, states)
@@ -208,16 +209,24 @@ def run(
         times = 1 if several is None or streams else several.count
         analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces, times=times)
         if several is None:
-            return _result(analysis, request, states, explain, graph)
+            return _result(analysis, request, states, explain, graph, about)
 
         def analysis_of(variant: Mechanism) -> Analysis:
             home = at is None and sweep is None and inputs is None
             its = wanted(variant, at, sweep, inputs, bare) if home and several.moves_inputs else q
             return Analysis.of(file, variant, its, rates, names, branch)
 
-        found = Many(mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None))
+        found = Many(
+            mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
+        )
         result = found.result(streams, show.as_json, table)
-        return replace(result, warnings=[*said, *result.warnings], within=lambda: _told(file))
+        return replace(
+            result,
+            warnings=[*said, *result.warnings],
+            within=lambda: _told(file),
+            method=METHOD,
+            about={"title": mechanism.name or "Mechanism"} | about,
+        )
 
 
 def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
@@ -242,13 +251,18 @@ def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
 
 
 def _result(
-    analysis: Analysis, request: Request, states: Path | None, explain: bool, graph: str | None
+    analysis: Analysis,
+    request: Request,
+    states: Path | None,
+    explain: bool,
+    graph: str | None,
+    about: dict[str, str],
 ) -> Result:
-    from cli.mechanism import columns, graphs, poses, remarks
+    from cli.mechanism import columns, graphs, poses, remarks, words
     from cli.mechanism import forces as of_forces
     from cli.mechanism.states import table as link_states
     from cli.mechanism.studies import Studies
-    from cli.show.columns import Result
+    from cli.show.columns import Result, Sheet
 
     studies = Studies(analysis, request)
     found = studies.document
@@ -265,11 +279,6 @@ def _result(
         if request.forces:
             listed = [pose | part for pose, part in zip(listed, of_forces.poses(analysis), strict=True)]
         return {"name": analysis.mechanism.name, "poses": listed, **found}
-
-    def afterword() -> str:
-        from cli.mechanism import words
-
-        return words.afterword(studies, explain=explain)
 
     def figure() -> Figure:
         from cli.mechanism import force_picture, picture
@@ -288,13 +297,17 @@ def _result(
     own = columns.studies(studies)
     # the table of a study asked for alone stands in place of the poses
     alone = bool(own) and len(request.tables) == 1
+    tables = {**own, "poses": of_poses} if alone else {"poses": of_poses, **own}
     return Result(
         document=document,
-        tables={**own, "poses": of_poses} if alone else {"poses": of_poses, **own},
+        tables=tables,
         screen=of_poses if alone else None,
         notes=lambda: analysis.mechanism.name,
-        afterword=afterword,
+        afterword=lambda: words.afterword(studies, explain=explain),
         figure=figure,
+        method=words.METHOD,
+        sheets=lambda: [Sheet("", words.sections(studies, tables, explain=explain), figure)],
+        about={"title": analysis.mechanism.name or "Mechanism"} | about,
         beside={} if states is None else {states: beside},
         warnings=remarks.warnings(studies),
         failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),

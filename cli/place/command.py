@@ -106,5 +106,7 @@ def run(
         notes=lambda: words.notes(found),
         afterword=lambda: words.error(found),
         figure=figure,
+        method=words.METHOD,
+        about={"title": "Placement of a correction"},
         warnings=found.warnings,
     )

@@ -81,6 +81,8 @@ def run(
         tables={"states": lambda: columns.states(found)},
         notes=lambda: words.notes(found),
         figure=figure,
+        method=words.METHOD,
+        about={"title": given.name or "Rotation in time"} | given.about,
         warnings=[*given.warnings, *words.warnings(found)],
     )
 

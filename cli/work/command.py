@@ -39,7 +39,7 @@ def run(
     column field.
     """
     g = 0j if gravity is None else options.plane_vector("--gravity", gravity)
-    from cli.show.columns import Result
+    from cli.show.columns import Result, Sheet
     from cli.work import columns, words
     from cli.work.read import read_states
     from cli.work.solve import WorkBalance
@@ -58,5 +58,8 @@ def run(
         tables={"ledger": tables["ledger"]} if ledger else tables,
         notes=(lambda: "") if ledger else (lambda: words.notes(found)),
         figure=figure,
+        method=words.METHOD,
+        sheets=lambda: [Sheet("", words.sections(found), figure)],
+        about={"title": "Balance of virtual power"},
         warnings=[*table.table.warnings, *table.warnings, *found.warnings],
     )
