@@ -1,8 +1,8 @@
 """What is known of a machine before its own runs: influence coefficients of sister machines, as prior knowledge of the fit.
 
 Of m sister machines the coefficients α_k are known, each with the error of its own runs. The mean α̂ of m differs from the
-α of a further machine as machines differ from one another, and their scatter shows by how much (Fox and others call the
-use of it one-shot balancing: the first correction comes before any trial run). It enters the fit of a machine's own runs
+α of a further machine as machines differ from one another, and their scatter shows by how much. The trade calls the use of it
+one-shot balancing: the first correction comes before any trial run. It enters the fit of a machine's own runs
 as mixed estimation (Theil and Goldberger, Int. Econ. Rev. 2 (1961) 65-78),
 
     min  Σ_j |y_j - x₀ - Σ_p α_p w_jp|²/σ²  +  (α - α̂)ᴴ Γ⁻¹ (α - α̂),
