@@ -30,6 +30,10 @@ class Integrator(StrEnum):
     splitting = "splitting"
 
 
+EXAMPLE = "tennis-racket"
+PANELS = {"What": "time at", "How": "method integrator"}
+
+
 @command
 def run(
     body: Annotated[
