@@ -56,7 +56,9 @@ def _link(s: Skeleton, model: Element, part: Part, light: float) -> None:
     if mass <= 0:
         mass, inertia = light, light * s.m.size**2
         SubElement(inertial, "dalembert:massless")
-    inertia = inertia or LIGHT * mass * s.m.size**2
+    elif inertia <= 0:
+        inertia = LIGHT * mass * s.m.size**2
+        SubElement(inertial, "dalembert:point_mass")
     at(inertial, part.center)
     add(inertial, "mass", digits(mass))
     tensor = add(inertial, "inertia")

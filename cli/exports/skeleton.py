@@ -136,7 +136,7 @@ class Skeleton:
             value, at = float(slide.position[0]), link.points[g.point]
             direction = on.turn + g.angle
             if not g.is_slider:
-                block = Part(self._block(g.point), link.world(at), direction, {g.point: 0j})
+                block = Part(_unused(f"block {g.point}", self.parts), link.world(at), direction, {g.point: 0j})
                 self.parts[block.name] = block
                 self._turn(g.point, g.link, block.name, (at, 0j))
                 link, at = block, 0j
@@ -151,9 +151,6 @@ class Skeleton:
                 joint.input = driver
             self.joints.append(joint)
 
-    def _block(self, point: str) -> str:
-        return _unused(f"block {point}", self.parts)
-
     def _name(self, wanted: str) -> str:
         return _unused(wanted, (j.name for j in self.joints))
 
@@ -165,10 +162,12 @@ class Skeleton:
         def rank(j: Joint) -> int:
             if j.input is not None:
                 return 0
-            # a light block hangs between two links, and no loop is closed on it
-            if j.kind == "slide" or not {j.on, j.link} <= {GROUND, *self.m.links}:
+            if j.kind == "slide":
                 return 1
-            return 2 if {j.on, j.link} in wanted else 3
+            # a light block hangs between two links, and no loop is closed on it where that can be
+            if not {j.on, j.link} <= {GROUND, *self.m.links}:
+                return 2
+            return 3 if {j.on, j.link} in wanted else 4
 
         order = sorted(self.joints, key=rank)
         taken = [order[k] for k in _spanning(self.parts, [(j.on, j.link) for j in order])]
@@ -177,7 +176,7 @@ class Skeleton:
         self.welds: list[tuple[str, str]] = []
         for j in [j for j in self.closing if j.kind == "slide"]:
             link = self.parts[j.link]
-            block = Part(self._block(j.point), link.at, link.turn)
+            block = Part(_unused(f"carriage {j.point}", self.parts), link.at, link.turn)
             self.parts[block.name] = block
             self.welds.append((j.link, block.name))
             self.closing.remove(j)

@@ -82,6 +82,11 @@ class _Layer:
         self._named_points()
         self._couplings()
         self._drives(moving)
+        for what in dict.fromkeys(what for j in moving for what in j.more):
+            names = ", ".join(j.name for j in moving if what in j.more)
+            d.notes.append(
+                left_out(f"{what} of {names}", "`dalembert import` takes over what moves and what is heavy")
+            )
         if robot.gravity is not None:
             g = self.plane.direction(robot.gravity)
             d.gravity = (g.real, g.imag) if abs(g) > 1e-12 * float(np.linalg.norm(robot.gravity)) else None
@@ -225,7 +230,8 @@ class _Layer:
         line = d.bodies[s.on].turn + s.angle + (0.0 if s.link == block else math.pi)
         at = _complex(moved.at) + _complex(moved.points[pin]) * cmath.rect(1.0, moved.turn)
         start = at - value * cmath.rect(1.0, line) - _complex(frame.at)
-        if s.link == carrier and s.point != pin:
+        # a point made for the slide alone goes with it
+        if s.link == carrier and s.point not in {label for label, _ in self.pins}:
             frame.points.pop(s.point)
         del d.bodies[block]
         s.point, s.link, s.on, s.turned = pin, rider, carrier, None

@@ -210,10 +210,14 @@ class _Reader:
         at = here @ pose(numbers(file, f"{where}, pos", values.get("pos"), 3, (0.0, 0.0, 0.0)))
         axis = numbers(file, f"{where}, axis", values.get("axis"), 3, (0.0, 0.0, 1.0))
         direction = here[:3, :3] @ unit(file, f"{where}, axis", axis)
+        keys = ("range", "damping", "stiffness", "frictionloss", "armature")
+        more = tuple("limits" if k == "range" else k for k in keys if values.get(k, "0").strip("0. "))
         value = number(file, f"{where}, ref", values.get("ref", "0"))
         value = self.angle(value) if kind == "turn" else value
         self.robot.join(
-            RobotJoint(name, kind, parent, below, (at[:3, 3], at[:3, 3]), np.asarray(direction), value, type_)
+            RobotJoint(
+                name, kind, parent, below, (at[:3, 3], at[:3, 3]), np.asarray(direction), value, type_, more
+            )
         )
 
     def _inertial(self, where: str, e: Element | None) -> Inertial | None:

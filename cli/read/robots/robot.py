@@ -47,7 +47,7 @@ class RobotJoint:
     """A joint; `ends` are where it stands as each of its two links has it, `axis` its axis, all in the world.
 
     `value` is its coordinate in the file's own configuration. A `ball` is pinned in every plane; `type` is what the file
-    calls it.
+    calls it, `more` what else it says of it: limits, damping.
     """
 
     name: str
@@ -58,6 +58,7 @@ class RobotJoint:
     axis: Array
     value: float = 0.0
     type: str = ""
+    more: tuple[str, ...] = ()
 
 
 @dataclass

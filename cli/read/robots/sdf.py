@@ -172,8 +172,11 @@ def _inertial(file: str, where: str, element: Element | None) -> Inertial | None
     }
     entries = {key: number(file, f"{where}, {key}", text.strip()) for key, text in texts.items()}
     mass = _text(child(element, "mass"))
-    if any(plain(e) == "massless" for e in element):
+    # what `dalembert export` writes beside numbers that the format asks for
+    if child(element, "massless") is not None:
         return None
+    if child(element, "point_mass") is not None:
+        entries = dict.fromkeys(ENTRIES, 0.0)
     return Inertial(
         1.0 if mass is None else number(file, f"{where}, mass", mass.strip()),
         read_pose(file, f"{where}, inertial", child(element, "pose")),
@@ -232,10 +235,23 @@ def joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     direction = np.zeros(3) if kind in ("fixed", "ball") else _axis(file, where, axis, frame, model)
     at = frame[:3, 3]
     robot.join(RobotJoint(name, kind, parent, below, (at, at), direction, type=type_))
+    robot.joints[name].more = _more(axis)
     mimic = None if axis is None else child(axis, "mimic")
     if mimic is not None:
         factor = number(file, f"{where}, mimic multiplier", _text(child(mimic, "multiplier")) or "1")
         robot.couplings.append((name, [(name, 1.0), (named(file, mimic, "joint"), -factor)]))
+
+
+def _more(axis: Element | None) -> tuple[str, ...]:
+    """Name what is said of a joint beyond its place."""
+    limit, dynamics = (None if axis is None else child(axis, tag) for tag in ("limit", "dynamics"))
+    found = [("limits", limit, ("lower", "upper"))]
+    found += [(key, dynamics, (key,)) for key in ("damping", "friction", "spring_stiffness")]
+    return tuple(
+        what.replace("_", " ")
+        for what, element, tags in found
+        if element is not None and any((_text(child(element, tag)) or "").strip("0. \n") for tag in tags)
+    )
 
 
 def _axis(file: str, where: str, axis: Element | None, frame: Array, model: _Model | None) -> Array:

@@ -148,7 +148,19 @@ def _joint(robot: Robot, row: tuple[Element, str, Kind, str, str], frame: Array)
     direction = frame[:3, :3] @ unit(robot.file, f"{where}, axis", xyz) if kind != "fixed" else np.zeros(3)
     ends = (frame[:3, 3], robot.links[link].pose[:3, 3])
     made = RobotJoint(named(robot.file, e), kind, parent, link, ends, direction, type=e.get("type", ""))
+    made.more = _more(e)
     robot.join(made)
+
+
+def _more(e: Element) -> tuple[str, ...]:
+    """Name what is said of a joint beyond its place."""
+    found = [("limits", child(e, "limit"), ("lower", "upper"))]
+    found += [(key, child(e, "dynamics"), (key,)) for key in ("damping", "friction")]
+    return tuple(
+        what
+        for what, element, keys in found
+        if element is not None and any(element.get(key, "0").strip("0. ") for key in keys)
+    )
 
 
 def _loop(robot: Robot, e: Element) -> None:
