@@ -136,7 +136,9 @@ class Skeleton:
             value, at = float(slide.position[0]), link.points[g.point]
             direction = on.turn + g.angle
             if not g.is_slider:
-                block = Part(_unused(f"block {g.point}", self.parts), link.world(at), direction, {g.point: 0j})
+                block = Part(
+                    _unused(f"block {g.point}", self.parts), link.world(at), direction, {g.point: 0j}
+                )
                 self.parts[block.name] = block
                 self._turn(g.point, g.link, block.name, (at, 0j))
                 link, at = block, 0j

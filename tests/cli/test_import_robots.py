@@ -71,19 +71,20 @@ LOOPS = {
   <origin xyz="0.3 0 0"/></joint>""",
 }
 
-MJCF = """<mujoco model="slider crank">
+PISTON = 0.1 + 0.3 * math.cos(math.radians(20)), 1 - 0.3 * math.sin(math.radians(20))
+MJCF = f"""<mujoco model="slider crank">
 <compiler angle="degree" inertiafromgeom="false"/>
 <default><joint axis="0 1 0"/><default class="rail"><joint type="slide" axis="1 0 0"/></default></default>
 <worldbody>
  <body name="crank" pos="0 0 1"><joint name="hip" damping="1"/>
   <inertial pos="0.05 0 0" mass="0.2" diaginertia="1e-4 2e-4 3e-4"/>
   <body name="rod" pos="0.1 0 0" euler="0 20 0"><joint name="knee"/><site name="mid" pos="0.15 0 0"/></body></body>
- <body name="piston" pos="{x!r} 0 {z!r}"><joint name="bore" class="rail"/></body>
+ <body name="piston" pos="{PISTON[0]!r} 0 {PISTON[1]!r}"><joint name="bore" class="rail"/></body>
 </worldbody>
 <equality><connect body1="rod" body2="piston" anchor="0.3 0 0"/></equality>
 <actuator><position name="m" joint="hip"/></actuator>
 <keyframe><key qpos="0 0 0" qvel="3 0 0"/></keyframe>
-</mujoco>""".format(x=0.1 + 0.3 * math.cos(math.radians(20)), z=1 - 0.3 * math.sin(math.radians(20)))
+</mujoco>"""
 
 
 def test_an_sdf_model_stands_where_its_poses_say() -> None:

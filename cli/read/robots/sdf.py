@@ -245,7 +245,7 @@ def joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
 def _more(axis: Element | None) -> tuple[str, ...]:
     """Name what is said of a joint beyond its place."""
     limit, dynamics = (None if axis is None else child(axis, tag) for tag in ("limit", "dynamics"))
-    found = [("limits", limit, ("lower", "upper"))]
+    found: list[tuple[str, Element | None, tuple[str, ...]]] = [("limits", limit, ("lower", "upper"))]
     found += [(key, dynamics, (key,)) for key in ("damping", "friction", "spring_stiffness")]
     return tuple(
         what.replace("_", " ")

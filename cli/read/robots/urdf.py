@@ -154,7 +154,9 @@ def _joint(robot: Robot, row: tuple[Element, str, Kind, str, str], frame: Array)
 
 def _more(e: Element) -> tuple[str, ...]:
     """Name what is said of a joint beyond its place."""
-    found = [("limits", child(e, "limit"), ("lower", "upper"))]
+    found: list[tuple[str, Element | None, tuple[str, ...]]] = [
+        ("limits", child(e, "limit"), ("lower", "upper"))
+    ]
     found += [(key, child(e, "dynamics"), (key,)) for key in ("damping", "friction")]
     return tuple(
         what
