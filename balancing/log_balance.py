@@ -120,6 +120,21 @@ class LogBalance:
             unknowns = self.fit.unknowns[machine] + np.matvec(self.fit.gain[machine], error)
             yield unknowns[:, 1:], unknowns[:, 0]
 
+    def residual_samples(self, machine: int, n: int = 4000, seed: int = 0) -> Complex:
+        """Draw the true vibration (n, s) of one of the machines with its corrections on, Student's errors included.
+
+        At fixed corrections it is linear in the readings: no further approximation is made.
+        """
+        rng = np.random.default_rng(seed)
+        masses = np.concatenate([[1.0], self.corrections[machine]])
+        unit, along, across = (part[machine] for part in self._by_channel())
+        share = np.vecmat(masses.conj(), self.fit.gain[machine]) * unit
+        one, other = rng.standard_normal((2, n, *share.shape))
+        error = np.vecdot(share.conj(), along * one + 1j * across * other)
+        nu = float(self.errors.degrees_of_freedom[machine])
+        wider = np.sqrt(nu / rng.gamma(nu, size=n))[:, None] if 0 < nu < np.inf else 1.0
+        return np.asarray(self.residual[machine] + wider * error)
+
     @property
     def deviations(self) -> tuple[Real, Real]:
         """Standard deviations of each correction's size, kg, and across it, kg, (..., p) each."""
@@ -135,7 +150,11 @@ class LogBalance:
         return np.asarray(axes * (k * np.sqrt(np.maximum(size, 0.0)))[..., None, :])
 
     def vibration_deviation(self, masses: ArrayLike, *, reading: bool = False) -> Real:
-        """Standard deviation of the fitted vibration's amplitude with these masses on, (..., p) -> (..., s).
+        """Standard deviation of the fitted vibration's amplitude with these masses on, (..., p) -> (..., s)."""
+        return np.asarray(np.sqrt(self.vibration_covariance(masses, reading=reading)[..., 0, 0]))
+
+    def vibration_covariance(self, masses: ArrayLike, *, reading: bool = False) -> Real:
+        """Covariance of the fitted vibration with these masses on, along itself and across, (..., p) -> (..., s, 2, 2).
 
         With `reading` the scatter of one more reading is included: that of the mean weight, or of the errors stated.
         """
@@ -144,19 +163,22 @@ class LogBalance:
         rows = np.concatenate([np.ones((*w.shape[:-1], 1), dtype=complex), w], axis=-1)
         gain = np.vecmat(rows[..., None, :].conj(), self.fit.gain)
         covariance = components(gain[..., None, :], None, value[..., None], *self._by_channel())
-        variance = covariance[..., 0, 0, 0]
-        return np.asarray(np.sqrt(variance + self._own(value) if reading else variance))
+        covariance = covariance[..., 0, :, :]
+        return np.asarray(covariance + self._own(value) if reading else covariance)
 
     def _own(self, value: Complex) -> Real:
-        """Variance of a reading of this value, of one component, (..., s)."""
+        """Covariance of a reading of this value, along itself and across, (..., s, 2, 2)."""
         read = self.fit.present
+        errors = self.errors.along, self.errors.across
         if np.isinf(self.errors.degrees_of_freedom).all():
             # errors relative to the amplitude: those of a reading of this size
             size = np.where(read, np.abs(self.fit.readings), 0.0).max(axis=-2)
-            share = np.max(self.errors.along, axis=-2) / np.where(size > 0, size, 1.0)
-            return np.asarray(np.square(share * np.abs(value)))
-        square = np.where(read, np.square(self.errors.along), 0.0)
-        return np.asarray(square.sum(axis=-2) / read.sum(axis=-2))
+            shares = [np.max(error, axis=-2) / np.where(size > 0, size, 1.0) for error in errors]
+            own = [np.square(share * np.abs(value)) for share in shares]
+        else:
+            squares = [np.where(read, np.square(error), 0.0) for error in errors]
+            own = [square.sum(axis=-2) / read.sum(axis=-2) for square in squares]
+        return np.asarray(np.stack(own, axis=-1)[..., None] * np.eye(2))
 
     def probability_within(self, limit: ArrayLike) -> Real:
         """Probability that the corrections as given leave each channel's true vibration within a limit, (..., s).

@@ -24,9 +24,9 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("__init__",),
         ("next_run",),
         ("amplitudes", "confidence", "doubt", "log_balance", "placement", "tolerance", "trial"),
-        ("balance", "correction"),
+        ("balance", "correction", "run_log"),
         ("optimality",),
-        ("limited", "rounding", "run_log"),
+        ("limited", "rounding"),
         ("influence", "propagation", "qr"),
         ("cone_problem", "dependence", "phase", "rotor", "synchronous"),
     ),
@@ -42,7 +42,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("branch",),
         ("bounds",),
         ("formulas",),
-        ("plan",),
+        ("drawing", "plan"),
         ("describe",),
     ),
     "rigidbody3d": (
@@ -57,6 +57,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "cli": (
         ("__main__",),
         ("app",),
+        ("help",),
         ("exports",),
         (
             "balance",
