@@ -21,6 +21,7 @@ _VECTOR = "X,Y,Z"
 EXAMPLE = "riul-rod"
 PANELS = {
     "What": "omega alpha frame_omega about fixed velocity acceleration",
+    "What: a robot": "check_inertias",
     "What: a shaft": "shaft speed speed_rate gravity correct",
 }
 

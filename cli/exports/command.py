@@ -46,7 +46,8 @@ def run(
         raise typer.BadParameter(
             f"'{output}': expected a name that ends in {', '.join(SUFFIXES)}", param_hint="-o"
         )
-    m, bare, _ = load(file)
+    given = load(file)
+    m, bare = given.mechanism, given.bare
     inputs = tuple(wanted(m, None if at is None else [at], None, None, bare).values[0].tolist())
     refuse_inputs([output])
     name = "standard input" if file == "-" else Path(file).name

@@ -20,7 +20,7 @@ def dxf(drawing: Drawing, said: str) -> bytes:
     made = new("R2010")
     made.header["$INSUNITS"] = UNITS[drawing.unit]
     made.header["$MEASUREMENT"] = 0 if drawing.unit in ("in", "ft") else 1
-    for name, (colour, _) in LAYERS.items():
+    for name, (colour, _, _) in LAYERS.items():
         made.layers.add(name, color=colour)
     space = made.modelspace()
     for s in drawing.shapes:

@@ -6,7 +6,6 @@ import cmath
 from xml.etree.ElementTree import Element
 
 from cli.exports.markup import add, digits, document, spatial
-from cli.exports.outline import outline
 from cli.exports.skeleton import Branching, Joint, Part, Skeleton
 from cli.exports.travel import Travel
 from virtualwork.describe.parts import GROUND
@@ -104,7 +103,7 @@ def _inside(s: Skeleton, part: Part, body: Element) -> None:
     for point, z in part.points.items():
         if part.name != GROUND and point not in s.m.pins and not any(point == j.point for j in s.joints):
             add(body, "site", name=point, pos=spatial(z))
-    for a, b in outline(list(part.points.values())):
+    for a, b in part.strokes:
         add(body, "geom", type="capsule", size=THICK * s.m.size, fromto=f"{spatial(a)} {spatial(b)}")
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement
 
 from cli.exports.markup import add, digits, document
-from cli.exports.outline import outline
 from cli.exports.skeleton import Joint, Part, Skeleton
 from cli.exports.travel import Travel
 from virtualwork.describe.parts import GROUND, Gear
@@ -65,7 +64,7 @@ def _link(s: Skeleton, model: Element, part: Part, light: float) -> None:
     for name in AXES:
         # in the plane only izz acts
         add(tensor, name, digits(inertia if name[1] == name[2] else 0.0))
-    for k, (a, b) in enumerate(outline(list(part.points.values())), 1):
+    for k, (a, b) in enumerate(part.strokes, 1):
         visual = add(link, "visual", name=f"stroke {k}")
         at(visual, (a + b) / 2, cmath.phase(b - a))
         box = add(add(add(visual, "geometry"), "box"), "size")

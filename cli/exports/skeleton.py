@@ -14,6 +14,7 @@ import numpy as np
 
 from cli.errors import DataError
 from virtualwork.describe.parts import GROUND
+from virtualwork.drawing import hull
 from virtualwork.motion import SlideMotion
 
 if TYPE_CHECKING:
@@ -35,6 +36,12 @@ class Part:
     def world(self, z: complex) -> complex:
         """Return a place of its axes in the ground's."""
         return self.at + z * cmath.rect(1.0, self.turn)
+
+    @property
+    def strokes(self) -> list[tuple[complex, complex]]:
+        """What it looks like: the sides of the hull of its points, in its axes."""
+        ends = hull(self.points.values())
+        return list(zip(ends, ends[1:] + (ends[:1] if len(ends) > 2 else ()), strict=False))
 
     def inside(self, z: complex) -> complex:
         """Return a place of the ground in its axes."""

@@ -23,7 +23,7 @@ def svg(drawing: Drawing, said: str, millimetres: float) -> bytes:
     # y points down
     root.set("viewBox", digits(low.real - edge, -high.imag - edge, width, height))
     groups = {}
-    for name, (_, colour) in LAYERS.items():
+    for name, (_, colour, _) in LAYERS.items():
         groups[name] = add(root, "g", id=name, fill="none", stroke=colour)
         groups[name].set("stroke-width", digits(STROKE * extent))
         groups[name].set("stroke-linejoin", "round")

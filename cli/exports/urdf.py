@@ -8,7 +8,6 @@ from xml.etree.ElementTree import Element
 
 from cli.exports import sdf
 from cli.exports.markup import add, digits, document, spatial
-from cli.exports.outline import outline
 from cli.exports.skeleton import Branching, Part, Skeleton
 from cli.exports.travel import Travel
 from virtualwork.describe.parts import GROUND, Gear
@@ -55,7 +54,7 @@ def _link(s: Skeleton, root: Element, part: Part, origin: complex) -> None:
         add(inertial, "mass", value=part.mass)
         # in the plane only izz acts
         add(inertial, "inertia", None, **{n: part.inertia if n[1] == n[2] else 0.0 for n in AXES})
-    for a, b in outline(list(part.points.values())):
+    for a, b in part.strokes:
         visual = add(link, "visual")
         add(visual, "origin", xyz=spatial((a + b) / 2 - origin), rpy=digits(0.0, 0.0, cmath.phase(b - a)))
         size = digits(abs(b - a), 2 * THICK * s.m.size, 2 * THICK * s.m.size)

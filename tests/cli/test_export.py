@@ -380,7 +380,8 @@ def test_svg_is_in_true_size_with_a_group_for_each_layer(tmp_path: Path, dalembe
     width = float((root.get("viewBox") or "").split()[2])
     assert float((root.get("width") or "")[:-2]) == pytest.approx(width, rel=1e-5)
     groups = {g.get("id"): g for g in root.findall(f"{space}g")}
-    assert set(groups) == {"LINKS", "JOINTS", "GROUND", "GUIDES", "CURVES", "NAMES"}
+    layers = "GROUND GUIDES LINKS GEARS SPRINGS MASSES CURVES JOINTS POINTS NAMES"
+    assert list(groups) == layers.split()
     pins = {
         (float(c.get("cx") or 0), float(c.get("cy") or 0)) for c in groups["JOINTS"].findall(f"{space}circle")
     }
