@@ -192,7 +192,7 @@ def run(
         swept=sweep is not None or inputs is not None,
     )
     own = request.tables
-    if show.as_csv and len(own) > 1:
+    if show.holds_one and len(own) > 1:
         raise options.bad(
             own[1],
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
@@ -206,13 +206,11 @@ def run(
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)
         analysis.warnings += said
         analysis.check_names()
-        others = show.json or show.text or show.plot or show.expect or show.report
-        streams = show.as_csv and not others
-        if several is None and streams and own in ([], ["--forces"]) and analysis.is_long:
+        if several is None and show.streams and own in ([], ["--forces"]) and analysis.is_long:
             return _long(analysis, forces, states)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not show.json or show.expect is not None or show.output is not None
-        times = 1 if several is None or streams else several.count
+        times = 1 if several is None or show.streams else several.count
         analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces, times=times)
         if several is None:
             return _result(analysis, request, states, explain, graph, about)
@@ -225,7 +223,7 @@ def run(
         found = Many(
             mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
         )
-        result = found.result(streams, show.as_json, table)
+        result = found.result(show.streams, show.as_json, table)
         return replace(
             result,
             warnings=[*said, *result.warnings],

@@ -144,12 +144,13 @@ class Many:
 
     # --- in every form ------------------------------------------------------------------------------------------
     def result(self, streams: bool, json: bool, table: bool) -> Result:
-        """The result: as CSV alone, written part by part, or the forms asked for, at once."""
+        """The result: as one table alone, written part by part, or the forms asked for, at once."""
         if streams:
             return Result(
                 document=dict,
                 tables={},
                 blocks=self.tables,
+                blocks_name="variants",
                 late_warnings=self.said,
                 failed=lambda: not self.any_assembled,
             )
