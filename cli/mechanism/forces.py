@@ -29,7 +29,7 @@ def rows_of(analysis: Analysis, motion: Motion) -> list[tuple[Joint, str, str]]:
         else:
             pairs = [(body, "pin") for body in joint.bodies if body != GROUND]
         for on, of in pairs:
-            if analysis.only is None or joint.name in analysis.only or on in analysis.only:
+            if analysis.only is None or {joint.name, on, of} & set(analysis.only):
                 wanted.append((joint, on, of))
     return wanted
 
