@@ -57,9 +57,12 @@ def wrong_dead_points(t: Topology) -> list[str]:
     dead = np.array(m.check.dead_points)
     period = None if m.inputs[0].is_slide else m.assembly.track.period
     q = t.inputs[0] + np.linspace(-SCANNED, SCANNED, GRID)
+    low, end = -math.inf, math.inf
     if period is not None:
-        dead = np.concatenate([dead - period, dead, dead + period])
-        q = period * np.arange(GRID) / GRID
+        # ends of other ranges are named in the turns in which the guess's own lies
+        low = max((m.check.input_limits or (-math.inf,))[0], t.inputs[0] - period)
+        q, end = low + period * (np.arange(GRID) + 0.5) / GRID, low + period
+        dead = low + (dead - low + 1e-6) % period - 1e-6
     motion, wrong = m.motion(q), []
     there = np.append(motion.assembled, False)
     first = np.flatnonzero(there & ~np.roll(there, 1))
@@ -71,6 +74,8 @@ def wrong_dead_points(t: Topology) -> list[str]:
             way = follow(pose, (side,), (SCANNED,), FINEST)
             ahead = side * (dead - start)
             near = float(ahead[ahead > 0].min(initial=math.inf))
+            if way.reached > (end - start if side > 0 else start - low) + 1e-3:
+                continue
             if way.end == "limit" and abs(near - way.reached) > 1e-3:
                 wrong.append(
                     f"a dead point {side * way.reached:+.6g} from {start:.6g}, said to be at {side * near:+.6g}"
