@@ -29,6 +29,8 @@ from virtualwork.formulas.sweep import EvenSweep
 from virtualwork.plan.steps import Step
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
     from pandas import DataFrame
 
     from virtualwork.bounds.motion import MotionErrors
@@ -375,6 +377,22 @@ class Motion:
         from virtualwork.study.counterweights import least_squares
 
         return least_squares(self, links)
+
+    # --- as a picture -----------------------------------------------------------------------------------------------
+    def plot(self, points: Sequence[str] | None = None, figure: FigureBase | None = None) -> Axes:
+        """Draw the mechanism to scale and the paths of points (default: of all that are no joint); return the axes.
+
+        Without a figure it is a new one of pyplot's; without matplotlib (the extra `plot`) an ImportError.
+        """
+        from virtualwork.picture.drawing import drawing
+
+        return drawing(self.poses, points, figure)
+
+    def plot_curves(self, *names: str, figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw `H.x`, `coupler.omega` … against the input, a panel for each unit; return their axes. See `plot`."""
+        from virtualwork.picture.over_input import curves
+
+        return curves(self.poses, names, figure)
 
     # --- as a table -------------------------------------------------------------------------------------------------
     def to_frame(self) -> DataFrame:
