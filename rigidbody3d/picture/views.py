@@ -108,7 +108,7 @@ def shaft(
         for k, (name, force) in enumerate(forces.items()):
             value = quiet(force[:, component], largest) * factor
             shift = (k - (len(forces) - 1) / 2) * wide
-            below.bar(at + shift, value, width=wide, label=name, **_BARS[k % len(_BARS)])
+            below.bar(at + shift, value, width=wide, label=name, **_BARS.get(name, _FURTHER))
         below.axhline(0, color="0.4", lw=0.8)
         plain(below)
         below.margins(y=0.15)
@@ -122,11 +122,11 @@ def shaft(
     return grid
 
 
-_BARS = (
-    {"color": "0.7", "edgecolor": "black", "lw": 0.6},
-    {"color": "tab:red", "edgecolor": "black", "lw": 0.6},
-    {"color": "white", "edgecolor": "tab:blue", "hatch": "////", "lw": 1.0},
-)
+_BARS = {
+    "static": {"color": "0.7", "edgecolor": "black", "lw": 0.6},
+    "dynamic": {"color": "tab:red", "edgecolor": "black", "lw": 0.6},
+}
+_FURTHER = {"color": "white", "edgecolor": "tab:blue", "hatch": "////", "lw": 1.0}
 
 
 def _area(points: Array) -> float:
@@ -193,21 +193,21 @@ def _view(
     if bearings is not None:
         axes.plot(bearings * factor, [0, 0], "^", color="black", ms=9, zorder=65)
         axes.plot(bearings * factor, [0, 0], color="0.5", lw=1.0, zorder=0)
-    _frame(axes, np.concatenate([every, *(line.get_xydata() for line in axes.lines)]))
+    _frame(axes, bearings is not None)
     axes.set_xlabel(f"{'xyz'[view[0]]}, {unit}")
     axes.set_ylabel(f"{'xyz'[view[1]]}, {unit}")
     plain(axes)
     return axes, labels
 
 
-def _frame(axes: Axes, every: Array) -> None:
-    """Show all of the points, to one scale; where the horizontal axis is shared it is made long enough for that."""
+def _frame(axes: Axes, shared: bool) -> None:
+    """Show all that is drawn, to one scale; a shared horizontal axis is made long enough for the height."""
+    every = np.concatenate([line.get_xydata() for line in axes.lines])
     low, high = every.min(axis=0), every.max(axis=0)
-    across, up = 1.12 * (high - low)
-    wide = max(across, 1.7 * up)
-    middle = (low + high) / 2
-    axes.set_xlim(middle[0] - wide / 2, middle[0] + wide / 2)
-    axes.set_ylim(middle[1] - up / 2, middle[1] + up / 2)
+    axes.margins(0.06)
+    if shared:
+        wide = max(1.12 * (high - low)[0], 1.9 * (high - low)[1])
+        axes.set_xlim(*((low + high)[0] / 2 + np.array([-0.5, 0.5]) * wide))
     axes.set_aspect("equal", adjustable="datalim")
 
 

@@ -82,5 +82,9 @@ def draw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Draw:
 
 
 @pytest.mark.parametrize(("name", "words"), CALLS)
-def test_a_picture_can_be_handed_on(name: str, words: str | None, draw: Draw) -> None:
+def test_a_picture_can_be_handed_on(
+    name: str, words: str | None, draw: Draw, caplog: pytest.LogCaptureFixture
+) -> None:
     assert faults(draw(name, words)) == []
+    # matplotlib's own remarks would stand on the user's terminal
+    assert [record.message for record in caplog.records] == []
