@@ -20,12 +20,13 @@ if TYPE_CHECKING:
         plane_significance,
         unseen,
     )
-    from balancing.doubt import outlier_probability, phase_sense, repeats, robust_fit
+    from balancing.doubt import Drift, drift, outlier_probability, phase_sense, repeats, robust_fit
     from balancing.influence import influence_coefficients
     from balancing.limited import Infeasible
     from balancing.log_balance import LogBalance, region_factor
     from balancing.next_run import NextRun, suggest_run
     from balancing.placement import Placement, drill_depth, place, place_from_stock, transfer
+    from balancing.prior import Prior, fit_with_prior, pooled_prior, stored_prior
     from balancing.rotor import by_size
     from balancing.rounding import influence_error
     from balancing.run_log import JointFit, Undetermined, determined, joint_fit
@@ -48,13 +49,14 @@ _HOMES = {
     "balancing.confidence": "Readings spread",
     "balancing.correction": "CoincidentPlanes Correction Unbalances correct",
     "balancing.dependence": "DependentPlanes DependentTrials condition_number plane_significance unseen",
-    "balancing.doubt": "outlier_probability phase_sense repeats robust_fit",
+    "balancing.doubt": "Drift drift outlier_probability phase_sense repeats robust_fit",
     "balancing.influence": "influence_coefficients",
     "balancing.run_log": "JointFit Undetermined determined joint_fit",
     "balancing.limited": "Infeasible",
     "balancing.log_balance": "LogBalance region_factor",
     "balancing.next_run": "NextRun suggest_run",
     "balancing.synchronous": "OncePerTurn once_per_turn",
+    "balancing.prior": "Prior fit_with_prior pooled_prior stored_prior",
     "balancing.placement": "Placement drill_depth place place_from_stock transfer",
     "balancing.rotor": "by_size",
     "balancing.rounding": "influence_error",
@@ -83,6 +85,7 @@ __all__ = [
     "Correction",
     "DependentPlanes",
     "DependentTrials",
+    "Drift",
     "ErrorBudget",
     "Indexed",
     "Infeasible",
@@ -91,6 +94,7 @@ __all__ = [
     "NextRun",
     "OncePerTurn",
     "Placement",
+    "Prior",
     "Readings",
     "TrialEffect",
     "Unbalances",
@@ -100,8 +104,10 @@ __all__ = [
     "condition_number",
     "correct",
     "determined",
+    "drift",
     "drill_depth",
     "error_budget",
+    "fit_with_prior",
     "grade_value",
     "index_balancing",
     "influence_coefficients",
@@ -118,10 +124,12 @@ __all__ = [
     "place",
     "place_from_stock",
     "plane_significance",
+    "pooled_prior",
     "region_factor",
     "repeats",
     "robust_fit",
     "spread",
+    "stored_prior",
     "suggest_run",
     "transfer",
     "trial_effect",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,6 +39,14 @@ def region_factor(probability: float, degrees_of_freedom: ArrayLike, dimensions:
         known, 2 * gammaincinv(dimensions / 2, probability), dimensions * fdtri(dimensions, real, probability)
     )
     return np.asarray(np.sqrt(np.where(nu > 0, square, np.nan)))
+
+
+@record
+class Spread(NamedTuple):
+    """Covariances along a vector and across it, (..., 2, 2), and the complex degrees of freedom of each, (...)."""
+
+    covariance: Real
+    degrees_of_freedom: Real
 
 
 @record
@@ -133,9 +141,18 @@ class LogBalance:
         flat = (*unit.shape[:-2], -1)
         return unit.reshape(flat), along.reshape(flat), across.reshape(flat)
 
-    @cached_property
+    @property
     def covariance(self) -> Real:
         """Of each correction along itself (its size) and across (its angle), (..., p, 2, 2), kg²."""
+        return self._spread.covariance
+
+    @property
+    def degrees_of_freedom(self) -> Real:
+        """Complex, of the covariance of each correction, (..., p)."""
+        return self._spread.degrees_of_freedom
+
+    @cached_property
+    def _spread(self) -> Spread:
         fit = self.fit
         weights = np.ones(fit.initial.shape) if self.weights is None else self.weights
         left = fit.fitted(self.corrections[..., None, :])[..., 0, :]
@@ -148,7 +165,28 @@ class LogBalance:
         )
         flat = [part.reshape(*part.shape[:-2], -1) for part in of_readings]
         along = self.corrections if self.along is None else self.along
-        return components(flat[0], flat[1], along, *self._each())
+        own = components(flat[0], flat[1], along, *self._each())
+        known = fit.foreknown
+        if known is None:
+            return self._together(own, None)
+        # what was known before has errors that channels share
+        shared = np.einsum("...psn,...snq->...pq", linear, known.sources)
+        other = np.einsum("...psn,...snq->...pq", antilinear, known.sources.conj())
+        return self._together(own, components(shared, other, along, *_unit_errors(known.sources)))
+
+    def _together(self, own: Real, before: Real | None) -> Spread:
+        """Add the covariances (..., k, 2, 2) that readings and what was known before bring."""
+        nu = np.asarray(self.errors.degrees_of_freedom, dtype=float)[..., None]
+        if before is None or self.fit.foreknown is None:
+            return Spread(own, np.broadcast_to(nu, own.shape[:-2]))
+        # Welch and Satterthwaite
+        a, b = (np.trace(part, axis1=-2, axis2=-1) for part in (own, before))
+        whole = np.square(a) / nu + np.square(b) / self.fit.foreknown.degrees_of_freedom[..., None]
+        both = np.square(a + b)
+        freedom = np.where(
+            whole > 0, both / np.where(whole > 0, whole, 1.0), np.where(np.isnan(whole), np.nan, np.inf)
+        )
+        return Spread(own + before, freedom)
 
     def problem_samples(self, machine: int, n: int = 200, seed: int = 0) -> Iterator[tuple[Complex, Complex]]:
         """Draw coefficients (s, p) and vibration (s,) of one of the machines (leading axis) from its readings' errors."""
@@ -158,7 +196,31 @@ class LogBalance:
             one, other = rng.standard_normal((2, *unit.shape))
             error = unit * (along * one + 1j * across * other)
             unknowns = self.fit.unknowns[machine] + np.matvec(self.fit.gain[machine], error)
+            if self.fit.foreknown is not None:
+                sources = self.fit.foreknown.sources[machine]
+                one, other = rng.standard_normal((2, sources.shape[-1])) / np.sqrt(2)
+                unknowns = unknowns + np.matvec(sources, one + 1j * other)
             yield unknowns[:, 1:], unknowns[:, 0]
+
+    def residual_samples(self, machine: int, n: int = 4000, seed: int = 0) -> Complex:
+        """Draw the true vibration (n, s) of one of the machines with its corrections on, Student's errors included.
+
+        At fixed corrections it is linear in the readings: no further approximation is made.
+        """
+        rng = np.random.default_rng(seed)
+        masses = np.concatenate([[1.0], self.corrections[machine]])
+        unit, along, across = (part[machine] for part in self._by_channel())
+        share = np.vecmat(masses.conj(), self.fit.gain[machine]) * unit
+        one, other = rng.standard_normal((2, n, *share.shape))
+        error = np.vecdot(share.conj(), along * one + 1j * across * other)
+        error = error * _wider(rng, float(self.errors.degrees_of_freedom[machine]), n)
+        known = self.fit.foreknown
+        if known is not None:
+            share = np.vecmat(masses.conj(), known.sources[machine])
+            one, other = rng.standard_normal((2, n, share.shape[-1])) / np.sqrt(2)
+            wider = _wider(rng, float(known.degrees_of_freedom[machine]), n)
+            error = error + wider * ((one + 1j * other) @ share.T)
+        return np.asarray(self.residual[machine] + error)
 
     @property
     def deviations(self) -> tuple[Real, Real]:
@@ -171,11 +233,15 @@ class LogBalance:
         Its columns are the semi-axes, kg, in the coordinates along the correction and across it.
         """
         size, axes = np.linalg.eigh(self.covariance)
-        k = region_factor(probability, self.errors.degrees_of_freedom)[..., None, None]
+        k = region_factor(probability, self.degrees_of_freedom)[..., None]
         return np.asarray(axes * (k * np.sqrt(np.maximum(size, 0.0)))[..., None, :])
 
     def vibration_deviation(self, masses: ArrayLike, *, reading: bool = False) -> Real:
-        """Standard deviation of the fitted vibration's amplitude with these masses on, (..., p) -> (..., s).
+        """Standard deviation of the fitted vibration's amplitude with these masses on, (..., p) -> (..., s)."""
+        return np.asarray(np.sqrt(self.vibration_spread(masses, reading=reading).covariance[..., 0, 0]))
+
+    def vibration_spread(self, masses: ArrayLike, *, reading: bool = False) -> Spread:
+        """Covariance of the fitted vibration with these masses on, along itself and across, (..., p) -> (..., s, 2, 2).
 
         With `reading` the scatter of one more reading is included: that of the mean weight, or of the errors stated.
         """
@@ -183,20 +249,29 @@ class LogBalance:
         value = self.fit.fitted(w[..., None, :])[..., 0, :]
         rows = np.concatenate([np.ones((*w.shape[:-1], 1), dtype=complex), w], axis=-1)
         gain = np.vecmat(rows[..., None, :].conj(), self.fit.gain)
-        covariance = components(gain[..., None, :], None, value[..., None], *self._by_channel())
-        variance = covariance[..., 0, 0, 0]
-        return np.asarray(np.sqrt(variance + self._own(value) if reading else variance))
+        own = components(gain[..., None, :], None, value[..., None], *self._by_channel())[..., 0, :, :]
+        if reading:
+            own = own + self._own(value)
+        known = self.fit.foreknown
+        if known is None:
+            return self._together(own, None)
+        share = np.vecmat(rows[..., None, :].conj(), known.sources)
+        before = components(share[..., None, :], None, value[..., None], *_unit_errors(share))
+        return self._together(own, before[..., 0, :, :])
 
     def _own(self, value: Complex) -> Real:
-        """Variance of a reading of this value, of one component, (..., s)."""
+        """Covariance of a reading of this value, along itself and across, (..., s, 2, 2)."""
         read = self.fit.present
+        errors = self.errors.along, self.errors.across
         if np.isinf(self.errors.degrees_of_freedom).all():
             # errors relative to the amplitude: those of a reading of this size
             size = np.where(read, np.abs(self.fit.readings), 0.0).max(axis=-2)
-            share = np.max(self.errors.along, axis=-2) / np.where(size > 0, size, 1.0)
-            return np.asarray(np.square(share * np.abs(value)))
-        square = np.where(read, np.square(self.errors.along), 0.0)
-        return np.asarray(square.sum(axis=-2) / read.sum(axis=-2))
+            shares = [np.max(error, axis=-2) / np.where(size > 0, size, 1.0) for error in errors]
+            own = [np.square(share * np.abs(value)) for share in shares]
+        else:
+            squares = [np.where(read, np.square(error), 0.0) for error in errors]
+            own = [square.sum(axis=-2) / read.sum(axis=-2) for square in squares]
+        return np.asarray(np.stack(own, axis=-1)[..., None] * np.eye(2))
 
     def probability_within(self, limit: ArrayLike) -> Real:
         """Probability that the corrections as given leave each channel's true vibration within a limit, (..., s).
@@ -207,8 +282,8 @@ class LogBalance:
         from scipy.special import chndtr, gammaincinv
 
         ceiling = np.broadcast_to(np.asarray(limit, dtype=float), self.residual.shape)
-        variance = np.square(self.vibration_deviation(self.corrections))
-        nu = np.broadcast_to(self.errors.degrees_of_freedom[..., None], variance.shape)
+        spread = self.vibration_spread(self.corrections)
+        variance, nu = spread.covariance[..., 0, 0], spread.degrees_of_freedom
         node, share = np.polynomial.legendre.leggauss(80)
         node, share = (node + 1) / 2, share / 2
         known = np.isinf(nu)
@@ -221,3 +296,16 @@ class LogBalance:
         sure = (np.abs(self.residual) <= ceiling).astype(float)
         found = np.where(variance > 0, within @ share, sure)
         return np.asarray(np.where(nu > 0, found, np.nan))
+
+
+def _unit_errors(sources: Complex) -> tuple[Complex, Real, Real]:
+    """Direction and deviations of circular errors z, E|z|² = 1, one for each column of (..., q)."""
+    ones = np.ones(sources.shape[-1])
+    return ones.astype(complex), ones / np.sqrt(2), ones / np.sqrt(2)
+
+
+def _wider(rng: np.random.Generator, degrees_of_freedom: float, n: int) -> Real:
+    """Draw by what factor σ may be larger than its estimate, (n, 1)."""
+    if not 0 < degrees_of_freedom < np.inf:
+        return np.ones((n, 1))
+    return np.asarray(np.sqrt(degrees_of_freedom / rng.gamma(degrees_of_freedom, size=n))[:, None])

@@ -35,6 +35,9 @@ TOGETHER = Look("tab:red", 1.8)
 READ = Look("tab:blue", 1.0)
 
 
+NONE = np.zeros(0, dtype=complex)
+
+
 class KnownMasses(NamedTuple):
     """A rotor with known unbalances."""
 
@@ -59,13 +62,13 @@ class Vibration(NamedTuple):
     corrections: Complex
     standing: Complex
     """What of the trial masses stays on, (p,)."""
-    read: Complex
-    fitted: Complex
-    """Readings of runs, and what was fitted to each, (n,)."""
     places: Sequence[float] = ()
     """Where masses can go, rad."""
     split: Sequence[Sequence[float]] = ()
     """The masses on these places, of each plane."""
+    read: Complex = NONE
+    fitted: Complex = NONE
+    """Readings of runs, and what was fitted to each, (n,)."""
 
 
 class Places(NamedTuple):
@@ -127,10 +130,10 @@ def before_and_after(
     s, p = before.shape[-1], corrections.shape[-1]
     many = corrections.ndim > 1
     rows = [part.reshape(-1, part.shape[-1])[:MOST] for part in np.broadcast_arrays(before, after)]
+    read, fitted = history or (NONE, NONE)
     masses = np.broadcast_to(
         corrections, (*np.broadcast_shapes(before.shape[:-1], corrections.shape[:-1]), p)
     )
-    none = np.zeros(0, dtype=complex)
     found = [
         Vibration(
             str(i + 1) if many else "",
@@ -140,7 +143,8 @@ def before_and_after(
             planes or [str(k + 1) for k in range(p)],
             w * 1e3,
             np.zeros(p, dtype=complex),
-            *(history or (none, none)),
+            read=read,
+            fitted=fitted,
         )
         for i, (v, r, w) in enumerate(zip(*rows, masses.reshape(-1, p)[:MOST], strict=True))
     ]

@@ -12,14 +12,14 @@ circular, E|ε|² = σ²/weight, of one σ for all channels of a machine.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import threshold
+from balancing.dependence import roundings, threshold
 from balancing.qr import factors
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
@@ -56,6 +56,19 @@ class Errors:
 
 @record
 @dataclass(frozen=True, eq=False, repr=False)
+class Foreknown:
+    """What was known before the runs, in a fit with it."""
+
+    plain: JointFit
+    """The runs alone: of least norm where they do not determine the unknowns."""
+    sources: Complex
+    """Errors of θ for errors z, E|z|² = 1, of what was known, (..., s, 1 + p, q)."""
+    degrees_of_freedom: Real
+    """Complex, of the estimate that these are, (...)."""
+
+
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class JointFit:
     """Initial vibration and influence coefficients of every channel; see `joint_fit`."""
 
@@ -71,19 +84,34 @@ class JointFit:
     """θ = gain y, (..., s, 1 + p, r); 0 where a reading is missing."""
     leverage: Real
     """h, how far a reading is its own fitted value, in [0, 1], (..., r, s)."""
+    count: NDArray[np.intp] | None = None
+    """How many unknowns the runs determine, (...), where these are not all."""
+    foreknown: Foreknown | None = None
+    """Where more than the runs was fitted: see `balancing.prior`."""
 
     def machine(self, i: int) -> JointFit:
         """Return the fit of one of many machines, along the leading axis."""
-        weights = None if self.weights is None else self.weights[i]
         parts = (self.readings, self.masses, self.unknowns, self.gain, self.leverage)
         y, t, unknowns, gain, leverage = (part[i] for part in parts)
-        return JointFit(y, t, weights, unknowns, gain, leverage)
+        weights, count = (None if part is None else part[i] for part in (self.weights, self.count))
+        known = self.foreknown
+        if known is not None:
+            known = Foreknown(known.plain.machine(i), known.sources[i], known.degrees_of_freedom[i])
+        return JointFit(y, t, weights, unknowns, gain, leverage, count, known)
 
     def without(self, runout: Complex) -> JointFit:
         """Return the fit with the run-out (s,) subtracted from every reading."""
         unknowns = self.unknowns.copy()
         unknowns[..., 0] -= runout
-        return JointFit(self.readings - runout, self.masses, self.weights, unknowns, self.gain, self.leverage)
+        known = self.foreknown
+        if known is not None:
+            known = replace(known, plain=known.plain.without(runout))
+        return replace(self, readings=self.readings - runout, unknowns=unknowns, foreknown=known)
+
+    @property
+    def alone(self) -> JointFit:
+        """The fit of the runs alone: itself, where nothing else was known."""
+        return self if self.foreknown is None else self.foreknown.plain
 
     @property
     def initial(self) -> Complex:
@@ -130,13 +158,17 @@ class JointFit:
 
     @cached_property
     def degrees_of_freedom(self) -> NDArray[np.intp]:
-        """ν: complex readings less complex unknowns, (...)."""
-        unknowns = self.unknowns.shape[-2] * self.unknowns.shape[-1]
+        """ν: complex readings less complex unknowns that they determine, (...)."""
+        if self.foreknown is not None:
+            return self.alone.degrees_of_freedom
+        unknowns = self.unknowns.shape[-2] * self.unknowns.shape[-1] if self.count is None else self.count
         return np.asarray(self.present.sum(axis=(-2, -1)) - unknowns)
 
     @cached_property
     def sum_of_squares(self) -> Real:
-        """Σ weight·|residual|², (...)."""
+        """Σ weight·|residual|², (...); of the runs alone."""
+        if self.foreknown is not None:
+            return self.alone.sum_of_squares
         square = np.square(np.abs(np.where(self.present, self.residuals, 0.0)))
         return np.asarray((square if self.weights is None else self.weights * square).sum(axis=(-2, -1)))
 
@@ -150,13 +182,42 @@ class JointFit:
     def standardized(self) -> Real:
         """|residual|/(s √(1 - h)), the internally studentised residual, (..., r, s); NaN where there is none.
 
-        Where h is 1 the reading alone determines an unknown and has no residual.
+        Where h is 1 the reading alone determines an unknown and has no residual. Of the runs alone.
         """
+        if self.foreknown is not None:
+            return self.alone.standardized
         free = np.where(self.leverage < 1 - 1e-9, 1 - self.leverage, np.nan)
         root = 1.0 if self.weights is None else np.sqrt(self.weights)
         sd = self.residual_sd[..., None, None]
         size = np.abs(self.residuals) * root
         return np.asarray(np.where(size > 0, size / np.where(sd > 0, sd, np.nan), 0.0 * sd) / np.sqrt(free))
+
+    def error_estimate(
+        self, reading_error: ArrayLike | None = None, mass_error: ArrayLike | None = None
+    ) -> Real:
+        """Return a bound of the rounding errors of the unknowns, (..., s, 1 + p), as `balancing.rounding` has it.
+
+        Bounds of the errors of readings (..., r, s) and masses (..., r, p) are carried on; None: they are exact.
+
+        >>> fit = joint_fit([[5], [7], [9.5]], [[0], [1], [2]])
+        >>> bool((fit.error_estimate() < 1e-14).all())
+        True
+        """
+        from balancing.rounding import perturbed
+
+        root = np.where(self.present, 1.0 if self.weights is None else np.sqrt(self.weights), 0.0)
+        root = np.swapaxes(root, -1, -2)
+        off, of_masses = (
+            0.0 if e is None else np.asarray(e, dtype=float) for e in (reading_error, mass_error)
+        )
+        y = np.swapaxes(np.where(self.present, self.readings, 0.0), -1, -2) * root
+        rows = root[..., None] * _rows(self.masses)[..., None, :, :]
+        c = roundings(rows.shape[-1])
+        of_rows = c * np.abs(rows)
+        of_rows[..., 1:] += root[..., None] * np.broadcast_to(of_masses, self.masses.shape)[..., None, :, :]
+        of_y = c * np.abs(y) + root * np.swapaxes(np.broadcast_to(off, self.readings.shape), -1, -2)
+        left = np.matvec(rows, self.unknowns) - y
+        return perturbed(rows, -y, self.unknowns, left, of_rows, of_y).solution
 
     def scatter(self) -> Errors:
         """Return the errors of readings as the residuals show them: s/√2 in each component."""
@@ -165,6 +226,12 @@ class JointFit:
             each = np.where(self.present, each / np.sqrt(np.where(self.present, self.weights, 1.0)), 0.0)
         ones = np.ones(self.readings.shape, dtype=complex)
         return Errors(ones, each, each, np.asarray(self.degrees_of_freedom, dtype=float))
+
+    def known(self, sd: ArrayLike, degrees_of_freedom: ArrayLike = np.inf) -> Errors:
+        """Return errors of √E|ε|² = sd, (...), known with so many complex degrees of freedom."""
+        each = np.broadcast_to(np.asarray(sd, dtype=float)[..., None, None] / np.sqrt(2), self.readings.shape)
+        nu = np.broadcast_to(np.asarray(degrees_of_freedom, dtype=float), self.readings.shape[:-2])
+        return Errors(np.ones(self.readings.shape, dtype=complex), each, each, nu)
 
     def stated(self, amplitude: float, phase: float) -> Errors:
         """Return errors that are known: relative ones of the amplitude, and those of the phase in rad."""

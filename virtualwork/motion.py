@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from virtualwork.bounds.motion import MotionErrors
+    from virtualwork.drawing import Drawing
     from virtualwork.forces import Forces
     from virtualwork.study.cycle import Cycle
 
@@ -370,26 +371,27 @@ class Motion:
         return Cycle(self)
 
     def counterweights(self, links: Sequence[str]) -> tuple[dict[str, complex], Complexes, Complexes]:
-        """The counterweights on links with a fixed pivot that leave the least RMS shaking force.
-
-        See `virtualwork.study.counterweights.least_squares`.
-        """
+        """Counterweights of the least RMS shaking force: see `virtualwork.study.counterweights.least_squares`."""
         from virtualwork.study.counterweights import least_squares
 
         return least_squares(self, links)
 
     # --- as a picture -----------------------------------------------------------------------------------------------
+    @cached_property
+    def drawing(self) -> Drawing:
+        """What the mechanism is drawn as, its guides as long as they are used; `at(shape.body, z)` carries shapes along."""
+        from virtualwork.picture.shapes import shapes_of
+
+        return shapes_of(self.poses)
+
     def plot(self, points: Sequence[str] | None = None, figure: FigureBase | None = None) -> Axes:
-        """Draw the mechanism to scale and the paths of points (default: of all that are no joint); return the axes.
+        """Draw the mechanism to scale and the paths of points (default: of all that are no joint). See docs/pictures.md."""
+        from virtualwork.picture.paper import on_paper
 
-        Without a figure it is a new one of pyplot's; without matplotlib (the extra `plot`) an ImportError.
-        """
-        from virtualwork.picture.drawing import drawing
-
-        return drawing(self.poses, points, figure)
+        return on_paper(self.poses, points, figure)
 
     def plot_curves(self, *names: str, figure: FigureBase | None = None) -> NDArray[np.object_]:
-        """Draw `H.x`, `coupler.omega` … against the input, a panel for each unit; return their axes. See `plot`."""
+        """Draw `H.x`, `coupler.omega` … against the input, a panel for each unit; return their axes."""
         from virtualwork.picture.over_input import curves
 
         return curves(self.poses, names, figure)

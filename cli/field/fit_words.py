@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.field.fit import Fitted, LogFits
+from balancing.doubt import LEVEL
+from cli.field.fit import Fitted, LogFits, drifts
 from cli.field.solve import Solved
 from cli.field.words import FEW, amplitude_unit
 from cli.read.units import degrees
@@ -48,8 +49,17 @@ def summary(fits: LogFits, solved: Solved, i: int) -> str:
         if log.sense is None
         else f"the runs say that the phase {log.sense}s"
     )
+    of_time = drifts(solved.group)
+    if of_time is not None and np.isfinite(chance := of_time.probability[i]):
+        told = "the vibration drifts with time" if chance < LEVEL else "no drift with time is told"
+        sense += f"; {told} (F test at {LEVEL:.0%}: by chance in {chance:.2g} of logs)"
+    before = solved.group.before
+    if before is not None:
+        scatter = "" if before.scatter is None else f", which differ from one another by {before.scatter:.1%}"
+        many = f"{before.machines} machines" if before.machines > 1 else "one machine"
+        sense += f"; coefficients of {many}{scatter} are known before"
     return (
-        f"{len(log.runs)} runs, {int(fit.present[i].sum())} readings fitted together, {nu} complex degree{'s' * (nu != 1)} of "
+        f"{len(log.runs)} run{'s' * (len(log.runs) != 1)}, {int(fit.present[i].sum())} readings fitted together, {nu} complex degree{'s' * (nu != 1)} of "
         f"freedom: {spread}; {sense}"
     )
 
@@ -78,8 +88,9 @@ def expected(fits: LogFits, solved: Solved, i: int) -> list[str]:
     unit = amplitude_unit(found)
     if fits.asked.predict is not None:
         value, sd = (part[i] for part in fits.predicted(solved))
+        lines.append(f"a run with {_masses(fits, solved, fits.masses(solved.planes))} should read")
         lines += [
-            f"that run should read at sensor {channel}: {abs(v):.4g} {unit} at {angle_text(degrees(v), '.2f')}°{_plus_minus(u)}"
+            f"  at sensor {channel}: {abs(v):.4g}{_plus_minus(u)} {unit} at {angle_text(degrees(v), '.2f')}°"
             for channel, v, u in zip(solved.group.channels, value, sd, strict=True)
         ]
     if fits.asked.suggest:

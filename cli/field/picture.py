@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.picture import Complex, Vibration, vibration
-from cli.field.solve import FieldBalancing, Solved
+from balancing.picture import Vibration, vibration
+from cli.field.solve import FieldBalancing
 from cli.field.words import amplitude_unit
 from cli.show.picture import blank
 
@@ -41,16 +41,6 @@ def _rotor(found: FieldBalancing, rotor: int) -> Vibration:
         solved.planes,
         found.amount(solved.corrections[i]),
         found.amount(solved.standing[i]),
-        *_history(solved, i),
-        np.radians(places).tolist(),
-        split,
+        places=np.radians(places).tolist(),
+        split=split,
     )
-
-
-def _history(solved: Solved, i: int) -> tuple[Complex, Complex]:
-    """Return the readings of a rotor whose runs were fitted together, and the vibration fitted to each."""
-    if solved.balance is None:
-        return np.zeros(0, dtype=complex), np.zeros(0, dtype=complex)
-    fit = solved.balance.fit
-    here = fit.present[i]
-    return fit.readings[i][here], (fit.readings - fit.residuals)[i][here]

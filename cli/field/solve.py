@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,14 +43,6 @@ SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
 MANY = 200  # rotors whose uncertainties are worked out unasked
 SHOWN = 5  # of so many rotors the same is said, of the others together
 UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
-
-
-class Verdict(NamedTuple):
-    """A plane's permissible and initial unbalance, kg·m; NaN where the readings do not determine it."""
-
-    plane: str
-    permissible: float
-    initial: float
 
 
 @dataclass
@@ -328,12 +320,26 @@ class FieldBalancing:
     def _doubt(self, solved: Solved, fit: JointFit, runout: Complex, limited: bool) -> None:
         """Carry the errors of a fit of all runs to the corrections."""
         request, weights = self.request, solved.group.weights
-        errors = fit.scatter() if request.reading_error is None else fit.stated(*request.reading_error)
+        before = solved.group.before
+        if request.reading_error is not None:
+            errors = fit.stated(*request.reading_error)
+        elif before is not None and before.reading is not None:
+            # where the runs leave nothing over, the readings scatter as those of the sisters did
+            told = fit.degrees_of_freedom > 0
+            errors = fit.known(
+                np.where(told, fit.residual_sd, before.reading[0]),
+                np.where(told, fit.degrees_of_freedom, before.reading[1]),
+            )
+        else:
+            errors = fit.scatter()
         still = fit.without(runout)
         balance = LogBalance(still, solved.total, errors, weights, solved.corrections, request.ridge)
         solved.balance = balance
         if not np.isfinite(errors.along).any():
             return
+        if len(solved.corrections) <= MANY:
+            left = [np.abs(balance.residual_samples(i)).max(axis=1) for i in range(len(solved.corrections))]
+            solved.residual_95 = np.quantile(left, 0.95, axis=1)
         if limited and len(solved.corrections) > MANY:
             self.warn("uncertainties of so many rotors are not worked out under limits or with minimax")
         elif limited:
@@ -365,14 +371,6 @@ class FieldBalancing:
         """Say what was done otherwise than a reader might think, once."""
         if text not in self.warnings:
             self.warnings.append(text)
-
-    def verdicts(self, solved: Solved, i: int) -> list[Verdict]:
-        """Return each plane's tolerance; none where no tolerance is asked for."""
-        if self.request.tolerance is None or solved.unbalance is None:
-            return []
-        share = self.request.tolerance.permissible / len(solved.planes)
-        size = self.in_kg_m(solved.unbalance[i]).tolist()
-        return [Verdict(plane, share, u) for plane, u in zip(solved.planes, size, strict=True)]
 
     def in_kg_m(self, corrections: Complex) -> Real:
         """Return the unbalances of masses at the trial radius, or of unbalances as they are."""

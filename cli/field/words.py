@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.field.solve import FieldBalancing, Solved
-from cli.read.units import degrees, from_si, to_si
+from cli.field.tolerance import verdicts
+from cli.read.units import degrees, from_si, to_si, written
 from cli.show.text import angle_text, table_text
 
 if TYPE_CHECKING:
@@ -113,6 +114,14 @@ def residual_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
         f"before {amplitude_unit(found)}": [float(abs(v)) for v in before],
         f"predicted {amplitude_unit(found)}": [float(abs(v)) for v in after],
     }
+    if solved.balance is not None:
+        spread = solved.balance.vibration_deviation(solved.total)[i]
+        if np.isfinite(spread).any():
+            columns[f"± {amplitude_unit(found)}"] = [_known(x) for x in spread]
+        ceiling = found.request.max_residual
+        if ceiling is not None:
+            within = solved.balance.probability_within(ceiling)[i]
+            columns[f"within {ceiling:g}: probability"] = [_known(x) for x in within]
     if not found.request.four_run:
         columns["phase°"] = [round(float(degrees(v)), 2) for v in after]
     return columns
@@ -120,12 +129,7 @@ def residual_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
 
 def amplitude_unit(found: FieldBalancing) -> str:
     """The amplitude's unit as people write it."""
-    text = found.runs.amplitude_unit
-    tag = ""
-    for suffix, name in (("_pp", " pk-pk"), ("_pk", " pk"), ("_rms", " r.m.s.")):
-        if text.endswith(suffix):
-            text, tag = text[: -len(suffix)], name
-    return text.replace("um", "µm").replace("_s2", "/s²").replace("_s", "/s") + tag
+    return written(found.runs.amplitude_unit)
 
 
 def summary(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
@@ -145,11 +149,16 @@ def summary(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
             f"repeated readings scatter by {solved.group.reading_sd[i]:.4g} {amplitude_unit(found)} (standard deviation of one reading as a "
             f"vector, {solved.group.repeats} complex degree{'s' * (solved.group.repeats > 1)} of freedom)"
         )
-    if solved.residual_95 is not None:
+    if solved.residual_95 is not None and np.isfinite(solved.residual_95[i]):
         known = []
         if found.request.reading_error is not None:
             relative, angle = found.request.reading_error
             known.append(f"of {100 * relative:.3g} % and {np.degrees(angle):.3g}°")
+        elif solved.balance is not None:
+            left = solved.balance.fit.degrees_of_freedom[i] > 0
+            known.append(
+                f"as the {'residuals of the fit' if left else 'readings behind the coefficients'} scatter"
+            )
         if solved.group.reading_sd[i]:
             known.append(
                 f"{'or ' if known else ''}as the repeats scatter{' where that is more' if known else ''}"
@@ -177,14 +186,16 @@ def verdict(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
     lines = [
         f"tolerance{' ' + tolerance.grade if tolerance.grade else ''}: U_per = {whole:.6g} g·mm, shared equally"
     ]
-    for plane, share, before in found.verdicts(solved, i):
-        initial = (
+    for plane, share, *sizes in verdicts(found, solved, i):
+        before, after = (
             "not determined"
-            if np.isnan(before)
-            else f"{from_si(before, 'unbalance', 'g_mm'):.6g} g·mm ({'within' if before <= share else 'beyond'})"
+            if np.isnan(u)
+            else f"{from_si(u, 'unbalance', 'g_mm'):.6g} g·mm ({'within' if u <= share else 'beyond'})"
+            for u in sizes
         )
         lines.append(
-            f"  plane {plane}: permissible {from_si(share, 'unbalance', 'g_mm'):.6g}, initial {initial}"
+            f"  plane {plane}: permissible {from_si(share, 'unbalance', 'g_mm'):.6g}, initial {before}, "
+            f"residual as predicted {after}"
         )
     return lines
 

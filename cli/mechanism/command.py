@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cli.mechanism.solve import Analysis
     from cli.mechanism.studies import Request
     from cli.show.columns import Document, Result, Table
+    from virtualwork import Mechanism
 
 
 def _print_schema(asked: bool) -> None:
@@ -30,6 +31,14 @@ def _print_schema(asked: bool) -> None:
 
         typer.echo(json.dumps(schema(), indent=2, ensure_ascii=False))
         raise typer.Exit
+
+
+EXAMPLE = "klann"
+PANELS = {
+    "What": "at sweep inputs only branch change vary variants",
+    "How": "order newton",
+    "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states schema",
+}
 
 
 @command
@@ -53,8 +62,8 @@ def run(
         str | None, typer.Option(metavar="NAME,...", help="These links and points; nothing else is computed.")
     ] = None,
     order: Annotated[
-        str | None,
-        typer.Option(help="position, velocity, acceleration or jerk (default: what the file's input gives)."),
+        Literal["position", "velocity", "acceleration", "jerk"] | None,
+        typer.Option(help="How far to differentiate (default: as the file's input gives it)."),
     ] = None,
     branch: Annotated[
         str | None, typer.Option(metavar="all|NUMBER", help="Every assembly, or one of them.")
@@ -104,6 +113,28 @@ def run(
             callback=suffix_among(".csv"),
         ),
     ] = None,
+    change: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="PATH=VALUE",
+            help="Another number in place of the file's, such as links.crank.B.x=62mm; repeatable.",
+        ),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PATH=FROM:TO:STEP",
+            help="Variants over a range, such as links.crank.B.x=50mm:60mm:1mm; repeatable: the grid of all.",
+        ),
+    ] = None,
+    variants: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE.csv",
+            help="Variants as a table: a column for each path, links.crank.B.x_mm, a row for each variant.",
+        ),
+    ] = None,
     schema: Annotated[
         bool,
         typer.Option(
@@ -122,12 +153,13 @@ def run(
     for each pose and link (what `dalembert work` reads); with --only or --forces a row for each pose. In a pipe
     --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
     """
+    from cli.mechanism.many import Many
     from cli.mechanism.read import wanted
     from cli.mechanism.solve import ORDERS, Analysis, load
     from cli.mechanism.studies import Request
+    from cli.mechanism.variants import asked, assigned
+    from cli.mechanism.words import METHOD
 
-    if order is not None and order not in ORDERS:
-        raise options.bad("--order", f"'{order}': expected {', '.join(ORDERS)}")
     if branch is not None and branch != "all" and options.whole(branch) < 1:
         raise options.bad("--branch", f"'{branch}': expected all, or the number of an assembly")
     names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
@@ -142,6 +174,14 @@ def run(
         raise options.bad(flag, "expected a cycle too: --sweep, such as --sweep 0deg:360deg:1deg")
     if graph is not None and show.plot is None:
         raise options.bad("--graph", "expected --plot FILE too: the picture that the curves are drawn into")
+    for flag, given in (
+        ("--states", states),
+        ("--explain", explain),
+        ("--graph", graph),
+        ("--plot", show.plot),
+    ):
+        if given and (vary or variants is not None):
+            raise options.bad(flag, "expected one mechanism, and no --vary or --variants beside it")
     request = Request(
         newton,
         check,
@@ -152,26 +192,45 @@ def run(
         swept=sweep is not None or inputs is not None,
     )
     own = request.tables
-    if show.as_csv and len(own) > 1:
+    if show.holds_one and len(own) > 1:
         raise options.bad(
             own[1],
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
         )
     with _told(file):
-        mechanism, bare, said = load(file)
+        mechanism, bare, said, about = load(file)
+        mechanism = assigned(mechanism, bare, change) if change else mechanism
+        several = asked(mechanism, bare, vary, variants, said)
         q = wanted(mechanism, at, sweep, inputs, bare)
-        analysis = Analysis.of(
-            file, mechanism, q, None if order is None else ORDERS.index(order), names, branch
-        )
+        rates = None if order is None else ORDERS.index(order)
+        analysis = Analysis.of(file, mechanism, q, rates, names, branch)
         analysis.warnings += said
         analysis.check_names()
-        others = show.json or show.text or show.plot or show.expect
-        if show.as_csv and not others and own in ([], ["--forces"]) and analysis.is_long:
+        if several is None and show.streams and own in ([], ["--forces"]) and analysis.is_long:
             return _long(analysis, forces, states)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not show.json or show.expect is not None or show.output is not None
-        analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces)
-        return _result(analysis, request, states, explain, graph)
+        times = 1 if several is None or show.streams else several.count
+        analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces, times=times)
+        if several is None:
+            return _result(analysis, request, states, explain, graph, about)
+
+        def analysis_of(variant: Mechanism) -> Analysis:
+            home = at is None and sweep is None and inputs is None
+            its = wanted(variant, at, sweep, inputs, bare) if home and several.moves_inputs else q
+            return Analysis.of(file, variant, its, rates, names, branch)
+
+        found = Many(
+            mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
+        )
+        result = found.result(show.streams, show.as_json, table)
+        return replace(
+            result,
+            warnings=[*said, *result.warnings],
+            within=lambda: _told(file),
+            method=METHOD,
+            about={"title": mechanism.name or "Mechanism"} | about,
+        )
 
 
 def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
@@ -196,13 +255,18 @@ def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
 
 
 def _result(
-    analysis: Analysis, request: Request, states: Path | None, explain: bool, graph: str | None
+    analysis: Analysis,
+    request: Request,
+    states: Path | None,
+    explain: bool,
+    graph: str | None,
+    about: dict[str, str],
 ) -> Result:
-    from cli.mechanism import columns, picture, poses, remarks
+    from cli.mechanism import columns, picture, poses, remarks, words
     from cli.mechanism import forces as of_forces
     from cli.mechanism.states import table as link_states
     from cli.mechanism.studies import Studies
-    from cli.show.columns import Result
+    from cli.show.columns import Result, Sheet
 
     studies = Studies(analysis, request)
     found = studies.document
@@ -220,11 +284,6 @@ def _result(
             listed = [pose | part for pose, part in zip(listed, of_forces.poses(analysis), strict=True)]
         return {"name": analysis.mechanism.name, "poses": listed, **found}
 
-    def afterword() -> str:
-        from cli.mechanism import words
-
-        return words.afterword(studies, explain=explain)
-
     def figure() -> Figure:
         several = len(analysis.inputs.shown) > 2 and analysis.motions[0].assembled.any()
         if graph:
@@ -240,13 +299,17 @@ def _result(
     own = columns.studies(studies)
     # the table of a study asked for alone stands in place of the poses
     alone = bool(own) and len(request.tables) == 1
+    tables = {**own, "poses": of_poses} if alone else {"poses": of_poses, **own}
     return Result(
         document=document,
-        tables={**own, "poses": of_poses} if alone else {"poses": of_poses, **own},
+        tables=tables,
         screen=of_poses if alone else None,
         notes=lambda: analysis.mechanism.name,
-        afterword=afterword,
+        afterword=lambda: words.afterword(studies, explain=explain),
         figure=figure,
+        method=words.METHOD,
+        sheets=lambda: [Sheet("", words.sections(studies, tables, explain=explain), figure)],
+        about={"title": analysis.mechanism.name or "Mechanism"} | about,
         beside={} if states is None else {states: beside},
         warnings=remarks.warnings(studies),
         failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),

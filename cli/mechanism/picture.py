@@ -9,8 +9,8 @@ from cli.mechanism.solve import Analysis
 from cli.read import options
 from cli.show.picture import blank
 from virtualwork import DescriptionError
-from virtualwork.picture.drawing import drawing
 from virtualwork.picture.over_input import curves, forces
+from virtualwork.picture.paper import on_paper
 from virtualwork.picture.quantities import quantities
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def draw(analysis: Analysis) -> Figure:
     """Draw the mechanism to scale: the first pose in full, others as ghosts, the paths of its points."""
     figure = blank()
-    drawing(analysis.motions[0].poses, None if analysis.only is None else analysis.points, figure)
+    on_paper(analysis.motions[0].poses, None if analysis.only is None else analysis.points, figure)
     return figure
 
 

@@ -16,6 +16,8 @@ ZIP, OLE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
 SUFFIXES = (".xlsx", ".xlsm", ".xls", ".ods")
 # device and inode: a link to a file is the file
 _read: set[tuple[int, int]] = set()
+# the tables and descriptions that were read, as the user named them
+_named: dict[str, None] = {}
 # what can be read only once: standard input, pipes
 _held: dict[str, bytes] = {}
 
@@ -24,12 +26,24 @@ def forget() -> None:
     """Begin a call: nothing has been read."""
     _read.clear()
     _held.clear()
+    _named.clear()
+
+
+def remember(path: str) -> None:
+    """Remember how the user named a table or a description."""
+    _named[path] = None
+
+
+def named() -> list[str]:
+    """Return the tables and descriptions that were read, in order."""
+    return list(_named)
 
 
 def note(path: str | Path) -> Path:
     """Remember that a file is read."""
     with suppress(OSError, ValueError):
-        found = os.stat(path)
+        # standard input may be a file too
+        found = os.fstat(sys.stdin.fileno()) if path == "-" else os.stat(path)
         _read.add((found.st_dev, found.st_ino))
     return Path(path)
 
@@ -39,7 +53,8 @@ def load(path: str | Path) -> bytes:
     name = str(path)
     if name in _held:
         return _held[name]
-    data = sys.stdin.buffer.read() if path == "-" else note(path).read_bytes()
+    file = note(path)
+    data = sys.stdin.buffer.read() if path == "-" else file.read_bytes()
     if path == "-" or not os.path.isfile(path):
         _held[name] = data
     return data

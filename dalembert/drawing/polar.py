@@ -51,7 +51,7 @@ def dial(axes: PolarAxes, title: str, vectors: Sequence[Vector], room: float = 1
     formatter = ScalarFormatter(useOffset=False)
     formatter.set_scientific(False)
     axes.yaxis.set_major_formatter(formatter)
-    axes.set_rlabel_position(_free_direction([v.value for v in vectors]))
+    axes.set_rlabel_position(free_direction([v.value for v in vectors]))
     axes.tick_params(labelsize=8, colors="0.3")
     axes.grid(color="0.87", lw=0.7)
     labels = []
@@ -62,14 +62,18 @@ def dial(axes: PolarAxes, title: str, vectors: Sequence[Vector], room: float = 1
         if size < SHORT * scale:
             axes.plot([angle], [size], "o", color=look.color, ms=3 + look.width, zorder=4)
         else:
-            _arrow(axes, angle, size, scale, look)
+            arrow(axes, value, scale, look)
         if name:
             color = "black" if look.color == GIVEN.color else look.color
             labels.append(Label(name, (angle, size), color, 8.0, float(np.degrees(angle))))
     return labels
 
 
-def _arrow(axes: PolarAxes, angle: float, size: float, scale: float, look: Look) -> None:
+def arrow(axes: PolarAxes, value: complex, scale: float, look: Look) -> None:
+    """Draw a vector as an arrow; beside a dial of the size `scale` that is nothing, as nothing."""
+    angle, size = float(np.angle(value)), abs(value)
+    if not size > 1e-9 * scale:
+        return
     # the shaft ends within the head, so that a dash never blurs the tip
     neck = max(size - 0.03 * scale, 0.5 * size)
     axes.plot([angle, angle], [0, neck], color=look.color, lw=look.width, ls=look.dash, solid_capstyle="butt")
@@ -90,7 +94,7 @@ def handle(look: Look, label: str) -> Line2D:
     return Line2D([], [], color=look.color, lw=look.width, ls=look.dash, label=label)
 
 
-def _free_direction(vectors: Sequence[complex]) -> float:
+def free_direction(vectors: Sequence[complex]) -> float:
     """Return the direction, in degrees, in the middle of the widest gap between vectors: room for the scale."""
     angles = np.sort(np.degrees(np.angle([v for v in vectors if v and np.isfinite(v)])) % 360)
     if not len(angles):

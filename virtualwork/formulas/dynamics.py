@@ -14,8 +14,8 @@ from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort, finished, write_effort
 from virtualwork.formulas.friction import settle
-from virtualwork.formulas.loads import EXTERNAL, OWN
-from virtualwork.formulas.numbers import Complexes, Number, Reals, cross, plus, xy
+from virtualwork.formulas.loads import EXTERNAL, OWN, Load
+from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, cross, plus, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.reactions import Reactions
 from virtualwork.formulas.scene import Scene
@@ -56,6 +56,18 @@ class Dynamics:
     def locked(self) -> NDArray[np.bool_]:
         """(n,): poses in which friction locks the mechanism: no reaction balances its own friction."""
         return ~self._settled[1]
+
+    @cached_property
+    def without_length(self) -> dict[int, NDArray[np.bool_]]:
+        """Of the springs whose pull needs a direction, by number: the poses in which their ends meet, (n,)."""
+        m, found = self.poses.mechanism, {}
+        for number, spring in enumerate(m.springs, 1):
+            if (spring.stiffness and spring.free_length) or (spring.damping and self.scene.moves):
+                a, b = (self.poses.point_derivative(link, m.place(link, p), 0) for link, p in spring.between)
+                meet = np.broadcast_to(np.abs(a - b) <= TOGETHER * m.size, self.poses.n)
+                if meet.any():
+                    found[number] = meet
+        return found
 
     @property
     def effort(self) -> Reals:
@@ -193,20 +205,10 @@ class Dynamics:
         """
         n = self.poses.n
         force, moment = np.zeros(n, complex), np.zeros(n)
-        loads = [load for load in self.scene.loads if load.kind in EXTERNAL and load.body != GROUND]
+        loads = shaking_loads(self.scene.loads)
 
         def work(block: Block) -> None:
-            f: Number = None
-            m: Number = None
-            for load in loads:
-                value = block.formed(load)
-                if value is None:
-                    continue
-                if load.path is None:
-                    m = plus(m, value)
-                else:
-                    f = plus(f, value)
-                    m = plus(m, cross(block.position(load.path), value))
+            f, m = resultant(loads, block)
             if f is not None:
                 force[block.rows] = f
             if m is not None:
@@ -239,6 +241,27 @@ class Dynamics:
                 if arm is not None:
                     moment[block.rows] += cross(arm, value)
         return force, moment
+
+
+def shaking_loads(loads: Iterable[Load]) -> list[Load]:
+    """What acts on the moving links from outside."""
+    return [load for load in loads if load.kind in EXTERNAL and load.body != GROUND]
+
+
+def resultant(loads: Iterable[Load], block: Block) -> tuple[Number, Number]:
+    """The sum of loads over a block and their moment about the ground's origin; None where zero."""
+    force: Number = None
+    moment: Number = None
+    for load in loads:
+        value = block.formed(load)
+        if value is None:
+            continue
+        if load.path is None:
+            moment = plus(moment, value)
+        else:
+            force = plus(force, value)
+            moment = plus(moment, cross(block.position(load.path), value))
+    return force, moment
 
 
 class Moving(Protocol):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from virtualwork.describe.loads import Spring, TorsionSpring
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
-from virtualwork.formulas.numbers import Complexes, Number, Reals, dot, minus, plus, times
+from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, dot, minus, plus, times
 from virtualwork.formulas.quantities import Combination, Given, Quantities, Turned
 from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Path, path_reads
@@ -171,25 +171,29 @@ class Tabled(Load):
     periodic: bool = False
     link_axes: bool = False
 
-    def _in_cycle(self, block: Block) -> tuple[Reals, Complexes, Reals]:
+    def _in_cycle(self, q: Number) -> tuple[Reals, Complexes, Reals]:
         at = np.array([row[0] for row in self.table])
         force = np.array([row[1] for row in self.table])
-        q = np.asarray(block.st.inputs[0], dtype=float)
+        q = np.asarray(q, dtype=float)
         if self.periodic:
             # the table is one cycle of a whole number of turns
             q = at[0] + np.mod(q - at[0], at[-1] - at[0])
         return at, force, q
 
-    def form(self, block: Block) -> Number:
-        at, force, q = self._in_cycle(block)
+    def over(self, q: Number, many: bool) -> Number:
+        """The force at inputs, in the axes that it is given in; NaN outside the table."""
+        at, force, q = self._in_cycle(q)
         outside = (q < at[0]) | (q > at[-1])
         values = np.where(outside, np.nan, np.interp(q, at, force.real) + 1j * np.interp(q, at, force.imag))
-        found = values if block.st.many else complex(values)
+        return values if many else complex(values)
+
+    def form(self, block: Block) -> Number:
+        found = block.table(self)
         return found * block.st.turn[self.body] if self.link_axes else found
 
     def turned(self, block: Block, rates: Rates) -> Number:
         """Its derivative over the input, in ground axes."""
-        at, force, q = self._in_cycle(block)
+        at, force, q = self._in_cycle(block.st.inputs[0])
         place = np.clip(np.searchsorted(at, q, side="right") - 1, 0, len(at) - 2)
         slopes: NDArray[Any] = np.diff(force)[place] / np.diff(at)[place]
         steep: Number = slopes if block.st.many else complex(slopes)
@@ -254,7 +258,13 @@ class SpringEnd(Load):
         if not s.free_length:
             # the pull is k·d: no direction is needed, and none is asked for at zero length
             return s.stiffness * d
-        return s.stiffness * (1 - s.free_length / block.st.kind.sqrt(d.real * d.real + d.imag * d.imag)) * d
+        return s.stiffness * (1 - s.free_length * self._inverse(block, d)) * d
+
+    def _inverse(self, block: Block, d: Number) -> Number:
+        """1/l; NaN where the spring has no length, and its pull no direction."""
+        kind = block.st.kind
+        length = kind.sqrt(d.real * d.real + d.imag * d.imag)
+        return kind.inverse(length, TOGETHER * block.setting.mechanism.size)
 
     def form(self, block: Block) -> Number:
         s, d = self.spring, self._between(block.position)
@@ -262,8 +272,8 @@ class SpringEnd(Load):
         if s.damping:
             rate = self._between(block.velocity)
             if rate is not None:
-                length2 = d.real * d.real + d.imag * d.imag
-                pull = plus(pull, (s.damping * dot(d, rate) / length2) * d)
+                inverse = self._inverse(block, d)
+                pull = plus(pull, (s.damping * dot(d, rate) * (inverse * inverse)) * d)
         return pull
 
     def displacement(self, block: Block, j: int) -> Number:
@@ -292,8 +302,8 @@ class SpringEnd(Load):
         share: Number = 1.0
         bend: Number = 0.0
         if s.free_length:
-            length = abs(d)
-            share, bend = 1 - s.free_length / length, s.free_length / length**3 * dot(d, d1) ** 2
+            inverse = self._inverse(block, d)
+            share, bend = 1 - s.free_length * inverse, s.free_length * inverse**3 * dot(d, d1) ** 2
         return -s.stiffness * (share * plus(dot(d1, d1), times_dot(d, d2)) + bend)
 
 
