@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -81,9 +81,7 @@ def measure(quick: bool) -> Iterator[Measurement]:
         ("position", bare.evaluator("points.C"), (1.0,), 3e3),
         ("torque and 8 reactions", loaded.evaluator(*forces), (1.0, speed), 8e3),
     ):
-        yield measured(
-            DOMAIN, f"one pose: {what}", "evaluator", lambda at=at, given=given: at(*given), aim_ns=aim
-        )
+        yield measured(DOMAIN, f"one pose: {what}", "evaluator", partial(at, *given), aim_ns=aim)
 
 
 def _sweep(

@@ -12,7 +12,8 @@ import pytest
 from benchmarks.stress.topologies import generate
 from virtualwork import Mechanism
 from virtualwork.describe.errors import DescriptionError, MechanismError
-from virtualwork.formulas.lanes import Lanes, over_blocks
+from virtualwork.formulas.asked import over_blocks
+from virtualwork.formulas.lanes import Lanes
 
 EXAMPLES = {
     f"{path.parent.name}/{path.name}": path
