@@ -38,7 +38,7 @@ def page() -> Iterator[str]:
         solves = "Head of the report" in panels
         shared |= {heading: records for heading, records in panels.items() if solves and heading in PANELS}
         for heading, records in panels.items():
-            if heading in shared and heading != "What":
+            if solves and heading in PANELS and heading != "What":
                 continue
             yield from _table(heading, records)
         if command.example:
