@@ -31,7 +31,7 @@ def page() -> Iterator[str]:
         assert isinstance(group, TyperGroup)
         command = group.commands[name]
         assert isinstance(command, Command)
-        context = typer.Context(command, info_name=name, parent=typer.Context(group, info_name="dalembert"))  # type: ignore[arg-type]
+        context = typer.Context(command, info_name=name, parent=typer.Context(group, info_name="dalembert"))
         yield from ("", f"## dalembert {name}", "", line)
         yield from ("", *inspect.cleandoc(command.help or "").replace("*", r"\*").splitlines())
         panels = command.panels_of(context)
