@@ -92,7 +92,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "dalembert": (("__init__",), ("arithmetic", "drawing", "page")),
     "benchmarks": (
-        ("__main__", "same_outputs", "trace_passes"),
+        ("__main__", "commands_page", "same_outputs", "trace_passes"),
         ("fuzz", "page", "peers"),
         ("speed", "stress"),
         ("scenes",),
