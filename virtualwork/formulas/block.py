@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from dalembert.arithmetic.recorded import rotation
+from dalembert.arithmetic.varied import rotation
 from virtualwork.describe.description import Description
 from virtualwork.describe.loads import TorsionSpring
 from virtualwork.describe.parts import GROUND

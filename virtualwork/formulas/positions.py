@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from dalembert.arithmetic.recorded import rotation
+from dalembert.arithmetic.varied import rotation
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import (
     Gap,

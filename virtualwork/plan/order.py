@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
-from dalembert.arithmetic.recorded import Varied, rotation
+from dalembert.arithmetic.varied import Varied, rotation
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.plan.graph import decompose
