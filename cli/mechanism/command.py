@@ -96,6 +96,21 @@ def run(
             help="--plot draws these against the input, such as H.x,coupler.omega.",
         ),
     ] = None,
+    time: Annotated[
+        str | None,
+        typer.Option(
+            metavar="START:STOP:STEP",
+            help="Let go of the inputs: the motion under the loads, such as 0:10:0.01 (seconds).",
+        ),
+    ] = None,
+    accuracy: Annotated[
+        str | None,
+        typer.Option(metavar="NUMBER", help="With --time: the wanted error of the inputs (default 1e-9)."),
+    ] = None,
+    until: Annotated[
+        str | None,
+        typer.Option(metavar="INPUT=VALUE", help="With --time: end where an input has a value, crank=90deg."),
+    ] = None,
     states: Annotated[
         Path | None,
         typer.Option(
@@ -157,6 +172,19 @@ def run(
             own[1],
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
         )
+    if time is not None:
+        given = {
+            "--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order, "--graph": graph,
+            "--states": states, "--explain": explain, **dict.fromkeys(own, True),
+        }  # fmt: skip
+        clash = [flag for flag, value in given.items() if value and flag != "--forces"]
+        if clash or branch == "all":
+            raise options.bad(
+                "--time", f"expected without {(*clash, '--branch all')[0]}: the motion decides the poses"
+            )
+        return _in_time(file, (time, accuracy, until), names, branch, forces)
+    if accuracy is not None or until is not None:
+        raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
     with _told(file):
         mechanism, bare, said = load(file)
         q = wanted(mechanism, at, sweep, inputs, bare)
@@ -172,6 +200,30 @@ def run(
         table = not show.json or show.expect is not None or show.output is not None
         analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces)
         return _result(analysis, request, states, explain, graph)
+
+
+def _in_time(
+    file: str,
+    asked: tuple[str, str | None, str | None],
+    only: list[str] | None,
+    branch: str | None,
+    forces: bool,
+) -> Result:
+    """The motion under forces."""
+    from cli.mechanism import in_time
+    from cli.mechanism.read import wanted
+    from cli.mechanism.solve import Analysis, load
+
+    time, accuracy, until = asked
+    times, error = in_time.asked(time, accuracy)
+    with _told(file):
+        mechanism, bare, said = load(file)
+        home = wanted(mechanism, None, None, None, bare)
+        analysis = Analysis.of(file, mechanism, home, 2, only, branch)
+        analysis.warnings += said
+        analysis.check_names()
+        found = in_time.InTime(analysis, times, error, until, bare, forces)
+        return replace(in_time.result(found), within=lambda: _told(file))
 
 
 def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
