@@ -20,7 +20,7 @@ if TYPE_CHECKING:
         plane_significance,
         unseen,
     )
-    from balancing.doubt import outlier_probability, phase_sense, repeats, robust_fit
+    from balancing.doubt import Drift, drift, outlier_probability, phase_sense, repeats, robust_fit
     from balancing.influence import influence_coefficients
     from balancing.limited import Infeasible
     from balancing.log_balance import LogBalance, region_factor
@@ -48,7 +48,7 @@ _HOMES = {
     "balancing.confidence": "Readings spread",
     "balancing.correction": "CoincidentPlanes Correction Unbalances correct",
     "balancing.dependence": "DependentPlanes DependentTrials condition_number plane_significance unseen",
-    "balancing.doubt": "outlier_probability phase_sense repeats robust_fit",
+    "balancing.doubt": "Drift drift outlier_probability phase_sense repeats robust_fit",
     "balancing.influence": "influence_coefficients",
     "balancing.run_log": "JointFit Undetermined determined joint_fit",
     "balancing.limited": "Infeasible",
@@ -83,6 +83,7 @@ __all__ = [
     "Correction",
     "DependentPlanes",
     "DependentTrials",
+    "Drift",
     "ErrorBudget",
     "Indexed",
     "Infeasible",
@@ -100,6 +101,7 @@ __all__ = [
     "condition_number",
     "correct",
     "determined",
+    "drift",
     "drill_depth",
     "error_budget",
     "grade_value",

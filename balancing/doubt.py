@@ -1,4 +1,4 @@
-"""Which readings of a log are in doubt: outliers, repeats that contradict each other, the sense of the phase, a robust fit."""
+"""Which readings of a log are in doubt: outliers, contradicting repeats, drift, the sense of the phase, a robust fit."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from balancing.run_log import JointFit, joint_fit
 from dalembert.arithmetic.exact import EPS
@@ -86,6 +86,71 @@ def repeats(fit: JointFit) -> Iterator[Repeat]:
         share = apart**2 / (of_both * float(fit.sum_of_squares)) if apart else 0.0
         chance = float(_chance(np.asarray(share), np.asarray(nu), int(both.sum()))) if nu >= 2 else np.nan
         yield Repeat((one, other), s, apart, chance)
+
+
+@record
+class Drift(NamedTuple):
+    """How the vibration without masses changes with time, and how probable so large a change is by chance."""
+
+    rate: Complex
+    """Of each channel, in readings per unit of time, (..., s); NaN where the times do not tell it."""
+    deviation: Real
+    """Standard deviation of each component of the rate, (..., s); NaN where nothing is left over."""
+    probability: Real
+    """Of all channels together, (...); NaN where untested."""
+
+
+def drift(fit: JointFit, times: ArrayLike) -> Drift:
+    """Test whether the vibration drifts with time: y = x₀ + αw + βt, with a β of each channel.
+
+    Parameters
+    ----------
+    fit
+        Of the runs without drift.
+    times
+        When each run was read, (..., r), any origin and unit.
+
+    Notes
+    -----
+    With t⊥ the part of t that x₀ and α cannot follow, β = t⊥ᴴr/‖t⊥‖² (Frisch and Waugh; Seber and Lee, section 3.7), and
+    the k channels whose t⊥ is not zero lessen the sum of squares by the share f = Σ|t⊥ᴴr|²/‖t⊥‖²/Σ|r|². Without drift f is
+    distributed as Beta(k, ν - k): the F test of k complex coefficients with 2k and 2(ν - k) degrees of freedom. It needs
+    ν > k.
+
+    Examples
+    --------
+    >>> on, day = np.array([[0], [1], [1j], [-1], [0], [1]]), np.arange(6.0)
+    >>> noise = 0.05 * np.exp(1j * np.arange(6) ** 2)[:, None]
+    >>> found = drift(joint_fit(5 + 2 * on + 0.1 * day[:, None] + noise, on), day)
+    >>> found.rate.real.round(2), bool(found.probability < 0.01)
+    (array([0.09]), True)
+    """
+    from scipy.special import betainc
+
+    time = np.asarray(times, dtype=float)
+    time = time - time.mean(axis=-1, keepdims=True)
+    shared = np.where(fit.present, time[..., None], 0.0)
+    by_channel = np.swapaxes(shared, -1, -2)
+    rows = np.concatenate([np.ones((*fit.masses.shape[:-1], 1)), fit.masses], axis=-1)
+    followed = np.swapaxes(rows @ np.swapaxes(np.matvec(fit.gain, by_channel), -1, -2), -1, -2)
+    weights = 1.0 if fit.weights is None else np.swapaxes(fit.weights, -1, -2)
+    read = np.swapaxes(fit.present, -1, -2)
+    free = np.where(read, by_channel - followed, 0.0)
+    length = (weights * np.square(np.abs(free))).sum(axis=-1)
+    told = length > 1e-20 * (weights * np.square(by_channel)).sum(axis=-1)
+    left = np.swapaxes(np.where(fit.present, fit.residuals, 0.0), -1, -2)
+    along = (weights * free.conj() * left).sum(axis=-1)
+    safe = np.where(told, length, 1.0)
+    k, nu = told.sum(axis=-1), np.asarray(fit.degrees_of_freedom)
+    rate = np.where(told, along / safe, np.nan)
+    less = np.where(told, np.square(np.abs(along)) / safe, 0.0).sum(axis=-1)
+    tested = (k > 0) & (nu > k)
+    whole = fit.sum_of_squares
+    share = np.clip(less / np.where(whole > 0, whole, 1.0), 0.0, 1.0)
+    chance = betainc(np.where(tested, nu - k, 1), np.where(tested, k, 1), 1 - share)
+    variance = np.maximum(whole - less, 0.0) / np.where(tested, nu - k, np.nan) / 2
+    deviation = np.where(told, np.sqrt(variance[..., None] / safe), np.nan)
+    return Drift(rate, deviation, np.asarray(np.where(tested, chance, np.nan)))
 
 
 def phase_sense(fit: JointFit) -> tuple[Real, Real, Real]:

@@ -120,6 +120,21 @@ class LogBalance:
             unknowns = self.fit.unknowns[machine] + np.matvec(self.fit.gain[machine], error)
             yield unknowns[:, 1:], unknowns[:, 0]
 
+    def residual_samples(self, machine: int, n: int = 4000, seed: int = 0) -> Complex:
+        """Draw the true vibration (n, s) of one of the machines with its corrections on, Student's errors included.
+
+        At fixed corrections it is linear in the readings: no further approximation is made.
+        """
+        rng = np.random.default_rng(seed)
+        masses = np.concatenate([[1.0], self.corrections[machine]])
+        unit, along, across = (part[machine] for part in self._by_channel())
+        share = np.vecmat(masses.conj(), self.fit.gain[machine]) * unit
+        one, other = rng.standard_normal((2, n, *share.shape))
+        error = np.vecdot(share.conj(), along * one + 1j * across * other)
+        nu = float(self.errors.degrees_of_freedom[machine])
+        wider = np.sqrt(nu / rng.gamma(nu, size=n))[:, None] if 0 < nu < np.inf else 1.0
+        return np.asarray(self.residual[machine] + wider * error)
+
     @property
     def deviations(self) -> tuple[Real, Real]:
         """Standard deviations of each correction's size, kg, and across it, kg, (..., p) each."""

@@ -23,6 +23,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.parts import Point, as_point
+from virtualwork.drawing import Drawing, draw
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.sweep import EvenSweep
@@ -375,6 +376,19 @@ class Motion:
         from virtualwork.study.counterweights import least_squares
 
         return least_squares(self, links)
+
+    # --- as a picture ---------------------------------------------------------------------------------------------
+    @cached_property
+    def drawing(self) -> Drawing:
+        """What the mechanism is drawn as, its guides as long as they are used in these poses.
+
+        `at(shape.body, z)` carries the shapes' points along.
+        """
+        slides = [self.poses.slide_derivative(i, 0) for i in range(len(self.mechanism.guides))]
+        used = [s[np.isfinite(s)] for s in slides]
+        return draw(
+            self.mechanism, [(float(s.min()), float(s.max())) if len(s) else (-np.inf, np.inf) for s in used]
+        )
 
     # --- as a table -------------------------------------------------------------------------------------------------
     def to_frame(self) -> DataFrame:

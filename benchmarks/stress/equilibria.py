@@ -120,6 +120,7 @@ def scene(rng: Generator) -> tuple[Mechanism, Potential]:
             length = np.sqrt((x - u) ** 2 + (y - v) ** 2)
             total = total + spring.stiffness / 2 * (length - spring.free_length) ** 2
         for force in forces:
+            assert isinstance(force.point, complex)
             x, y = _seat(*at[force.link], force.point)
             total = total - (force.force.real * x + force.force.imag * y)
         return total

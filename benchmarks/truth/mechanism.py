@@ -300,12 +300,11 @@ class Exact:
                 found.append((name, 0j, mp.mpc(0), -mp.mpf(link.inertia) * self.angle(name, 2)))
         for f in m.forces:
             value = mp.mpc(f.force)
-            found.append(
-                (f.link, f.point, value * self.turn(f.link, 0)[0] if f.frame == "link" else value, mp.mpf(0))
-            )
+            turned = value * self.turn(f.link, 0)[0] if f.frame == "link" else value
+            found.append((f.link, m.place(f.link, f.point), turned, mp.mpf(0)))
         found += [(t.link, 0j, mp.mpc(0), mp.mpf(t.torque)) for t in m.torques]
         for s in m.springs:
-            (a, za), (b, zb) = s.between
+            (a, za), (b, zb) = ((body, m.place(body, point)) for body, point in s.between)
             d, v = (self.point(b, zb, k) - self.point(a, za, k) for k in (0, 1))
             length = abs(d)
             pull = mp.mpf(s.stiffness) * (1 - mp.mpf(s.free_length) / length) * d

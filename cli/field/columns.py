@@ -138,7 +138,7 @@ def document(found: FieldBalancing) -> Document:
         if solved.bound is not None:
             document["residual_bound"] = float(solved.bound[i])
         if solved.residual_95 is not None:
-            document["residual_max_95"] = float(solved.residual_95[i])
+            document["residual_max_95"] = _number(solved.residual_95[i])
         if group.repeats:
             document["repeats"] = {
                 "readings": int(group.counts[group.counts > 1].sum()),

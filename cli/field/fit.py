@@ -9,9 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from balancing import (
+    Drift,
     JointFit,
     LogBalance,
     NextRun,
+    drift,
     least_squares,
     outlier_probability,
     repeats,
@@ -115,6 +117,14 @@ class LogFits:
         ).corrections
 
 
+def drifts(group: Group) -> Drift | None:
+    """How the vibration of each rotor changes in a year, and how often so much by chance; None without dates."""
+    assert group.fit is not None
+    if not group.logs or group.logs[0].years is None:
+        return None
+    return drift(group.fit, np.array([log.years for log in group.logs]))
+
+
 def outliers(group: Group) -> Real:
     """By chance how often, (g, r, s)."""
     assert group.fit is not None
@@ -173,6 +183,7 @@ def remarks(found: FieldBalancing) -> Iterator[str]:
             )
         for i in range(min(len(group.logs), SHOWN)):
             yield from _repeats(found, solved, i)
+        yield from _drifts(found, group)
         if found.request.reading_error is not None:
             yield from _more_scatter(found, solved)
 
@@ -197,6 +208,24 @@ def _repeats(found: FieldBalancing, solved: Solved, i: int) -> Iterator[str]:
                 f"{found.of(group, i)}{where}, sensor {group.channels[pair.channel]}: with the same masses on it was read {figures[0]} "
                 f"and {figures[1]}: the readings contradict each other by {pair.difference:.4g} {found.runs.amplitude_unit}"
             )
+
+
+def _drifts(found: FieldBalancing, group: Group) -> Iterator[str]:
+    """Say where the vibration without masses drifts with time."""
+    of_time = drifts(group)
+    if of_time is None:
+        return
+    for i in np.flatnonzero(of_time.probability < LEVEL)[:SHOWN].tolist():
+        told = [
+            f"sensor {channel} by {abs(rate):.4g} {found.runs.amplitude_unit} at {degrees(rate):.4g}°"
+            for channel, rate in zip(group.channels, of_time.rate[i].tolist(), strict=True)
+            if rate == rate
+        ]
+        yield (
+            f"{found.of(group, i)}the vibration drifts with time, in a year {', '.join(told)}: by chance in "
+            f"{of_time.probability[i]:.2g} of logs (F test at {LEVEL:.0%}); all runs count alike, --exclude leaves out those of "
+            "another time"
+        )
 
 
 def _more_scatter(found: FieldBalancing, solved: Solved) -> Iterator[str]:

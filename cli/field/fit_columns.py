@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.field.fit import Fitted, LogFits, polar
+from balancing.doubt import LEVEL
+from cli.field.fit import Fitted, LogFits, drifts, polar
 from cli.field.solve import Solved
 from cli.read.units import degrees
 from cli.show.columns import Column, Table
@@ -67,6 +68,7 @@ class _Parts:
         self.within = None if ceiling is None else balance.probability_within(ceiling)
         self.predicted = None if fits.asked.predict is None else fits.predicted(solved)
         self.robust = fits.robust(solved) if fits.asked.robust else None
+        self.drift = drifts(solved.group)
 
 
 def _of_group(fits: LogFits, solved: Solved) -> _Parts:
@@ -101,6 +103,22 @@ def _fill(entry: Document, fits: LogFits, solved: Solved, fitted: Fitted, i: int
             for row in fitted.rows(i)
         ],
     }
+    if parts.drift is not None:
+        chance = _number(parts.drift.probability[i])
+        entry["fit"]["drift"] = {  # type: ignore[index]
+            "probability": chance,
+            "level": LEVEL,
+            "drifts": None if chance is None else chance < LEVEL,
+            "rates": [
+                {
+                    **name,
+                    "amplitude_per_year": _number(abs(rate)),
+                    "phase_deg": float(degrees(rate)) if np.isfinite(rate) else None,
+                    "amplitude_per_year_uncertainty": _number(sd),
+                }
+                for name, rate, sd in zip(keys, parts.drift.rate[i], parts.drift.deviation[i], strict=True)
+            ],
+        }
     residual: list[Document] = entry["residual"]  # type: ignore[assignment]
     for s, one in enumerate(residual):
         one["amplitude_uncertainty"] = _number(parts.of_residual[i, s])

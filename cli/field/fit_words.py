@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.field.fit import Fitted, LogFits
+from balancing.doubt import LEVEL
+from cli.field.fit import Fitted, LogFits, drifts
 from cli.field.solve import Solved
 from cli.field.words import FEW, amplitude_unit
 from cli.read.units import degrees
@@ -48,6 +49,10 @@ def summary(fits: LogFits, solved: Solved, i: int) -> str:
         if log.sense is None
         else f"the runs say that the phase {log.sense}s"
     )
+    of_time = drifts(solved.group)
+    if of_time is not None and np.isfinite(chance := of_time.probability[i]):
+        told = "the vibration drifts with time" if chance < LEVEL else "no drift with time is told"
+        sense += f"; {told} (F test at {LEVEL:.0%}: by chance in {chance:.2g} of logs)"
     return (
         f"{len(log.runs)} runs, {int(fit.present[i].sum())} readings fitted together, {nu} complex degree{'s' * (nu != 1)} of "
         f"freedom: {spread}; {sense}"

@@ -67,7 +67,7 @@ def log_table(path: str) -> tuple[Table, dict[str, float]]:
     table = read(
         path,
         numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},
-        texts=["rotor", "run", "sensor", "state", "trial_plane", "trial_kept", "ref", "use"],
+        texts=["rotor", "run", "sensor", "state", "trial_plane", "trial_kept", "ref", "use", "date"],
         cells={"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"},
         blank=["speed", "weight"],
         headers=headed,

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from cli.errors import DataError, quote
+from cli.field.dates import YEAR, years
 from cli.field.layouts import log_table
 from cli.field.log_groups import LogRows, Logs
 from cli.field.read import NEAR_SPEED
 from cli.field.runs import Channel, Rows, Runs
 from cli.read.options import bad
+from cli.read.rounding import vector_error
 from cli.read.tables import Cells, Table, number_names
 from cli.read.units import UNITS, phasor, to_si
 
@@ -39,7 +41,7 @@ def read_log(path: str, *, lagging: bool | None, exclude: Sequence[str] = ()) ->
         speed.unit if speed is not None else "rpm",
         max_mass=max_mass,
     )
-    masses = _masses(table, size, runs.per)
+    masses, mass_share = _masses(table, size, runs.per)
     if "ref" in table.texts:
         masses = _on_top(table, rotor, masses)
     if "use" in table.texts:
@@ -54,6 +56,9 @@ def read_log(path: str, *, lagging: bool | None, exclude: Sequence[str] = ()) ->
         _channels(table, rotor),
         masses,
         table.texts.get("run") or [],
+        years(table),
+        float(vector_error(np.ones(table.rows), phase.values, phase.unit).max()),
+        mass_share,
     )
     if not rows.run:
         rows.run = _run_names(rows)
@@ -68,8 +73,8 @@ def read_log(path: str, *, lagging: bool | None, exclude: Sequence[str] = ()) ->
     return runs
 
 
-def _masses(table: Table, size: Cells, per: str) -> list[dict[str, complex] | None]:
-    """Read the masses of each row; several are joined by ';'."""
+def _masses(table: Table, size: Cells, per: str) -> tuple[list[dict[str, complex] | None], float]:
+    """Read the masses of each row, several joined by ';', and by what share of it one may be off as it is rounded."""
     angle = table.cells.get("trial_angle")
     plane = table.texts.get("trial_plane") or [""] * table.rows
     turns = angle.values if angle is not None else [""] * table.rows
@@ -106,7 +111,7 @@ def _masses(table: Table, size: Cells, per: str) -> list[dict[str, complex] | No
         mine = out[i]
         assert mine is not None
         mine[name] = mine.get(name, 0) + mass
-    return out
+    return out, float(vector_error(np.ones(len(angles)), angles, unit).max(initial=0.0))
 
 
 def _number(table: Table, cells: Cells, row: int, text: str, expected: str) -> float:
@@ -200,13 +205,17 @@ def _channels(table: Table, rotor: Rows) -> list[Channel]:
 
 
 def _run_names(rows: LogRows) -> list[str]:
-    """Tell runs apart where no column does: a new one begins where the masses change, or a channel comes again."""
+    """Tell runs apart where no column does: a new one begins where masses or day change, or a channel comes again."""
     out: list[str] = []
     count: dict[int, int] = {}
-    before: tuple[int, dict[str, complex]] | None = None
+    before: tuple[int, float, dict[str, complex]] | None = None
     seen: set[Channel] = set()
-    for r, channel, masses in zip(rows.rotor.tolist(), rows.channel, rows.masses, strict=True):
-        on = (r, {plane: mass for plane, mass in (masses or {}).items() if mass})
+    none = [np.nan] * rows.table.rows
+    days = none if rows.years is None else np.floor(rows.years * YEAR + 1e-6).tolist()
+    for r, channel, day, masses in zip(rows.rotor.tolist(), rows.channel, days, rows.masses, strict=True):
+        # of an unknown day: that of the row before
+        on_day = day if day == day or before is None else before[1]
+        on = (r, on_day, {plane: mass for plane, mass in (masses or {}).items() if mass})
         if on != before or channel in seen:
             count[r] = count.get(r, 0) + 1
             before, seen = on, set()

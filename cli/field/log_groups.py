@@ -10,7 +10,7 @@ import numpy as np
 from balancing import JointFit, determined, joint_fit, phase_sense
 from cli.errors import DataError
 from cli.field.read import NO, SHOWN, YES
-from cli.field.runs import Channel, Complex, Group, Log, Rows, Runs
+from cli.field.runs import Channel, Complex, Group, Log, Real, Rows, Runs
 from cli.read.tables import Table
 
 
@@ -28,6 +28,11 @@ class LogRows:
     """Plane -> what this row puts on, SI; None where the row says nothing of masses."""
     run: list[str]
     """Its name, in each row."""
+    years: Real | None = None
+    """When it was read; NaN where the row does not say."""
+    reading_share: float = 0.0
+    """By what share of it a reading may be off from its decimals."""
+    mass_share: float = 0.0
 
 
 class _Rotor(NamedTuple):
@@ -46,6 +51,8 @@ class _Rotor(NamedTuple):
     """What stays on after the last run, (p,)."""
     weights: list[float]
     """(s,)."""
+    years: list[float] | None
+    """When each row of readings was read, (r,)."""
 
 
 class Logs:
@@ -106,10 +113,23 @@ class Logs:
                 np.array([one.weights for one in mine]) if "weight" in self.rows.table.numbers else None,
                 np.ones((1, s), dtype=np.intp),
                 np.zeros((g, 1, s)),
-                lambda: (np.zeros((g, s)), np.zeros((g, 0, s)), np.zeros((g, 0, p))),
+                lambda: self._errors(fit),
                 fit=fit,
-                logs=[Log(one.rows, sense) for one, sense in zip(mine, senses, strict=True)],
+                logs=[Log(one.rows, sense, one.years) for one, sense in zip(mine, senses, strict=True)],
             )
+        )
+
+    def _errors(self, fit: JointFit) -> tuple[Real, Real, Real]:
+        """Bound the errors of the readings (g, r, s) and masses (g, r, p) of a fit against the decimals of the table."""
+        size = np.abs(fit.masses)
+        if {"ref", "trial_kept"} & set(self.rows.table.texts):
+            # each may be a sum of all that went before
+            size = 2 * size.sum(axis=1, keepdims=True) + 0 * size
+        readings = np.abs(np.where(fit.present, fit.readings, 0.0))
+        return (
+            np.zeros(fit.initial.shape),
+            self.rows.reading_share * readings,
+            self.rows.mass_share * size,
         )
 
     def _sense(self, rotors: Rows, fit: JointFit) -> tuple[JointFit, list[str | None]]:
@@ -175,7 +195,30 @@ class Logs:
                     f"{rows.table.file}: {of}the weights are zero or negative: expected one that is positive"
                 )
         last = [standing.get(plane, 0j) for plane in planes]
-        return _Rotor(r, list(lines), list(first), planes, list(lines.values()), masses, last, weights)
+        when = None if rows.years is None else self._years(members, list(lines))
+        return _Rotor(r, list(lines), list(first), planes, list(lines.values()), masses, last, weights, when)
+
+    def _years(self, members: list[int], lines: list[tuple[str, int]]) -> list[float]:
+        """Return when each row of readings was read: each says it itself, or its run does once."""
+        rows = self.rows
+        assert rows.years is not None
+        of_run: dict[str, float] = {}
+        of_line: dict[tuple[str, int], float] = {}
+        again: dict[tuple[str, Channel], int] = {}
+        for i in members:
+            run, channel, at = rows.run[i], rows.channel[i], float(rows.years[i])
+            k = again[run, channel] = again.get((run, channel), -1) + 1
+            if at == at:
+                of_run.setdefault(run, at)
+                of_line.setdefault((run, k), at)
+        found = [of_line.get(line, of_run.get(line[0], np.nan)) for line in lines]
+        if not np.isfinite(found).all():
+            of = f"rotor {rows.rotors[rows.rotor[members[0]]]}: " if self.several else ""
+            lacking = dict.fromkeys(run for (run, _), at in zip(lines, found, strict=True) if at != at)
+            self.runs.warnings.append(
+                f"{of}no date in run{'s' * (len(lacking) > 1)} {', '.join(lacking)}: drift over time is not tested"
+            )
+        return found
 
     def _on(self, members: list[int]) -> tuple[dict[str, complex], dict[str, dict[str, complex]]]:
         """Return what stays on after the last run, and what was on in each run."""
@@ -252,6 +295,7 @@ class Logs:
             readings=of_rows([of_channels(row) for row in one.readings]),
             masses=of_rows(one.masses),
             weights=of_channels(one.weights),
+            years=None if one.years is None else of_rows(one.years),
         )
 
     def _missing(self, planes: list[str], masses: Complex) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from balancing import Balance, condition_number, influence_error
-from cli.field.runs import Real
+from cli.field.runs import Group, Real
 from cli.field.solve import FieldBalancing, Solved
 from cli.read.rounding import EPS
 from cli.read.units import to_si
@@ -20,6 +20,8 @@ def coefficient_errors(found: FieldBalancing, solved: Solved) -> Real:
         phase = found.stored.table.require("phase", "angle")
         turn = float(np.abs(to_si(phase.values, "angle", phase.unit)).max())
         return np.asarray(EPS * (6 + turn / 2) * np.abs(solved.alpha))
+    if group.fit is not None:
+        return _fit_errors(group)[..., 1:]
     initial, runs, on = group.errors()
     if solved.fits:
         # relative errors of amplitudes and masses: what is written with many digits is rounded once
@@ -30,16 +32,20 @@ def coefficient_errors(found: FieldBalancing, solved: Solved) -> Real:
     return influence_error(group.initial, group.runs, group.on, reading_error=(initial, runs), mass_error=on)
 
 
+def _fit_errors(group: Group) -> Real:
+    """Bound the errors of what a fit of all runs found, (g, s, 1 + p)."""
+    assert group.fit is not None
+    _, readings, masses = group.errors()
+    return group.fit.error_estimate(readings, masses)
+
+
 def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]) -> Real:
     """Bound the errors of the corrections, (g, p), SI; NaN where they cannot be bounded."""
     request, group = found.request, solved.group
-    if group.fit is not None:
-        said = "--digits: the corrections are given in full, for no bound of the rounding of a fit of all runs is known"
-        if said not in warnings:
-            warnings.append(said)
-        return np.full(solved.corrections.shape, np.nan)
     of_alpha = coefficient_errors(found, solved)
     initial, _, on = group.errors()
+    if group.fit is not None:
+        initial = _fit_errors(group)[..., 0]
     runout = np.array([abs(request.runout.get(channel.sensor, 0)) for channel in group.channels])
     here = solved.initial + np.matvec(solved.alpha, solved.standing)
     of_here = initial + 8 * EPS * (runout + np.abs(solved.initial))
@@ -81,13 +87,20 @@ def uncertainty_share(found: FieldBalancing, solved: Solved, bound: Real) -> Rea
     To first order: the pseudo-inverses of coefficients and trial masses are right to their condition numbers times
     the relative errors of what they are of, and the corrections they are for to their own.
     """
-    if solved.group.fit is not None:
-        return np.full(bound.shape, np.nan)
     of_alpha = np.linalg.norm(coefficient_errors(found, solved), axis=-2)
     norms = np.linalg.norm(solved.alpha, axis=-2)
     relative = 8 * EPS + (of_alpha / np.where(norms > 0, norms, 1.0)).max(axis=-1)
     share = condition_number(solved.alpha, solved.group.weights) * relative
-    if found.stored is None:
+    fit = solved.group.fit
+    if fit is not None:
+        # the scatter of the residuals is a difference of readings, and the design is that of the masses
+        of_all = _fit_errors(solved.group).max(axis=1) / np.abs(fit.unknowns).max(axis=1)
+        scatter = np.where(fit.residual_sd > 0, fit.residual_sd, np.inf)
+        rounding = 32 * EPS * np.nanmax(np.abs(fit.readings), axis=(1, 2))
+        share = (
+            share + of_all.max(axis=-1) + (rounding / scatter if found.request.reading_error is None else 0.0)
+        )
+    elif found.stored is None:
         share = share + 8 * EPS * condition_number(solved.group.on)
     # the scatter of repeats is a difference of readings
     sd = solved.group.reading_sd

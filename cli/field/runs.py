@@ -58,6 +58,9 @@ class Log:
     sense: str | None = None
     """"lead" or "lag", as the runs show it; None where they cannot tell."""
 
+    years: list[float] | None = None
+    """When each was read, from any origin; NaN where it is not known, None where the log has no dates."""
+
     @property
     def runs(self) -> list[str]:
         """The runs, in order."""

@@ -334,6 +334,9 @@ class FieldBalancing:
         solved.balance = balance
         if not np.isfinite(errors.along).any():
             return
+        if len(solved.corrections) <= MANY:
+            left = [np.abs(balance.residual_samples(i)).max(axis=1) for i in range(len(solved.corrections))]
+            solved.residual_95 = np.quantile(left, 0.95, axis=1)
         if limited and len(solved.corrections) > MANY:
             self.warn("uncertainties of so many rotors are not worked out under limits or with minimax")
         elif limited:

@@ -145,11 +145,13 @@ def summary(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
             f"repeated readings scatter by {solved.group.reading_sd[i]:.4g} {amplitude_unit(found)} (standard deviation of one reading as a "
             f"vector, {solved.group.repeats} complex degree{'s' * (solved.group.repeats > 1)} of freedom)"
         )
-    if solved.residual_95 is not None:
+    if solved.residual_95 is not None and np.isfinite(solved.residual_95[i]):
         known = []
         if found.request.reading_error is not None:
             relative, angle = found.request.reading_error
             known.append(f"of {100 * relative:.3g} % and {np.degrees(angle):.3g}°")
+        elif solved.balance is not None:
+            known.append("as the residuals of the fit scatter")
         if solved.group.reading_sd[i]:
             known.append(
                 f"{'or ' if known else ''}as the repeats scatter{' where that is more' if known else ''}"

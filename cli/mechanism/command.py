@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cli.mechanism.solve import Analysis
     from cli.mechanism.studies import Request
     from cli.show.columns import Document, Result, Table
+    from virtualwork import Mechanism
 
 
 def _print_schema(asked: bool) -> None:
@@ -119,6 +120,28 @@ def run(
             callback=suffix_among(".csv"),
         ),
     ] = None,
+    change: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="PATH=VALUE",
+            help="Another number in place of the file's, such as links.crank.B.x=62mm; repeatable.",
+        ),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PATH=FROM:TO:STEP",
+            help="Variants over a range, such as links.crank.B.x=50mm:60mm:1mm; repeatable: the grid of all.",
+        ),
+    ] = None,
+    variants: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE.csv",
+            help="Variants as a table: a column for each path, links.crank.B.x_mm, a row for each variant.",
+        ),
+    ] = None,
     schema: Annotated[
         bool,
         typer.Option(
@@ -137,9 +160,11 @@ def run(
     for each pose and link (what `dalembert work` reads); with --only or --forces a row for each pose. In a pipe
     --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
     """
+    from cli.mechanism.many import Many
     from cli.mechanism.read import wanted
     from cli.mechanism.solve import ORDERS, Analysis, load
     from cli.mechanism.studies import Request
+    from cli.mechanism.variants import asked, assigned
 
     if order is not None and order not in ORDERS:
         raise options.bad("--order", f"'{order}': expected {', '.join(ORDERS)}")
@@ -157,6 +182,14 @@ def run(
         raise options.bad(flag, "expected a cycle too: --sweep, such as --sweep 0deg:360deg:1deg")
     if graph is not None and show.plot is None:
         raise options.bad("--graph", "expected --plot FILE too: the picture that the curves are drawn into")
+    for flag, given in (
+        ("--states", states),
+        ("--explain", explain),
+        ("--graph", graph),
+        ("--plot", show.plot),
+    ):
+        if given and (vary or variants is not None):
+            raise options.bad(flag, "expected one mechanism, and no --vary or --variants beside it")
     request = Request(
         newton,
         check,
@@ -187,19 +220,32 @@ def run(
         raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
     with _told(file):
         mechanism, bare, said = load(file)
+        mechanism = assigned(mechanism, bare, change) if change else mechanism
+        several = asked(mechanism, bare, vary, variants, said)
         q = wanted(mechanism, at, sweep, inputs, bare)
-        analysis = Analysis.of(
-            file, mechanism, q, None if order is None else ORDERS.index(order), names, branch
-        )
+        rates = None if order is None else ORDERS.index(order)
+        analysis = Analysis.of(file, mechanism, q, rates, names, branch)
         analysis.warnings += said
         analysis.check_names()
         others = show.json or show.text or show.plot or show.expect
-        if show.as_csv and not others and own in ([], ["--forces"]) and analysis.is_long:
+        streams = show.as_csv and not others
+        if several is None and streams and own in ([], ["--forces"]) and analysis.is_long:
             return _long(analysis, forces, states)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not show.json or show.expect is not None or show.output is not None
-        analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces)
-        return _result(analysis, request, states, explain, graph)
+        times = 1 if several is None or streams else several.count
+        analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces, times=times)
+        if several is None:
+            return _result(analysis, request, states, explain, graph)
+
+        def analysis_of(variant: Mechanism) -> Analysis:
+            home = at is None and sweep is None and inputs is None
+            its = wanted(variant, at, sweep, inputs, bare) if home and several.moves_inputs else q
+            return Analysis.of(file, variant, its, rates, names, branch)
+
+        found = Many(mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None))
+        result = found.result(streams, show.as_json, table)
+        return replace(result, warnings=[*said, *result.warnings], within=lambda: _told(file))
 
 
 def _in_time(

@@ -146,19 +146,23 @@ def _inputs(m: Mechanism, shown: NDArray[np.float64]) -> Inputs:
 
 def _quantity(m: Mechanism, j: int, text: str, flag: str, bare: Mapping[str, str]) -> float:
     """One input's value, in degrees or metres."""
-    slide = m.inputs[j].is_slide
-    named = bare.get("length" if slide else "angle")
+    return place_or_angle(text, "length" if m.inputs[j].is_slide else "angle", flag, bare)
+
+
+def place_or_angle(text: str, kind: str, flag: str, bare: Mapping[str, str]) -> float:
+    """A length in metres, or an angle in degrees: those of an angle in degrees stay as they are written."""
+    named = bare.get(kind)
     if named is not None and is_number(text):
         factor = unit(named)
         if named in ("deg", "°"):
             return parse_number(text)
         si = scaled(text.strip(), factor[0] if factor else 1.0)
-        return si if slide else math.degrees(si)
+        return si if kind == "length" else math.degrees(si)
     try:
-        value, given = parse_quantity(text, "length" if slide else "angle")
+        value, given = parse_quantity(text, kind)
     except ValueError as error:
         raise options.bad(flag, error) from None
-    if slide:
+    if kind == "length":
         return float(to_si(value, "length", given))
     return value if given == "deg" else math.degrees(value)
 

@@ -182,13 +182,13 @@ class Analysis:
         wide = self.only is not None or forces
         return 300 + 110 * numbers * json + table * (100 * numbers if wide else 1200 * len(self.links))
 
-    def check_size(self, *, json: bool, table: bool, forces: bool) -> None:
-        """Refuse what would take more memory than there is, before it is begun."""
+    def check_size(self, *, json: bool, table: bool, forces: bool, times: int = 1) -> None:
+        """Refuse what would take more memory than there is, before it is begun; `times` so many variants."""
         each = self.bytes_each(json=json, table=table, forces=forces) * len(self.assemblies)
-        poses, room = self.inputs.n, memory()
+        poses, room = self.inputs.n * times, memory()
         if poses * each > room:
             raise DataError(
-                f"{self.file}: {poses} poses of {len(self.links)} links and {len(self.points)} points would take "
+                f"{self.file}: {poses} poses{f' of {times} variants' if times > 1 else ''} of {len(self.links)} links and {len(self.points)} points would take "
                 f"{float(f'{poses * each / 1e9:.2g}'):g} GB: expected at most {room / each:.0f} poses, or fewer names by --only, or CSV, which is not limited"
             )
 

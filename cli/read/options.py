@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import typer
 
@@ -131,31 +132,41 @@ def number_or_quantity(flag: str, text: str, dimension: str) -> float:
 
 
 def time_range(flag: str, text: str) -> list[float]:
-    """Read `START:STOP:STEP` or `START:STOP/N` (N equal steps); a step that divides the range includes its end."""
+    """Read `START:STOP:STEP` or `START:STOP/N` in seconds."""
+    return grid(flag, text, lambda part: number_or_quantity(flag, part, "time"), "states", "0:10:0.01")
+
+
+def grid(
+    flag: str, text: str, read: Callable[[str], float], what: str, example: str, most: int = STATES
+) -> list[float]:
+    """Read `START:STOP:STEP` or `START:STOP/N` (N equal steps); a step that divides the range includes its end.
+
+    `read` reads one of the three; `what` is counted, `most` of them at most.
+    """
     steps = None
     body = text
     if "/" in text:
-        body, _, number = text.partition("/")
+        body, _, number = text.rpartition("/")
         if whole(number) < 1:
             raise bad(flag, f"'{text}': expected a number of equal steps after the /, such as 0:10/1000")
         steps = whole(number)
     parts = body.split(":")
     if len(parts) != (2 if steps else 3):
-        raise bad(flag, f"'{text}': expected START:STOP:STEP or START:STOP/N, such as 0:10:0.01")
-    values = [number_or_quantity(flag, part, "time") for part in parts]
+        raise bad(flag, f"'{text}': expected START:STOP:STEP or START:STOP/N, such as {example}")
+    values = [read(part) for part in parts]
     start, stop = values[:2]
     if steps is None:
         step = values[2]
         if step == 0 or (stop - start) * step < 0:
-            raise bad(flag, f"'{text}': a step of {step:g} s never gets from {start:g} s to {stop:g} s")
+            raise bad(flag, f"'{text}': a step of {parts[2]} never gets from {parts[0]} to {parts[1]}")
         ratio = (stop - start) / step
-        if ratio > STATES:
-            raise bad(flag, f"'{text}': {ratio:.3g} states: expected at most {STATES}")
+        if ratio > most:
+            raise bad(flag, f"'{text}': {ratio:.3g} {what}: expected at most {most}")
         steps = round(ratio)
         if abs(ratio - steps) > 1e-9 * max(1.0, ratio):
             return [start + i * step for i in range(int(ratio) + 1)]
         if steps == 0:
             return [start]
-    if steps > STATES:
-        raise bad(flag, f"'{text}': {steps:.3g} states: expected at most {STATES}")
+    if steps > most:
+        raise bad(flag, f"'{text}': {steps:.3g} {what}: expected at most {most}")
     return [start + (stop - start) * i / steps for i in range(steps + 1)]

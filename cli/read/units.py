@@ -61,6 +61,12 @@ UNITS: dict[str, dict[str, Unit]] = {
     "area density": {"kg_m2": (1, 1), "g_cm2": (10, 1)},
     "linear density": {"kg_m": (1, 1), "g_m": (1, 1000)},
     "time": {"s": (1, 1), "ms": (1, 1000), "min": (60, 1), "h": (3600, 1)},
+    "angular jerk": {"rad_s3": (1, 1), "deg_s3": _TURN},
+    "jerk": {"m_s3": (1, 1), "mm_s3": (1, 1000)},
+    "stiffness": {"N_per_m": (1, 1), "N_per_mm": (1000, 1)},
+    "damping": {"N_s_per_m": (1, 1), "N_s_per_mm": (1000, 1)},
+    "torsional stiffness": {"N_m_per_rad": (1, 1), "N_m_per_deg": (180, math.pi)},
+    "torsional damping": {"N_m_s_per_rad": (1, 1), "N_m_s_per_deg": (180, math.pi)},
 }
 """Dimension -> suffix -> unit. The first suffix of each dimension is SI."""
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import cmath
 import math
+import operator
 from collections.abc import Mapping
 from typing import Any
 
@@ -135,6 +136,8 @@ class Real:
 
     def __add__(self, other: Number) -> Number:
         if isinstance(other, (Complex, complex)):
+            if isinstance(other, Varied):
+                return self + other.recorded
             return Complex(self + other.real, other.imag)
         if _plain(other) and other == 0:
             return self
@@ -156,6 +159,8 @@ class Real:
 
     def __mul__(self, other: Number) -> Number:
         if isinstance(other, (Complex, complex)):
+            if isinstance(other, Varied):
+                return self * other.recorded
             return Complex(product(self, other.real), product(self, other.imag))
         if _plain(other):
             if other == 0:
@@ -171,6 +176,8 @@ class Real:
 
     def __truediv__(self, other: Number) -> Number:
         if isinstance(other, (Complex, complex)):
+            if isinstance(other, Varied):
+                return self / other.recorded
             return Complex(self, 0.0) / other
         # by a power of two: the product is exact too
         if _plain(other) and abs(math.frexp(other)[0]) == 0.5 and 1e-300 < abs(other) < 1e300:
@@ -182,6 +189,8 @@ class Real:
 
     def __rtruediv__(self, other: Number) -> Number:
         if isinstance(other, complex):
+            if isinstance(other, Varied):
+                return other.recorded / self
             return Complex(quotient(other.real, self), quotient(other.imag, self))
         return quotient(other, self)
 
@@ -230,17 +239,21 @@ class Complex:
         return Complex(-self.real, -self.imag)
 
     def __add__(self, other: Number) -> Complex:
+        other = bare(other)
         return Complex(self.real + other.real, self.imag + other.imag)
 
     __radd__ = __add__
 
     def __sub__(self, other: Number) -> Complex:
+        other = bare(other)
         return Complex(self.real - other.real, self.imag - other.imag)
 
     def __rsub__(self, other: Number) -> Complex:
+        other = bare(other)
         return Complex(other.real - self.real, other.imag - self.imag)
 
     def __mul__(self, other: Number) -> Complex:
+        other = bare(other)
         if isinstance(other, Real) or _plain(other):
             return Complex(product(self.real, other), product(self.imag, other))
         a, b, c, d = self.real, self.imag, other.real, other.imag
@@ -249,6 +262,7 @@ class Complex:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Number) -> Complex:
+        other = bare(other)
         if isinstance(other, Real) or _plain(other):
             return Complex(
                 0.0 if _plain(self.real) and self.real == 0 else self.real / other,
@@ -259,6 +273,7 @@ class Complex:
         return Complex(turned.real / size, turned.imag / size)
 
     def __rtruediv__(self, other: Number) -> Complex:
+        other = bare(other)
         return Complex(other.real, other.imag) / self
 
     def __abs__(self) -> Number:
@@ -268,6 +283,137 @@ class Complex:
 def squared(z: Number) -> Number:
     """|z|²."""
     return product(z.real, z.real) + product(z.imag, z.imag)
+
+
+class Varied(complex):
+    """A constant of the mechanism that varies: decisions see a number, arithmetic writes down.
+
+    Comparisons, `bool` and the size are those of the number it is made with; a sum or a product of it is again one, and
+    with a recorded number a recorded one. It is never equal to a plain number: what is left out or taken as one where a
+    constant is exactly 0 or 1 stays where that may change. `float` and the functions of `math` refuse it.
+
+    >>> recorder = Recorder()
+    >>> length = Varied(2.0, recorder.input("length"))
+    >>> half = 0.5 * length
+    >>> half > 0.9, half == 1.0, recorder.tape({"half": half.recorded}).cost
+    (True, False, 1)
+    """
+
+    recorded: Number
+
+    def __new__(cls, value: complex, recorded: Number) -> Varied:
+        self = super().__new__(cls, value)
+        self.recorded = recorded
+        return self
+
+    def __reduce__(self) -> Any:
+        raise TypeError("a recorded constant does not leave its process")
+
+    def __repr__(self) -> str:
+        return f"Varied({complex(self)!r}, {self.recorded!r})"
+
+    @property
+    def is_real(self) -> bool:
+        """Whether it is a real number."""
+        return isinstance(self.recorded, Real)
+
+    # what complex itself answers, of the value or of what is recorded
+    @property
+    def real(self) -> Any:
+        return self if self.is_real else made(complex(self).real, self.recorded.real)
+
+    @property
+    def imag(self) -> Any:
+        return 0.0 if self.is_real else made(complex(self).imag, self.recorded.imag)
+
+    def conjugate(self) -> Any:
+        return made(complex(self).conjugate(), self.recorded.conjugate())
+
+    def is_integer(self) -> bool:
+        """False: it may change."""
+        return False
+
+    def __complex__(self) -> complex:
+        return complex.__pos__(self)
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Varied):
+            return False
+        mine, its = self.recorded, other.recorded
+        return all(
+            type(a) is type(b) and (a == b if _plain(a) else (a.number, a.negative) == (b.number, b.negative))
+            for a, b in ((mine.real, its.real), (mine.imag, its.imag))
+        )
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    def __hash__(self) -> int:
+        return complex.__hash__(self)
+
+    def __lt__(self, other: Any) -> bool:
+        return complex(self).real < complex(other).real
+
+    def __gt__(self, other: Any) -> bool:
+        return complex(self).real > complex(other).real
+
+    def __le__(self, other: Any) -> bool:
+        return complex(self).real <= complex(other).real
+
+    def __ge__(self, other: Any) -> bool:
+        return complex(self).real >= complex(other).real
+
+    def __pos__(self) -> Any:
+        return self
+
+    def __neg__(self) -> Any:
+        return made(-complex(self), -self.recorded)
+
+    def __abs__(self) -> Any:
+        return made(abs(complex(self)), abs(self.recorded))
+
+    def __pow__(self, power: Any, modulo: Any = None) -> Any:
+        return made(complex(self) ** power, self.recorded**power)
+
+
+def rotation(angle: Any) -> Any:
+    """e^{i·angle} of a constant, plain or varied."""
+    if isinstance(angle, Varied):
+        return made(cmath.rect(1.0, complex(angle).real), RECORDED.turn(angle.recorded))
+    return complex(math.cos(angle), math.sin(angle))
+
+
+def bare(value: Number) -> Number:
+    """What is recorded of a constant that varies; any other number as it is."""
+    return value.recorded if isinstance(value, Varied) else value
+
+
+def made(value: complex, recorded: Number) -> Any:
+    """A varied constant, or what is recorded where that is plain."""
+    return Varied(value, recorded) if isinstance(recorded, (Real, Complex)) else recorded
+
+
+def _operator(name: str) -> Any:
+    of = getattr(operator, name.strip("_").removeprefix("r"))
+    turned = name.startswith("__r")
+
+    def form(self: Varied, other: Any) -> Any:
+        a, b = (other, self) if turned else (self, other)
+        if isinstance(other, (Real, Complex)):
+            return of(bare(a), bare(b))
+        if not isinstance(other, (int, float, complex)):
+            return NotImplemented
+        return made(of(complex(a), complex(b)), of(bare(a), bare(b)))
+
+    return form
+
+
+for _name in ("add", "sub", "mul", "truediv"):
+    for _side in ("__", "__r"):
+        setattr(Varied, f"{_side}{_name}__", _operator(f"{_side}{_name}__"))
 
 
 class Recorded:

@@ -157,56 +157,6 @@ def test_bad_input_is_refused(readings: Complex, masses: Complex, weights: Real 
         joint_fit(readings, masses, weights)
 
 
-def covered(machines: int, runs: int, channels: int, planes: int, seed: int) -> tuple[Real, Real, Real]:
-    """Return how often true corrections, and one more run, lie within regions of 68.3 and 95 %."""
-    rng = np.random.default_rng(seed)
-    sd = 0.02
-    masses, unknowns, readings = campaign(rng, machines, runs, channels, planes, sd)
-    fit = joint_fit(readings, masses)
-    found = balanced(fit)
-    if not fit.degrees_of_freedom.all():
-        # nothing left over: the errors are stated
-        fit = joint_fit(readings, masses)
-        known = replace(
-            fit.scatter(),
-            along=np.full(readings.shape, sd / np.sqrt(2)),
-            across=np.full(readings.shape, sd / np.sqrt(2)),
-            degrees_of_freedom=np.full(machines, np.inf),
-        )
-        found = LogBalance(fit, found.corrections, known)
-    true = least_squares(unknowns[..., 1:], unknowns[..., 0]).corrections
-    off = (true - found.corrections) * np.exp(-1j * np.angle(found.corrections))
-    off = np.stack([off.real, off.imag], axis=-1)
-    distance = np.vecdot(off, np.linalg.solve(found.covariance, off[..., None])[..., 0])
-    levels = np.array([0.683, 0.95])
-    k = np.stack([region_factor(level, found.errors.degrees_of_freedom) for level in levels])
-    of_corrections = (distance <= k[..., None] ** 2).mean(axis=(1, 2))
-    # one more run, with other masses on
-    new = 0.7 * np.exp(1j * rng.uniform(0, 6, (machines, planes)))
-    read = unknowns[..., 0] + np.matvec(unknowns[..., 1:], new) + sd * circular(rng, machines, channels)
-    expected = fit.fitted(new[:, None])[:, 0]
-    if np.isinf(found.errors.degrees_of_freedom).all():
-        # the reading's own scatter is circular here, not a share of its size
-        own = np.square(found.vibration_deviation(new)) + sd**2 / 2
-    else:
-        own = np.square(found.vibration_deviation(new, reading=True))
-    of_run = (np.abs(read - expected) ** 2 / own <= k[..., None] ** 2).mean(axis=(1, 2))
-    return levels, of_corrections, of_run
-
-
-KINDS = [(p, s, spare) for p in (1, 2) for s in (1, 2, 4) if s >= p for spare in (0, 1, 2, 6)]
-
-
-@pytest.mark.parametrize(("planes", "channels", "spare"), KINDS)
-def test_stated_regions_cover_what_they_say(planes: int, channels: int, spare: int) -> None:
-    machines, runs = 2000, 1 + planes + spare
-    levels, of_corrections, of_run = covered(machines, runs, channels, planes, 10 * planes + spare)
-    # the planes of a machine, and its channels, are not independent of one another: counted as one
-    allowed = 4 * np.sqrt(levels * (1 - levels) / machines)
-    assert (np.abs(of_corrections - levels) <= allowed).all(), (of_corrections, of_run)
-    assert (np.abs(of_run - levels) <= allowed).all(), (of_corrections, of_run)
-
-
 def test_the_region_s_factor_is_that_of_f_and_of_chi_square() -> None:
     # F tables: F(0.95; 2, 8) = 4.459, F(0.95; 4, 8) = 3.838; chi-square(0.95; 2) = 5.991
     assert float(region_factor(0.95, 4)) ** 2 / 2 == pytest.approx(4.459, abs=5e-4)

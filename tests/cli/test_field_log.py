@@ -425,12 +425,3 @@ def test_a_kept_mass_stays_on_where_its_run_is_left_out(dalembert: Dalembert) ->
     assert rotor["fit"]["residual_sd"] < 1e-12
     for one, a in zip(rotor["influence"], alpha, strict=True):
         assert polar(one["magnitude_per_kg"], one["phase_deg"]) / 1000 == pytest.approx(a, rel=1e-11)
-
-
-def test_digits_of_a_fit_are_given_in_full_and_it_is_said(dalembert: Dalembert) -> None:
-    done = dalembert("field", "-", "--digits", stdin=standard(MASSES, ERRORS))
-    assert done.returncode == 0
-    assert "given in full" in done.stderr
-    whole = dalembert("field", "-", stdin=standard(MASSES, ERRORS)).stdout
-    cut, given = (text.splitlines()[1].split(",")[2:] for text in (done.stdout, whole))
-    assert [float(cell) for cell in cut] == pytest.approx([float(cell) for cell in given], rel=1e-14)

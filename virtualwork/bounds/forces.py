@@ -98,15 +98,14 @@ class ForceErrors:
     def _spring(self, load: SpringEnd) -> Reals:
         """Of k(1 − l₀/l)d + c(d·ḋ/l²)d."""
         s, r, p = load.spring, self.motion, self.poses
-        moved = sum(r.point(body, z) for body, z in s.between)
-        d = np.abs(np.subtract(*(p.point_derivative(body, z, 0) for body, z in s.between)))
+        ends = [(body, self.mechanism.place(body, point)) for body, point in s.between]
+        moved = sum(r.point(body, z) for body, z in ends)
+        d = np.abs(np.subtract(*(p.point_derivative(body, z, 0) for body, z in ends)))
         slack = s.free_length / d if s.free_length else np.zeros(self.n)
         error: Any = s.stiffness * ((np.abs(1 - slack) + slack) * moved + 4 * EPS * s.free_length)
         if s.damping and self.scene.moves:
-            rate = np.abs(np.subtract(*(p.point_derivative(body, z, 1) for body, z in s.between)))
-            error = error + s.damping * (
-                3 * rate * moved / d + sum(r.point(b, z, None, 1) for b, z in s.between)
-            )
+            rate = np.abs(np.subtract(*(p.point_derivative(body, z, 1) for body, z in ends)))
+            error = error + s.damping * (3 * rate * moved / d + sum(r.point(b, z, None, 1) for b, z in ends))
         return np.asarray(error)
 
     # --- by virtual work ----------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from virtualwork.describe.record import Record
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import Case, State, run
 from virtualwork.formulas.rates import Passage
+from virtualwork.formulas.winding import principal
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, Turn
 
@@ -99,7 +100,7 @@ class Choice(Record):
     def _close(self, group: Group, st: State) -> None:
         self.cases[group.name].solve(st, self.signs[group.name], self.mechanism.size)
         for body in self.geared.intersection(group.members):
-            st.angle[body] = np.angle(st.turn[body])
+            st.angle[body] = principal(np.angle(st.turn[body]))
 
 
 class Along(Passage, Protocol):

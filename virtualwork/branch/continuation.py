@@ -6,7 +6,7 @@ corrected by Newton-Raphson on all poses together, so that no error accumulates.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -251,17 +251,15 @@ def along_lines(track: Along, group: Group, st: State) -> None:
     """With several inputs: every pose on its own straight line of inputs from the guess, all poses together."""
     assembly = track.assembly
     m = assembly.mechanism
-    n = max(np.size(v) for v in st.inputs)
     before = assembly.before(group)
-    at = np.array(m.at)
-    way = np.array([np.broadcast_to(np.asarray(v, dtype=float), n) for v in st.inputs]).T - at
-    longest = 1 / np.maximum(1.0, _steps(m, way))
+    at, way, longest = straight_lines(m, st)
+    n = len(way)
     x: Any = np.tile(np.asarray(assembly.starts[group.name], dtype=float), (n, 1))
     # of each pose: the share of its way that is gone, the next step, and dx of the whole way
     gone, step = np.zeros(n), longest.copy()
     slope = _slope(track, group, before, at + 0 * way, way, x)
     angles = np.arange(x.shape[1]) < len(group.angles)
-    left = np.isfinite(way).all(axis=1)
+    left = np.asarray(np.isfinite(way).all(axis=1))
     closed = left.copy()
     while left.any():
         i = np.flatnonzero(left)
@@ -300,49 +298,10 @@ def _slope(track: Along, group: Group, before: Sequence[Step], inputs: Reals, wa
         return np.nan_to_num(solve(stack(columns(group, st), n), -stack_rows(d.right_side(group, 1), n)))
 
 
-def _steps(m: Description, way: Reals) -> Reals:
-    """How many steps of a march each way of the inputs takes, (n,)."""
-    unit = np.array([m.size if e.is_slide else 2 * np.pi for e in m.inputs])
-    return np.asarray(np.abs(way / unit).max(axis=1) * NODES)
-
-
-def wind_along_lines(track: Along, group: Group, st: State, bodies: Collection[str]) -> None:
-    """With several inputs: the angles of some bodies of a closed form, with the whole turns made on the same lines.
-
-    A pose that is not reached on its line has no number of turns, and is not assembled.
-    """
-    if not bodies:
-        return
-    assembly = track.assembly
+def straight_lines(m: Description, st: State) -> tuple[Reals, Reals, Reals]:
+    """From the guess to each pose of a state: the guess's inputs, the ways (n, k), the longest steps as shares of them."""
     n = max(np.size(v) for v in st.inputs)
-    before = assembly.before(group)
-    at = np.array(assembly.mechanism.at)
+    at = np.array(m.at)
     way = np.array([np.broadcast_to(np.asarray(v, dtype=float), n) for v in st.inputs]).T - at
-    steps = max(1, int(np.ceil(np.max(_steps(assembly.mechanism, way), initial=0.0))))
-    start = State(list(assembly.mechanism.at))
-    track.run(before, start)
-    assembly.cases[group.name].solve(start, assembly.signs[group.name], assembly.mechanism.size)
-    last: dict[str, Any] = {body: start.turn[body] for body in bodies}
-    total: dict[str, Any] = {body: np.angle(last[body]) for body in bodies}
-    with np.errstate(all="ignore"):
-        for i in range(1, steps + 1):
-            trial = State(list((at + i / steps * way).T), many=True)
-            track.run(before, trial)
-            assembly.cases[group.name].solve(trial, assembly.signs[group.name], assembly.mechanism.size)
-            closed = np.asarray(trial.margin[group.name]) >= 0
-            for body in bodies:
-                turned = np.angle(trial.turn[body] / last[body])
-                total[body] = total[body] + np.where(closed, turned, np.nan)
-                last[body] = trial.turn[body]
-        for body in bodies:
-            angle = np.angle(st.turn[body])
-            # what no input moves is one number for all poses
-            wound = np.broadcast_to(angle + 2 * np.pi * np.round((total[body] - angle) / (2 * np.pi)), n)
-            reached = np.isfinite(wound)
-            turn, margin = (
-                np.where(reached, st.turn[body], np.nan),
-                np.where(reached, st.margin[group.name], -1.0),
-            )
-            st.angle[body] = wound if st.many else float(wound[0])
-            st.turn[body] = turn if st.many else complex(turn[0])
-            st.margin[group.name] = margin if st.many else float(margin[0])
+    unit = np.array([m.size if e.is_slide else 2 * np.pi for e in m.inputs])
+    return at, way, 1 / np.maximum(1.0, np.abs(way / unit).max(axis=1) * NODES)

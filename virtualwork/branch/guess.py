@@ -17,6 +17,7 @@ from virtualwork.formulas.linear import stack, stack_rows
 from virtualwork.formulas.newton import gaps, newton, write_unknowns
 from virtualwork.formulas.numbers import cross, dot
 from virtualwork.formulas.positions import Case, State, columns, run
+from virtualwork.formulas.winding import principal
 from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, Turn
@@ -120,7 +121,7 @@ class _Chooser:
                     starts[step.name] = tuple(map(float, self._newton(step, st)))
                 else:
                     signs[step.name] = self._sign(step, helper.cases[step.name], st, signs)
-                    st.angle.update({b: float(np.angle(st.turn[b])) for b in step.members})
+                    st.angle.update({b: float(principal(np.angle(st.turn[b]))) for b in step.members})
             else:
                 waiting.append(step)
         run(waiting, st)

@@ -20,8 +20,9 @@ import numpy as np
 
 from virtualwork.branch.change_point import ChangePoint, near_by, put, through
 from virtualwork.branch.choice import Choice
-from virtualwork.branch.continuation import Continuation, along_lines, wind_along_lines
+from virtualwork.branch.continuation import Continuation, along_lines
 from virtualwork.branch.radicand import crossing, lowest, rounding, vanishes
+from virtualwork.branch.winding import Winding, wind_along_lines
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.numbers import Complexes, Number, Reals
 from virtualwork.formulas.positions import State, run
@@ -66,7 +67,7 @@ class Track:
         self.changes: dict[str, list[ChangePoint]] = {}
         self._brackets: list[tuple[str, float, float]] = []
         self._continuations: dict[str, Continuation] = {}
-        self._followed: dict[str, tuple[Reals, Reals]] = {}
+        self._winding = Winding(self)
         # one turn says it all where every turn of a body is a whole number of turns of the input
         whole = all(
             float(k).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, k in s.angle.inputs
@@ -105,7 +106,7 @@ class Track:
             wind_along_lines(self, group, st, bodies)
             return
         for body in bodies:
-            st.angle[body] = self.unwound(body, st.inputs[0], np.angle(st.turn[body]))
+            st.angle[body] = self._winding.angle(body, st.inputs[0], np.angle(st.turn[body]))
 
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""
@@ -212,28 +213,6 @@ class Track:
                     x[j][i] = rate[j]
         return x
 
-    def unwound(self, body: str, q: Number, angle: Number) -> Number:
-        """An angle with its whole turns, counted from the guess."""
-        if not self.active or body not in self._followed:
-            return angle
-        nodes, turns = self._followed[body]
-        good = np.isfinite(turns)
-        near = np.interp(q, nodes[good], turns[good])
-        whole = angle + 2 * np.pi * np.round((near - angle) / (2 * np.pi))
-        return whole if np.ndim(q) else float(whole)
-
-    def _follow(self, body: str, q: Reals, angle: Reals) -> None:
-        """Add samples of an angle and count its turns from the guess."""
-        nodes, angles = self._followed.get(body, (np.empty(0), np.empty(0)))
-        nodes, first = np.unique(np.append(nodes, q), return_index=True)
-        angles = np.append(angles, np.broadcast_to(angle, q.shape))[first]
-        good = np.isfinite(angles)
-        if good.any():
-            angles[good] = np.unwrap(angles[good])
-            here = np.interp(self.start, nodes[good], angles[good])
-            angles = angles - 2 * np.pi * np.round(here / (2 * np.pi))
-            self._followed[body] = nodes, angles
-
     def _fold(self, name: str) -> None:
         """Note a group that is singular in every pose."""
         self.folded.add(name)
@@ -299,8 +278,8 @@ class Track:
                 if self._look(s, q, m, a, b):
                     self.close(s, st)
                 for body in self.assembly.geared.intersection(s.members):
-                    self._follow(body, q, np.angle(st.turn[body]))
-                    st.angle[body] = self.unwound(body, q, np.angle(st.turn[body]))
+                    self._winding.follow(body, q)
+                    st.angle[body] = self._winding.angle(body, q, np.angle(st.turn[body]))
             else:
                 self._continued(s).extend(a, b)
                 if self._continued(s).singular():

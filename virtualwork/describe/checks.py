@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from difflib import get_close_matches
+from collections.abc import Collection, Mapping, Sequence
 
-from virtualwork.describe.errors import DescriptionError
-from virtualwork.describe.loads import Force, Torque
+from virtualwork.describe.errors import DescriptionError, hint
+from virtualwork.describe.loads import Force, Spring, Torque
 from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link
 
 Bodies = Mapping[str, Mapping[str, complex]]
-
-
-def hint(word: str, names: Iterable[str]) -> str:
-    """The nearest of some names, as a question; empty where none is near.
-
-    >>> hint("crnak", ["crank", "rocker"])
-    "; did you mean 'crank'?"
-    """
-    close = get_close_matches(word, list(names), n=1, cutoff=0.4)
-    return f"; did you mean '{close[0]}'?" if close else ""
 
 
 def known(name: str, names: Collection[str], where: str, what: str) -> None:
@@ -37,6 +26,7 @@ def refuse(
     inputs: Sequence[Input],
     guess: Guess,
     loads: Mapping[str, Sequence[Force | Torque]],
+    springs: Sequence[Spring],
 ) -> None:
     """Refuse unknown names and impossible sizes, each with its place.
 
@@ -70,6 +60,14 @@ def refuse(
     for table, entries in loads.items():
         for i, load in enumerate(entries, 1):
             known(load.link, links, f"[[{table}]] {i} link", "link")
+            if isinstance(load, Force) and isinstance(load.point, str):
+                what = f"point of link {load.link}"
+                known(load.point, bodies[load.link], f"[[{table}]] {i} point", what)
+    for i, spring in enumerate(springs, 1):
+        for body, point in spring.between:
+            known(body, bodies, f"[[springs]] {i} between", "link")
+            if isinstance(point, str):
+                known(point, bodies[body], f"[[springs]] {i} between", f"point of {body}")
 
 
 def _link(name: str, link: Link, pins: Collection[str], guided: Collection[str]) -> None:

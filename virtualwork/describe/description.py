@@ -98,6 +98,7 @@ class Description(Record):
             self.inputs,
             self.guess,
             {"forces": self.forces, "torques": self.torques},
+            self.springs,
         )
 
     def __repr__(self) -> str:
@@ -169,9 +170,15 @@ class Description(Record):
         """Whether anything but weight and inertia acts on a link: forces, torques, springs, friction."""
         return any((self.forces, self.torques, self.springs, self.torsion_springs, self.friction))
 
+    def place(self, body: str, point: complex | str | None) -> complex:
+        """A point in the axes of its body, given by its place or its name; None is the link's own centre of mass."""
+        if point is None:
+            return self.links[body].center
+        return self.bodies[body][point] if isinstance(point, str) else point
+
     def through(self, guide: Guide) -> complex:
         """A point of a guide's line, in the axes of the body that carries it."""
-        return self.bodies[guide.on][guide.through] if isinstance(guide.through, str) else guide.through
+        return self.place(guide.on, guide.through)
 
     def guide_of(self, entry: Input) -> int:
         """The guide along which a slide input drives."""

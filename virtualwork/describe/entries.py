@@ -7,8 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from virtualwork.describe.checks import hint
-from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe.errors import DescriptionError, hint
 from virtualwork.describe.keys import UNITS, Keys
 from virtualwork.describe.parts import GROUND, Link
 from virtualwork.describe.tables import rows
@@ -63,14 +62,14 @@ class Entries:
             raise DescriptionError(f"{where}: unknown link '{name}'{hint(str(name), names)}")
         return name
 
-    def place(self, link: str, value: Any, where: str) -> complex:
+    def place(self, link: str, value: Any, where: str) -> complex | str:
         """A point of a link: its name, or [x, y] in the link's axes."""
         if isinstance(value, str):
             if value not in self.bodies[link]:
                 raise DescriptionError(
                     f"{where}: unknown point '{value}' of {link}{hint(str(value), self.bodies[link])}"
                 )
-            return self.bodies[link][value]
+            return value
         return self.pair(value, "length", where)
 
     def point_of(self, name: Any, where: str) -> tuple[str, str]:

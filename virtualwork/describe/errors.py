@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 
 class MechanismError(ValueError):
     """A description that cannot be solved: says which table and key, what was found and what was expected."""
@@ -21,3 +24,13 @@ class AssemblyError(MechanismError):
 
 class ParallelGuidesError(AssemblyError):
     """The two guides of a group are parallel: its position is not determined."""
+
+
+def hint(word: str, names: Iterable[str]) -> str:
+    """The nearest of some names, as a question; empty where none is near.
+
+    >>> hint("crnak", ["crank", "rocker"])
+    "; did you mean 'crank'?"
+    """
+    close = get_close_matches(word, list(names), n=1, cutoff=0.4)
+    return f"; did you mean '{close[0]}'?" if close else ""

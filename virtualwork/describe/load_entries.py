@@ -6,9 +6,8 @@ import itertools
 import math
 from typing import Any
 
-from virtualwork.describe.checks import hint
 from virtualwork.describe.entries import Entries, need, proper
-from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe.errors import DescriptionError, hint
 from virtualwork.describe.keys import FORCE, FRICTION, MOTOR, SPRING, TORQUE, TORSION_SPRING
 from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.describe.units import LARGEST, wrong
@@ -31,11 +30,7 @@ class LoadEntries(Entries):
         if "table" not in entry:
             need(entry, ("force",), where)
         link = self.body(entry["link"], f"{where} link", ground=False)
-        point = (
-            self.place(link, entry["point"], f"{where} point")
-            if "point" in entry
-            else self.links[link].center
-        )
+        point = self.place(link, entry["point"], f"{where} point") if "point" in entry else None
         frame = entry.get("frame", "ground")
         if frame not in ("ground", "link"):
             raise wrong(f"{where} frame", frame, "'ground' or 'link'")

@@ -8,14 +8,15 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Force:
-    """A force of fixed components in ground or link axes (N), at a point of a link given in the link's axes (m).
+    """A force of fixed components in ground or link axes (N), at a point of a link.
 
+    The point is given in the link's axes (m), by its name, or not at all: the link's own centre of mass.
     `history` is a table (input, force) in place of a constant, linear between its rows; with a turning input and a
     span of whole turns it is `periodic`, one cycle that repeats.
     """
 
     link: str
-    point: complex
+    point: complex | str | None
     force: complex = 0j
     frame: Literal["ground", "link"] = "ground"
     history: tuple[tuple[float, complex], ...] | None = None
@@ -32,9 +33,9 @@ class Torque:
 
 @dataclass(frozen=True)
 class Spring:
-    """A spring and damper between two points, each given as (link, point in its axes)."""
+    """A spring and damper between two points, each given as (link, point): its name, or its place in the link's axes."""
 
-    between: tuple[tuple[str, complex], tuple[str, complex]]
+    between: tuple[tuple[str, complex | str], tuple[str, complex | str]]
     stiffness: float = 0.0
     free_length: float = 0.0
     damping: float = 0.0

@@ -5,11 +5,14 @@ Points and vectors of the plane are complex numbers x + iy: R e^{iθ} is then wr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from types import MappingProxyType
 
 from dalembert.arithmetic.records import record
+from virtualwork.describe.errors import DescriptionError, hint
 from virtualwork.describe.record import Record
 
 GROUND = "ground"
@@ -22,15 +25,81 @@ def as_point(value: Point) -> complex:
     >>> as_point((3, 4))
     (3+4j)
     """
-    if isinstance(value, (complex, float, int)):
+    if isinstance(value, complex):
+        # a number that varies stays what it is
+        return complex(value) if hasattr(value, "dtype") else value
+    if isinstance(value, Real):
         return complex(value)
     x, y = value
-    return complex(float(x), float(y))
+    return joined(x, y)
+
+
+def joined(x: float, y: float) -> complex:
+    """x + iy, of numbers that vary too.
+
+    >>> joined(3, 4)
+    (3+4j)
+    """
+    plain = isinstance(x, Real) and isinstance(y, Real)
+    return complex(x, y) if plain else as_number(x) + 1j * as_number(y)
+
+
+def as_number(value: float) -> float:
+    """Read a real number as a float; one that varies stays what it is.
+
+    >>> as_number(3)
+    3.0
+    """
+    return value if isinstance(value, complex) else float(value)
 
 
 def as_points(given: Mapping[str, Point]) -> Mapping[str, complex]:
     """Read named points, and freeze them."""
     return MappingProxyType({name: as_point(value) for name, value in given.items()})
+
+
+@dataclass(frozen=True)
+class Polar:
+    """A point of a link by its distance and direction from another point of it, in the link's axes, m and rad."""
+
+    origin: str
+    length: float
+    angle: float
+
+    @property
+    def arm(self) -> complex:
+        """From the other point to this one."""
+        return self.length * complex(math.cos(self.angle), math.sin(self.angle))
+
+
+def placed(given: Mapping[str, Point | Polar]) -> Mapping[str, complex]:
+    """Where the points of a link lie, those given by distance and direction too; frozen.
+
+    Raises
+    ------
+    DescriptionError
+        Where one hangs on no point, or on itself.
+
+    Examples
+    --------
+    >>> dict(placed({"H": Polar("G", 2, 0), "G": (1, 0)}))
+    {'H': (3+0j), 'G': (1+0j)}
+    """
+    found: dict[str, complex] = {}
+    waiting = dict(given)
+    while waiting:
+        ready = [p for p, at in waiting.items() if not isinstance(at, Polar) or at.origin in found]
+        if not ready:
+            point, at = next((p, at) for p, at in waiting.items() if isinstance(at, Polar))
+            if at.origin not in waiting:
+                raise DescriptionError(
+                    f"points.{point} from: unknown point '{at.origin}'{hint(at.origin, given)}"
+                )
+            raise DescriptionError(f"points.{point} from: '{at.origin}' hangs on '{point}' itself")
+        for point in ready:
+            z = waiting.pop(point)
+            found[point] = found[z.origin] + z.arm if isinstance(z, Polar) else as_point(z)
+    return MappingProxyType({point: found[point] for point in given})
 
 
 @record
@@ -40,7 +109,7 @@ class Link(Record):
 
     Parameters
     ----------
-    points : mapping of name to (x, y)
+    points : mapping of name to (x, y) or Polar
         In the link's own axes, m. Points that share a name with another link's are pinned together.
     mass : float
         kg.
@@ -48,20 +117,31 @@ class Link(Record):
         Centre of mass in the link's own axes, m.
     inertia : float
         About the centre of mass, kg·m².
+    polar : mapping of name to Polar
+        The points that are given by distance and direction: they win over `points`.
     """
 
     points: Mapping[str, complex]
     mass: float = 0.0
     center: complex = 0j
     inertia: float = 0.0
+    polar: Mapping[str, Polar] = field(default_factory=dict)
 
     def __init__(
-        self, points: Mapping[str, Point], mass: float = 0.0, center: Point = 0j, inertia: float = 0.0
+        self,
+        points: Mapping[str, Point | Polar],
+        mass: float = 0.0,
+        center: Point = 0j,
+        inertia: float = 0.0,
+        polar: Mapping[str, Polar] | None = None,
     ) -> None:
-        object.__setattr__(self, "points", as_points(points))
-        object.__setattr__(self, "mass", float(mass))
+        given = {**points, **(polar or {})}
+        object.__setattr__(self, "points", placed(given))
+        object.__setattr__(self, "mass", as_number(mass))
         object.__setattr__(self, "center", as_point(center))
-        object.__setattr__(self, "inertia", float(inertia))
+        object.__setattr__(self, "inertia", as_number(inertia))
+        hung = {point: at for point, at in given.items() if isinstance(at, Polar)}
+        object.__setattr__(self, "polar", MappingProxyType(hung))
 
 
 @dataclass(frozen=True)
@@ -150,7 +230,11 @@ class Guess(Record):
         points: Mapping[str, Point] | None = None,
     ) -> None:
         values = (
-            None if at is None else (float(at),) if isinstance(at, (int, float)) else tuple(map(float, at))
+            None
+            if at is None
+            else (as_number(at),)
+            if isinstance(at, (int, float, complex))
+            else tuple(map(as_number, at))
         )
         object.__setattr__(self, "at", values)
         object.__setattr__(self, "angles", MappingProxyType(dict(angles or {})))

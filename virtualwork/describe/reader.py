@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from virtualwork.describe import keys
-from virtualwork.describe.checks import hint
 from virtualwork.describe.description import Description
 from virtualwork.describe.entries import Load, known_keys, proper
-from virtualwork.describe.errors import DescriptionError, MechanismError
+from virtualwork.describe.errors import DescriptionError, MechanismError, hint
 from virtualwork.describe.load_entries import LoadEntries
-from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link
+from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link, Polar
 from virtualwork.describe.units import LARGEST, wrong
 
 D = TypeVar("D", bound=Description)
@@ -103,36 +102,23 @@ class _Reader(LoadEntries):
         if not isinstance(entry, dict):
             raise wrong(where, entry, "a table with points")
         known_keys(entry, keys.LINK, where, "key")
-        points: dict[str, complex] = {}
+        points: dict[str, complex | Polar] = {}
         given = entry.get("points", {})
         if not isinstance(given, dict):
             raise wrong(f"{where} points", given, "a table { A = [0, 0], B = [120, 0] }")
         for p, v in given.items():
-            if isinstance(v, dict) and not isinstance(v.get("from"), str):
-                raise DescriptionError(
-                    f"{where} points.{p} from: expected the name of another point of this link"
-                )
-        waiting = dict(given)
-        while waiting:
-            ready = [p for p, v in waiting.items() if not isinstance(v, dict) or v.get("from") in points]
-            if not ready:
-                p, v = next(iter(waiting.items()))
-                start = v.get("from")
-                if start not in waiting:
-                    raise DescriptionError(
-                        f"{where} points.{p} from: unknown point '{start}'{hint(str(start), given)}"
-                    )
-                raise DescriptionError(f"{where} points.{p} from: '{start}' hangs on '{p}' itself")
-            for p in ready:
-                v, at = waiting.pop(p), f"{where} points.{p}"
-                if isinstance(v, dict):
-                    proper(v, keys.POINT, at)
-                    angle = self.number(v["angle"], "angle", f"{at} angle")
-                    length = self.number(v["length"], "length", f"{at} length")
-                    points[p] = points[v["from"]] + length * complex(math.cos(angle), math.sin(angle))
-                else:
-                    points[p] = self.pair(v, "length", at)
-        ordered = {p: points[p] for p in given}
+            at = f"{where} points.{p}"
+            if not isinstance(v, dict):
+                points[p] = self.pair(v, "length", at)
+                continue
+            if not isinstance(v.get("from"), str):
+                raise DescriptionError(f"{at} from: expected the name of another point of this link")
+            proper(v, keys.POINT, at)
+            points[p] = Polar(
+                v["from"],
+                self.number(v["length"], "length", f"{at} length"),
+                self.number(v["angle"], "angle", f"{at} angle"),
+            )
         mass = self.optional(entry, keys.LINK, "mass", where)
         inertia = self.optional(entry, keys.LINK, "inertia", where)
         center = self.pair(entry["center"], "length", f"{where} center") if "center" in entry else 0j
@@ -140,7 +126,10 @@ class _Reader(LoadEntries):
             raise wrong(f"{where} mass", entry["mass"], "a mass of zero or more")
         if inertia < 0:
             raise wrong(f"{where} inertia", entry["inertia"], "a moment of inertia of zero or more")
-        return Link(ordered, mass, center, inertia)
+        try:
+            return Link(points, mass, center, inertia)
+        except DescriptionError as error:
+            raise DescriptionError(f"{where} {error}") from None
 
     def guide(self, entry: dict[str, Any], i: int, table: str) -> Guide:
         where = f"[[{table}]] {i}"

@@ -77,6 +77,27 @@ EXPECTED: dict[str, tuple[str, Dimension]] = {
     "number": ("a number", (0, 0, 0, 0)),
 }
 
+# how a column of such quantities ends, and a key of JSON: SI, but degrees
+HEADERS: dict[str, str] = {
+    "length": "m",
+    "angle": "deg",
+    "mass": "kg",
+    "inertia": "kg_m2",
+    "speed": "rad_s",
+    "acceleration": "rad_s2",
+    "jerk": "rad_s3",
+    "slide speed": "m_s",
+    "slide acceleration": "m_s2",
+    "slide jerk": "m_s3",
+    "force": "N",
+    "torque": "N_m",
+    "stiffness": "N_per_m",
+    "damping": "N_s_per_m",
+    "torsion stiffness": "N_m_per_rad",
+    "torsion damping": "N_m_s_per_rad",
+    "number": "",
+}
+
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
 
 

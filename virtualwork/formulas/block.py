@@ -12,17 +12,20 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from dalembert.arithmetic.recorded import rotation
+from virtualwork.describe.description import Description
 from virtualwork.describe.loads import TorsionSpring
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.numbers import Number, Reals, plus, times
 from virtualwork.formulas.poses import Poses, part
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.rates import Rates
-from virtualwork.plan.steps import Path
+from virtualwork.formulas.winding import Samples, follow, whole
+from virtualwork.plan.steps import Path, Plan
 
 
-class Setting:
-    """What all blocks of a scene share: the poses, whether they move, how far torsion springs are wound.
+class Shared:
+    """What all blocks share.
 
     Attributes
     ----------
@@ -32,12 +35,40 @@ class Setting:
         The effort at each input by virtual work, as motors that other links carry need it.
     """
 
-    def __init__(self, poses: Poses, at_rest: bool) -> None:
-        self.poses, self.at_rest = poses, at_rest
-        self.mechanism, self.plan = poses.mechanism, poses.plan
+    def __init__(self, mechanism: Description, plan: Plan) -> None:
+        self.mechanism, self.plan = mechanism, plan
         self.formed: set[str] = set()
         self.drive: Reals | None = None
-        self._followed: dict[TorsionSpring, tuple[Reals, Reals]] = {}
+
+    def rates(self, rows: slice, many: bool) -> tuple[Number, Number]:
+        """q̇ and q̈ of the one input over a block, None where zero."""
+        raise NotImplementedError
+
+    def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
+        """A torsion spring's twist with its whole turns, from what lies within half a turn of free."""
+        raise NotImplementedError
+
+    def twist(self, st: State, spring: TorsionSpring) -> Number:
+        """θ_second − θ_first − free angle: within half a turn at the guess, and from there on followed continuously.
+
+        Where the inputs alone fix both angles they are taken as they are, whole turns included. With several inputs
+        the angle lies within half a turn of free.
+        """
+        a, b = spring.links
+        known = [self.plan.angles[body] for body in (a, b)]
+        if all(not angle.bases for angle in known):
+            return (st.affine(known[1]) - spring.free_angle) - st.affine(known[0])
+        within = st.kind.angle(st.turn[b] * st.turn[a].conjugate() * rotation(-spring.free_angle))
+        return within if len(st.inputs) > 1 else self.wound(spring, st, within)
+
+
+class Setting(Shared):
+    """What the blocks of a scene share: the poses, whether they move, how far torsion springs are wound."""
+
+    def __init__(self, poses: Poses, at_rest: bool) -> None:
+        super().__init__(poses.mechanism, poses.plan)
+        self.poses, self.at_rest = poses, at_rest
+        self._followed: dict[TorsionSpring, Samples] = {}
 
     @cached_property
     def moves(self) -> bool:
@@ -51,42 +82,28 @@ class Setting:
         speed, acceleration, _ = self.poses.rates
         return part(speed[0], rows, many), part(acceleration[0], rows, many)
 
-    def twist(self, st: State, spring: TorsionSpring) -> Number:
-        """θ_second − θ_first − free angle: within half a turn at the guess, and from there on followed continuously.
+    def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
+        """A torsion spring's twist with its whole turns, from what lies within half a turn of free."""
+        found = whole(self._counted(spring), st.inputs[0], within)
+        return found if st.many else float(found)
 
-        Where the inputs alone fix both angles they are taken as they are, whole turns included. With several inputs
-        the angle lies within half a turn of free.
-        """
-        a, b = spring.links
-        known = [self.plan.angles[body] for body in (a, b)]
-        if all(not angle.bases for angle in known):
-            return (st.affine(known[1]) - spring.free_angle) - st.affine(known[0])
-        relative = st.turn[b] * np.conj(st.turn[a]) * complex(np.exp(-1j * spring.free_angle))
-        within = np.angle(relative)
-        if len(st.inputs) == 1:
-            q, unwrapped = self._unwrapped(spring)
-            rough = np.interp(np.asarray(st.inputs[0], dtype=float), q, unwrapped)
-            within = within + 2 * np.pi * np.round((rough - within) / (2 * np.pi))
-        return within if st.many else float(within)
-
-    def _unwrapped(self, spring: TorsionSpring) -> tuple[Reals, Reals]:
-        """The twist of a torsion spring followed from the guess, roughly: only its whole turns are used."""
+    def _counted(self, spring: TorsionSpring) -> Samples:
+        """The twist of a torsion spring followed from the guess over all poses asked for."""
         if spring not in self._followed:
             m = self.mechanism
             inputs, at = self.poses.inputs[:, 0], m.at[0]
             low, high = min(float(np.nanmin(inputs)), at), max(float(np.nanmax(inputs)), at)
-            step = m.size / 720 if m.inputs[0].is_slide else 2 * np.pi / 720
-            q = np.linspace(low, high, min(20000, 2 + int((high - low) / step)))
-            along = self.poses.again(q[:, None])
-            a, b = (along.angle(body) if body != GROUND else np.zeros(len(q)) for body in spring.links)
-            relative = np.angle(np.exp(1j * (b - a - spring.free_angle)))
-            there = np.isfinite(relative)
-            path = np.unwrap(relative[there])
-            if len(path):
-                start = int(np.argmin(np.abs(q[there] - at)))
-                path = path + (relative[there][start] - path[start])
-                q = q[there]
-            self._followed[spring] = (q, path) if len(path) else (q, np.zeros(len(q)))
+            turn = m.size if m.inputs[0].is_slide else 2 * np.pi
+            # of very many turns fewer samples each
+            samples = int(min(720.0, max(24.0, 20000 * turn / max(high - low, turn))) * (high - low) / turn)
+
+            def angle(q: Reals) -> Reals:
+                along = self.poses.again(q[:, None])
+                a, b = (along.angle(body) if body != GROUND else np.zeros(len(q)) for body in spring.links)
+                relative: Reals = np.angle(np.exp(1j * (b - a - spring.free_angle)))
+                return relative
+
+            self._followed[spring] = follow(angle, np.linspace(low, high, 2 + samples), at, turn)
         return self._followed[spring]
 
 
@@ -101,15 +118,20 @@ class Formed(Protocol):
         """Its value over a block."""
 
 
+class Table(Protocol):
+    """A force given over the input."""
+
+    def over(self, q: Number, many: bool) -> Number:
+        """The force at inputs."""
+
+
 class Block:
     """A block of poses as the loads see it: positions, velocity coefficients, velocities, accelerations.
 
     A derivative that is identically zero is None.
     """
 
-    def __init__(
-        self, setting: Setting, rows: slice, st: State, along: Rates | None, by: list[Rates]
-    ) -> None:
+    def __init__(self, setting: Shared, rows: slice, st: State, along: Rates | None, by: list[Rates]) -> None:
         self.setting, self.rows, self.st, self.along, self.by = setting, rows, st, along, by
         self.one = len(by) == 1
         self.rates = setting.rates(rows, st.many) if self.one else (None, None)
@@ -122,6 +144,16 @@ class Block:
         if what not in self.kept:
             self.kept[what] = what.form(self)
         return self.kept[what]
+
+    def drive(self, j: int) -> Number:
+        """The torque of input j's motor, by virtual work."""
+        assert self.setting.drive is not None
+        torque = self.setting.drive[:, j]
+        return torque[self.rows] if self.st.many else float(torque[0])
+
+    def table(self, load: Table) -> Number:
+        """The force of a load that is given over the input."""
+        return load.over(self.st.inputs[0], self.st.many)
 
     def forget(self, *, lasting: bool = False) -> None:
         """Drop the arrays, or all but those that others will ask for."""

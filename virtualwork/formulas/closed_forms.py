@@ -13,7 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from virtualwork.formulas.numbers import ONE, Kind, Number, cross
+from virtualwork.formulas.kinds import ONE
+from virtualwork.formulas.numbers import Kind, Number, cross
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort, finished, write_effort
 from virtualwork.formulas.friction import settle
-from virtualwork.formulas.loads import EXTERNAL, OWN
+from virtualwork.formulas.loads import EXTERNAL, OWN, Load
 from virtualwork.formulas.numbers import Complexes, Number, Reals, cross, plus, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.reactions import Reactions
@@ -193,20 +193,10 @@ class Dynamics:
         """
         n = self.poses.n
         force, moment = np.zeros(n, complex), np.zeros(n)
-        loads = [load for load in self.scene.loads if load.kind in EXTERNAL and load.body != GROUND]
+        loads = shaking_loads(self.scene.loads)
 
         def work(block: Block) -> None:
-            f: Number = None
-            m: Number = None
-            for load in loads:
-                value = block.formed(load)
-                if value is None:
-                    continue
-                if load.path is None:
-                    m = plus(m, value)
-                else:
-                    f = plus(f, value)
-                    m = plus(m, cross(block.position(load.path), value))
+            f, m = resultant(loads, block)
             if f is not None:
                 force[block.rows] = f
             if m is not None:
@@ -239,6 +229,27 @@ class Dynamics:
                 if arm is not None:
                     moment[block.rows] += cross(arm, value)
         return force, moment
+
+
+def shaking_loads(loads: Iterable[Load]) -> list[Load]:
+    """What acts on the moving links from outside."""
+    return [load for load in loads if load.kind in EXTERNAL and load.body != GROUND]
+
+
+def resultant(loads: Iterable[Load], block: Block) -> tuple[Number, Number]:
+    """The sum of loads over a block and their moment about the ground's origin; None where zero."""
+    force: Number = None
+    moment: Number = None
+    for load in loads:
+        value = block.formed(load)
+        if value is None:
+            continue
+        if load.path is None:
+            moment = plus(moment, value)
+        else:
+            force = plus(force, value)
+            moment = plus(moment, cross(block.position(load.path), value))
+    return force, moment
 
 
 class Moving(Protocol):

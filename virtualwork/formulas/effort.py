@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from virtualwork.formulas.block import Block
+from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.numbers import Number, Reals, plus, times
 from virtualwork.formulas.positions import BLOCK
 from virtualwork.formulas.scene import Scene
@@ -38,20 +39,25 @@ def effort(scene: Scene) -> Reals:
 
 def write_effort(scene: Scene, block: Block, out: Reals) -> None:
     """The generalized forces over one block."""
-    paths = scene.paths
     for j in range(out.shape[1]):
-        total: Number = None
-        for body, guide, load in paths.working:
-            moved = block.by[j].slide[guide][0] if body is None else block.turning(body, j)
-            # what cannot move is not evaluated
-            if moved is not None:
-                value = paths.value(block, load)
-                total = plus(total, value if isinstance(moved, float) and moved == 1 else times(value, moved))
+        total = generalized_force(scene.paths, block, j)
         if total is not None:
             np.negative(total, out=out[block.rows, j])
             bad = _singular(scene, block, j)
             if bad is not False:
                 out[block.rows, j][bad] = np.nan
+
+
+def generalized_force(paths: LoadPaths, block: Block, j: int) -> Number:
+    """What the loads do for a unit of input j over one block; None where nothing."""
+    total: Number = None
+    for body, guide, load in paths.working:
+        moved = block.by[j].slide[guide][0] if body is None else block.turning(body, j)
+        # what cannot move is not evaluated
+        if moved is not None:
+            value = paths.value(block, load)
+            total = plus(total, value if isinstance(moved, float) and moved == 1 else times(value, moved))
+    return total
 
 
 def finished(scene: Scene, out: Reals) -> Reals:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.formulas.numbers import PARALLEL, Number, Reals
 
 # a singular value below this share of the largest is that of a null vector
 SINGULAR = 1e-6
@@ -115,3 +115,21 @@ def solve_determined(cols: list[list[Number]], right: list[Number], angles: int)
         least = -(np.linalg.pinv(jacobian, rcond=SINGULAR) @ (w[good] / size)[..., None])[..., 0]
         out[good] = np.where(free, np.nan, least * scale)
     return [out[:, j] if shape else float(out[0, j]) for j in range(out.shape[1])]
+
+
+def solve_transposed(cols: list[list[Number]], loads: list[Number]) -> list[Number]:
+    """Solve Σ_c λ_c·∂C_c/∂x + Q_x = 0 for the complex λ of the loops; None is no load."""
+    given = [0.0 if load is None else load for load in loads]
+    shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(q) for q in given))
+    n = int(np.prod(shape))
+    jacobian = np.swapaxes(stack(cols, n), -1, -2)
+    right = np.zeros((n, len(loads)))
+    for i, load in enumerate(given):
+        right[:, i] = -load
+    good = np.asarray(np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(right).all(axis=1))
+    out = np.full((n, jacobian.shape[-1]), np.nan)
+    if jacobian.shape[-1] == jacobian.shape[-2]:
+        good &= np.linalg.cond(np.where(good[:, None, None], jacobian, np.eye(len(loads)))) < 1 / PARALLEL
+        out[good] = np.linalg.solve(jacobian[good], right[good][..., None])[..., 0]
+    found = out[:, 0::2] + 1j * out[:, 1::2]
+    return [found[:, c] if shape else complex(found[0, c]) for c in range(found.shape[1])]

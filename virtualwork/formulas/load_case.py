@@ -71,15 +71,17 @@ class LoadCase:
         return found
 
     def _force(self, force: Force) -> Load:
-        at = "applied force", force.link, self.path(force.link, force.point), force.point
+        place = self.mechanism.place(force.link, force.point)
+        at = "applied force", force.link, self.path(force.link, place), place
         if force.history:
             return Tabled(*at, force.history, force.periodic, force.frame == "link")
         return (Follower if force.frame == "link" else Constant)(*at, force.force)
 
     def _spring(self, spring: Spring) -> list[Load]:
-        ends = [self.path(*end) for end in spring.between]
+        between = [(body, self.mechanism.place(body, point)) for body, point in spring.between]
+        ends = [self.path(*end) for end in between]
         found: list[Load] = []
-        for k, (body, z) in enumerate(spring.between):
+        for k, (body, z) in enumerate(between):
             if body != GROUND:
                 end = SpringEnd("spring", body, ends[k], z, spring=spring, other=ends[1 - k])
                 found.append(_beside(end, found))

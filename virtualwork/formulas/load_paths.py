@@ -28,9 +28,8 @@ import numpy as np
 
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
-from virtualwork.formulas.linear import stack
 from virtualwork.formulas.load_case import LoadCase
-from virtualwork.formulas.numbers import PARALLEL, Number
+from virtualwork.formulas.numbers import Number
 from virtualwork.formulas.quantities import Combination, Quantity, Transmitted, in_order
 from virtualwork.plan.joint_forces import Order, Side
 from virtualwork.plan.steps import Group, Place, Term, Turn
@@ -335,7 +334,7 @@ class Solved(Quantity):
             return 1.0, [None] * len(group.closures)
         cols = block.by[0].columns(group)
         if group.kind == "Newton":
-            return 1.0, _transposed(cols, loads, block)
+            return 1.0, block.st.kind.transposed(cols, loads)
         (c1, c2), (q1, q2) = cols[0], loads
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             inverse = block.st.kind.regular(block.by[0].inverse(group), c1, c2)
@@ -386,24 +385,4 @@ class Carried(Quantity):
     input: int
 
     def form(self, block: Block) -> tuple[float, Number]:
-        assert block.setting.drive is not None
-        torque = block.setting.drive[:, self.input]
-        return 1.0, torque[block.rows] if block.st.many else float(torque[0])
-
-
-def _transposed(cols: list[list[Number]], loads: list[Number], block: Block) -> list[Number]:
-    """Solve Σ_c λ_c·∂C_c/∂x + Q_x = 0 of a larger group."""
-    shape = np.shape(block.st.inputs[0])
-    n = int(np.prod(shape))
-    jacobian = np.swapaxes(stack(cols, n), -1, -2)
-    right = np.zeros((n, len(loads)))
-    for i, load in enumerate(loads):
-        if load is not None:
-            right[:, i] = -load
-    good = np.asarray(np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(right).all(axis=1))
-    out = np.full((n, jacobian.shape[-1]), np.nan)
-    if jacobian.shape[-1] == jacobian.shape[-2]:
-        good &= np.linalg.cond(np.where(good[:, None, None], jacobian, np.eye(len(loads)))) < 1 / PARALLEL
-        out[good] = np.linalg.solve(jacobian[good], right[good][..., None])[..., 0]
-    found = out[:, 0::2] + 1j * out[:, 1::2]
-    return [found[:, c] if shape else complex(found[0, c]) for c in range(found.shape[1])]
+        return 1.0, block.drive(self.input)

@@ -171,25 +171,29 @@ class Tabled(Load):
     periodic: bool = False
     link_axes: bool = False
 
-    def _in_cycle(self, block: Block) -> tuple[Reals, Complexes, Reals]:
+    def _in_cycle(self, q: Number) -> tuple[Reals, Complexes, Reals]:
         at = np.array([row[0] for row in self.table])
         force = np.array([row[1] for row in self.table])
-        q = np.asarray(block.st.inputs[0], dtype=float)
+        q = np.asarray(q, dtype=float)
         if self.periodic:
             # the table is one cycle of a whole number of turns
             q = at[0] + np.mod(q - at[0], at[-1] - at[0])
         return at, force, q
 
-    def form(self, block: Block) -> Number:
-        at, force, q = self._in_cycle(block)
+    def over(self, q: Number, many: bool) -> Number:
+        """The force at inputs, in the axes that it is given in; NaN outside the table."""
+        at, force, q = self._in_cycle(q)
         outside = (q < at[0]) | (q > at[-1])
         values = np.where(outside, np.nan, np.interp(q, at, force.real) + 1j * np.interp(q, at, force.imag))
-        found = values if block.st.many else complex(values)
+        return values if many else complex(values)
+
+    def form(self, block: Block) -> Number:
+        found = block.table(self)
         return found * block.st.turn[self.body] if self.link_axes else found
 
     def turned(self, block: Block, rates: Rates) -> Number:
         """Its derivative over the input, in ground axes."""
-        at, force, q = self._in_cycle(block)
+        at, force, q = self._in_cycle(block.st.inputs[0])
         place = np.clip(np.searchsorted(at, q, side="right") - 1, 0, len(at) - 2)
         slopes: NDArray[Any] = np.diff(force)[place] / np.diff(at)[place]
         steep: Number = slopes if block.st.many else complex(slopes)

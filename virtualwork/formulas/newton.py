@@ -5,6 +5,7 @@ x_{k+1} = x_k − Φ⁻¹ f(x_k), on every pose of a block together; a step that
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,12 +19,17 @@ from virtualwork.plan.steps import Group
 
 
 def write_unknowns(group: Group, st: State, x: Reals) -> None:
-    """Put angles and slides into the state, with the bodies tied to them."""
-    for j, body in enumerate(group.angles):
-        st.angle[body] = x[:, j] if st.many else float(x[0, j])
-        st.turn[body] = st.kind.exp(st.angle[body])
-    for j, g in enumerate(group.slides, len(group.angles)):
-        st.slide[g] = x[:, j] if st.many else float(x[0, j])
+    """The same of an array (n, unknowns)."""
+    put_unknowns(group, st, [x[:, j] if st.many else float(x[0, j]) for j in range(x.shape[1])])
+
+
+def put_unknowns(group: Group, st: State, x: Sequence[Number]) -> None:
+    """Put a group's unknowns, angles and then slides, into the state, with the bodies tied to them."""
+    for body, angle in zip(group.angles, x, strict=False):
+        st.angle[body] = angle
+        st.turn[body] = st.kind.exp(angle)
+    for g, slide in zip(group.slides, x[len(group.angles) :], strict=True):
+        st.slide[g] = slide
     for tie in group.ties:
         angle = st.affine(tie.angle)
         for base, r in tie.angle.bases:

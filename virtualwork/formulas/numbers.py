@@ -1,13 +1,11 @@
 """What the formulas run on: Python numbers of one pose, arrays over many poses, or any numbers that behave so.
 
 A formula needs +, −, ·, /, `abs`, `.real`, `.imag` and `.conjugate()` of its numbers. What Python has no operator for,
-roots, e^{iθ}, and a complex number of two real ones, a `Kind` gives; a state carries its kind. Recorded numbers bring
-a kind of their own.
+roots, e^{iθ}, a complex number of two real ones, a `Kind` gives; a state carries its kind (`kinds`).
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any, Protocol
 
 import numpy as np
@@ -37,81 +35,17 @@ class Kind(Protocol):
     def join(self, re: Number, im: Number) -> Number:
         """re + i·im."""
 
+    def angle(self, z: Number) -> Number:
+        """The angle of a complex number, in (−π, π]."""
+
     def regular(self, inverse: Number, c1: Number, c2: Number) -> Number:
         """1/(c1 × c2); NaN where two columns are parallel to rounding, for the joint forces have no value there."""
 
+    def solve(self, cols: list[list[Number]], right: list[Number]) -> list[Number]:
+        """Solve Σ column·x + right = 0, complex, for the real unknowns x of a group."""
 
-class One:
-    """Python numbers: a single pose."""
-
-    def constant(self, z: complex) -> complex:
-        """The constant itself."""
-        return z
-
-    def sqrt(self, x: float) -> float:
-        """The root."""
-        return math.sqrt(x) if x >= 0 else math.nan
-
-    def exp(self, angle: float) -> complex:
-        """e^{i·angle}."""
-        return complex(math.cos(angle), math.sin(angle))
-
-    def join(self, re: float, im: float) -> complex:
-        """re + i·im."""
-        return complex(re, im)
-
-    def regular(self, inverse: float, c1: complex, c2: complex) -> float:
-        """1/(c1 × c2), or NaN."""
-        return inverse if abs(inverse) * (abs(c1) * abs(c2)) < 1 / PARALLEL else math.nan
-
-
-class Many:
-    """Arrays over poses; what is the same in all of them may be a Python number."""
-
-    sqrt = staticmethod(np.sqrt)
-
-    def constant(self, z: complex) -> complex:
-        """The constant itself."""
-        return z
-
-    def exp(self, angle: Number) -> Number:
-        """e^{i·angle}."""
-        if not np.ndim(angle):
-            return ONE.exp(angle)
-        z = np.empty(np.shape(angle), complex)
-        np.cos(angle, out=z.real)
-        np.sin(angle, out=z.imag)
-        return z
-
-    def join(self, re: Number, im: Number) -> Number:
-        """re + i·im."""
-        z = np.empty(np.broadcast_shapes(np.shape(re), np.shape(im)), complex)
-        z.real = re
-        z.imag = im
-        return z
-
-    def regular(self, inverse: Number, c1: Number, c2: Number) -> Number:
-        """1/(c1 × c2), or NaN."""
-        # the norms over the block are above the largest entry: in most blocks they say that no pose is near
-        bound = np.vdot(inverse, inverse).real * np.vdot(c1, c1).real * np.vdot(c2, c2).real
-        if bound < 1 / PARALLEL**2:
-            return inverse
-        return np.where(np.abs(inverse) * (np.abs(c1) * np.abs(c2)) < 1 / PARALLEL, inverse, np.nan)
-
-
-class Folded:
-    """A kind for two assemblies that meet in every pose: the root is zero, and its noise is left out."""
-
-    def __init__(self, kind: Kind) -> None:
-        self.exp, self.join, self.regular = kind.exp, kind.join, kind.regular
-        self.constant = kind.constant
-
-    def sqrt(self, x: Number) -> Number:
-        """Zero."""
-        return 0.0 * x
-
-
-ONE, MANY = One(), Many()
+    def transposed(self, cols: list[list[Number]], loads: list[Number]) -> list[Number]:
+        """Solve Σ_c λ_c·column_c + load = 0 for the complex λ of a group's loops; NaN where they have no value."""
 
 
 def cross(a: Number, b: Number) -> Number:

@@ -7,8 +7,8 @@ taken once with respect to the input (the velocity coefficients K = dx/dq, L = d
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cached_property, partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -304,24 +304,8 @@ class Poses:
         rates = [rate[0] for rate in self.rates]
 
         def form(i: int, st: State) -> Number:
-            v, a, j = (part(x, slice(i * BLOCK, (i + 1) * BLOCK), st.many) for x in rates)
-            # what each derivative over the input is weighed with
-            if order == 1:
-                weights: tuple[Number, ...] = (v,)
-            elif order == 2:
-                weights = a, None if v is None else v * v
-            else:
-                second = None if v is None or a is None else 3.0 * v * a
-                weights = j, second, None if v is None else v * v * v
-            total: Number = None
-            for k in range(order, 0, -1):
-                weight = weights[k - 1]
-                value = None if weight is None else get(i, k)
-                if value is not None:
-                    # a factor of exactly 1 costs nothing
-                    value = value if isinstance(weight, float) and weight == 1.0 else value * weight
-                    total = value if total is None else total + value
-            return total
+            rows = slice(i * BLOCK, (i + 1) * BLOCK)
+            return chain_rule(order, partial(get, i), [part(x, rows, st.many) for x in rates])
 
         return self.over(form, kind)
 
@@ -391,6 +375,28 @@ class Poses:
             [self.join([b[i][j] for b in blocks], complex) for j in range(len(blocks[0][i]))]
             for i in range(len(group.closures))
         ]
+
+
+def chain_rule(order: int, get: Callable[[int], Number], rates: Sequence[Number]) -> Number:
+    """A derivative in time of what has the derivatives K, L, M over the input, from q̇, q̈, q⃛; None is zero."""
+    v, a, j = rates
+    # what each derivative over the input is weighed with
+    if order == 1:
+        weights: tuple[Number, ...] = (v,)
+    elif order == 2:
+        weights = a, None if v is None else v * v
+    else:
+        second = None if v is None or a is None else 3.0 * v * a
+        weights = j, second, None if v is None else v * v * v
+    total: Number = None
+    for k in range(order, 0, -1):
+        weight = weights[k - 1]
+        value = None if weight is None else get(k)
+        if value is not None:
+            # a factor of exactly 1 costs nothing
+            value = value if isinstance(weight, float) and weight == 1.0 else value * weight
+            total = value if total is None else total + value
+    return total
 
 
 def part(rate: Number, rows: slice, many: bool) -> Number:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from dalembert.arithmetic.recorded import rotation
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.closed_forms import (
     Gap,
@@ -21,7 +22,8 @@ from virtualwork.formulas.closed_forms import (
     two_angles,
     two_slides,
 )
-from virtualwork.formulas.numbers import MANY, ONE, Folded, Kind, Number, plus
+from virtualwork.formulas.kinds import MANY, ONE, Folded
+from virtualwork.formulas.numbers import Kind, Number, plus
 from virtualwork.plan.steps import Angle, Closure, Group, Path, Place, Step, Term, Turn
 
 # poses worked out together: their temporaries stay in the cache
@@ -114,7 +116,7 @@ class State:
             elif r == -1.0:
                 factor = e.conjugate()
             elif r.is_integer():
-                factor = self.kind.exp(r * np.angle(e))
+                factor = self.kind.exp(r * self.kind.angle(e))
             else:
                 factor = self.kind.exp(r * self.angle[base])
             value = factor if value is None else value * factor
@@ -192,7 +194,7 @@ class Case:
                 if owner.get(t.body) == angle and t.slide not in group.slides:
                     relative = tie.get(t.body, Angle())
                     if t.slide is None and not relative.inputs:
-                        fixed += t.z * complex(np.exp(1j * relative.const))
+                        fixed += t.z * rotation(relative.const)
                     else:
                         bent.append((t, relative))
             self.arms.append(fixed)
@@ -203,7 +205,7 @@ class Case:
             t = rail[0]
             relative = tie.get(t.body, Angle())
             plain = group.kind == "RPR" and not relative.inputs
-            self.rails.append((t.z * complex(np.exp(1j * relative.const)) if plain else t.z, t.body))
+            self.rails.append((t.z * rotation(relative.const) if plain else t.z, t.body))
 
     def arm(self, i: int, st: State) -> Number:
         """The arm of unknown angle i."""

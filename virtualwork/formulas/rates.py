@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.linear import singular_poses, solve_columns, solve_determined
+from virtualwork.formulas.linear import singular_poses, solve_determined
 from virtualwork.formulas.numbers import Number, cross
 from virtualwork.formulas.positions import State, columns
 from virtualwork.plan.steps import Angle, Group, Path, Place, Plan, Step, Term, Turn
@@ -185,7 +185,7 @@ class Rates:
             inverse = self.inverse(group)
             x: list[Number] = [cross(c2, w) * inverse, cross(w, c1) * inverse]
         else:
-            x = solve_columns(cols, right)
+            x = self.st.kind.solve(cols, right)
             if self.passage is not None:
                 bad = singular_poses(cols, len(group.angles), np.size(self.st.inputs[0]))
                 if bad.any():

@@ -14,6 +14,7 @@ import numpy as np
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort
+from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.numbers import Number, dot, minus, plus
 from virtualwork.formulas.positions import BLOCK
 from virtualwork.formulas.scene import Scene
@@ -22,35 +23,29 @@ from virtualwork.plan.joints import Joint
 from virtualwork.plan.steps import path_reads
 
 
-class Reactions:
-    """The joint forces of a scene, each formed when it is first asked for."""
+class JointForces:
+    """The joint forces over one block of poses."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-        self.paths = scene.paths
-        self.order = self.paths.order
-        self.plan = scene.plan
-        self.mechanism = scene.mechanism
+    def __init__(self, paths: LoadPaths, formed: set[str]) -> None:
+        self.paths = paths
+        # the names of what has been formed, for `--explain` and the tests
+        self.formed = formed
+        self.order = paths.order
+        self.plan, self.mechanism = paths.plan, paths.mechanism
         self.joints, self.by_key = self.order.joints, self.order.by_key
-
-    @property
-    def formed(self) -> set[str]:
-        """The names of what has been formed, for `--explain` and the tests."""
-        return self.scene.formed
 
     @property
     def redundant(self) -> bool:
         """Whether statics cannot give every joint force: more unknowns than equations."""
         return self.order.redundant
 
-    # --- values over one block ------------------------------------------------------------------------------------
     def force(self, block: Block, body: str) -> Number:
         """The sum of the loads on a body."""
         return self.paths.force(body).value(block)
 
     def moment(self, block: Block, body: str) -> Number:
         """The moment of the loads on a body about its centre of mass."""
-        return self.paths.moment(body, self.scene.rigid[body].center).value(block)
+        return self.paths.moment(body, self.mechanism.rigid[body].center).value(block)
 
     def on_side(self, block: Block, side: Side) -> Number:
         """The force of a joint on a body, complex; None where it is zero throughout."""
@@ -62,16 +57,74 @@ class Reactions:
         """Where a joint's force acts, from the body's centre of mass, in ground axes."""
         body = side[1]
         z, guide, direction = self.paths.place(side)
-        z -= self.scene.rigid[body].center
+        z -= self.mechanism.rigid[body].center
         return (z if guide is None else z + direction * block.st.slide[guide]) * block.st.turn[body]
 
-    # --- over all poses -------------------------------------------------------------------------------------------
+    def joint_force(self, block: Block, joint: Joint, body: str) -> Number:
+        """The force of a joint on a body over a block, without the force of an input that drives it."""
+        value = plus(self.on_side(block, (joint.key, body)), self.rubbed(block, joint, body))
+        if (
+            joint.guide is not None
+            and value is not None
+            and self.mechanism.driver_of(joint.guide) is not None
+        ):
+            rail = self.rail(block, joint.guide)
+            value = value - dot(value, rail) * rail
+        return value
+
+    def rubbed(self, block: Block, joint: Joint, body: str) -> Number:
+        """The friction force along a guide belongs to its reaction."""
+        total: Number = None
+        for load in self.paths.case.friction:
+            if load.path is None or load.joint != joint.key:
+                continue
+            # no load stands there: it feels the reverse of the other body's
+            if body == GROUND:
+                total = minus(total, load.form(block))
+            elif load.body == body:
+                total = plus(total, load.form(block))
+        return total
+
+    def rail(self, block: Block, guide: int | None) -> Number:
+        """The direction of a guide, a unit vector."""
+        assert guide is not None
+        on = self.mechanism.guides[guide].on
+        d = self.plan.directions[guide]
+        return d if on == GROUND else d * block.st.turn[on]
+
+    def guide_moment(self, block: Block, guide: int, body: str) -> Number:
+        """The moment a guide puts on one of its bodies about its point, over a block."""
+        g = self.mechanism.guides[guide]
+        if not g.is_slider:
+            return None
+        couple = self.paths.couple("guide", guide)
+        return self.paths.value(block, couple if body == g.link else couple.times(-1.0))
+
+    def effort(self, block: Block, j: int) -> Number:
+        """The effort at input j by Newton and Euler: ΣM = 0 of the driven link, or the force along the slide."""
+        entry = self.mechanism.inputs[j]
+        if not entry.is_slide:
+            return self.paths.value(block, self.paths.couple("input", j))
+        guide = self.mechanism.guide_of(entry)
+        value = self.on_side(block, (f"guide:{guide}", self.mechanism.guides[guide].link))
+        return None if value is None else dot(value, self.rail(block, guide))
+
+
+class Reactions(JointForces):
+    """The joint forces over all poses of a scene, each formed when it is first asked for."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene.paths, scene.formed)
+        self.scene = scene
+
     @cached_property
     def keys(self) -> tuple[str, ...]:
         """What the places of all joints hang on."""
         keys: set[str] = set()
         for body in self.mechanism.links:
-            keys |= path_reads(self.scene.case.path(body, self.scene.rigid[body].center)) | {f"angle:{body}"}
+            keys |= path_reads(self.scene.case.path(body, self.mechanism.rigid[body].center)) | {
+                f"angle:{body}"
+            }
         for i in range(len(self.mechanism.guides)):
             keys.add(f"slide:{i}")
         for group in self.plan.groups:
@@ -117,52 +170,3 @@ class Reactions:
             for out in found:
                 out[self.scene.lost] = np.nan
         return found
-
-    def joint_force(self, block: Block, joint: Joint, body: str) -> Number:
-        """The force of a joint on a body over a block, without the force of an input that drives it."""
-        value = plus(self.on_side(block, (joint.key, body)), self.rubbed(block, joint, body))
-        if (
-            joint.guide is not None
-            and value is not None
-            and self.mechanism.driver_of(joint.guide) is not None
-        ):
-            rail = self.rail(block, joint.guide)
-            value = value - dot(value, rail) * rail
-        return value
-
-    def rubbed(self, block: Block, joint: Joint, body: str) -> Number:
-        """The friction force along a guide belongs to its reaction."""
-        total: Number = None
-        for load in self.scene.friction:
-            if load.path is None or load.joint != joint.key:
-                continue
-            # no load stands there: it feels the reverse of the other body's
-            if body == GROUND:
-                total = minus(total, load.form(block))
-            elif load.body == body:
-                total = plus(total, load.form(block))
-        return total
-
-    def rail(self, block: Block, guide: int | None) -> Number:
-        """The direction of a guide, a unit vector."""
-        assert guide is not None
-        on = self.mechanism.guides[guide].on
-        d = self.plan.directions[guide]
-        return d if on == GROUND else d * block.st.turn[on]
-
-    def guide_moment(self, block: Block, guide: int, body: str) -> Number:
-        """The moment a guide puts on one of its bodies about its point, over a block."""
-        g = self.mechanism.guides[guide]
-        if not g.is_slider:
-            return None
-        couple = self.paths.couple("guide", guide)
-        return self.paths.value(block, couple if body == g.link else couple.times(-1.0))
-
-    def effort(self, block: Block, j: int) -> Number:
-        """The effort at input j by Newton and Euler: ΣM = 0 of the driven link, or the force along the slide."""
-        entry = self.mechanism.inputs[j]
-        if not entry.is_slide:
-            return self.paths.value(block, self.paths.couple("input", j))
-        guide = self.mechanism.guide_of(entry)
-        value = self.on_side(block, (f"guide:{guide}", self.mechanism.guides[guide].link))
-        return None if value is None else dot(value, self.rail(block, guide))

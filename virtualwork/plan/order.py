@@ -14,6 +14,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
+from dalembert.arithmetic.recorded import Varied, rotation
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.plan.graph import decompose
@@ -44,10 +45,12 @@ def direction(angle: float) -> complex:
     >>> direction(math.pi / 2)
     1j
     """
+    if isinstance(angle, Varied):
+        return rotation(angle)
     quarter = angle / (math.pi / 2)
     if abs(quarter - round(quarter)) <= 1e-15 * max(1.0, abs(quarter)):
         return (1 + 0j, 1j, -1 + 0j, -1j)[round(quarter) % 4]
-    return complex(math.cos(angle), math.sin(angle))
+    return rotation(angle)  # type: ignore[no-any-return]
 
 
 def plan(m: Description, *, merged: bool = False, phases: Mapping[int, float] | None = None) -> Plan:

@@ -1,0 +1,29 @@
+"""How far long work has come, on standard error: on a terminal alone, and once it has taken two seconds."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+T = TypeVar("T")
+AFTER, EVERY = 2.0, 0.5  # s
+
+
+def progress(items: Iterable[T], count: int, what: str) -> Iterator[T]:
+    """Hand the items on, and say how many of them are done."""
+    if not sys.stderr.isatty():
+        yield from items
+        return
+    start = shown = time.monotonic()
+    told = ""
+    for done, item in enumerate(items):
+        now = time.monotonic()
+        if now - start > AFTER and now - shown > EVERY:
+            told = f"{done} of {count} {what}, {(now - start) / done * (count - done):.0f} s to go"
+            print(f"\r{told:<60}", end="", file=sys.stderr, flush=True)
+            shown = now
+        yield item
+    if told:
+        print(f"\r{'':<60}\r", end="", file=sys.stderr, flush=True)

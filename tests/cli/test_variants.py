@@ -1,0 +1,214 @@
+"""`--set`, `--vary`, `--variants`: each variant says what its own file would."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import pytest
+
+FOUR_BAR = """
+name = "four-bar"
+gravity = [0, -9.81]
+[units]
+length = "mm"
+angle = "deg"
+[ground]
+A = [0, 0]
+D = [{ground}, 0]
+[links.crank]
+points = {{ A = [0, 0], B = [{crank}, 0] }}
+mass = 0.5
+[links.coupler]
+points = {{ B = [0, 0], C = [120, 0], H = {{ from = "C", length = 50, angle = {turn} }} }}
+mass = {mass}
+[links.rocker]
+points = {{ D = [0, 0], C = [80, 0] }}
+[input]
+link = "crank"
+angle = 40
+speed = 10
+[guess]
+at = 40
+coupler = 20
+rocker = 57
+"""
+NOMINAL = {"ground": 100, "crank": 40, "turn": 30, "mass": 0.25}
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Write the four-bar with its dimensions into a file."""
+
+    def write(name="m.toml", **dimensions):
+        (tmp_path / name).write_text(FOUR_BAR.format(**NOMINAL | dimensions))
+        return name
+
+    return write
+
+
+def rows(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_set_is_the_file_with_that_number(dalembert, files):
+    files("other.toml", crank=42.5, turn=-15, mass=0.75)
+    options = ("--sweep", "0:360:90", "--forces")
+    changes = ("links.crank.B.x=42.5", "links.coupler.H.angle=-15", "links.coupler.mass=750 g")
+    changed = dalembert("mechanism", files(), *options, *(o for change in changes for o in ("--set", change)))
+    assert changed.returncode == 0
+    assert changed.stdout == dalembert("mechanism", "other.toml", *options).stdout
+    nominal = dalembert("mechanism", "m.toml", *options).stdout
+    assert nominal != changed.stdout
+
+
+def test_a_grid_runs_over_the_last_path_fastest_and_each_row_begins_with_its_variant(dalembert, files):
+    vary = ("--vary", "links.crank.B.x=38:42:2mm", "--vary", "links.coupler.H.angle=0deg:30deg/2")
+    found = dalembert("mechanism", files(), *vary, "--at", "40", "--at", "60", "--only", "H,coupler")
+    table = rows(found.stdout)
+    assert list(table[0])[:5] == [
+        "variant", "links.crank.B.x_m", "links.coupler.H.angle_deg", "assembled", "step",
+    ]  # fmt: skip
+    assert [row["variant"] for row in table] == [str(i) for i in range(1, 10) for _ in range(2)]
+    expected = [(crank, turn) for crank in (38, 40, 42) for turn in (0, 15, 30)]
+    for i, (crank, turn) in enumerate(expected):
+        alone = dalembert(
+            "mechanism", files("alone.toml", crank=crank, turn=turn), "--at", "40", "--at", "60", "--only", "H,coupler"
+        )  # fmt: skip
+        here = table[2 * i : 2 * i + 2]
+        for row, own in zip(here, rows(alone.stdout), strict=True):
+            assert float(row.pop("links.crank.B.x_m")) == crank / 1000
+            assert float(row.pop("links.coupler.H.angle_deg")) == turn
+            assert row.pop("assembled") == "true"
+            row.pop("variant")
+            assert row == own
+
+
+def test_json_holds_what_was_set_and_the_poses_of_each_variant(dalembert, files):
+    vary = ("--vary", "links.coupler.H.angle=0:30:15", "--set", "ground.D.x=101")
+    found = json.loads(dalembert("mechanism", files(), *vary, "--at", "40", "--json").stdout)
+    assert [v["variant"] for v in found["variants"]] == ["1", "2", "3"]
+    assert [v["set"] for v in found["variants"]] == [{"links.coupler.H.angle_deg": a} for a in (0, 15, 30)]
+    for variant, turn in zip(found["variants"], (0, 15, 30), strict=True):
+        files("alone.toml", ground=101, turn=turn)
+        alone = json.loads(dalembert("mechanism", "alone.toml", "--at", "40", "--json").stdout)
+        assert variant["poses"] == alone["poses"]
+
+
+def test_a_variant_that_cannot_be_assembled_is_a_row_that_says_so(dalembert, files):
+    # at 40 deg a ground of 300 mm is out of reach
+    vary = ("--vary", "ground.D.x=100mm:300mm:200mm", "--at", "40", "--only", "H")
+    found = dalembert("mechanism", files(), *vary)
+    assert found.returncode == 0
+    good, bad = rows(found.stdout)
+    assert (good["assembled"], bad["assembled"]) == ("true", "false")
+    assert good["H_x_m"]
+    assert not bad["H_x_m"]
+    assert "variant 2: " in found.stderr
+    document = json.loads(dalembert("mechanism", "m.toml", *vary, "--json").stdout)
+    assert [[pose["assembled"] for pose in v["poses"]] for v in document["variants"]] == [[True], [False]]
+    assert document["variants"][1]["poses"][0]["points"]["H"]["x_m"] is None
+    none = dalembert("mechanism", "m.toml", "--vary", "ground.D.x=300mm:400mm:100mm", "--at", "40")
+    assert none.returncode == 1
+    assert len(rows(none.stdout)) == 2 * 3
+
+
+def test_a_variant_that_newton_cannot_put_together_is_a_row_too(dalembert, tmp_path):
+    dalembert("examples", "stephenson-six-bar")
+    # the five-bar of 75 + 80 + 70 mm spans a ground of 100 mm, not one of 1000 mm
+    vary = ("--vary", "ground.D.x=1000:100:-900", "--at", "10", "--at", "20")
+    found = dalembert("mechanism", "stephenson.toml", *vary, "--only", "E")
+    table = rows(found.stdout)
+    assert [(row["variant"], row["step"], row["assembled"]) for row in table] == [
+        ("1", "1", "false"), ("1", "2", "false"), ("2", "1", "true"), ("2", "2", "true"),
+    ]  # fmt: skip
+    assert not table[0]["E_x_m"]
+    assert "variant 1: " in found.stderr
+    assert "cannot be assembled" in found.stderr
+    poses = json.loads(dalembert("mechanism", "stephenson.toml", *vary, "--json").stdout)["variants"]
+    assert [pose["assembled"] for pose in poses[0]["poses"]] == [False, False]
+    assert poses[0]["poses"][0].keys() == poses[1]["poses"][0].keys()
+    assert poses[0]["poses"][1]["input_deg"] == 20
+    assert poses[0]["poses"][1]["points"]["E"] == dict.fromkeys(poses[1]["poses"][1]["points"]["E"])
+
+
+def test_variants_come_from_a_table_in_any_unit(dalembert, files, tmp_path):
+    (tmp_path / "v.csv").write_text(
+        "variant,note,links.crank.B.x_mm,links.coupler.mass_g\nfirst,a,40,250\nsecond,b,41.5,300\n"
+    )
+    found = dalembert("mechanism", files(), "--variants", "v.csv", "--at", "40", "--forces")
+    table = rows(found.stdout)
+    assert [row["variant"] for row in table] == ["1", "2"]
+    assert [float(row["links.coupler.mass_kg"]) for row in table] == [0.25, 0.3]
+    alone = dalembert("mechanism", files("alone.toml", crank=41.5, mass=0.3), "--at", "40", "--forces")
+    assert table[1]["virtual_work_torque_N_m"] == rows(alone.stdout)[0]["virtual_work_torque_N_m"]
+    assert "ignored the column 'note'" in found.stderr
+
+
+def test_a_study_is_made_of_every_variant(dalembert, files):
+    vary = ("--vary", "links.crank.B.x=40:100:60", "--check", "--json")
+    found = json.loads(dalembert("mechanism", files(), *vary).stdout)
+    classes = [v["check"]["four_bars"][0]["grashof"] for v in found["variants"]]
+    assert classes[0] == "crank-rocker"
+    assert classes[1] != classes[0]
+
+
+def test_many_variants_are_written_part_by_part(dalembert, files, tmp_path):
+    vary = ("--vary", "links.crank.B.x=38mm:42mm/199", "--only", "H", "-o", "out.csv")
+    assert dalembert("mechanism", files(), *vary).returncode == 0
+    table = rows((tmp_path / "out.csv").read_text())
+    assert [row["variant"] for row in table] == [str(i) for i in range(1, 201)]
+    assert float(table[-1]["links.crank.B.x_m"]) == 0.042
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--vary", "links.crnak.B.x=1:2:1"), "did you mean 'links.crank.B.x'"),
+        (("--set", "links.coupler.H.x=1"), "expected links.coupler.H.length or links.coupler.H.angle"),
+        (("--vary", "links.crank.B=1:2:1"), "expected links.crank.B.x or links.crank.B.y"),
+        (("--vary", "links.crank.B.x=40:30:1"), "never gets from 40 to 30"),
+        (("--vary", "links.crank.B.x=40:nan:1"), "nan"),
+        (("--vary", "links.crank.B.x"), "PATH=FROM:TO:STEP"),
+        (("--set", "links.crank.B.x=3kg"), "unit of mass"),
+        (("--set", "links.coupler.mass=-1"), "must not be negative"),
+        (("--set", "gravity=1", "--set", "gravity.x=1"), "two values X,Y"),
+        (("--set", "gravity=1,2", "--set", "gravity.x=1"), "given twice"),
+        (("--vary", "links.crank.B.x=1:2:1", "--variants", "v.csv"), "--vary or --variants"),
+        (("--vary", "links.crank.B.x=40:41:1", "--states", "s.csv"), "expected one mechanism"),
+    ],
+)
+def test_a_bad_option_is_one_line_and_nothing_is_written(dalembert, files, tmp_path, options, said):
+    found = dalembert("mechanism", files(), *options, "-o", "out.csv")
+    assert found.returncode == 2
+    assert said in found.stderr
+    assert not found.stdout
+    assert not (tmp_path / "out.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("links.crank.B.x_mm\n40\nNaN\n", "row 2 (line 3), column links.crank.B.x_mm: found 'NaN'"),
+        ("links.crnak.B.x_mm\n40\n", "unknown dimension 'links.crnak.B.x_mm'"),
+        ("links.crank.B_mm\n40\n", "links.crank.B"),
+        ("links.crank.B.x_kg\n40\n", "'kg' is a unit of mass"),
+        ("crank_mm\n40\n", "no column names a dimension"),
+        ("links.crank.B.x_mm\n", "no rows"),
+    ],
+)
+def test_a_bad_table_of_variants_is_one_line_and_nothing_is_written(dalembert, files, tmp_path, table, said):
+    (tmp_path / "v.csv").write_text(table)
+    found = dalembert("mechanism", files(), "--variants", "v.csv", "-o", "out.csv")
+    assert found.returncode == 1
+    assert said in found.stderr
+    assert found.stderr.count("\n") == 1
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_more_than_memory_holds_is_refused_where_it_has_to_be_held(dalembert, files):
+    vary = ("--vary", "links.crank.B.x=38mm:42mm/999999", "--sweep", "0:360/99999", "--json")
+    found = dalembert("mechanism", files(), *vary)
+    assert found.returncode == 1
+    assert "1000000 variants" in found.stderr

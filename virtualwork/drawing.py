@@ -1,0 +1,305 @@
+"""What a mechanism is drawn as: lines and circles in the axes of its bodies, springs between two of them, names.
+
+Every picture walks this one list, from the back to the front: on paper, in a page that moves, in a drawing for a CAD
+program. A shape's `role` says what it is, and with it which line or layer it gets; `ROLES` lists them. Where a body
+stands is a motion's matter: a shape at a pose is its points carried along by its body.
+
+>>> from virtualwork.describe.parts import Input, Link
+>>> crank = Description({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
+>>> [(shape.role, shape.body) for shape in draw(crank).shapes if shape.role in ("link", "pin", "tip")]
+[('link', 'crank'), ('pin', 'ground'), ('tip', 'crank')]
+"""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from math import isfinite, pi
+
+from virtualwork.describe.description import Description
+from virtualwork.describe.loads import Spring
+from virtualwork.describe.parts import GROUND, Gear, Guide
+
+ROLES = {
+    "rail": "the walls of a guide in the ground",
+    "hatch": "what marks the ground as fixed",
+    "frame": "the foot of a fixed pivot",
+    "link": "a link: a bar, or the hull of its points, its slots and its centre of mass",
+    "wheel": "the pitch circle of a gear",
+    "spoke": "a mark that shows how a wheel turns",
+    "slot": "the outline of a slot",
+    "block": "the block of a slider",
+    "spring": "a spring",
+    "mass": "a centre of mass",
+    "pin": "a pin or a slot's point",
+    "tip": "a named point without a joint",
+}
+
+SYMBOL = 0.016
+"""The radius of a pin, of the size of the mechanism."""
+UNKNOWN_TRAVEL = 0.3
+"""Where nobody says how far a guide is used: so much of the size of the mechanism either way."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line through points (m) in the axes of its body; a closed one is an outline that may be filled."""
+
+    role: str
+    body: str
+    points: tuple[complex, ...]
+    closed: bool = False
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A circle, m, in the axes of its body."""
+
+    role: str
+    body: str
+    centre: complex
+    radius: float
+
+
+@dataclass(frozen=True)
+class Coil:
+    """A spring between points of two bodies, each (body, point in its axes); `along` draws it."""
+
+    ends: tuple[tuple[str, complex], tuple[str, complex]]
+    width: float
+    """From its middle line to the turns, m."""
+    role: str = "spring"
+
+    @property
+    def body(self) -> str:
+        """The body of its first end."""
+        return self.ends[0][0]
+
+    def along(self, start: complex, end: complex) -> tuple[complex, ...]:
+        """Return the line of the spring between where its ends stand."""
+        way = end - start
+        across = 1j * self.width * (way / abs(way) if way else 1)
+        turns = [(0.2 + 0.06 * i, (-1) ** i) for i in range(11)]
+        return (
+            start,
+            start + 0.17 * way,
+            *(start + share * way + side * across for share, side in turns),
+            start + 0.83 * way,
+            end,
+        )
+
+
+@dataclass(frozen=True)
+class Label:
+    """A name and where it stands, in the axes of its body; `of` is "point" or "link"."""
+
+    of: str
+    body: str
+    at: complex
+    text: str
+
+
+Shape = Line | Circle | Coil
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """The shapes of a mechanism from the back to the front, and its names.
+
+    Attributes
+    ----------
+    symbol : float
+        The radius of a pin, m: the measure of every symbol.
+    """
+
+    shapes: tuple[Shape, ...]
+    labels: tuple[Label, ...]
+    symbol: float
+
+
+def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> Drawing:
+    """Return what a mechanism is drawn as.
+
+    Parameters
+    ----------
+    travel : sequence of (least, largest)
+        Of each guide, m: over which slides it is drawn. Default: some way about its `through`.
+    """
+    s = SYMBOL * mechanism.size
+    reach = UNKNOWN_TRAVEL * mechanism.size
+    spans = [
+        span if all(map(isfinite, span)) else (-reach, reach)
+        for span in (travel or [(-reach, reach)] * len(mechanism.guides))
+    ]
+    guides = list(zip(mechanism.guides, spans, strict=True))
+    wheels = [circle for gear in mechanism.gears for circle in _wheels(mechanism, gear)]
+    wheels = list(dict.fromkeys(wheels))
+    layers: list[Iterable[Shape]] = [
+        *(_in_ground(mechanism, guide, span, s) for guide, span in guides),
+        *(_foot(z, s) for name, z in mechanism.ground.items() if name in mechanism.pins),
+        *(_link(mechanism, name, guides, wheels, s) for name in mechanism.links),
+        wheels,
+        [
+            Line("spoke", w.body, (w.centre, w.centre + w.radius))
+            for w in wheels
+            if w.body != GROUND and len(mechanism.bodies[w.body]) < 2
+        ],
+        *(_slot(mechanism, guide, span, s) for guide, span in guides if not guide.is_slider),
+        *(_block(mechanism, guide, s) for guide, _ in guides if guide.is_slider),
+        (_coil(mechanism, spring, s) for spring in mechanism.springs),
+        *(_mass(body, own.center, s) for body, own in mechanism.rigid.items() if own.mass),
+        _points(mechanism, s),
+    ]
+    return Drawing(tuple(chain.from_iterable(layers)), tuple(_labels(mechanism)), s)
+
+
+def _coil(mechanism: Description, spring: Spring, s: float) -> Coil:
+    a, b = ((body, mechanism.place(body, point)) for body, point in spring.between)
+    return Coil((a, b), 1.6 * s)
+
+
+def _ends(mechanism: Description, guide: Guide, span: tuple[float, float], beyond: float) -> list[complex]:
+    """Return the ends of a guide's line, in the axes of the body that carries it."""
+    along = cmath.exp(1j * guide.angle)
+    start = mechanism.through(guide)
+    return [start + (span[0] - beyond) * along, start + (span[1] + beyond) * along]
+
+
+def _in_ground(mechanism: Description, guide: Guide, span: tuple[float, float], s: float) -> Iterator[Shape]:
+    """The walls along which a block of the ground's own guide slides."""
+    if guide.on != GROUND or not guide.is_slider:
+        return
+    low, high = _ends(mechanism, guide, span, 4 * s)
+    along = cmath.exp(1j * guide.angle)
+    for side in (2, -2):
+        wall = (low + side * 1j * s * along, high + side * 1j * s * along)
+        yield Line("rail", GROUND, wall)
+        yield from _hatched(*wall, s * side / 2)
+
+
+def _hatched(start: complex, end: complex, depth: float) -> Iterator[Line]:
+    """Short strokes to the left of a line (to the right where the depth is negative)."""
+    count = max(2, round(abs(end - start) / (1.8 * abs(depth))))
+    way = (end - start) / count
+    along = way / abs(way) if way else 1
+    for i in range(count):
+        root = start + (i + 0.7) * way
+        yield Line("hatch", GROUND, (root, root + (1j * depth - 0.7 * abs(depth)) * along))
+
+
+def _foot(z: complex, s: float) -> Iterator[Shape]:
+    left, right = z + (-1.9 - 3.2j) * s, z + (1.9 - 3.2j) * s
+    yield Line("frame", GROUND, (z, left, right), closed=True)
+    yield Line("frame", GROUND, (left - 0.9 * s, right + 0.9 * s))
+    yield from _hatched(left - 0.9 * s, right + 0.9 * s, -s)
+
+
+def _link(
+    mechanism: Description,
+    name: str,
+    guides: list[tuple[Guide, tuple[float, float]]],
+    wheels: list[Circle],
+    s: float,
+) -> Iterator[Shape]:
+    """The hull of a link's points and of the guides that it carries; a bar where they are on one line."""
+    points = list(mechanism.links[name].points.values())
+    for guide, span in guides:
+        if guide.on == name:
+            points += _ends(mechanism, guide, span, 3 * s)
+    own = mechanism.rigid[name]
+    if len(points) == 1 and own.mass:
+        points.append(own.center)
+    outline = hull(points)
+    if len(outline) > 1:
+        yield Line("link", name, outline, closed=len(outline) > 2)
+    elif name not in {w.body for w in wheels} and not any(name == g.link and g.is_slider for g, _ in guides):
+        yield Circle("link", name, outline[0], 3 * s)
+
+
+def hull(points: Iterable[complex]) -> tuple[complex, ...]:
+    """Return the convex hull, counter-clockwise (Andrew's chain); two points where all lie on one line.
+
+    >>> hull([0, 1, 1 + 1j, 1j, 0.5 + 0.5j])
+    (0j, (1+0j), (1+1j), 1j)
+    >>> hull([0, 2, 1])
+    (0j, (2+0j))
+    """
+    ordered = sorted(set(map(complex, points)), key=lambda z: (z.real, z.imag))
+    if len(ordered) < 3:
+        return tuple(ordered)
+    width = abs(ordered[-1] - ordered[0])
+
+    def chain_of(line: Iterable[complex]) -> list[complex]:
+        found: list[complex] = []
+        for z in line:
+            # what turns left by less than rounding lies on the line
+            while len(found) > 1 and _turn(found[-2], found[-1], z) <= 1e-9 * width * abs(z - found[-2]):
+                found.pop()
+            found.append(z)
+        return found[:-1]
+
+    return (*chain_of(ordered), *chain_of(reversed(ordered)))
+
+
+def _turn(a: complex, b: complex, c: complex) -> float:
+    return ((b - a).conjugate() * (c - b)).imag
+
+
+def _wheels(mechanism: Description, gear: Gear) -> Iterator[Circle]:
+    """The pitch circles of two wheels on an arm: r_a / r_b = |ratio|, their sum (outside) or difference (inside) the arm.
+
+    None where the wheels share their axis, or where the links turn alike.
+    """
+    arm = mechanism.bodies[gear.arm]
+    axes = [next((p for p in mechanism.bodies[body] if p in arm), "") for body in gear.links]
+    if gear.ratio == 1 or gear.arm in gear.links or "" in axes or axes[0] == axes[1]:
+        return
+    second = abs(arm[axes[1]] - arm[axes[0]]) / abs(1 - gear.ratio)
+    for body, axis, radius in zip(gear.links, axes, (abs(gear.ratio) * second, second), strict=True):
+        yield Circle("wheel", body, mechanism.bodies[body][axis], radius)
+
+
+def _slot(mechanism: Description, guide: Guide, span: tuple[float, float], s: float) -> Iterator[Shape]:
+    """The rounded outline of a slot, as wide as its pin."""
+    low, high = _ends(mechanism, guide, span, 0)
+    along = 1.35 * s * cmath.exp(1j * guide.angle)
+    round_ = [cmath.exp(1j * (pi / 2 + pi * k / 8)) for k in range(9)]
+    outline = [*(low + along * turn for turn in round_), *(high - along * turn for turn in round_)]
+    yield Line("slot", guide.on, tuple(outline), closed=True)
+
+
+def _block(mechanism: Description, guide: Guide, s: float) -> Iterator[Shape]:
+    centre = mechanism.bodies[guide.link][guide.point]
+    along = s * cmath.exp(-1j * (guide.turned or 0.0))
+    corners = tuple(centre + along * corner for corner in (-3.2 - 2j, 3.2 - 2j, 3.2 + 2j, -3.2 + 2j))
+    yield Line("block", guide.link, corners, closed=True)
+
+
+def _mass(body: str, centre: complex, s: float) -> Iterator[Shape]:
+    yield Circle("mass", body, centre, 0.9 * s)
+    for way in (0.9, 0.9j):
+        yield Line("mass", body, (centre - way * s, centre + way * s))
+
+
+def _points(mechanism: Description, s: float) -> Iterator[Circle]:
+    jointed = {*mechanism.pins, *(guide.point for guide in mechanism.guides)}
+    seen: set[str] = set()
+    for body, points in mechanism.bodies.items():
+        for name, z in points.items():
+            if name not in seen:
+                yield Circle("pin", body, z, s) if name in jointed else Circle("tip", body, z, 0.6 * s)
+            seen.add(name)
+
+
+def _labels(mechanism: Description) -> Iterator[Label]:
+    seen: set[str] = set()
+    for body, points in mechanism.bodies.items():
+        for name, z in points.items():
+            if name not in seen:
+                yield Label("point", body, z, name)
+            seen.add(name)
+    for name, link in mechanism.links.items():
+        if len(link.points) > 1:
+            yield Label("link", name, sum(link.points.values()) / len(link.points), name)

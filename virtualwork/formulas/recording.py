@@ -1,0 +1,381 @@
+"""The formulas of one assembly, written down on a tape: positions, rates, loads, effort, joint forces.
+
+The same formulas as everywhere, handed recorded numbers. What hangs on more than the pose enters as an input of the
+tape beside the inputs of the mechanism: the sign of a closed form where it turns over on the way, the unknowns of a
+group that has none, the whole turns of an angle, the force that a table gives.
+
+Inputs of a tape
+----------------
+`q0`, `v0`, `a0`, `j0`   input 0 of the mechanism and its derivatives in time; `q1` … of further ones
+`sign GROUP`             ±1, of a closed form that changes its sign along the input
+`x GROUP 0`              the unknowns of a group without a closed form: angles, then slides
+`turns BODY`             whole turns of a body whose angle itself is needed, beyond what lies within (−π, π]
+`turns spring 0`         the same of a torsion spring's twist
+`table 0 x`, `table 0 y` the force of the first load that is given by a table
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from dalembert.arithmetic.recorded import Number, Recorder, bare
+from dalembert.arithmetic.systems import solved
+from dalembert.arithmetic.tape import Tape
+from virtualwork.describe.description import Description
+from virtualwork.describe.loads import TorsionSpring
+from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.block import Block, Shared, Table
+from virtualwork.formulas.dynamics import resultant, shaking_loads
+from virtualwork.formulas.effort import generalized_force
+from virtualwork.formulas.kinds import WRITTEN
+from virtualwork.formulas.load_case import LoadCase
+from virtualwork.formulas.load_paths import LoadPaths
+from virtualwork.formulas.loads import Tabled
+from virtualwork.formulas.newton import gaps, put_unknowns
+from virtualwork.formulas.poses import chain_rule
+from virtualwork.formulas.positions import Case, State, columns, run
+from virtualwork.formulas.rates import Rates
+from virtualwork.formulas.reactions import JointForces
+from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
+
+# (kind, of what …): see `Recording.value`
+Key = tuple[Any, ...]
+NAMES = ("q", "v", "a", "j")
+TURN = 2 * math.pi
+
+
+class Recording:
+    """The formulas of an assembly, written down as far as they are asked for.
+
+    Parameters
+    ----------
+    mechanism : Description
+        Its constants may vary (`Varied`).
+    plan : Plan
+        Of the same description.
+    signs : mapping of group name to ±1
+        Of the closed forms.
+    moves : tuple of bool
+        Whether the inputs have a speed, an acceleration, a jerk; what they have not is zero and costs nothing.
+    turning_over : collection of group names
+        Whose sign is an input of the tape.
+    geared : set of str
+        Bodies whose angle itself is needed.
+    settled : bool
+        Whether the unknowns of groups without a closed form are exact as they enter. Else one Newton step is on the
+        tape, without which a derivative to a dimension would not see what the group makes of it.
+    """
+
+    def __init__(
+        self,
+        mechanism: Description,
+        plan: Plan,
+        signs: Mapping[str, Number],
+        moves: tuple[bool, ...] = (True, True, True),
+        turning_over: Iterable[str] = (),
+        geared: Iterable[str] = (),
+        settled: bool = True,
+        recorder: Recorder | None = None,
+    ) -> None:
+        self.mechanism, self.plan, self.signs, self.moves = mechanism, plan, signs, moves
+        self.recorder = recorder or Recorder()
+        self.turning_over, self.geared = frozenset(turning_over), frozenset(geared)
+        self.settled = settled
+        k = len(mechanism.inputs)
+        self.st = State([self.recorder.input(f"q{j}") for j in range(k)], kind=WRITTEN)
+        self.rates = [
+            [self.recorder.input(f"{name}{j}") if there else None for j in range(k)]
+            for name, there in zip(NAMES[1:], moves, strict=True)
+        ]
+        self._cases = {g.name: Case(g) for g in plan.groups if g.kind != "Newton"}
+        self._by = (
+            [Rates(plan, self.st, [[1.0]])]
+            if k == 1
+            else [Rates(plan, self.st, [[1.0] if i == j else [] for i in range(k)]) for j in range(k)]
+        )
+        self._along = None
+        if k > 1:
+            given = [[rate[j] for rate in self.rates] for j in range(k)]
+            self._along = Rates(plan, self.st, given)
+        self._done: set[tuple[int, int, int]] = set()
+        self._values: dict[Key, Number] = {}
+        self._forces: tuple[LoadPaths, JointForces, Block] | None = None
+
+    # --- solving ------------------------------------------------------------------------------------------------
+    def _close(self, group: Group, st: State) -> None:
+        if group.kind == "Newton":
+            n = len(group.angles) + len(group.slides)
+            x: list[Number] = [self.recorder.input(f"x {group.name} {i}") for i in range(n)]
+            put_unknowns(group, st, x)
+            if not self.settled:
+                step = WRITTEN.solve(columns(group, st), gaps(group, st))
+                put_unknowns(group, st, [a + b for a, b in zip(x, step, strict=True)])
+            return
+        sign: Number = self.signs[group.name]
+        if group.name in self.turning_over:
+            sign = self.recorder.input(f"sign {group.name}")
+        self._cases[group.name].solve(st, sign, bare(self.mechanism.size))
+        for body in sorted(self.geared.intersection(group.members)):
+            st.angle[body] = WRITTEN.angle(st.turn[body]) + TURN * self.recorder.input(f"turns {body}")
+
+    def solve(self, targets: Iterable[str], order: int) -> None:
+        """Write down what targets hang on, up to an order of derivatives."""
+        steps = self.plan.needed(tuple(t for t in targets if t != f"angle:{GROUND}"))
+        for k in range(order + 1):
+            ways: list[tuple[int, Rates | None]] = [(-1, None)] if k == 0 else [*enumerate(self._by)]
+            if k and self._along is not None:
+                ways.append((len(self._by), self._along))
+            for number, rates in ways:
+                for step in steps:
+                    key = id(step), k, number
+                    if key not in self._done:
+                        self._done.add(key)
+                        self._advance(step, rates, k)
+
+    def _advance(self, step: Step, rates: Rates | None, k: int) -> None:
+        if rates is None:
+            run([step], self.st, self._close)
+        else:
+            rates.advance([step], k)
+
+    @property
+    def along(self) -> Rates:
+        """The derivatives over the one input, or in time with several."""
+        return self._by[0] if self._along is None else self._along
+
+    def _in_time(self, order: int, get: Callable[[int], Number]) -> Number:
+        """A derivative in time, of derivatives over the one input or along all."""
+        if self._along is not None:
+            return get(order)
+        return chain_rule(order, get, [rate[0] for rate in self.rates])
+
+    # --- forces ---------------------------------------------------------------------------------------------------
+    @property
+    def forces(self) -> tuple[LoadPaths, JointForces, Block]:
+        """The loads over the recorded pose, with everything solved that they hang on."""
+        if self._forces is None:
+            case = LoadCase(self.mechanism, self.plan, any(self.moves[:2]))
+            paths = LoadPaths(case)
+            reads = set().union(*(load.reads() for load in case.everything))
+            if not reads:
+                # nothing acts: any one thing that moves will do
+                reads = {key for s in self.plan.steps for key in self.plan.writes(s)}
+            self.solve(sorted(reads), max((load.order for load in case.loads), default=1))
+            self._forces = paths, JointForces(paths, set()), _Block(self)
+        return self._forces
+
+    def _places(self, order: int = 1) -> None:
+        """Solve what the places of all joints hang on."""
+        paths, *_ = self.forces
+        keys: set[str] = {f"slide:{i}" for i in range(len(self.mechanism.guides))}
+        for body in self.mechanism.links:
+            keys |= path_reads(paths.case.path(body, self.mechanism.rigid[body].center)) | {f"angle:{body}"}
+        for group in self.plan.groups:
+            keys |= self.plan.reads(group) | set(self.plan.writes(group))
+        self.solve(sorted(keys), max((load.order for load in paths.case.loads), default=order))
+
+    def efforts(self) -> list[Number]:
+        """The effort at each input by virtual work, through the carriers of motors."""
+        paths, _, block = self.forces
+        k = len(self.mechanism.inputs)
+        moved = [
+            j
+            for j, e in enumerate(self.mechanism.inputs)
+            if not e.is_slide and self.mechanism.carrier(j) != e.on
+        ]
+        force = [self._negative(generalized_force(paths, block, j)) for j in range(k)]
+        if not moved:
+            return force
+        matrix: list[list[Number]] = [[float(i == j) for j in range(k)] for i in range(k)]
+        for j in moved:
+            link, carrier = str(self.mechanism.inputs[j].link), self.mechanism.carrier(j)
+            self.solve([f"angle:{link}", f"angle:{carrier}"], 1)
+            for i in range(k):
+                turned = [block.turning(body, i) for body in (link, carrier)]
+                driven, carried = (0.0 if t is None else t for t in turned)
+                matrix[i][j] = driven - carried
+        return solved(matrix, force) if k > 1 else [force[0] / matrix[0][0]]
+
+    @staticmethod
+    def _negative(value: Number) -> Number:
+        return 0.0 if value is None else -bare(value)
+
+    # --- what can be asked ------------------------------------------------------------------------------------------
+    def value(self, key: Key) -> Number:
+        """A quantity, written down once.
+
+        Keys
+        ----
+        ("point", body, z, node or None, order)      position or a time derivative, complex
+        ("angle", body, order)                       θ in (−π, π], ω, α, the angular jerk
+        ("slide", guide, order)
+        ("turn", body)                               e^{iθ}, complex
+        ("dpoint", body, z, node or None, j, order)  ∂P/∂q_j, complex; order 2 with one input: ∂²P/∂q²
+        ("dangle", body, j, order)
+        ("dslide", guide, j, order)
+        ("effort", j), ("newton-euler", j)
+        ("force", joint's key, body), ("moment", joint's key, body)
+        ("shaking",), ("shaking moment",)            complex; real
+        ("closed",)                                  a finite number where every group is assembled
+        ("margin", group's name)                     the radicand of a closed form, relative
+        """
+        if key not in self._values:
+            found = getattr(self, f"_{key[0].replace('-', '_').replace(' ', '_')}")(*key[1:])
+            self._values[key] = 0.0 if found is None else bare(found)
+        return self._values[key]
+
+    def tape(self, keys: Iterable[Key]) -> Tape:
+        """The tape of quantities: outputs are called as `names` says."""
+        outputs: dict[str, Number] = {}
+        for key in keys:
+            value = self.value(key)
+            where = names(key)
+            if len(where) == 1:
+                outputs[where[0]] = value.real
+            else:
+                outputs[where[0]], outputs[where[1]] = value.real, value.imag
+        return self.recorder.tape(outputs)
+
+    def _point(self, body: str, z: complex, node: str | None, order: int) -> Number:
+        path = self._path(body, z, node)
+        self.solve(self._path_reads(path), order)
+        if order == 0:
+            return self.st.at(path)
+        return self._in_time(order, lambda k: self.along.vector(path, k))
+
+    def _dpoint(self, body: str, z: complex, node: str | None, j: int, order: int = 1) -> Number:
+        path = self._path(body, z, node)
+        self.solve(self._path_reads(path), order)
+        return self._by[j].vector(path, order)
+
+    def _path(self, body: str, z: complex, node: str | None) -> Any:
+        if node is not None:
+            return node, ()
+        base, terms = self.plan.anchors[body]
+        return base, (*terms, Term(z, body))
+
+    @staticmethod
+    def _path_reads(path: Any) -> list[str]:
+        return sorted(path_reads(path) - {f"angle:{GROUND}"})
+
+    def _turn(self, body: str) -> Number:
+        self.solve((f"angle:{body}",), 0)
+        return self.st.turn[body]
+
+    def _angle(self, body: str, order: int) -> Number:
+        if body == GROUND:
+            return 0.0
+        self.solve((f"angle:{body}",), order)
+        if order == 0:
+            return WRITTEN.angle(self.st.turn[body])
+        return self._in_time(order, lambda k: self.along.angle[body][k - 1])
+
+    def _dangle(self, body: str, j: int, order: int = 1) -> Number:
+        if body == GROUND:
+            return 0.0
+        self.solve((f"angle:{body}",), order)
+        return self._by[j].angle[body][order - 1]
+
+    def _slide(self, guide: int, order: int) -> Number:
+        self.solve((f"slide:{guide}",), order)
+        if order == 0:
+            return self.st.slide[guide]
+        return self._in_time(order, lambda k: self.along.slide[guide][k - 1])
+
+    def _dslide(self, guide: int, j: int, order: int = 1) -> Number:
+        self.solve((f"slide:{guide}",), order)
+        return self._by[j].slide[guide][order - 1]
+
+    def _effort(self, j: int) -> Number:
+        return self.efforts()[j]
+
+    def _newton_euler(self, j: int) -> Number:
+        self._places()
+        _, of, block = self.forces
+        return of.effort(block, j)
+
+    def _force(self, joint: str, body: str) -> Number:
+        self._places()
+        _, of, block = self.forces
+        return of.joint_force(block, of.by_key[joint], body)
+
+    def _moment(self, joint: str, body: str) -> Number:
+        self._places()
+        _, of, block = self.forces
+        guide = of.by_key[joint].guide
+        return None if guide is None else of.guide_moment(block, guide, body)
+
+    def _shaking(self) -> Number:
+        paths, _, block = self.forces
+        return resultant(shaking_loads(paths.case.loads), block)[0]
+
+    def _shaking_moment(self) -> Number:
+        paths, _, block = self.forces
+        return resultant(shaking_loads(paths.case.loads), block)[1]
+
+    def _closed(self) -> Number:
+        self.solve([key for g in self.plan.groups for key in self.plan.writes(g)], 0)
+        total: Number = 0.0
+        for group in self.plan.groups:
+            for body in group.angles:
+                total = total + self.st.turn[body].real
+            for guide in group.slides:
+                total = total + self.st.slide[guide]
+        return total
+
+    def _margin(self, group: str) -> Number:
+        of = next(g for g in self.plan.groups if g.name == group)
+        self.solve(self.plan.writes(of), 0)
+        return self.st.margin[group]
+
+
+COMPLEX = {"point", "turn", "dpoint", "force", "shaking"}
+
+
+def names(key: Key) -> tuple[str, ...]:
+    """What the outputs of a quantity are called on the tape: one, or two where it is complex.
+
+    >>> names(("angle", "crank", 1)), names(("force", "pin:B", "coupler"))
+    (('angle crank 1',), ('force pin:B coupler x', 'force pin:B coupler y'))
+    """
+    text = " ".join(repr(part) if isinstance(part, complex) else str(part) for part in key)
+    return (f"{text} x", f"{text} y") if key[0] in COMPLEX else (text,)
+
+
+class _Setting(Shared):
+    """What the one recorded block is told of its poses."""
+
+    def __init__(self, recording: Recording) -> None:
+        super().__init__(recording.mechanism, recording.plan)
+        self.recording = recording
+
+    def rates(self, rows: slice, many: bool) -> tuple[Number, Number]:
+        """q̇ and q̈ of the one input."""
+        speed, acceleration, _ = self.recording.rates
+        return speed[0], acceleration[0]
+
+    def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
+        """A twist with the whole turns that enter."""
+        number = self.mechanism.torsion_springs.index(spring)
+        return within + TURN * self.recording.recorder.input(f"turns spring {number}")
+
+
+class _Block(Block):
+    """The recorded pose as the loads see it."""
+
+    def __init__(self, recording: Recording) -> None:
+        super().__init__(_Setting(recording), slice(None), recording.st, recording._along, recording._by)
+        self.recording = recording
+
+    def drive(self, j: int) -> Number:
+        """The torque of input j's motor."""
+        return self.recording.value(("effort", j))
+
+    def table(self, load: Table) -> Number:
+        """The force of a table, as it enters."""
+        tables = [of for of in self.recording.forces[0].case.loads if isinstance(of, Tabled)]
+        number = next(i for i, of in enumerate(tables) if of is load)
+        enter = self.recording.recorder.input
+        return WRITTEN.join(enter(f"table {number} x"), enter(f"table {number} y"))
