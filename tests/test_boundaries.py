@@ -33,10 +33,10 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "virtualwork": (
         ("__init__",),
         ("mechanism",),
-        ("motion",),
-        ("forces",),
         ("family",),
         ("intime",),
+        ("motion",),
+        ("forces",),
         ("study",),
         ("textbook",),
         ("branch",),

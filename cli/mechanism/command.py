@@ -206,15 +206,12 @@ def run(
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
         )
     if time is not None:
-        given = {
-            "--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order, "--graph": graph,
-            "--states": states, "--explain": explain, **dict.fromkeys(own, True),
-        }  # fmt: skip
-        clash = [flag for flag, value in given.items() if value and flag != "--forces"]
-        if clash or branch == "all":
-            raise options.bad(
-                "--time", f"expected without {(*clash, '--branch all')[0]}: the motion decides the poses"
-            )
+        beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
+        beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}
+        beside |= {"--branch all": branch == "all"}
+        clash = [flag for flag, value in beside.items() if value and flag != "--forces"]
+        if clash:
+            raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
         return _in_time(file, (time, accuracy, until), names, branch, forces)
     if accuracy is not None or until is not None:
         raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")

@@ -235,6 +235,6 @@ def result(simulation: InTime) -> Result:
         tables={"time": simulation.table},
         notes=lambda: a.mechanism.name,
         afterword=simulation.words,
-        figure=lambda: draw(simulation),
+        figure=lambda: draw(simulation.run, a.mechanism),
         warnings=[*a.warnings, *simulation.run.warnings],
     )

@@ -10,17 +10,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cli.mechanism.in_time import InTime
+    from virtualwork import Mechanism
+    from virtualwork.intime.run import Run
 
 STYLES = ("-", "--", "-.", ":")
 INSTANTS = 5
 
 
-def draw(simulation: InTime) -> Figure:
+def draw(run: Run, m: Mechanism) -> Figure:
     """Draw angles, speeds and energy against time, and beside them the mechanism at instants evenly apart."""
     from matplotlib.figure import Figure
 
-    run, m = simulation.run, simulation.analysis.mechanism
     figure = Figure(figsize=(11, 6.4), layout="constrained")
     halves: Any = figure.subfigures(1, 2, width_ratios=(1.25, 1))
     places, speeds, energy = halves[0].subplots(3, 1, sharex=True)
@@ -37,14 +37,13 @@ def draw(simulation: InTime) -> Figure:
     for axes in (places, speeds):
         axes.legend(fontsize=8, frameon=False)
     energy.set_xlabel("t, s")
-    _instants(halves[1].subplots(), simulation)
+    _instants(halves[1].subplots(), run, m)
     figure.suptitle(m.name, fontsize=10)
     return figure
 
 
-def _instants(axes: Axes, simulation: InTime) -> None:
+def _instants(axes: Axes, run: Run, m: Mechanism) -> None:
     """The mechanism at a few times, the later the darker, with the way of its free points."""
-    run, m = simulation.run, simulation.analysis.mechanism
     scale, unit = (1e3, "mm") if m.size < 2 else (1.0, "m")
     motion = run.motion
     chosen = np.unique(np.linspace(0, len(run.t) - 1, INSTANTS).astype(int))

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property
 from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,8 @@ from virtualwork.describe.errors import MechanismError
 from virtualwork.describe.parts import GROUND, Guess, Input
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.recording import Recording
-from virtualwork.intime.equations import Equations, Floats
+from virtualwork.intime.equations import Equations
+from virtualwork.intime.watch import Floats
 from virtualwork.motion import Motion
 
 TURN = 2 * math.pi
@@ -45,9 +45,13 @@ class Coordinates:
         self.equations, self.inputs = equations, inputs
         self.own = equations.mechanism.inputs == inputs
 
-    def motion(self, q: Reals, v: Reals | float = 0.0, a: Reals | float = 0.0) -> Motion:
+    def motion(
+        self, q: Reals, v: Reals | float = 0.0, a: Reals | float = 0.0, t: Reals | None = None
+    ) -> Motion:
         """The motion over coordinates (n, k)."""
-        return Motion(self.equations.assembly, q, v, a)
+        found = Motion(self.equations.assembly, q, v, a)
+        found.poses.time = t
+        return found
 
     def states(self, q: Reals, v: Reals, a: Reals, near: Reals) -> tuple[Reals, Reals, Reals]:
         """The inputs, their speeds and accelerations (n, k); of the inputs' whole turns those nearest to `near`."""
@@ -95,6 +99,9 @@ class Coordinates:
     def others(self, q: Floats) -> Iterator[Coordinates]:
         """The same pose in other coordinates: the inputs themselves, then every link's angle for one of those now used."""
         m, k = self.equations.mechanism, self.equations.k
+        if any(force.history for force in m.forces):
+            # they are given over the input
+            return
         motion = self.motion(np.array([q]))
         angles = {name: float(motion.link(name).angle[0]) for name in m.links}
         points = {
@@ -105,15 +112,13 @@ class Coordinates:
         }
         choices = [] if self.own else [self.inputs]
         for j, name in product(range(k), m.links):
-            entries = list(m.inputs)
-            entries[j] = Input(link=name)
             if all(e.link != name for e in m.inputs):
-                choices.append(tuple(entries))
+                choices.append((*m.inputs[:j], Input(link=name), *m.inputs[j + 1 :]))
         for entries in choices:
             at = tuple(self._value(motion, entry) for entry in entries)
             described = replace(m, inputs=entries, guess=Guess(at, angles, points))
             try:
-                yield Coordinates(Equations(Assembly.from_guess(described)), self.inputs)
+                yield Coordinates(type(self.equations)(Assembly.from_guess(described)), self.inputs)
             except MechanismError:
                 # the link cannot be a coordinate: others are
                 continue

@@ -36,10 +36,15 @@ from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.scene import Scene
+from virtualwork.intime.watch import Floats, Watch
 
-Floats = list[float]
 # of a turn: how far beyond an input its change points are looked for
 AHEAD = 1.0
+TURN = 2 * math.pi
+# of a table's span: how far beyond its ends it is read
+EDGE = 1e-9
+Value = Callable[[float, Floats, Floats], float]
+Rate = Callable[[float, Floats, Floats, Floats], float]
 
 
 class Lost(ArithmeticError):
@@ -99,7 +104,7 @@ class Equations:
             Not assembled there, or an input on which no mass moves; which, and what is missing.
         """
         names = [e.name for e in self.mechanism.inputs]
-        mass, rest, *_ = self.by_poses(np.array([q]), np.array([v]))
+        mass, rest, *_ = self.by_poses(np.array([t]), np.array([q]), np.array([v]))
         if not (np.isfinite(mass).all() and np.isfinite(rest).all()):
             raise MechanismError("it cannot be assembled at the start, or stands at a limit of its input")
         # how much of each input's own inertia is left when the others are free to follow
@@ -126,13 +131,13 @@ class Equations:
                 out[rows, j] = found[name]
         rows = np.flatnonzero(careful)
         if len(rows):
-            mass, rest, power, _ = self.by_poses(q[rows], v[rows])
+            mass, rest, power, _ = self.by_poses(t[rows], q[rows], v[rows])
             good = np.isfinite(mass).all(axis=(1, 2)) & np.isfinite(rest).all(axis=1)
             out[rows[good], : self.k] = np.linalg.solve(mass[good], -rest[good, :, None])[..., 0]
             out[rows[good], self.k] = power[good]
         return out
 
-    def by_poses(self, q: Reals, v: Reals) -> tuple[Reals, Reals, Reals, Reals]:
+    def by_poses(self, t: Reals, q: Reals, v: Reals) -> tuple[Reals, Reals, Reals, Reals]:
         """M (n, k, k), h (n, k), the power of what stores nothing and the potential (n,), by the poses' own formulas.
 
         The effort of k + 1 motions through each pose gives M and h.
@@ -141,7 +146,9 @@ class Equations:
         speeds = np.repeat(v, k + 1, axis=0)
         unit = np.tile(np.vstack([np.zeros(k), np.eye(k)]), (n, 1))
         with np.errstate(all="ignore"):
-            scene = Scene(Poses(self.assembly, np.repeat(q, k + 1, axis=0), speeds, unit))
+            poses = Poses(self.assembly, np.repeat(q, k + 1, axis=0), speeds, unit)
+            poses.time = np.repeat(t, k + 1)
+            scene = Scene(poses)
             found = effort(scene).reshape(n, k + 1, k)
             power, stored = np.zeros(n * (k + 1)), np.zeros(n * (k + 1))
             for block in scene.blocks():
@@ -149,6 +156,54 @@ class Equations:
                 stored[block.rows] = potential(scene.loads, block)
         mass = np.swapaxes(found[:, 1:] - found[:, :1], 1, 2)
         return mass, found[:, 0], power[:: k + 1], stored[:: k + 1]
+
+    def watches(self) -> list[Watch]:
+        """What a step must not pass: the kinks of tables over what hangs on the inputs alone."""
+        found = []
+        for number, load in enumerate(self._tables):
+            of = self._linear(load)
+            if of is not None and load.axis != "time":
+                knots = [x for x, _ in load.table]
+                period = knots[-1] - knots[0] if load.periodic else None
+                found.append(Watch(f"table {number}", *of, knots[:-1] if period else knots, period))
+        return found
+
+    @cached_property
+    def stops(self) -> list[float]:
+        """Times that no step passes: the rows of tables."""
+        return sorted({x for load in self._tables if load.axis == "time" for x, _ in load.table})
+
+    def outside(self, t: float, q: Floats, v: Floats) -> str:
+        """Which table ends at a state; empty where none does."""
+        for load in self._tables:
+            of, (first, last) = self._linear(load), (load.table[0][0], load.table[-1][0])
+            if of is None or load.periodic:
+                continue
+            at, near = of[0](t, q, v), 1e-6 * (last - first)
+            if not first + near < at < last - near:
+                unit = {"time": "s", "speed": "rad/s"}.get(load.axis, "rad")
+                return f"the table of the {load.kind} on {load.body} ends at {last if at > first + near else first:.6g} {unit}"
+        return ""
+
+    def _linear(self, load: Tabled) -> tuple[Value, Rate] | None:
+        """What a table is over and its derivative, where it is a sum of inputs or of their speeds; None where not."""
+        if load.axis == "time":
+            return lambda t, q, v: t, lambda t, q, v, a: 1.0
+        if load.axis == "input":
+            return lambda t, q, v: q[0], lambda t, q, v, a: v[0]
+        angle = self.assembly.plan.angles[load.body]
+        if angle.bases:
+            return None
+        const, terms = angle.const, angle.inputs
+        if load.axis == "angle":
+            return (
+                lambda t, q, v: const + sum(c * q[j] for j, c in terms),
+                lambda t, q, v, a: sum(c * v[j] for j, c in terms),
+            )
+        return (
+            lambda t, q, v: sum(c * v[j] for j, c in terms),
+            lambda t, q, v, a: sum(c * a[j] for j, c in terms),
+        )
 
     # --- the tape ---------------------------------------------------------------------------------------------
     @cached_property
@@ -196,15 +251,15 @@ class Equations:
     def _function(self) -> Callable[..., tuple[float, ...]]:
         return floats.compiled(self._tape)
 
-    def energies(self, q: Reals, v: Reals) -> Reals:
+    def energies(self, t: Reals, q: Reals, v: Reals) -> Reals:
         """Kinetic energy and that of gravity and springs together, (n,) J."""
         careful = np.array([self._careful(x) for x in q[:, 0].tolist()], dtype=bool)
         out = np.empty(len(q))
         if careful.any():
-            mass, _, _, stored = self.by_poses(q[careful], v[careful])
+            mass, _, _, stored = self.by_poses(t[careful], q[careful], v[careful])
             out[careful] = stored + 0.5 * np.einsum("ni,nij,nj->n", v[careful], mass, v[careful])
         if not careful.all():
-            found = self._run(self._recorded[1], np.zeros(len(q)), q, v, np.flatnonzero(~careful))
+            found = self._run(self._recorded[1], t, q, v, np.flatnonzero(~careful))
             out[~careful] = found["energy"]
         return out
 
@@ -215,14 +270,14 @@ class Equations:
             return run(tape, dict(zip(tape.inputs, given.T.copy(), strict=True)))
 
     @cached_property
-    def _fillers(self) -> dict[str, Callable[[float, Floats, Floats], float]]:
+    def _fillers(self) -> dict[str, Value]:
         """What gives each input of the tapes at a state."""
         return {name: self._filler(name) for tape in self._recorded for name in tape.inputs}
 
     def _filled(self, t: float, q: Floats, v: Floats, tape: Tape | None = None) -> Floats:
         return [self._fillers[name](t, q, v) for name in (tape or self._tape).inputs]
 
-    def _filler(self, name: str) -> Callable[[float, Floats, Floats], float]:
+    def _filler(self, name: str) -> Value:
         """How an input of the tape hangs on the state."""
         kind, _, of = name.partition(" ")
         if kind == "sign":
@@ -231,16 +286,53 @@ class Equations:
             return self._turns(int(of.removeprefix("spring ")))
         if kind == "table":
             number, axis = of.split()
-            load = self._tables[int(number)]
-            if axis == "x":
-                return lambda t, q, v: load.over(q[0], False).real
-            return lambda t, q, v: load.over(q[0], False).imag
+            return self._table(int(number), axis == "y")
         j = int(name[1:])
         if name[0] == "q":
             return lambda t, q, v: q[j]
         return lambda t, q, v: v[j]
 
-    def _turns(self, number: int) -> Callable[[float, Floats, Floats], float]:
+    def _table(self, number: int, imaginary: bool) -> Value:
+        """One component of what a table gives."""
+        load = self._tables[number]
+        known = self._linear(load)
+        place = self._followed(load) if known is None else known[0]
+        at = [x for x, _ in load.table]
+        given = [y.imag if imaginary else y.real for _, y in load.table]
+        slopes = [
+            (b - a) / (y - x) for a, b, x, y in zip(given[:-1], given[1:], at[:-1], at[1:], strict=True)
+        ]
+        first, span = at[0], at[-1] - at[0]
+
+        def value(t: float, q: Floats, v: Floats) -> float:
+            x = place(t, q, v)
+            if load.periodic:
+                x = first + (x - first) % span
+            i = bisect_right(at, x) - 1
+            if not 0 <= i < len(slopes):
+                # a step may reach beyond the last row by its rounding
+                if not -EDGE * span <= x - first <= (1 + EDGE) * span:
+                    return math.nan
+                i = min(max(i, 0), len(slopes) - 1)
+            return given[i] + slopes[i] * (x - at[i])
+
+        return value
+
+    def _followed(self, load: Tabled) -> Value:
+        """The angle or speed of a link that hangs on more than the inputs, by a tape of its own."""
+        a = self.assembly
+        recording = Recording(self.mechanism, a.plan, a.signs, (True, False, False), self._flips)
+        order = 1 if load.axis == "speed" else 0
+        tape = recording.tape([("angle", load.body, order)])
+        function, first = floats.compiled(tape), load.table[0][0]
+
+        def place(t: float, q: Floats, v: Floats) -> float:
+            (x,) = function(*(self._fillers[name](t, q, v) for name in tape.inputs))
+            return x if order else first + (x - first) % TURN
+
+        return place
+
+    def _turns(self, number: int) -> Value:
         """The whole turns of a torsion spring, followed from the guess."""
         spring = self.mechanism.torsion_springs[number]
         a = self.assembly
@@ -258,11 +350,11 @@ class Equations:
             e = run(tape, {name: self._fillers[name](t, q, v) for name in tape.inputs})
             first, second = (complex(e[f"turn {body} x"], e[f"turn {body} y"]) for body in spring.links)
             within = cmath.phase(second * first.conjugate() * rotation(-spring.free_angle))
-            return float(known[-1].turns(spring, State(list(q)), within))
+            return float(round((known[-1].wound(spring, State(list(q)), within) - within) / TURN))
 
         return turns
 
-    def _sign(self, group: str) -> Callable[[float, Floats, Floats], float]:
+    def _sign(self, group: str) -> Value:
         base, start = self.assembly.signs[group], self.assembly.track.start
         flips = self._flips
 

@@ -14,7 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from virtualwork.formulas.numbers import Reals
-from virtualwork.intime.equations import Equations, Floats
+from virtualwork.intime.equations import Equations
+from virtualwork.intime.step import Step
+from virtualwork.intime.watch import Floats
 
 
 class Tableau(NamedTuple):
@@ -37,18 +39,6 @@ def tableau() -> Tableau:
     return Tableau(DOP853.C[1:].tolist(), rows, DOP853.B.tolist(), DOP853.E3.tolist(), DOP853.E5.tolist())
 
 
-class Step(NamedTuple):
-    """What a step gives: changes of q and q̇, the work, the rates at its end, two errors of each, h·|λ|."""
-
-    dq: Floats
-    dv: Floats
-    work: float
-    rates: Floats
-    third: Floats
-    fifth: Floats
-    stiffness: float
-
-
 class DormandPrince:
     """The method: its steps, and how large the error of one is."""
 
@@ -62,10 +52,8 @@ class DormandPrince:
         own = tableau()
         k = len(q)
         speeds, others = [[x] for x in v], [[x] for x in rates]
-        before: tuple[Floats, Floats] = ([], [])
         place: tuple[Floats, Floats] = ([], [])
         for c, row in zip(own.at, own.rows, strict=True):
-            before = place
             place = (
                 [x + h * sum(map(mul, row, s)) for x, s in zip(q, speeds, strict=True)],
                 [x + h * sum(map(mul, row, s)) for x, s in zip(v, others, strict=False)],
@@ -91,7 +79,7 @@ class DormandPrince:
             [h * sum(map(mul, weights, s)) for s in (*speeds, *others[:k])]
             for weights in (own.third, own.fifth)
         )
-        return Step(dq, dv, work, found, *errors, stiffness)
+        return Step(dq, dv, work, found, tuple(errors), stiffness)
 
     def steps(
         self, f: Equations, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals
@@ -112,6 +100,5 @@ class DormandPrince:
 
     def size(self, done: Step, scale: Floats) -> float:
         """A step's error over the one allowed in each of (q, q̇)."""
-        fifth = sum((e / s) ** 2 for e, s in zip(done.fifth, scale, strict=True))
-        third = sum((e / s) ** 2 for e, s in zip(done.third, scale, strict=True))
+        third, fifth = (sum((e / s) ** 2 for e, s in zip(of, scale, strict=True)) for of in done.errors)
         return fifth / ((fifth + 0.01 * third) * len(scale)) ** 0.5 if fifth else 0.0

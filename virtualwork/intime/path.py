@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Sequence
+from bisect import bisect_right
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
 from virtualwork.formulas.numbers import EPS, Reals
-from virtualwork.intime.equations import Equations, Floats, Lost
+from virtualwork.intime.equations import Equations, Lost
+from virtualwork.intime.step import Method, Step
+from virtualwork.intime.watch import Floats, Watch
 
 # steps of one simulation
 MOST = 200_000
@@ -19,55 +20,6 @@ MOST = 200_000
 SAFETY, SHRINK, GROW = 0.9, 0.2, 6.0
 # steps in a row that the method's stability limits, not its accuracy
 STIFF = 15
-
-
-class Step(Protocol):
-    """What a step gives: changes of q and q̇, the work, the rates at its end, and h·|λ|."""
-
-    dq: Floats
-    dv: Floats
-    work: float
-    rates: Floats
-    stiffness: float
-
-
-class Method(Protocol):
-    """A one-step method."""
-
-    name: str
-    order: int
-    stable: float
-
-    def step(self, f: Equations, t: float, q: Floats, v: Floats, rates: Floats, h: float) -> Step:
-        """One step."""
-
-    def size(self, done: Step, scale: Floats) -> float:
-        """Its error over that allowed."""
-
-    def steps(
-        self, f: Equations, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals
-    ) -> tuple[Reals, Reals, Reals]:
-        """Changes over steps from many states, each of its own length."""
-
-
-@dataclass
-class Watch:
-    """A quantity that must not pass a level within a step: the step ends there.
-
-    `ends`: the path ends there too.
-    """
-
-    name: str
-    value: Callable[[float, Floats, Floats], float]
-    levels: Sequence[float]
-    ends: bool = False
-
-    def passed(self, before: float, after: float) -> float | None:
-        """The first level between two values, the first value's own left out."""
-        low, high = min(before, after), max(before, after)
-        near = 64 * EPS * max(abs(low), abs(high), 1e-3)
-        inside = self.levels[bisect_left(self.levels, low) : bisect_right(self.levels, high)]
-        return min((x for x in inside if abs(x - before) > near), key=lambda x: abs(x - before), default=None)
 
 
 @dataclass
@@ -86,10 +38,11 @@ class Path:
 
     def put(self, t: float, q: Floats, v: Floats, rates: Floats, work: float) -> None:
         """Add a node."""
-        for row, value in zip(
-            (self.t, self.q, self.v, self.rates, self.work), (t, q, v, rates, work), strict=True
-        ):
-            row.append(value)  # type: ignore[arg-type]
+        self.t.append(t)
+        self.q.append(q)
+        self.v.append(v)
+        self.rates.append(rates)
+        self.work.append(work)
 
     def at(self, times: Reals) -> tuple[Reals, Reals, Reals]:
         """q, q̇ (n, k) and the work (n,) at times on the way: a step of the method from the node before each."""
@@ -142,74 +95,61 @@ def walk(
     k, span = equations.k, end - t
     fastest = [max(abs(x), s / span if span else 1.0) for x, s in zip(v, equations.scale, strict=True)]
     low_q, low_v = [0.0] * k, [0.0] * k
-    h, stiff = 0.0, 0
+    h, grow, stiff = 0.0, GROW, 0
+    left: dict[str, float] = {}
     power = -1.0 / method.order
-    grow = GROW
     while t < end:
         if len(path.t) > budget:
             path.ended = "budget"
             return path
         allowed = [tolerance * s + 4 * EPS * abs(x) for x, s in zip(q, equations.scale, strict=True)]
         if not h:
-            steep = max(
-                abs(x) / s
-                for x, s in zip((*v, *rates), (*allowed, *(tolerance * x for x in fastest)), strict=False)
-            )
+            slow = [tolerance * x for x in fastest]
+            steep = max(abs(x) / s for x, s in zip((*v, *rates), (*allowed, *slow), strict=False))
             h = min(span, (0.01 / steep) ** (1 / (method.order + 1)) if steep else span)
-        next_stop = stops[i] if (i := bisect_right(stops, t)) < len(stops) else end
-        limit = min(next_stop, end) - t
+        i = bisect_right(stops, t)
+        stop = min(stops[i], end) if i < len(stops) else end
+        wanted, whole = h, stop - t
         # no sliver is left before a stop
-        own, h = h, limit if h > 0.99 * limit else min(h, 0.5 * limit) if h > 0.5 * limit else h
+        h = whole if h > 0.99 * whole else min(h, max(0.5 * whole, 0.5 * h))
         if h < 16 * EPS * max(abs(t), span * 1e-3):
             path.ended = "lost"
             return path
+        node = Node(equations, method, t, q, v, rates)
         try:
             done = method.step(equations, t, q, v, rates, h)
         except Lost:
             path.rejected += 1
-            h *= 0.25
-            grow = 1.0
+            h, grow = 0.25 * h, 1.0
             continue
-        scale = [
-            *allowed,
-            *(tolerance * max(f, abs(x + d)) for f, x, d in zip(fastest, v, done.dv, strict=True)),
-        ]
-        error = method.size(done, scale)
+        ends = (max(f, abs(x + d)) for f, x, d in zip(fastest, v, done.dv, strict=True))
+        error = method.size(done, [*allowed, *(tolerance * x for x in ends)])
         if not error <= 1.0:
             path.rejected += 1
-            h *= max(SHRINK, SAFETY * error**power) if error < math.inf else SHRINK
-            grow = 1.0
+            h, grow = h * (max(SHRINK, SAFETY * error**power) if error < math.inf else SHRINK), 1.0
             continue
-        found = _met(equations, method, watches, t, q, v, rates, h, done)
-        met = None
+        following = max(
+            wanted if h < wanted else 0.0, h * min(grow, SAFETY * error**power if error else grow)
+        )
+        found = node.met(watches, h, done, left) if watches else None
+        met, left, grow = None, {}, GROW
         if found is not None:
-            met, h, done = found
+            met, level, h, done = found
+            left = {met.name: level}
         stiff = stiff + 1 if done.stiffness > method.stable else max(0, stiff - 1)
-        t = min(next_stop, end) if h == limit else t + h
+        t = stop if h == whole else t + h
         q, low_q = _added(q, low_q, done.dq)
         v, low_v = _added(v, low_v, done.dv)
-        work += done.work
-        rates = done.rates
+        work, rates, h = work + done.work, done.rates, following
         fastest = [max(f, abs(x)) for f, x in zip(fastest, v, strict=True)]
         path.put(t, q, v, rates, work)
         if met is not None and met.ends:
             path.ended = met.name
+        elif check is not None:
+            path.ended = check(t, q, v)
+        if path.ended or stiff >= STIFF:
+            path.ended = path.ended or "stiff"
             return path
-        if check is not None and (why := check(t, q, v)):
-            path.ended = why
-            return path
-        if stiff >= STIFF:
-            path.ended = "stiff"
-            return path
-        if met is None:
-            h = (
-                max(own, h) * min(grow, max(SHRINK, SAFETY * error**power))
-                if h < own
-                else h * min(grow, SAFETY * error**power if error else grow)
-            )
-        else:
-            h = own
-        grow = GROW
     path.ended = "end"
     return path
 
@@ -225,101 +165,87 @@ def _added(x: Floats, low: Floats, d: Floats) -> tuple[Floats, Floats]:
     return high, rest
 
 
-def _met(
-    equations: Equations,
-    method: Method,
-    watches: Sequence[Watch],
-    t: float,
-    q: Floats,
-    v: Floats,
-    rates: Floats,
-    h: float,
-    done: Step,
-) -> tuple[Watch, float, Step] | None:
-    """The first watch that a step passes a level of, the length of the step that ends there, and that step."""
-    first: tuple[Watch, float, Step] | None = None
-    for watch in watches:
-        states = _between(q, v, rates, h, done)
-        before = watch.value(t, q, v)
-        for share in (0.25, 0.5, 0.75, 1.0):
-            level = watch.passed(before, watch.value(t + share * h, *states(share)))
-            if level is None:
-                continue
-            at = _bisected(lambda s: watch.value(t + s * h, *states(s)) - level, share - 0.25, share)
-            found = _sharpened(equations, method, watch, level, t, q, v, rates, at * h)
-            if found is not None and (first is None or found[0] < first[1]):
-                first = watch, *found
-            break
-    return first
+@dataclass
+class Node:
+    """Where a step begins."""
 
+    equations: Equations
+    method: Method
+    t: float
+    q: Floats
+    v: Floats
+    rates: Floats
 
-def _sharpened(
-    equations: Equations,
-    method: Method,
-    watch: Watch,
-    level: float,
-    t: float,
-    q: Floats,
-    v: Floats,
-    rates: Floats,
-    h: float,
-) -> tuple[float, Step] | None:
-    """The length of a step that ends at a level, to rounding, by secants of the method's own steps."""
+    def met(
+        self, watches: Sequence[Watch], h: float, done: Step, left: Mapping[str, float]
+    ) -> tuple[Watch, float, float, Step] | None:
+        """The first watch that a step passes a level of: it, the level, the step that ends there, and its length."""
+        first: tuple[Watch, float, float, Step] | None = None
+        for watch in watches:
+            before = watch.value(self.t, self.q, self.v)
+            for share in (0.25, 0.5, 0.75, 1.0):
+                value = self._value(watch, h, done, share)
+                level = watch.passed(before, value, left.get(watch.name))
+                if level is not None:
+                    at = self._bisected(watch, level, h, done, share)
+                    found = self._sharpened(watch, level, at * h)
+                    if found is not None and (first is None or found[0] < first[2]):
+                        first = watch, level, *found
+                    break
+        return first
 
-    def off(length: float) -> tuple[float, Step]:
-        done = method.step(equations, t, q, v, rates, length)
-        end = (
-            [x + d for x, d in zip(q, done.dq, strict=True)],
-            [x + d for x, d in zip(v, done.dv, strict=True)],
-        )
-        return watch.value(t + length, *end) - level, done
+    def _value(self, watch: Watch, h: float, done: Step, share: float) -> float:
+        return watch.value(self.t + share * h, *_between(self.q, self.v, self.rates, h, done, share))
 
-    try:
-        gap, done = off(h)
-        other = h * (1 + 1e-6) + 4 * EPS * abs(t)
-        gap_there, _ = off(other)
-        for _ in range(8):
-            if gap == 0.0 or gap == gap_there:
-                break
-            change = -gap * (other - h) / (gap_there - gap)
-            if not abs(change) > 2 * EPS * max(abs(t), abs(h)):
-                break
-            other, gap_there = h, gap
-            h += change
-            if h <= 0:
-                return None
-            gap, done = off(h)
-    except Lost:
-        return None
-    return h, done
+    def _bisected(self, watch: Watch, level: float, h: float, done: Step, high: float) -> float:
+        """Where in a step a level lies, to seven digits."""
+        low = high - 0.25
+        up = self._value(watch, h, done, high) > level
+        for _ in range(24):
+            middle = 0.5 * (low + high)
+            if (self._value(watch, h, done, middle) > level) == up:
+                high = middle
+            else:
+                low = middle
+        return 0.5 * (low + high)
+
+    def _sharpened(self, watch: Watch, level: float, h: float) -> tuple[float, Step] | None:
+        """The length of a step that ends at a level, by Newton's method over the method's own steps."""
+        enough = 2 * EPS * max(abs(self.t), abs(h)) if watch.ends else 1e-7 * h
+        # of the secant, where no derivative is known
+        before: tuple[float, float] | None = None
+        try:
+            for _ in range(12):
+                done = self.method.step(self.equations, self.t, self.q, self.v, self.rates, h)
+                q = [x + d for x, d in zip(self.q, done.dq, strict=True)]
+                v = [x + d for x, d in zip(self.v, done.dv, strict=True)]
+                gap = level - watch.value(self.t + h, q, v)
+                if watch.rate is not None:
+                    rate = watch.rate(self.t + h, q, v, done.rates)
+                    change = gap / rate if rate else 0.0
+                elif before is None:
+                    change = 1e-6 * h
+                else:
+                    change = gap * (h - before[0]) / (before[1] - gap) if before[1] != gap else 0.0
+                before = h, gap
+                if not abs(change) > enough or h + change <= 0:
+                    break
+                h += change
+        except Lost:
+            return None
+        return h, done
 
 
 def _between(
-    q: Floats, v: Floats, rates: Floats, h: float, done: Step
-) -> Callable[[float], tuple[Floats, Floats]]:
-    """States within a step, roughly: the polynomial of degree 5 through q, q̇ and q̈ at both ends."""
-
-    def state(share: float) -> tuple[Floats, Floats]:
-        x = share
-        places, speeds = [], []
-        for a, b, c, d, e, f in zip(q, v, rates, done.dq, done.dv, done.rates, strict=False):
-            # what is left to fit after the Taylor polynomial of degree 2 at the beginning
-            p, r, s = d - h * (b + 0.5 * h * c), h * (e - h * c), h * h * (f - c)
-            c3, c4, c5 = 10 * p - 4 * r + 0.5 * s, -15 * p + 7 * r - s, 6 * p - 3 * r + 0.5 * s
-            places.append(a + x * (h * b + x * (0.5 * h * h * c + x * (c3 + x * (c4 + x * c5)))))
-            speeds.append(b + x * h * c + x * x * (3 * c3 + x * (4 * c4 + x * 5 * c5)) / h)
-        return places, speeds
-
-    return state
-
-
-def _bisected(f: Callable[[float], float], low: float, high: float) -> float:
-    """A root between two ends, to six digits."""
-    sign = f(high) > 0
-    for _ in range(24):
-        middle = 0.5 * (low + high)
-        if (f(middle) > 0) == sign:
-            high = middle
-        else:
-            low = middle
-    return 0.5 * (low + high)
+    q: Floats, v: Floats, rates: Floats, h: float, done: Step, share: float
+) -> tuple[Floats, Floats]:
+    """A state within a step, roughly: of the polynomial of degree 5 through q, q̇ and q̈ at both ends."""
+    x = share
+    places, speeds = [], []
+    for a, b, c, d, e, f in zip(q, v, rates, done.dq, done.dv, done.rates, strict=False):
+        # what is left to fit after the Taylor polynomial of degree 2 at the beginning
+        p, r, s = d - h * (b + 0.5 * h * c), h * (e - h * c), h * h * (f - c)
+        c3, c4, c5 = 10 * p - 4 * r + 0.5 * s, -15 * p + 7 * r - s, 6 * p - 3 * r + 0.5 * s
+        places.append(a + x * (h * b + x * (0.5 * h * h * c + x * (c3 + x * (c4 + x * c5)))))
+        speeds.append(b + x * h * c + x * x * (3 * c3 + x * (4 * c4 + x * 5 * c5)) / h)
+    return places, speeds

@@ -21,8 +21,11 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.parts import Input
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.coordinates import Coordinates
-from virtualwork.intime.equations import Equations, Floats
+from virtualwork.intime.equations import Equations
+from virtualwork.intime.friction import Rubbing
+from virtualwork.intime.path import MOST
 from virtualwork.intime.travel import Travel, travel
+from virtualwork.intime.watch import Floats
 from virtualwork.motion import Motion
 
 # the tolerance of a step over the accuracy asked for, at first; between two solutions
@@ -116,7 +119,8 @@ class Run:
     @property
     def first_motion(self) -> Motion:
         """The motion at the first time, in the coordinates of the beginning: for its joints."""
-        return self.fine.legs[0].coordinates.motion(self.angle[:1], self.speed[:1], self.acceleration[:1])
+        first = self.angle[:1], self.speed[:1], self.acceleration[:1], self.t[:1]
+        return self.fine.legs[0].coordinates.motion(*first)
 
 
 def simulate(
@@ -134,7 +138,7 @@ def simulate(
     v = _state("speed", speed, [e.speed for e in m.inputs], [0.0] * k, k)
     if not 0 < accuracy < 1:
         raise ValueError(f"accuracy: found {accuracy:g}, expected a number between 0 and 1")
-    equations = Equations(assembly)
+    equations = (Rubbing if m.friction else Equations)(assembly)
     equations.refuse(float(t[0]), q, v)
     scale = np.array(equations.scale)
     levels = _levels(m.inputs, until)
@@ -188,7 +192,8 @@ def _reached(t: Reals, way: Travel) -> Reals:
     """The times up to the end of a way; where it ends before the last, its end is the last."""
     if way.end >= t[-1]:
         return t
-    return np.append(t[t < way.end], way.end)
+    near = 1e-8 * (way.end - t[0])
+    return np.append(t[t < way.end - near], way.end)
 
 
 def _said(
@@ -198,6 +203,10 @@ def _said(
     found = []
     if run.fine.ended == "end" and until:
         found.append(f"{', '.join(until)}: the event is not met before {asked[-1]:g} s")
+    if run.fine.ended == "budget":
+        found.append(f"ends at {run.fine.end:.9g} s, after {MOST} steps: a lower accuracy takes fewer")
+    elif run.fine.ended not in ("end", "until"):
+        found.append(f"ends at {run.fine.end:.9g} s: {run.fine.ended}")
     if worst > 1.0:
         bad = (run.error_estimate / np.array(run.fine.legs[0].path.equations.scale)).max(axis=1) > 1e-2
         found.append(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -11,10 +11,12 @@ import numpy as np
 
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.coordinates import FOLDING, TURN, Coordinates
-from virtualwork.intime.equations import Floats
+from virtualwork.intime.equations import Equations
 from virtualwork.intime.explicit import DormandPrince
+from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.joined import Joined
-from virtualwork.intime.path import MOST, Path, Watch, walk
+from virtualwork.intime.path import MOST, Path, walk
+from virtualwork.intime.watch import Floats, Watch
 
 # changes of coordinates in one simulation
 CHANGES = 10_000
@@ -109,12 +111,15 @@ class Travel:
         out = np.empty(len(times))
         for leg, rows in self._parts(times):
             q, v, _ = leg.path.at(times[rows])
-            out[rows] = leg.path.equations.energies(q, v)
+            out[rows] = leg.path.equations.energies(times[rows], q, v)
         return out
 
     def motion(self, times: Reals) -> Any:
         """The motion through times: a `Motion`, or several joined."""
-        parts = [(rows, leg.coordinates.motion(*leg.at(times[rows])[:3])) for leg, rows in self._parts(times)]
+        parts = [
+            (rows, leg.coordinates.motion(*leg.at(times[rows])[:3], times[rows]))
+            for leg, rows in self._parts(times)
+        ]
         return parts[0][1] if len(parts) == 1 else Joined(parts, len(times))
 
     def link_angle(self, name: str, times: Reals) -> Reals:
@@ -131,6 +136,33 @@ class Travel:
                 # as the input itself is counted
                 whole += TURN * np.round((self.legs[0].first[j] - whole[0]) / TURN)
         return np.asarray(whole[np.searchsorted(every, times)])
+
+
+@dataclass
+class Monitor:
+    """What a path is asked at every node: whether its coordinates fold, and what the inputs are there."""
+
+    coordinates: Coordinates
+    near: Floats
+    folding: bool
+    follows: bool
+
+    def __call__(self, t: float, q: Floats, v: Floats) -> str:
+        if self.follows:
+            self.near = self.inputs(q, v)
+        was, self.folding = self.folding, self.coordinates.margin(q) < FOLDING
+        return "folding" if self.folding and not was else ""
+
+    def inputs(self, q: Floats, v: Floats) -> Floats:
+        """The inputs at a state, with the whole turns of those at the last node."""
+        state = [np.array([x]) for x in (q, v, v, self.near)]
+        return self.coordinates.states(*state)[0][0].tolist()  # type: ignore[no-any-return]
+
+    def until(self, j: int, level: float) -> Watch:
+        """The end where input j has a value."""
+        if self.coordinates.own:
+            return Watch("until", lambda t, q, v: q[j], lambda t, q, v, a: v[j], [level], ends=True)
+        return Watch("until", lambda t, q, v: self.inputs(q, v)[j], None, [level], ends=True)
 
 
 def travel(
@@ -151,52 +183,62 @@ def travel(
     found = Travel()
     t, q, v = start
     inputs, work = q, 0.0
+    # joints that rub and came to rest just now; at first all that stand
+    resting: list[int] | None = None
     while True:
-        # what the inputs were at the last node
-        near = list(inputs)
-        folding = coordinates.margin(q) < FOLDING
-
-        def check(t: float, q: Floats, v: Floats) -> str:
-            nonlocal folding
-            if until and not coordinates.own:
-                near[:] = coordinates.states(*(np.array([x]) for x in (q, v, v, near)))[0][0].tolist()
-            was, folding = folding, coordinates.margin(q) < FOLDING
-            return "folding" if folding and not was else ""
-
-        watches = [
-            Watch("until", _input(coordinates, j, near), [level], ends=True) for j, level in until.items()
-        ]
-        budget = MOST - found.steps
-        path = walk(
-            coordinates.equations,
-            DormandPrince(),
-            (t, q, v, work),
-            end,
-            tolerance,
-            watches,
-            check=check,
-            budget=budget,
+        equations = coordinates.equations
+        if isinstance(equations, Rubbing):
+            equations, v = _in_mode(equations, t, q, v, resting)
+        monitor = Monitor(
+            coordinates, inputs, coordinates.margin(q) < FOLDING, bool(until) and not coordinates.own
         )
-        found.legs.append(Leg(coordinates, path, inputs))
+        watches = [*(monitor.until(j, level) for j, level in until.items()), *equations.watches()]
+        stops, budget = equations.stops, MOST - found.steps
+        path = walk(
+            equations, DormandPrince(), (t, q, v, work), end, tolerance, watches, stops, monitor, budget
+        )
+        leg = Leg(coordinates, path, inputs)
+        found.legs.append(leg)
         found.ended = path.ended
-        if path.ended not in ("folding", "lost") or len(found.legs) > CHANGES:
+        if path.ended in ("end", "until", "budget") or len(found.legs) > CHANGES:
             return found
-        other = coordinates.better(path.q[-1])
-        if other is None:
-            if path.ended == "lost":
-                return found
-            other = coordinates
-        t, work = path.t[-1], path.work[-1]
-        inputs = found.legs[-1].inputs[-1].tolist()
-        q, v = _in(coordinates, other, path.q[-1], path.v[-1])
-        coordinates = other
+        t, q, v, work = path.t[-1], path.q[-1], path.v[-1], path.work[-1]
+        inputs, resting = leg.inputs[-1].tolist(), []
+        if path.ended.startswith("friction"):
+            resting = _resting(equations, path.ended)
+            continue
+        found.ended = equations.outside(t, q, v) if path.ended == "lost" else ""
+        other = None if found.ended else coordinates.better(q)
+        if other is None and path.ended == "lost":
+            found.ended = (
+                found.ended or "it can go no further: a limit, or a pose where its motion is not determined"
+            )
+            return found
+        if other is not None:
+            q, v = _in(coordinates, other, q, v)
+            coordinates = other
 
 
-def _input(coordinates: Coordinates, j: int, near: Floats) -> Callable[[float, Floats, Floats], float]:
-    """Input j at a state."""
-    if coordinates.own:
-        return lambda t, q, v: q[j]
-    return lambda t, q, v: float(coordinates.states(*(np.array([x]) for x in (q, v, v, near)))[0][0, j])
+def _in_mode(
+    equations: Rubbing, t: float, q: Floats, v: Floats, resting: list[int] | None
+) -> tuple[Rubbing, Floats]:
+    """The mode of friction in which a motion goes on, and its speeds, those of joints that stick exactly zero."""
+    if resting is None:
+        resting = [n for n, rate in enumerate(equations.values(t, q, v).rate) if not rate]
+    mode = equations.decided(t, q, v, resting)
+    return equations.in_mode(mode), equations.brought_to_rest(
+        t, q, v, [n for n, s in enumerate(mode) if not s]
+    )
+
+
+def _resting(equations: Equations, ended: str) -> list[int]:
+    """The joints whose rate is zero at the end of a path: that which ended it, and those that stick."""
+    assert isinstance(equations, Rubbing)
+    stuck = [n for n, s in enumerate(equations.mode) if not s]
+    own = ended.removeprefix("friction").strip()
+    if equations.k == 1 or not own:
+        return list(range(len(equations.mode)))
+    return sorted({*stuck, int(own)})
 
 
 def _in(old: Coordinates, new: Coordinates, q: Floats, v: Floats) -> tuple[Floats, Floats]:
