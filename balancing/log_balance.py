@@ -150,7 +150,11 @@ class LogBalance:
         return np.asarray(axes * (k * np.sqrt(np.maximum(size, 0.0)))[..., None, :])
 
     def vibration_deviation(self, masses: ArrayLike, *, reading: bool = False) -> Real:
-        """Standard deviation of the fitted vibration's amplitude with these masses on, (..., p) -> (..., s).
+        """Standard deviation of the fitted vibration's amplitude with these masses on, (..., p) -> (..., s)."""
+        return np.asarray(np.sqrt(self.vibration_covariance(masses, reading=reading)[..., 0, 0]))
+
+    def vibration_covariance(self, masses: ArrayLike, *, reading: bool = False) -> Real:
+        """Covariance of the fitted vibration with these masses on, along itself and across, (..., p) -> (..., s, 2, 2).
 
         With `reading` the scatter of one more reading is included: that of the mean weight, or of the errors stated.
         """
@@ -159,19 +163,22 @@ class LogBalance:
         rows = np.concatenate([np.ones((*w.shape[:-1], 1), dtype=complex), w], axis=-1)
         gain = np.vecmat(rows[..., None, :].conj(), self.fit.gain)
         covariance = components(gain[..., None, :], None, value[..., None], *self._by_channel())
-        variance = covariance[..., 0, 0, 0]
-        return np.asarray(np.sqrt(variance + self._own(value) if reading else variance))
+        covariance = covariance[..., 0, :, :]
+        return np.asarray(covariance + self._own(value) if reading else covariance)
 
     def _own(self, value: Complex) -> Real:
-        """Variance of a reading of this value, of one component, (..., s)."""
+        """Covariance of a reading of this value, along itself and across, (..., s, 2, 2)."""
         read = self.fit.present
+        errors = self.errors.along, self.errors.across
         if np.isinf(self.errors.degrees_of_freedom).all():
             # errors relative to the amplitude: those of a reading of this size
             size = np.where(read, np.abs(self.fit.readings), 0.0).max(axis=-2)
-            share = np.max(self.errors.along, axis=-2) / np.where(size > 0, size, 1.0)
-            return np.asarray(np.square(share * np.abs(value)))
-        square = np.where(read, np.square(self.errors.along), 0.0)
-        return np.asarray(square.sum(axis=-2) / read.sum(axis=-2))
+            shares = [np.max(error, axis=-2) / np.where(size > 0, size, 1.0) for error in errors]
+            own = [np.square(share * np.abs(value)) for share in shares]
+        else:
+            squares = [np.where(read, np.square(error), 0.0) for error in errors]
+            own = [square.sum(axis=-2) / read.sum(axis=-2) for square in squares]
+        return np.asarray(np.stack(own, axis=-1)[..., None] * np.eye(2))
 
     def probability_within(self, limit: ArrayLike) -> Real:
         """Probability that the corrections as given leave each channel's true vibration within a limit, (..., s).

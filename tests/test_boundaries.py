@@ -57,6 +57,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "cli": (
         ("__main__",),
         ("app",),
+        ("help",),
         (
             "balance",
             "body",

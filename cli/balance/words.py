@@ -5,12 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from balancing import GRADES
+from cli.balance import columns
+from cli.balance.read import Complex
 from cli.balance.solve import Balancing
 from cli.read.units import degrees, from_si
+from cli.show.columns import Column, Section, Table
 from cli.show.text import angle_text
 
 NEAR = 20.0  # from this growth of errors on the planes are said to be near each other
 SHOWN = 10  # so many rotors are described on the terminal
+
+METHOD = (
+    "Each mass is an unbalance U = m·r·e^{iθ}. The corrections are those with the least sum of squares whose resultant and "
+    "moment about the planes are opposite to ΣU and ΣU·z (J. A. Riul, Dinâmica das Máquinas, unit II, eqs. 6–21); "
+    "tolerance after ISO 21940-11. Angles are counter-clockwise as seen against +z."
+)
 
 
 def warnings(found: Balancing) -> list[str]:
@@ -85,3 +94,63 @@ def verdicts(found: Balancing) -> str:
                 f"residual {after:.6g} ({'within' if v.residual <= v.permissible else 'beyond'})"
             )
     return "\n".join(lines)
+
+
+def sections(found: Balancing) -> list[Section]:
+    """What the report says: the corrections, the rotors before and after, the tolerance."""
+    unit = found.rotors.unbalance_unit
+    length = found.rotors.radius_unit or found.planes.z_unit or "mm"
+    action = f"Material to {'remove' if found.request.remove else 'add'}"
+    shown = [Section(action, [columns.corrections(found)]), Section("Before and after", [_states(found)])]
+    if found.has_couple:
+        about = from_si(found.about[0], "length", length)
+        same = (found.about == found.about[0]).all()
+        where = f"z = {about:g} {length}" if same else "the first correction plane of each"
+        shown[1] = Section("Before and after", [_states(found), f"The couple is about {where}."])
+    if found.request.tolerance is not None:
+        shown.append(Section("Verdict", [*verdicts(found).splitlines()[:1], _within(found, unit)]))
+    return shown
+
+
+def _states(found: Balancing) -> Table:
+    unit, names = found.rotors.unbalance_unit, found.rotors.names
+    length = found.rotors.radius_unit or found.planes.z_unit or "mm"
+
+    def both(before: Complex, after: Complex) -> Complex:
+        # what rounding leaves is nothing
+        after = np.where(np.abs(after) > 1e-12 * np.abs(before), after, 0)
+        return np.stack([before, after], axis=1).ravel()
+
+    def angle(value: Complex) -> list[float | None]:
+        return [float(degrees(v)) if v else None for v in value.tolist()]
+
+    static = both(found.static, found.residual_static)
+    table = [
+        Column("rotor", "", [name for name in names for _ in range(2)]),
+        Column("state", "", ["before", "after"] * len(names)),
+        Column("static_unbalance", unit, from_si(np.abs(static), "unbalance", unit)),
+        Column("angle", "deg", angle(static)),
+    ]
+    if found.has_couple:
+        couple = both(found.couple, found.residual_couple)
+        size = from_si(from_si(np.abs(couple), "unbalance", unit), "length", length)
+        of_couple = f"{unit}_{length}".replace(f"{length}_{length}", f"{length}2")
+        table += [Column("couple", of_couple, size), Column("couple_angle", "deg", angle(couple))]
+    return Table(table, keys=("rotor", "state"))
+
+
+def _within(found: Balancing, unit: str) -> Table:
+    rows = [
+        (
+            rotor,
+            v.plane,
+            *(from_si(u, "unbalance", unit) for u in v[1:]),
+            "within" if v.residual <= v.permissible else "beyond",
+        )
+        for r, rotor in enumerate(found.rotors.names)
+        for v in found.verdicts(r)
+    ]
+    names = ("rotor", "plane", "permissible", "before", "after", "verdict")
+    units = ("", "", unit, unit, unit, "")
+    columns = zip(names, units, zip(*rows, strict=True), strict=True)
+    return Table([Column(*column) for column in columns], keys=("rotor", "plane"))

@@ -18,6 +18,13 @@ if TYPE_CHECKING:
 _VECTOR = "X,Y,Z"
 
 
+EXAMPLE = "riul-rod"
+PANELS = {
+    "What": "omega alpha frame_omega about fixed velocity acceleration",
+    "What: a shaft": "shaft speed speed_rate gravity correct",
+}
+
+
 @command
 def run(
     parts: Annotated[str, typer.Argument(metavar="PARTS", help="CSV of parts; - is standard input.")],
@@ -52,7 +59,9 @@ def run(
         str | None,
         typer.Option(metavar="Z1:Z2", help="The parts turn about z on bearings there, such as 0mm:400mm."),
     ] = None,
-    speed: Annotated[str | None, typer.Option(help="Speed of the shaft, such as 1200rpm.")] = None,
+    speed: Annotated[
+        str | None, typer.Option(metavar="SPEED", help="Speed of the shaft, such as 1200rpm.")
+    ] = None,
     speed_rate: Annotated[
         str | None, typer.Option(metavar="RATE", help="Its rate, such as 10rad_s2.")
     ] = None,
@@ -116,6 +125,12 @@ def run(
         screen=lambda: columns.quantities(found),
         notes=lambda: words.notes(found),
         figure=figure,
+        method=words.METHOD,
+        about={
+            "title": "A shaft on two bearings"
+            if shaft is not None
+            else "Mass properties and motion of a body"
+        },
         warnings=[*found.parts.warnings, *words.warnings(found)],
     )
 

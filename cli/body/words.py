@@ -6,6 +6,12 @@ import numpy as np
 
 from cli.body.solve import MovingBody
 
+METHOD = (
+    "Tensors of the parts moved by Steiner's theorem, turned and added; principal moments by the eigenvalues; angular momentum "
+    "H = I·ω and its true rate in any axes; d'Alembert's inertia wrench (J. A. Riul, Dinâmica das Máquinas, unit II, eqs. "
+    "22–47; F. P. Beer, E. R. Johnston, Vector Mechanics for Engineers: Dynamics, ch. 18)."
+)
+
 
 def warnings(found: MovingBody) -> list[str]:
     """Say where eq. 44 with a constant tensor would go wrong, and what is not balanced in one plane."""

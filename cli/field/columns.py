@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.field.runs import Real
+from cli.field.runs import Channel, Real
 from cli.field.solve import FieldBalancing
+from cli.field.tolerance import verdicts
 from cli.read.rounding import angle_error, size_error
 from cli.read.units import degrees, from_si, to_si
 from cli.show.columns import Column, Table
@@ -83,6 +85,62 @@ def coefficients(found: FieldBalancing) -> Table:
         for name, values in zip(names, zip(*rows, strict=True), strict=True)
     ]
     return Table(columns if found.several else columns[1:])
+
+
+def channels(found: FieldBalancing, of: Sequence[Channel]) -> list[Column]:
+    """The columns that name sensors: with their state and speed, where the table has them."""
+    columns = [Column("sensor", "", [channel.sensor for channel in of])]
+    if any(channel.state is not None for channel in of):
+        columns.append(Column("state", "", [channel.state for channel in of]))
+    if any(channel.speed is not None for channel in of):
+        unit = found.runs.speed_unit or "rpm"
+        columns.append(
+            Column("speed", unit, [None if c.speed is None else from_si(c.speed, "speed", unit) for c in of])
+        )
+    return columns
+
+
+def prediction(found: FieldBalancing) -> Table:
+    """The vibration before, and as predicted with the corrections: a row for each rotor and sensor."""
+    rows = [
+        (rotor, channel, before, after)
+        for rotor, solved, i in found.each()
+        for channel, before, after in zip(
+            solved.group.channels, solved.initial[i].tolist(), solved.residual[i].tolist(), strict=True
+        )
+    ]
+    rotors, of, before, after = (list(column) for column in zip(*rows, strict=True))
+    unit = found.runs.amplitude_unit
+    columns = [
+        *([Column("rotor", "", rotors)] if found.several else []),
+        *channels(found, of),
+        Column("before_amplitude", unit, [abs(v) for v in before]),
+        Column("predicted_amplitude", unit, [abs(v) for v in after]),
+    ]
+    if not found.request.four_run:
+        columns.insert(-1, Column("before_phase", "deg", [degrees(v) for v in before]))
+        columns.append(Column("predicted_phase", "deg", [degrees(v) if v else None for v in after]))
+    return Table(columns, keys=("rotor", "sensor", "state", "speed_rpm"))
+
+
+def split(found: FieldBalancing) -> Table:
+    """The corrections on the places there are: a row for each mass."""
+    rows = [
+        (rotor, plane, position, angle, mass)
+        for rotor, solved, i in found.each()
+        for plane, w in zip(solved.planes, solved.corrections[i].tolist(), strict=True)
+        for position, angle, mass in found.split(w)
+    ]
+    rotors, planes, positions, angles, masses = zip(*rows, strict=True) if rows else ((),) * 5
+    per, unit = found.runs.per, found.runs.mass_unit
+    columns = [
+        Column("rotor", "", list(rotors)),
+        Column("plane", "", list(planes)),
+        Column("position", "", list(positions)),
+        Column(per, unit, [found.amount(mass) for mass in masses]),
+        Column("angle", "deg", list(angles)),
+    ]
+    return Table(columns if found.several else columns[1:], keys=("rotor", "plane", "position"))
 
 
 def document(found: FieldBalancing) -> Document:
@@ -165,8 +223,10 @@ def document(found: FieldBalancing) -> Document:
                         "permissible_kg_m": share,
                         "initial_kg_m": _number(before),
                         "within": before <= share if np.isfinite(before) else None,
+                        "residual_kg_m": _number(after),
+                        "residual_within": after <= share if np.isfinite(after) else None,
                     }
-                    for plane, share, before in found.verdicts(solved, i)
+                    for plane, share, before, after in verdicts(found, solved, i)
                 ],
             }
         documents.append(document)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -16,6 +16,15 @@ if TYPE_CHECKING:
     from cli.field.fit import LogFits
     from cli.field.solve import FieldBalancing
     from cli.show.columns import Document, Result, Table
+
+
+EXAMPLE = "fan-one-plane"
+PANELS = {
+    "What": "influence runout phase_lag rotation signal exclude",
+    "How": "method fit robust objective max_mass max_residual from_here ridge reading_error monte_carlo",
+    "How: the tolerance, the first trial mass": "grade speed rotor_mass permissible radius suggest_trial planes",
+    "Output: where masses go, the next run": "blades positions first predict suggest save_influence",
+}
 
 
 @command
@@ -32,7 +41,10 @@ def run(
         Path | None,
         typer.Option(metavar="FILE.csv", help="Store the coefficients.", callback=suffix_among(".csv")),
     ] = None,
-    objective: Annotated[str, typer.Option(help="least-squares or minimax.")] = "least-squares",
+    objective: Annotated[
+        Literal["least-squares", "minimax"],
+        typer.Option(help="Least sum of squares of the residuals, or the smallest largest one."),
+    ] = "least-squares",
     max_mass: Annotated[
         list[str] | None,
         typer.Option(metavar="[PLANE=]MASS", help="Limit of each correction (5g), or of one plane's (A=5g)."),
@@ -57,20 +69,26 @@ def run(
         typer.Option(metavar="N", min=0, max=100_000, help="Uncertainties from N drawn sets of readings."),
     ] = 0,
     method: Annotated[
-        str, typer.Option(help="influence, or four-run: amplitudes only, one plane.")
+        Literal["influence", "four-run"],
+        typer.Option(help="By influence coefficients, or by amplitudes only in one plane."),
     ] = "influence",
     ridge: Annotated[
-        float, typer.Option(min=0.0, help="Damp the corrections of nearly dependent planes, such as 0.1.")
+        float,
+        typer.Option(
+            metavar="NUMBER", min=0.0, help="Damp the corrections of nearly dependent planes, such as 0.1."
+        ),
     ] = 0.0,
     phase_lag: Annotated[bool, typer.Option("--phase-lag", help="The instrument's phase lags.")] = False,
     rotation: Annotated[
-        str | None,
-        typer.Option(help="ccw or cw, seen against +z: phases lead in that sense, mass angles are ccw."),
+        Literal["ccw", "cw"] | None,
+        typer.Option(help="Seen against +z: phases lead in that sense, mass angles are ccw."),
     ] = None,
     grade: Annotated[
-        str | None, typer.Option(help="Balance quality grade of ISO 21940-11, such as G6.3.")
+        str | None, typer.Option(metavar="GRADE", help="Balance quality grade of ISO 21940-11, such as G6.3.")
     ] = None,
-    speed: Annotated[str | None, typer.Option(help="Highest service speed, such as 3000rpm.")] = None,
+    speed: Annotated[
+        str | None, typer.Option(metavar="SPEED", help="Highest service speed, such as 3000rpm.")
+    ] = None,
     rotor_mass: Annotated[
         str | None, typer.Option(metavar="MASS", help="Mass of the rotor, such as 120kg.")
     ] = None,
@@ -88,11 +106,16 @@ def run(
             help="Suggest a trial mass for --rotor-mass, --speed, --radius and --planes; no RUNS.",
         ),
     ] = False,
-    planes: Annotated[int, typer.Option(min=1, help="Number of planes, for --suggest-trial.")] = 1,
+    planes: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Number of planes, for --suggest-trial.")
+    ] = 1,
     blades: Annotated[
         int | None,
         typer.Option(
-            min=1, max=options.PLACES, help="Split the corrections onto so many places, evenly spaced."
+            metavar="N",
+            min=1,
+            max=options.PLACES,
+            help="Split the corrections onto so many places, evenly spaced.",
         ),
     ] = None,
     positions: Annotated[
@@ -130,12 +153,6 @@ def run(
             metavar="FILE.csv", help="Once-per-turn vectors of a recording: t_s, mark, A_um …; no RUNS."
         ),
     ] = None,
-    report: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.html", help="Write a report to print.", callback=suffix_among(".html", ".htm")
-        ),
-    ] = None,
 ) -> Result:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
@@ -144,12 +161,6 @@ def run(
     and trial_kept (yes: the trial mass stays on in all later runs). Several trial masses in one run are joined
     by ';'. Phase and mass angle are counted in one common sense. amplitude_um_pp, _pk, _rms tell how it is read.
     """
-    if objective not in ("least-squares", "minimax"):
-        raise options.bad("--objective", f"'{objective}': expected least-squares or minimax")
-    if method not in ("influence", "four-run"):
-        raise options.bad("--method", f"'{method}': expected influence or four-run")
-    if rotation not in (None, "ccw", "cw"):
-        raise options.bad("--rotation", f"'{rotation}': expected ccw or cw")
     if not ridge < float("inf"):
         raise options.bad("--ridge", "expected a finite number")
     if ridge and (objective == "minimax" or max_mass or max_residual is not None):
@@ -249,17 +260,15 @@ def run(
         radius=arm,
         conventions=asked.conventions(method, phase_lag or measured.lags, rotation),
         places=options.places(positions, blades, first),
+        against=against or measured.lags,
     )
     found = FieldBalancing(measured, request, stored)
     fits = LogFits(found, Asked(masses_at(predict, measured), suggest, robust)) if fit else None
-    source = "standard input" if runs == "-" else Path(runs).name
-    return _result(found, fits, source, save_influence, report)
+    return _result(found, fits, save_influence)
 
 
-def _result(
-    found: FieldBalancing, fits: LogFits | None, source: str, save_influence: Path | None, report: Path | None
-) -> Result:
-    from cli.field import columns, fit, fit_columns, fit_words, remarks, words
+def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | None) -> Result:
+    from cli.field import columns, fit, fit_columns, fit_words, remarks, report, words
     from cli.show.columns import Result
     from cli.show.text import csv_text
 
@@ -274,30 +283,30 @@ def _result(
         return fit_columns.residuals(fits)
 
     def figure() -> Figure:
-        from cli.field.picture import draw
+        from cli.field import fit_picture, picture
 
-        return draw(found, range(min(len(found.runs.rotors), 3)))
-
-    def page() -> bytes:
-        from cli.field.report import html
-
-        return html(found, source, warnings, fits)
+        few = range(min(len(found.runs.rotors), 3))
+        return picture.draw(found, few) if fits is None else fit_picture.draw(fits, few)
 
     beside = {}
     if save_influence is not None:
         beside[save_influence] = lambda: csv_text(columns.coefficients(found).cells).encode()
-    if report is not None:
-        beside[report] = page
     return Result(
         document=document,
         tables={
             "corrections": lambda: columns.corrections(found, warnings),
             "influence": lambda: columns.coefficients(found),
+            "prediction": lambda: columns.prediction(found),
+            **({} if found.request.places is None else {"split": lambda: columns.split(found)}),
             **({} if fits is None else {"residuals": residuals}),
         },
         notes=lambda: (fit_words.notes(fits) if fits is not None else "") + words.notes(found),
         afterword=lambda: words.afterword(found) + (fit_words.afterword(fits) if fits is not None else ""),
         figure=figure,
+        method=report.METHOD,
+        sheets=lambda: report.sheets(found, fits),
+        shows_input=True,
+        about={"title": "Balancing in the field"},
         beside=beside,
         warnings=warnings,
     )

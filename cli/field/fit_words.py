@@ -83,8 +83,9 @@ def expected(fits: LogFits, solved: Solved, i: int) -> list[str]:
     unit = amplitude_unit(found)
     if fits.asked.predict is not None:
         value, sd = (part[i] for part in fits.predicted(solved))
+        lines.append(f"a run with {_masses(fits, solved, fits.masses(solved.planes))} should read")
         lines += [
-            f"that run should read at sensor {channel}: {abs(v):.4g} {unit} at {angle_text(degrees(v), '.2f')}°{_plus_minus(u)}"
+            f"  at sensor {channel}: {abs(v):.4g}{_plus_minus(u)} {unit} at {angle_text(degrees(v), '.2f')}°"
             for channel, v, u in zip(solved.group.channels, value, sd, strict=True)
         ]
     if fits.asked.suggest:

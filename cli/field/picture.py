@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.field.solve import FieldBalancing, Solved
+from cli.field.solve import FieldBalancing
 from cli.field.words import amplitude_unit
 from cli.show.picture import arrow, free_direction
 
@@ -28,17 +28,13 @@ def draw(found: FieldBalancing, rotors: Sequence[int]) -> Figure:
         solved = found.solved[k]
         name = f"rotor {found.runs.rotors[rotor]}: " if found.several else ""
         before, after = solved.initial[i], solved.residual[i]
-        read, fitted = _history(solved, i)
-        scale = float(np.abs([*before, *after, *read, *fitted]).max()) or 1.0
+        scale = float(np.abs([*before, *after]).max()) or 1.0
         few = len(before) <= 16
         for channel, v, r in zip(solved.group.channels, before, after, strict=True):
             arrow(left, v, scale, "0.5", 1.4, "--", str(channel) if few else "")
             arrow(left, r, scale, "tab:red", 2.0, "-", "")
             if 1e-9 * scale < abs(r) < 0.04 * scale:  # too short for an arrow
                 left.plot([np.angle(r)], [abs(r)], "o", color="tab:red", ms=4)
-        for v, w in zip(read, fitted, strict=True):
-            left.plot(np.angle([w, v]), np.abs([w, v]), "-", color="tab:orange", lw=1.0)
-            left.plot([np.angle(v)], [abs(v)], "o", color="tab:blue", ms=3.5)
         left.set_title(f"{name}vibration, {amplitude_unit(found)}", pad=16)
         left.set_rlim(0, 1.12 * scale)
         left.set_rlabel_position(free_direction([*before, *after]))
@@ -65,22 +61,6 @@ def draw(found: FieldBalancing, rotors: Sequence[int]) -> Figure:
         ),
         Line2D([], [], color="tab:red", lw=2.0, label="predicted vibration; correction, named by its plane"),
     ]
-    if any(solved.group.fit is not None for solved in found.solved):
-        label = "reading of a run; to what was fitted to it"
-        handles.append(
-            Line2D(
-                [], [], color="tab:orange", lw=1.0, marker="o", mfc="tab:blue", mec="tab:blue", label=label
-            )
-        )
     figure.get_layout_engine().set(rect=(0, 0, 1, 0.985))  # type: ignore[union-attr, call-arg]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9, frameon=False)
     return figure
-
-
-def _history(solved: Solved, i: int) -> tuple[list[complex], list[complex]]:
-    """Return the readings of a rotor whose runs were fitted together, and the vibration fitted to each."""
-    if solved.balance is None:
-        return [], []
-    fit = solved.balance.fit
-    here = fit.present[i]
-    return fit.readings[i][here].tolist(), (fit.readings - fit.residuals)[i][here].tolist()

@@ -1,109 +1,195 @@
-"""The report of a balancing in the field: one self-contained page of HTML."""
+"""What the report of a balancing in the field says: before, after, what to trim, the verdict; a page for each rotor."""
 
 from __future__ import annotations
 
-import io
-from collections.abc import Mapping, Sequence
-from html import escape
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from functools import partial
 
-from cli.field import fit_words, words
+import numpy as np
+
+from cli.field import columns, fit_picture, fit_words, picture, words
 from cli.field.fit import LogFits
+from cli.field.runs import Complex, Real
 from cli.field.solve import FieldBalancing, Solved
+from cli.field.tolerance import LastRun, Verdict, first_reading, last_run, measured_verdicts, verdicts
+from cli.read.units import degrees, from_si
+from cli.show.columns import Column, Section, Sheet, Table
+from cli.show.text import angle_text
 
-if TYPE_CHECKING:
-    from cli.show.columns import Cell, Values
-
-STYLE = """
-body { font: 10.5pt/1.35 system-ui, sans-serif; color: #111; max-width: 190mm; margin: 8mm auto; padding: 0 4mm; }
-h1 { font-size: 15pt; margin: 0 0 1mm; } h2 { font-size: 11pt; margin: 3.5mm 0 1mm; border-bottom: 1px solid #999; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 9.5pt; }
-th, td { padding: .15mm 2mm; text-align: right; border-bottom: 1px solid #ddd; } th { background: #f0f0f0; font-weight: 600; }
-td.text, th.text { text-align: left; } table.main td { font-size: 12pt; font-weight: 600; }
-.beside { display: flex; gap: 8mm; } .beside > div { flex: 1 1 auto; }
-p, ul { margin: 1mm 0; } .small { font-size: 9pt; color: #333; } .warning { border-left: 3px solid #b00; padding-left: 2mm; }
-svg { width: 100%; height: auto; max-height: 64mm; } section { break-after: page; } section:last-of-type { break-after: auto; }
-@page { size: A4; margin: 10mm; } @media print { body { margin: 0; max-width: none; } }
-"""
+METHOD = (
+    "Influence coefficients from trial runs (E. L. Thearle 1934), corrections by least squares or by the smallest largest "
+    "residual (T. P. Goodman 1964; second-order cone program), all runs of a log fitted together; tolerance after ISO "
+    "21940-11. The masses are at the radius of the trial masses."
+)
 
 
-def html(found: FieldBalancing, source: str, warnings: Sequence[str], fits: LogFits | None = None) -> bytes:
-    """Return the report of every rotor, a page each; with `fits` the history of its runs and what to expect."""
-    pages = []
-    for rotor, (k, i) in enumerate(found.place):
-        solved = found.solved[k]
-        name = f"Rotor {escape(found.runs.rotors[rotor])}" if found.several else "Balancing in the field"
-        parts = [
-            f"<h1>{name}</h1>",
-            f'<p class="small">{escape(source)}. {escape(words.conventions(found))}</p>',
-            *([f'<p class="warning">{escape(warning)}</p>' for warning in warnings] if rotor == 0 else []),
-            "<h2>Readings</h2>",
-            *(_readings(found, solved, i) if fits is None else _history(fits, solved, i)),
-            "<h2>Influence coefficients</h2>",
-            _table(words.influence_table(found, solved, i)),
-            '<div class="beside"><div><h2>Corrections</h2>',
-            _table(words.correction_table(found, solved, i), "main"),
-            "".join(f"<p>{escape(line)}</p>" for line in words.split_lines(found, solved, i)),
-            "</div><div><h2>Predicted vibration</h2>",
-            _table(words.residual_table(found, solved, i)),
-            "</div></div>",
-            "".join(f"<p>{escape(line)}</p>" for line in words.summary(found, solved, i)),
-        ]
-        if lines := words.verdict(found, solved, i):
-            parts += ["<h2>Verdict</h2>", "".join(f"<p>{escape(line)}</p>" for line in lines)]
-        if fits is not None and (lines := fit_words.expected(fits, solved, i)):
-            parts += ["<h2>What to expect</h2>", "".join(f"<p>{escape(line)}</p>" for line in lines)]
-        parts.append(_picture(found, rotor))
-        pages.append(f"<section>{''.join(parts)}</section>")
-    document = (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        f"<title>Balancing: {escape(source)}</title><style>{STYLE}</style></head>\n<body>{''.join(pages)}</body></html>\n"
+MOST = 24  # rotors of one report
+
+
+def sheets(found: FieldBalancing, fits: LogFits | None) -> Iterator[Sheet]:
+    """Yield for each rotor what to do and what it does, and on a page of its own how it was found."""
+    for rotor, (name, solved, i) in enumerate(found.each(MOST)):
+        title = f"Rotor {name}" if name else ""
+        figure = partial(picture.draw, found) if fits is None else partial(fit_picture.draw, fits)
+        yield Sheet(title, list(_sections(found, fits, solved, i)), partial(figure, [rotor]))
+        yield Sheet(title, [Section("How it was found", _found(found, fits, solved, i))])
+    if len(found.runs.rotors) > MOST:
+        yield Sheet("", [Section("Further rotors", [f"{len(found.runs.rotors) - MOST} are not shown here."])])
+
+
+def _sections(found: FieldBalancing, fits: LogFits | None, solved: Solved, i: int) -> Iterator[Section]:
+    last = last_run(found, solved, i)
+    from_here = found.request.from_here and bool(solved.standing[i].any())
+    before, said = first_reading(found, solved, i), [_convention(found)]
+    if before is None:
+        said.append("Before: as fitted to all runs, of which none was without masses.")
+    states = {"before": solved.initial[i] if before is None else before}
+    if last is not None:
+        states[f"run {last.run}"] = last.vibration
+        said.append(f"Run {last.run}: with {_masses(found, solved, last.on)} on the rotor.")
+    states["predicted"] = solved.residual[i]
+    yield Section("Vibration", [_vibration(found, solved, states), *said])
+    state = (
+        "as it stands, with the trial masses left on"
+        if from_here
+        else "in its initial state, all trial masses off"
     )
-    return document.encode()
-
-
-def _readings(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
-    return [
-        f'<p class="small">{escape("; ".join(words.trials_lines(found, solved, i)))}</p>',
-        _table(words.runs_table(found, solved, i))
-        if solved.group.trials
-        else "<p>The initial run stands below, beside the predicted vibration.</p>",
-    ]
-
-
-def _history(fits: LogFits, solved: Solved, i: int) -> list[str]:
-    summary = f'<p class="small">{escape(fit_words.summary(fits, solved, i))}</p>'
-    return [summary, _table(fit_words.history(fits, solved, i))]
-
-
-def _table(columns: Mapping[str, Values], kind: str = "") -> str:
-    named = [any(isinstance(cell, str) for cell in column) for column in columns.values()]
-
-    def cell(value: Cell, is_name: bool, tag: str = "td") -> str:
-        shown = "" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)
-        return (
-            f'<{tag} class="text">{escape(shown)}</{tag}>' if is_name else f"<{tag}>{escape(shown)}</{tag}>"
+    amounts = _amounts(found, solved, i, solved.corrections[i])
+    told = f"To ADD to the rotor {state}; or to REMOVE the same amounts opposite (+180°)."
+    title = "Trim: what to add now" if from_here else "Corrections"
+    yield Section(title, [amounts, *words.split_lines(found, solved, i), told])
+    if last is not None and not from_here:
+        told = f"To ADD to what was on the rotor in run {last.run}: together they are the corrections above."
+        yield Section(
+            "Trim: what to add now", [_amounts(found, solved, None, solved.total[i] - last.on), told]
         )
+    yield Section("Verdict", _verdict(found, solved, i, last))
+    if fits is not None and (lines := fit_words.expected(fits, solved, i)):
+        yield Section("What to expect", ["\n".join(lines)])
 
-    head = "".join(cell(name, is_name, "th") for name, is_name in zip(columns, named, strict=True))
-    rows = "".join(
-        "<tr>" + "".join(cell(value, is_name) for value, is_name in zip(row, named, strict=True)) + "</tr>"
-        for row in zip(*columns.values(), strict=True)
+
+def _amounts(found: FieldBalancing, solved: Solved, i: int | None, masses: Complex) -> Table:
+    """Masses in their planes; with `i` the uncertainties of that rotor's corrections."""
+    table = [
+        Column("plane", "", solved.planes),
+        Column(found.runs.per, found.runs.mass_unit, found.amount(np.abs(masses))),
+        Column("angle", "deg", [degrees(w) if w else None for w in masses.tolist()]),
+    ]
+    spreads = found.uncertainty(solved)
+    if i is not None and spreads is not None:
+        table += [
+            Column("± ", found.runs.mass_unit, found.amount(spreads[0][i])),
+            Column("± angle", "deg", spreads[1][i]),
+        ]
+    return Table(table, keys=("plane",))
+
+
+def _vibration(found: FieldBalancing, solved: Solved, states: dict[str, Complex]) -> Table:
+    """Vibration in several states, as the instrument shows it."""
+    unit, table = found.runs.amplitude_unit, columns.channels(found, solved.group.channels)
+    keys = [column.header for column in table]
+    for name, vibration in states.items():
+        table.append(Column(name, unit, _four_digits(np.abs(vibration))))
+        if not found.request.four_run:
+            table.append(Column("phase", "deg", _phases(found, vibration)))
+    return Table(table, keys=keys)
+
+
+def _four_digits(values: Real) -> list[float]:
+    return [float(f"{value:.4g}") for value in values.tolist()]
+
+
+def _phases(found: FieldBalancing, vibration: Complex) -> list[float | None]:
+    """Phases in the instrument's own sense, to a hundredth of a degree; none where nothing moves."""
+    shown = vibration.conj() if found.request.against else vibration
+    return [round(float(degrees(v)), 2) % 360 if abs(v) > 0 else None for v in shown.tolist()]
+
+
+def _convention(found: FieldBalancing) -> str:
+    if found.request.four_run:
+        return found.request.conventions
+    if not found.request.against:
+        return (
+            "Phases as the instrument shows them; they and the mass angles are counted in one common sense, from one mark "
+            "on the rotor."
+        )
+    return (
+        "Phases as the instrument shows them, counted against the sense of the mass angles; those of the influence "
+        "coefficients and of the picture are counted in the sense of the mass angles."
     )
-    return f'<table class="{kind}"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
 
 
-def _picture(found: FieldBalancing, rotor: int) -> str:
-    """Return the polar pictures as SVG, or a sentence where matplotlib is not installed."""
-    try:
-        import matplotlib
-    except ImportError:
-        return '<p class="small">(No picture: matplotlib is not installed.)</p>'
-    from cli.field.picture import draw
+def _masses(found: FieldBalancing, solved: Solved, masses: Complex) -> str:
+    return " and ".join(
+        f"{found.amount(abs(w)):.6g} {found.unit} at {angle_text(degrees(complex(w)), '.6g')}° in {plane}"
+        for plane, w in zip(solved.planes, masses, strict=True)
+        if w
+    )
 
-    matplotlib.use("Agg")
-    matplotlib.rcParams["svg.hashsalt"] = f"dalembert-{rotor}"
-    stream = io.StringIO()
-    draw(found, [rotor]).savefig(stream, format="svg", metadata={"Date": None})
-    drawing = stream.getvalue()
-    return drawing[drawing.index("<svg") :]
+
+def _verdict(found: FieldBalancing, solved: Solved, i: int, last: LastRun | None) -> list[str | Table]:
+    """The residual against what is permissible: measured where there is a run with the corrections, else predicted."""
+    read = first_reading(found, solved, i)
+    before = float(np.nanmax(np.abs(solved.initial[i] if read is None else read)))
+    after = np.abs(solved.residual[i] if last is None else last.vibration)
+    largest, unit = float(np.nanmax(after)), words.amplitude_unit(found)
+    how = "as predicted" if last is None else f"as measured in run {last.run}"
+    change = f", {100 * (largest - before) / before:+.1f} %" if before else ""
+    parts: list[str | Table] = [
+        f"Largest vibration {how}: {largest:.4g} {unit} (before: {before:.4g} {unit}{change})."
+    ]
+    ceiling = found.request.max_residual
+    if ceiling is not None:
+        verdict = "within" if largest <= ceiling * (1 + 1e-9) else "beyond"
+        limit = [Column("largest", found.runs.amplitude_unit, [largest]), Column("permissible", found.runs.amplitude_unit, [ceiling])]  # fmt: skip
+        parts.append(Table([*limit, Column("verdict", "", [verdict])]))
+    tolerance = found.request.tolerance
+    if tolerance is not None:
+        whole = from_si(tolerance.permissible, "unbalance", "g_mm")
+        grade = f" {tolerance.grade}" if tolerance.grade else ""
+        planes = verdicts(found, solved, i) if last is None else measured_verdicts(found, solved, i, last)
+        parts += [
+            f"Residual unbalance {how}; tolerance{grade}: {whole:.6g} g·mm, shared equally.",
+            _of_planes(planes),
+        ]
+    if last is None:
+        parts.append(
+            "No run with the corrections on is among these: measure one, add it to the table, and the verdict is on what was "
+            "measured."
+        )
+    return parts
+
+
+def _of_planes(planes: Sequence[Verdict]) -> Table:
+    def in_g_mm(values: Sequence[float]) -> list[float]:
+        return [from_si(value, "unbalance", "g_mm") for value in values]
+
+    _, share, before, after = (list(column) for column in zip(*planes, strict=True))
+    said = ["not determined" if v.residual != v.residual else "within" if v.residual <= v.permissible else "beyond" for v in planes]  # fmt: skip
+    table = [Column("plane", "", [v.plane for v in planes])]
+    table += [
+        Column(name, "g_mm", in_g_mm(values))
+        for name, values in (("permissible", share), ("before", before), ("after", after))
+    ]
+    return Table([*table, Column("verdict", "", said)], keys=("plane",))
+
+
+def _found(found: FieldBalancing, fits: LogFits | None, solved: Solved, i: int) -> list[str | Table]:
+    """Readings, coefficients, figures of merit."""
+    group = solved.group
+    parts: list[str | Table] = []
+    if fits is not None:
+        parts += [fit_words.summary(fits, solved, i), _history(found, fits, solved, i)]
+    for j, trial in enumerate(group.trials):
+        on = _masses(found, solved, group.on[i, j]) if found.stored is None else ""
+        parts += [f"Run {trial.run}{': ' + on if on else ''}{', kept' if trial.kept else ''}", _vibration(found, solved, {"amplitude": group.runs[i, j]})]  # fmt: skip
+    influence = words.influence_table(found, solved, i)
+    parts += ["Influence coefficients:", Table([Column(name, "", values) for name, values in influence.items()], keys=("sensor",))]  # fmt: skip
+    return [*parts, "\n".join(words.summary(found, solved, i)[1:])]
+
+
+def _history(found: FieldBalancing, fits: LogFits, solved: Solved, i: int) -> Table:
+    rows = fit_words.history(fits, solved, i)
+    if found.request.against:
+        rows["phase°"] = [round(-float(v or 0) % 360, 2) for v in rows["phase°"]]
+    return Table([Column(name, "", values) for name, values in rows.items()], keys=("run", "sensor"))

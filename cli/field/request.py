@@ -32,6 +32,8 @@ class Request:
     tolerance: Tolerance | None = None
     radius: float | None = None
     conventions: str = ""
+    against: bool = False
+    """Whether the instrument counts phases against the sense of the mass angles: they were turned round."""
     places: list[float] | None = None
     """Where masses can go, degrees: the corrections are split onto them."""
 

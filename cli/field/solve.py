@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,14 +43,6 @@ SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
 MANY = 200  # rotors whose uncertainties are worked out unasked
 SHOWN = 5  # of so many rotors the same is said, of the others together
 UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
-
-
-class Verdict(NamedTuple):
-    """A plane's permissible and initial unbalance, kg·m; NaN where the readings do not determine it."""
-
-    plane: str
-    permissible: float
-    initial: float
 
 
 @dataclass
@@ -368,14 +360,6 @@ class FieldBalancing:
         """Say what was done otherwise than a reader might think, once."""
         if text not in self.warnings:
             self.warnings.append(text)
-
-    def verdicts(self, solved: Solved, i: int) -> list[Verdict]:
-        """Return each plane's tolerance; none where no tolerance is asked for."""
-        if self.request.tolerance is None or solved.unbalance is None:
-            return []
-        share = self.request.tolerance.permissible / len(solved.planes)
-        size = self.in_kg_m(solved.unbalance[i]).tolist()
-        return [Verdict(plane, share, u) for plane, u in zip(solved.planes, size, strict=True)]
 
     def in_kg_m(self, corrections: Complex) -> Real:
         """Return the unbalances of masses at the trial radius, or of unbalances as they are."""

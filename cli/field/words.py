@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.field.solve import FieldBalancing, Solved
-from cli.read.units import degrees, from_si, to_si
+from cli.field.tolerance import verdicts
+from cli.read.units import degrees, from_si, to_si, written
 from cli.show.text import angle_text, table_text
 
 if TYPE_CHECKING:
@@ -113,6 +114,14 @@ def residual_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
         f"before {amplitude_unit(found)}": [float(abs(v)) for v in before],
         f"predicted {amplitude_unit(found)}": [float(abs(v)) for v in after],
     }
+    if solved.balance is not None:
+        spread = solved.balance.vibration_deviation(solved.total)[i]
+        if np.isfinite(spread).any():
+            columns[f"± {amplitude_unit(found)}"] = [_known(x) for x in spread]
+        ceiling = found.request.max_residual
+        if ceiling is not None:
+            within = solved.balance.probability_within(ceiling)[i]
+            columns[f"within {ceiling:g}: probability"] = [_known(x) for x in within]
     if not found.request.four_run:
         columns["phase°"] = [round(float(degrees(v)), 2) for v in after]
     return columns
@@ -120,12 +129,7 @@ def residual_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
 
 def amplitude_unit(found: FieldBalancing) -> str:
     """The amplitude's unit as people write it."""
-    text = found.runs.amplitude_unit
-    tag = ""
-    for suffix, name in (("_pp", " pk-pk"), ("_pk", " pk"), ("_rms", " r.m.s.")):
-        if text.endswith(suffix):
-            text, tag = text[: -len(suffix)], name
-    return text.replace("um", "µm").replace("_s2", "/s²").replace("_s", "/s") + tag
+    return written(found.runs.amplitude_unit)
 
 
 def summary(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
@@ -179,14 +183,16 @@ def verdict(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
     lines = [
         f"tolerance{' ' + tolerance.grade if tolerance.grade else ''}: U_per = {whole:.6g} g·mm, shared equally"
     ]
-    for plane, share, before in found.verdicts(solved, i):
-        initial = (
+    for plane, share, *sizes in verdicts(found, solved, i):
+        before, after = (
             "not determined"
-            if np.isnan(before)
-            else f"{from_si(before, 'unbalance', 'g_mm'):.6g} g·mm ({'within' if before <= share else 'beyond'})"
+            if np.isnan(u)
+            else f"{from_si(u, 'unbalance', 'g_mm'):.6g} g·mm ({'within' if u <= share else 'beyond'})"
+            for u in sizes
         )
         lines.append(
-            f"  plane {plane}: permissible {from_si(share, 'unbalance', 'g_mm'):.6g}, initial {initial}"
+            f"  plane {plane}: permissible {from_si(share, 'unbalance', 'g_mm'):.6g}, initial {before}, "
+            f"residual as predicted {after}"
         )
     return lines
 

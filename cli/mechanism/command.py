@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -33,6 +33,14 @@ def _print_schema(asked: bool) -> None:
         raise typer.Exit
 
 
+EXAMPLE = "klann"
+PANELS = {
+    "What": "at sweep inputs only branch change vary variants",
+    "How": "order newton",
+    "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states schema",
+}
+
+
 @command
 def run(
     file: Annotated[str, typer.Argument(metavar="FILE.toml", help="The mechanism; - is standard input.")],
@@ -54,8 +62,8 @@ def run(
         str | None, typer.Option(metavar="NAME,...", help="These links and points; nothing else is computed.")
     ] = None,
     order: Annotated[
-        str | None,
-        typer.Option(help="position, velocity, acceleration or jerk (default: what the file's input gives)."),
+        Literal["position", "velocity", "acceleration", "jerk"] | None,
+        typer.Option(help="How far to differentiate (default: as the file's input gives it)."),
     ] = None,
     branch: Annotated[
         str | None, typer.Option(metavar="all|NUMBER", help="Every assembly, or one of them.")
@@ -165,9 +173,8 @@ def run(
     from cli.mechanism.solve import ORDERS, Analysis, load
     from cli.mechanism.studies import Request
     from cli.mechanism.variants import asked, assigned
+    from cli.mechanism.words import METHOD
 
-    if order is not None and order not in ORDERS:
-        raise options.bad("--order", f"'{order}': expected {', '.join(ORDERS)}")
     if branch is not None and branch != "all" and options.whole(branch) < 1:
         raise options.bad("--branch", f"'{branch}': expected all, or the number of an assembly")
     names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
@@ -216,7 +223,7 @@ def run(
     if accuracy is not None or until is not None:
         raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
     with _told(file):
-        mechanism, bare, said = load(file)
+        mechanism, bare, said, about = load(file)
         mechanism = assigned(mechanism, bare, change) if change else mechanism
         several = asked(mechanism, bare, vary, variants, said)
         q = wanted(mechanism, at, sweep, inputs, bare)
@@ -224,7 +231,7 @@ def run(
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)
         analysis.warnings += said
         analysis.check_names()
-        others = show.json or show.text or show.plot or show.expect
+        others = show.json or show.text or show.plot or show.expect or show.report
         streams = show.as_csv and not others
         if several is None and streams and own in ([], ["--forces"]) and analysis.is_long:
             return _long(analysis, forces, states)
@@ -233,16 +240,24 @@ def run(
         times = 1 if several is None or streams else several.count
         analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces, times=times)
         if several is None:
-            return _result(analysis, request, states, explain, graph)
+            return _result(analysis, request, states, explain, graph, about)
 
         def analysis_of(variant: Mechanism) -> Analysis:
             home = at is None and sweep is None and inputs is None
             its = wanted(variant, at, sweep, inputs, bare) if home and several.moves_inputs else q
             return Analysis.of(file, variant, its, rates, names, branch)
 
-        found = Many(mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None))
+        found = Many(
+            mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
+        )
         result = found.result(streams, show.as_json, table)
-        return replace(result, warnings=[*said, *result.warnings], within=lambda: _told(file))
+        return replace(
+            result,
+            warnings=[*said, *result.warnings],
+            within=lambda: _told(file),
+            method=METHOD,
+            about={"title": mechanism.name or "Mechanism"} | about,
+        )
 
 
 def _in_time(
@@ -291,13 +306,18 @@ def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
 
 
 def _result(
-    analysis: Analysis, request: Request, states: Path | None, explain: bool, graph: str | None
+    analysis: Analysis,
+    request: Request,
+    states: Path | None,
+    explain: bool,
+    graph: str | None,
+    about: dict[str, str],
 ) -> Result:
-    from cli.mechanism import columns, graphs, poses, remarks
+    from cli.mechanism import columns, graphs, poses, remarks, words
     from cli.mechanism import forces as of_forces
     from cli.mechanism.states import table as link_states
     from cli.mechanism.studies import Studies
-    from cli.show.columns import Result
+    from cli.show.columns import Result, Sheet
 
     studies = Studies(analysis, request)
     found = studies.document
@@ -314,11 +334,6 @@ def _result(
         if request.forces:
             listed = [pose | part for pose, part in zip(listed, of_forces.poses(analysis), strict=True)]
         return {"name": analysis.mechanism.name, "poses": listed, **found}
-
-    def afterword() -> str:
-        from cli.mechanism import words
-
-        return words.afterword(studies, explain=explain)
 
     def figure() -> Figure:
         from cli.mechanism import force_picture, picture
@@ -337,13 +352,17 @@ def _result(
     own = columns.studies(studies)
     # the table of a study asked for alone stands in place of the poses
     alone = bool(own) and len(request.tables) == 1
+    tables = {**own, "poses": of_poses} if alone else {"poses": of_poses, **own}
     return Result(
         document=document,
-        tables={**own, "poses": of_poses} if alone else {"poses": of_poses, **own},
+        tables=tables,
         screen=of_poses if alone else None,
         notes=lambda: analysis.mechanism.name,
-        afterword=afterword,
+        afterword=lambda: words.afterword(studies, explain=explain),
         figure=figure,
+        method=words.METHOD,
+        sheets=lambda: [Sheet("", words.sections(studies, tables, explain=explain), figure)],
+        about={"title": analysis.mechanism.name or "Mechanism"} | about,
         beside={} if states is None else {states: beside},
         warnings=remarks.warnings(studies),
         failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),

@@ -12,7 +12,8 @@ import numpy as np
 
 from cli.errors import DataError, memory, nearest
 from cli.mechanism.read import Inputs, Sweep
-from cli.read.files import read_bytes
+from cli.read.about import about
+from cli.read.files import read_bytes, remember
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,6 +33,8 @@ class Described(NamedTuple):
     """The units of bare lengths and angles, as far as `[units]` says them."""
     warnings: list[str]
     """Remarks about the tables beside the file."""
+    about: dict[str, str]
+    """What the file says for the head of a report."""
 
 
 def load(path: str) -> Described:
@@ -41,6 +44,7 @@ def load(path: str) -> Described:
     from cli.mechanism.tables import beside
     from virtualwork import Mechanism
 
+    remember(path)
     file, data = read_bytes(path)
     warnings: list[str] = []
     try:
@@ -51,8 +55,9 @@ def load(path: str) -> Described:
         raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
     except ValueError as error:
         raise DataError(str(error)) from None
-    units = tomllib.loads(text).get("units", {})
-    return Described(mechanism, {kind: str(unit) for kind, unit in units.items()}, warnings)
+    document = tomllib.loads(text)
+    units = {kind: str(unit) for kind, unit in document.get("units", {}).items()}
+    return Described(mechanism, units, warnings, about(file, document))
 
 
 @dataclass

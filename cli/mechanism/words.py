@@ -3,11 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 
 from cli.mechanism.solve import ORDERS, Analysis
 from cli.mechanism.studies import Document, Studies
-from cli.show.text import table_text
+from cli.show.columns import Section, Table
+from cli.show.text import heading, table_text
 from virtualwork.plan.steps import Group, Place, Slide, Turn
+
+METHOD = (
+    "Assur groups one after the other, two-link groups in closed form (Chace), larger ones by Newton-Raphson; rates by the "
+    "derivatives of the loop equations along the input; effort by virtual work and by Newton and Euler, joint forces by "
+    "d'Alembert's principle (R. Ibrahim, Mecanismos, PMR/EPUSP; J. A. Riul, Dinâmica das Máquinas; R. Nicoletti, SEM 104). "
+    "Angles are counter-clockwise, reactions are what the link `from` exerts on the link `on`."
+)
+
+
+def sections(studies: Studies, tables: Mapping[str, Callable[[], Table]], *, explain: bool) -> list[Section]:
+    """What the report shows: every table, and the order of solution."""
+    shown = [Section(heading(name), [table()]) for name, table in tables.items()]
+    if explain:
+        parts = [explain_text(studies.analysis)]
+        if studies.request.forces:
+            parts.append(explain_forces(studies.analysis))
+        shown.append(Section("Order of solution", parts))
+    return shown
 
 
 def afterword(studies: Studies, *, explain: bool) -> str:

@@ -6,6 +6,12 @@ from cli.place.solve import Placing
 from cli.read.units import degrees, from_si
 from cli.show.text import angle_text
 
+METHOD = (
+    "Without limits the two places beside the correction share it by the sine rule; with limits the places nearest to it are "
+    "filled first (least total mass, by linear programming duality); weights from stock by the choice of least error, all "
+    "choices compared."
+)
+
 
 def notes(found: Placing) -> str:
     """Say what is to be reached."""

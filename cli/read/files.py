@@ -16,6 +16,8 @@ ZIP, OLE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
 SUFFIXES = (".xlsx", ".xlsm", ".xls", ".ods")
 # device and inode: a link to a file is the file
 _read: set[tuple[int, int]] = set()
+# the tables and descriptions that were read, as the user named them
+_named: dict[str, None] = {}
 # what can be read only once: standard input, pipes
 _held: dict[str, bytes] = {}
 
@@ -24,6 +26,17 @@ def forget() -> None:
     """Begin a call: nothing has been read."""
     _read.clear()
     _held.clear()
+    _named.clear()
+
+
+def remember(path: str) -> None:
+    """Remember how the user named a table or a description."""
+    _named[path] = None
+
+
+def named() -> list[str]:
+    """Return the tables and descriptions that were read, in order."""
+    return list(_named)
 
 
 def note(path: str | Path) -> Path:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from cli.errors import DataError, cell_error, quote
 from cli.read.decoding import LINE, LOOKED_AT, decoded, delimiter
-from cli.read.files import is_workbook, read_bytes, split_sheet
+from cli.read.files import is_workbook, read_bytes, remember, split_sheet
 from cli.read.headers import Heading, heading, is_unit, likeness, offers
 from cli.read.units import is_number
 
@@ -121,6 +121,7 @@ class Source:
 
 def open_source(path: str, known: Mapping[str, str], texts: Sequence[str] | None) -> Source:
     """Open a file, or standard input for `-`, and find its header; `texts` is None where every column is taken."""
+    remember(path)
     path, wanted = split_sheet(path)
     file, data = read_bytes(path)
     warnings: list[str] = []

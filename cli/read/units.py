@@ -124,6 +124,20 @@ def unit_name(written: str) -> str:
     return re.sub("_+", "_", written.translate(_SIGNS)).strip("_")
 
 
+_SPOKEN = {"_pp": " pk-pk", "_pk": " pk", "_rms": " r.m.s."}
+
+
+def written(unit: str) -> str:
+    """Return a unit as people write it: `g·mm`, `mm/s²`, `µm pk-pk`, `°`; the other way round than `unit_name`."""
+    tag = _tag(unit)
+    bare = unit.removesuffix(tag).replace("um", "µm").replace("deg", "°")
+    for per in ("_s3", "_s2", "_s", "_m3", "_cm3"):
+        if bare.endswith(per):
+            bare = f"{bare.removesuffix(per)}/{per[1:]}"
+            break
+    return bare.translate(str.maketrans("_23", "·²³")) + _SPOKEN.get(tag, "")
+
+
 def find_unit(dimension: str, suffix: str) -> str | None:
     """Return the unit of this dimension whose name is `suffix`, in any case of letters; None if there is none."""
     units = UNITS[dimension]

@@ -53,6 +53,23 @@ class Table:
 
 
 @dataclass(frozen=True, eq=False)
+class Section:
+    """A part of a report below a heading of its own: paragraphs and tables."""
+
+    title: str
+    parts: Sequence[str | Table]
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """What begins a page of a report."""
+
+    title: str
+    sections: Sequence[Section]
+    figure: Callable[[], Figure] | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Result:
     """What a command has found, in every form it can be shown in; each is formed when it is asked for."""
 
@@ -67,6 +84,14 @@ class Result:
     afterword: Callable[[], str] = lambda: ""
     """What the terminal shows below the table."""
     figure: Callable[[], Figure] | None = None
+    method: str = ""
+    """How it was found, and after whom: for the report."""
+    sheets: Callable[[], Iterable[Sheet]] | None = None
+    """What the report shows, where that is more than the notes, the tables, the afterword and the picture."""
+    shows_input: bool = False
+    """Whether the sheets show what the tables that were read hold."""
+    about: Mapping[str, str] = field(default_factory=dict)
+    """What the file itself says for the head of the report."""
     beside: Mapping[Path, Callable[[], bytes | Iterable[bytes]]] = field(default_factory=dict)
     """Files that options of the command itself ask for."""
     warnings: list[str] = field(default_factory=list)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Report:
+class Comparison:
     """A row for each expected cell, and whether all hold."""
 
     columns: Columns
@@ -36,7 +36,7 @@ def compare(
     file: str,
     rtol: float,
     other: Callable[[], Columns] | None = None,
-) -> Report:
+) -> Comparison:
     """Compare a result with a file of expected values, cell by cell.
 
     Rows are matched by the key columns that the file has, else by their order. A number holds where its
@@ -84,7 +84,7 @@ def compare(
     total = len(lines["verdict"])
     if not total:
         raise DataError(f"{file}: no expected value in it: nothing would be checked")
-    return Report(lines, f"{total - wrong} of {total} values within {rtol:g}", wrong == 0)
+    return Comparison(lines, f"{total - wrong} of {total} values within {rtol:g}", wrong == 0)
 
 
 def _alike(name: str, columns: Iterable[str]) -> list[str]:

@@ -22,7 +22,7 @@ def handed_on(suffix: str, tables: Mapping[str, Table], warnings: list[str]) -> 
     """Return the file of this suffix: all tables, each with its name where there are several."""
     if suffix == ".xlsx":
         return _workbook(tables)
-    form: Callable[[Cells], str] = {".md": _markdown, ".tex": _latex, ".html": _html}[suffix]
+    form: Callable[[Cells], str] = {".md": markdown, ".tex": _latex, ".html": _html}[suffix]
     title = {".md": "## {}\n\n", ".tex": "% {}\n", ".html": "<h2>{}</h2>\n"}[suffix]
     several = len(tables) > 1
     parts = [title.format(name) * several + form(_cells(table)) for name, table in tables.items()]
@@ -42,7 +42,8 @@ def _cells(table: Table) -> Cells:
     return list(columns), [list(row) for row in zip(*texts, strict=True)], numbers
 
 
-def _markdown(cells: Cells) -> str:
+def markdown(cells: Cells) -> str:
+    """A table in Markdown."""
     header, rows, numbers = cells
 
     def line(row: list[str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, wraps
 from inspect import Parameter, signature
@@ -14,10 +14,21 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.errors import one_line
-from cli.read.files import refuse_inputs
+from cli.read.files import named, refuse_inputs
+from cli.show.colour import coloured
 
 if TYPE_CHECKING:
     from cli.show.columns import Document, Result, Table
+    from cli.show.expect import Comparison
+
+
+PANELS = {
+    "What": "column",
+    "Output": "json output units digits plot report expect rtol",
+    "Head of the report": "title machine customer date author",
+    "Terminal": "text no_color help",
+}
+"""Heading of the help -> the options below it that every command shares."""
 
 
 def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
@@ -66,7 +77,10 @@ class ShowOptions:
         ),
     ] = None
     rtol: Annotated[
-        float, typer.Option("--rtol", min=0.0, help="Relative tolerance of --expect (for angles: radians).")
+        float,
+        typer.Option(
+            "--rtol", metavar="NUMBER", min=0.0, help="Relative tolerance of --expect (for angles: radians)."
+        ),
     ] = 1e-3
     text: Annotated[bool, typer.Option("--text", help="Print the aligned table even into a pipe.")] = False
     digits: Annotated[
@@ -86,6 +100,30 @@ class ShowOptions:
             metavar="UNIT,...", help="Units of the columns, such as mm,g,deg,N_mm,rpm; JSON stays SI."
         ),
     ] = None
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write a report to hand on to FILE (.html or .md): what was given, found, drawn, and how.",
+            callback=suffix_among(".html", ".htm", ".md"),
+        ),
+    ] = None
+    title: Annotated[str | None, typer.Option(metavar="TEXT", help="The report's title.")] = None
+    machine: Annotated[str | None, typer.Option(metavar="TEXT", help="The machine it is about.")] = None
+    customer: Annotated[str | None, typer.Option(metavar="TEXT", help="Whom it is for.")] = None
+    date: Annotated[str | None, typer.Option(metavar="TEXT", help="Its date, if not today's.")] = None
+    author: Annotated[str | None, typer.Option(metavar="TEXT", help="Who made it.")] = None
+    no_color: Annotated[
+        bool,
+        typer.Option("--no-color", help="No colours on a terminal; so does NO_COLOR in the environment."),
+    ] = False
+
+    @property
+    def head(self) -> dict[str, str]:
+        """What the options say for the head of the report."""
+        from cli.read.about import HEAD
+
+        return {name: text for name in HEAD if (text := getattr(self, name)) is not None}
 
     @property
     def as_csv(self) -> bool:
@@ -112,17 +150,35 @@ def command(find: Callable[..., Result]) -> Callable[..., None]:
         from cli.read.headers import rename
 
         options = ShowOptions(**{name: given.pop(name) for name in shared})  # type: ignore[arg-type]
+        if options.report is None and (unused := next(iter(options.head), None)) is not None:
+            raise typer.BadParameter("expected --report FILE too", param_hint=f"--{unused}")
         rename(options.column)
+        asked = {
+            name.replace("_", " "): _said(value)
+            for name, value in given.items()
+            if value != own[name].default and value is not None
+        }
         if "show" in own:
             given["show"] = options
         result = find(**given)
         with result.within():
-            show(result, options)
+            show(result, options, asked)
 
     parameters = [*(p for name, p in own.items() if name != "show"), *shared.values()]
     run.__signature__ = signature(find).replace(parameters=parameters, return_annotation=None)  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run
+
+
+def _said(value: object) -> str:
+    """Return an option's value as the user gave it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return (
+        ", ".join(map(str, value))
+        if isinstance(value, (list, tuple))
+        else str(getattr(value, "value", value))
+    )
 
 
 def _parameters(of: Callable[..., object]) -> dict[str, Parameter]:
@@ -136,34 +192,38 @@ def _parameters(of: Callable[..., object]) -> dict[str, Parameter]:
     }
 
 
-def show(result: Result, options: ShowOptions) -> None:
+def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
     """Write the files asked for, print the result; status 1 if an expectation is not met, or nothing was found."""
     from cli.read.headers import check_renamed
     from cli.show.files import write
     from cli.show.text import csv_text, json_parts, paragraphs, table_text
 
+    files = named()
     result = _in_chosen_units(result, options.units)
     if result.blocks is not None:
         check_renamed()
         _stream(result, result.blocks(), options)
         return
     first, output = cache(next(iter(result.tables.values()))), options.output
-    report = None
+    checked = None
     if options.expect is not None:
         from cli.show.expect import compare
 
         table = first()
         screen = result.screen
         other = None if screen is None else lambda: screen().cells
-        report = compare(table.cells, table.keys, str(options.expect), options.rtol, other)
-        checked = f"{table_text(report.columns)}\n{report.summary}"
+        checked = compare(table.cells, table.keys, str(options.expect), options.rtol, other)
+        verdict = f"{table_text(checked.columns)}\n{checked.summary}"
     check_renamed()
     if options.digits:
         result, cut = _with_digits_that_hold(result, first)
         first = cache(lambda: cut)
-    refuse_inputs([path for path in (output, options.plot, *result.beside) if path is not None])
+    pages = _report_files(result, options, asked, files, checked)
+    refuse_inputs([path for path in (output, options.plot, *result.beside, *pages) if path is not None])
     for path, data in result.beside.items():
         write(path, data())
+    for path, page in pages.items():
+        write(path, page)
     if options.plot is not None and result.figure is not None:
         from cli.show.picture import drawn
 
@@ -178,23 +238,61 @@ def show(result: Result, options: ShowOptions) -> None:
         (name, _), *others = result.tables.items()
         formed = {name.strip("-"): first()} | {name.strip("-"): table() for name, table in others}
         write(output, handed_on(output.suffix.lower(), formed, result.warnings))
-    _warn(result.warnings)
+    # a long table would carry the warnings out of sight
+    at_the_end = output is None and not options.json and sys.stdout.isatty()
+    if not at_the_end:
+        _warn(result.warnings, options)
     if options.json:
         sys.stdout.writelines(json_parts(_document(result)))
-        if report is not None:
-            print(checked, file=sys.stderr)
-    elif report is not None:
-        print(checked)
+        if checked is not None:
+            print(verdict, file=sys.stderr)
+    elif checked is not None:
+        print(coloured(verdict, sys.stdout, not options.no_color))
     elif options.text or (sys.stdout.isatty() and output is None):
         table = (result.screen or first)()
         width = get_terminal_size().columns if sys.stdout.isatty() else None
         text = table_text(table.cells, table.keys, width)
-        sys.stdout.write(paragraphs(result.notes(), text, result.afterword()))
+        said = paragraphs(result.notes(), text, result.afterword())
+        sys.stdout.write(coloured(said, sys.stdout, not options.no_color))
     elif output is None:
         sys.stdout.write(csv_text(first().cells))
     sys.stdout.flush()
-    if result.failed() or (report is not None and not report.passed):
+    if at_the_end:
+        _warn(result.warnings, options)
+    if result.failed() or (checked is not None and not checked.passed):
         raise typer.Exit(1)
+
+
+def _report_files(
+    result: Result,
+    options: ShowOptions,
+    asked: Mapping[str, str],
+    files: Sequence[str],
+    checked: Comparison | None,
+) -> dict[Path, bytes]:
+    """Return the files of --report."""
+    if options.report is None:
+        return {}
+    from cli.show.columns import Column, Section, Table
+    from cli.show.report import report
+    from cli.show.report_forms import formed
+
+    def finish(table: Table) -> Table:
+        if options.units is not None:
+            from cli.show.in_units import chosen_units, in_units
+
+            table = in_units(table, chosen_units(options.units))
+        if options.digits:
+            from cli.show.digits import digits_that_hold
+
+            table, _ = digits_that_hold(table)
+        return table
+
+    check = None
+    if checked is not None:
+        compared = Table([Column(name, "", values) for name, values in checked.columns.items()])
+        check = Section("Compared with what was expected", [compared, checked.summary])
+    return formed(options.report, report(result, options.head, asked, files, finish, check))
 
 
 def _in_chosen_units(result: Result, units: str | None) -> Result:
@@ -245,14 +343,15 @@ def _stream(result: Result, blocks: Iterator[Table], options: ShowOptions) -> No
     else:
         sys.stdout.writelines(parts())
         sys.stdout.flush()
-    _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)])
+    _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)], options)
     if result.failed():
         raise typer.Exit(1)
 
 
-def _warn(warnings: Iterable[str]) -> None:
+def _warn(warnings: Iterable[str], options: ShowOptions) -> None:
     for warning in warnings:
-        print(f"warning: {one_line(warning)}", file=sys.stderr)
+        line = coloured(f"warning: {one_line(warning)}", sys.stderr, not options.no_color)
+        print(line, file=sys.stderr)
 
 
 def _unknown(count: int) -> list[str]:

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from cli.show.columns import Cell, Document, Values
 
+GOOD, BAD = ("ok", "within", "stable"), ("WRONG", "beyond", "unstable")
+"""Verdicts, as they stand in cells and sentences."""
+
 
 def csv_text(columns: Mapping[str, Values], header: bool = True) -> str:
     """Return CSV with every digit of every number; without its header for a further part of a table."""
@@ -53,24 +56,40 @@ def table_text(columns: Mapping[str, Values], keys: Sequence[str] = (), width: i
     for name, column in columns.items():
         cells = [name, *printed(name, column)]
         longest = max(map(len, cells))
-        left = any(isinstance(value, str) and value for value in map(plain, column))
-        laid[name] = [cell.ljust(longest) if left else cell.rjust(longest) for cell in cells]
-    blocks: list[list[list[str]]] = [[]]
-    front = [laid[name] for name in columns if name in keys]
-    for name, cells in laid.items():
+        laid[name] = [cell.ljust(longest) if has_names(column) else cell.rjust(longest) for cell in cells]
+    return "\n".join(
+        "".join("  ".join(row).rstrip() + "\n" for row in zip(*(laid[name] for name in block), strict=True))
+        for block in in_blocks({name: len(cells[0]) for name, cells in laid.items()}, keys, width)
+    )
+
+
+def has_names(column: Values) -> bool:
+    """Whether a column holds names, which stand to the left."""
+    return any(isinstance(value, str) and value for value in map(plain, column))
+
+
+def in_blocks(widths: Mapping[str, int], keys: Sequence[str], width: int | None) -> list[list[str]]:
+    """Part columns into blocks that are no wider than `width`, each with the key columns in front."""
+    front = [name for name in widths if name in keys]
+    blocks: list[list[str]] = [[]]
+    for name in widths:
         last = blocks[-1]
-        wide = sum(len(other[0]) + 2 for other in last) + len(cells[0])
+        wide = sum(widths[other] + 2 for other in last) + widths[name]
         if width is not None and wide > width and len(last) > len(front) and name not in keys:
             blocks.append(list(front))
-        blocks[-1].append(cells)
-    return "\n".join(
-        "".join("  ".join(row).rstrip() + "\n" for row in zip(*block, strict=True)) for block in blocks
-    )
+        blocks[-1].append(name)
+    return blocks
 
 
 def _six_digits(name: str, value: float) -> str:
     cell = f"{value:.6g}"
     return "0" if cell == "360" and value < 360 and name.endswith("_deg") else cell
+
+
+def heading(name: str) -> str:
+    """Return a table's name as a heading."""
+    text = name.strip("-").replace("_", " ")
+    return text[:1].upper() + text[1:]
 
 
 def angle_text(degrees: float, spec: str) -> str:

@@ -30,6 +30,10 @@ class Integrator(StrEnum):
     splitting = "splitting"
 
 
+EXAMPLE = "tennis-racket"
+PANELS = {"What": "time at", "How": "method integrator"}
+
+
 @command
 def run(
     body: Annotated[
@@ -81,6 +85,8 @@ def run(
         tables={"states": lambda: columns.states(found)},
         notes=lambda: words.notes(found),
         figure=figure,
+        method=words.METHOD,
+        about={"title": given.name or "Rotation in time"} | given.about,
         warnings=[*given.warnings, *words.warnings(found)],
     )
 

@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError, nearest
-from cli.read.files import read_bytes
+from cli.read.about import about
+from cli.read.files import read_bytes, remember
 from cli.read.units import LARGEST
 from rigidbody3d import Body, check
 from rigidbody3d.attitude import normalize
 
 Array = NDArray[np.float64]
 
-KEYS = ("name", "inertia", "parts", "omega", "attitude", "top", "torque", "frame")
+KEYS = ("name", "inertia", "parts", "omega", "attitude", "top", "torque", "frame", "report")
 
 
 @dataclass(frozen=True)
@@ -35,12 +36,15 @@ class TurningBody:
     torque: Array | None
     frame: str
     warnings: list[str]
+    about: dict[str, str]
+    """What the file says for the head of a report."""
     rounded: Callable[[], Array] | None = None
     """Bounds of the errors of the tensor of a body made of parts, (3, 3)."""
 
 
 def read_body(path: str) -> TurningBody:
     """Read BODY.toml."""
+    remember(path)
     file, data = read_bytes(path)
     try:
         document = tomllib.loads(data.decode("utf-8-sig"))
@@ -90,6 +94,7 @@ def read_body(path: str) -> TurningBody:
         None if torque is None else _numbers(file, "torque", torque, (3,)),
         frame,
         warnings,
+        about(file, document),
         rounded,
     )
 
@@ -108,9 +113,9 @@ def _inertia(
     from cli.read.parts import read_parts
 
     parts = read_parts(str((Path() if path == "-" else Path(path).parent) / named))
-    about = [0.0, 0.0, 0.0] if top else None
-    inertia = parts.whole.inertia if about is None else parts.whole.about(about)
-    return inertia, partial(_tensor_error, parts.whole, about), parts.warnings
+    point = [0.0, 0.0, 0.0] if top else None
+    inertia = parts.whole.inertia if point is None else parts.whole.about(point)
+    return inertia, partial(_tensor_error, parts.whole, point), parts.warnings
 
 
 def _tensor_error(body: Body, about: list[float] | None) -> Array:

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from cli.spin.solve import Rotation
 
+METHOD = (
+    "Free rotation and tops in closed form by Jacobi's elliptic functions (Landau and Lifshitz, Mechanics, §37; Goldstein, "
+    "Classical Mechanics, ch. 5), else angular momentum and a unit quaternion integrated."
+)
+
 
 def warnings(found: Rotation) -> list[str]:
     """Say what was done otherwise than a reader might think."""

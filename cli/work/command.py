@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from cli.show.columns import Result
 
 
+EXAMPLE = "riul-slider-crank"
+PANELS = {"What": "gravity", "Output: of the balance": "ledger"}
+
+
 @command
 def run(
     states: Annotated[
@@ -39,7 +43,7 @@ def run(
     column field.
     """
     g = 0j if gravity is None else options.plane_vector("--gravity", gravity)
-    from cli.show.columns import Result
+    from cli.show.columns import Result, Sheet
     from cli.work import columns, words
     from cli.work.read import read_states
     from cli.work.solve import WorkBalance
@@ -58,5 +62,8 @@ def run(
         tables={"ledger": tables["ledger"]} if ledger else tables,
         notes=(lambda: "") if ledger else (lambda: words.notes(found)),
         figure=figure,
+        method=words.METHOD,
+        sheets=lambda: [Sheet("", words.sections(found), figure)],
+        about={"title": "Balance of virtual power"},
         warnings=[*table.table.warnings, *table.warnings, *found.warnings],
     )

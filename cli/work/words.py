@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+from cli.show.columns import Section
 from cli.show.text import table_text
+from cli.work import columns
 from cli.work.solve import WorkBalance
+
+METHOD = (
+    "Virtual power: the applied forces and the inertia forces −m·a, −I·α together do no work on the given velocities "
+    "(d'Alembert and Lagrange; J. A. Riul, Dinâmica das Máquinas, unit II, eqs. 1–5)."
+)
 
 SHOWN_STEPS = 3  # up to so many steps the terminal shows each term
 
@@ -27,3 +34,15 @@ def notes(found: WorkBalance) -> str:
             + (f"\ndo no work: {', '.join(workless)}" if workless else "")
         )
     return "\n\n".join([*parts, "unknowns:"])
+
+
+def sections(found: WorkBalance) -> list[Section]:
+    """The unknowns and the power of every term, for the report."""
+    sums = [f"{value:.3g} W" for i in range(len(found.states.steps)) for value in found.sums(i)]
+    kept = (
+        "The terms add up to " + ", ".join(sums[:SHOWN_STEPS]) + ("." if len(sums) <= SHOWN_STEPS else " …")
+    )
+    return [
+        Section("Unknowns", [columns.unknowns(found)]),
+        Section("Power of every term", [columns.ledger(found), kept]),
+    ]

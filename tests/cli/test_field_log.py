@@ -365,19 +365,30 @@ def test_text_and_report_tell_the_history(dalembert: Dalembert, tmp_path: Any) -
     assert done.returncode == 0, done.stderr
     for words in (
         "6 runs, 12 readings fitted together",
-        "that run should read",
+        "a run with 5 g at 10.00° in A should read",
         "A-optimal",
         "robust fit (Huber)",
     ):
         assert words in done.stdout
     page = (tmp_path / "r.html").read_text()
-    # a dot for each reading
-    drawn = dalembert("field", "-", "--plot", "p.svg", stdin=text)
+    drawn = dalembert("field", "-", "--plot", "p.svg", *options, stdin=text)
     assert drawn.returncode == 0, drawn.stderr
-    plain = dalembert("field", "-", "--plot", "q.svg", stdin=standard(MASSES[:2], ERRORS[:2]))
-    assert plain.returncode == 0
-    used = [(tmp_path / name).read_text().count("<use ") for name in ("p.svg", "q.svg")]
-    assert used[0] >= used[1] + 12
+    picture = (tmp_path / "p.svg").read_text()
+    # a dot for each reading, one for what was fitted to it, one among the residuals
+    assert picture.count("<use ") >= 3 * 12
+    for words in (
+        "sensor 0, µm",
+        "sensor 1, µm",
+        "corrections to ADD, g",
+        "95 % region of each correction, enlarged",
+        "standardised residuals",
+        "predicted run, 95 % region of a reading",
+        "masses of the next run",
+        # runs that lie near one another
+        "0, 5",
+    ):
+        assert f"<!-- {words} -->" in picture
+        assert f"<!-- {words} -->" in page
     assert "12 readings fitted together" in page
     assert "standardised" in page
 

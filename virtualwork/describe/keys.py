@@ -134,6 +134,7 @@ FILE: Keys = {
     "name": Key("name", "what the mechanism is called", default=""),
     "source": Key("anything", "where it is from; not evaluated"),
     "note": Key("anything", "a remark; not evaluated"),
+    "report": Key("texts", "the head of a report: title, machine, customer, date, author; not evaluated"),
     "gravity": Key("pair of slide acceleration", "its two components, m/s2", default=[0, 0]),
     "units": Key("units", "what bare lengths and angles mean"),
     "ground": Key("ground", "named fixed points [x, y]"),

@@ -84,6 +84,7 @@ def _form(kind: str) -> Schema:
 _FORMS: dict[str, Schema] = {
     "anything": {},
     "text": _TEXT,
+    "texts": {"type": "object", "additionalProperties": _TEXT},
     "name": {"type": ["string", "number"]},
     "torque or table": {"anyOf": [_A_QUANTITY, _TEXT]},
     "two texts": {"type": "array", "items": _TEXT, "minItems": 2, "maxItems": 2},

@@ -1,0 +1,266 @@
+"""The picture of a fitted log: a circle for each sensor and state with its runs, the corrections, the residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from balancing import region_factor
+from balancing.doubt import LEVEL
+from cli.field.fit import Fitted, LogFits
+from cli.field.runs import Complex, Real
+from cli.field.solve import Solved
+from cli.field.words import amplitude_unit
+from cli.show.picture import arrow, free_direction
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.lines import Line2D
+    from matplotlib.projections.polar import PolarAxes
+
+ACROSS = 3  # panels side by side
+CIRCLES = 6  # so many sensors and states have a circle
+NAMED = 14  # so many places of readings are named by their runs
+MARKS = "os^Dvp*XPhd<>8"
+BEFORE, AFTER, READ, FITTED, NEXT = "0.45", "tab:red", "tab:blue", "tab:orange", "tab:green"
+
+
+def draw(fits: LogFits, rotors: Sequence[int]) -> Figure:
+    """Draw the history of each rotor, its corrections with their 95 % regions, and its residuals."""
+    from matplotlib.figure import Figure
+
+    blocks = []
+    for rotor in rotors:
+        k, i = fits.found.place[rotor]
+        blocks.append((rotor, fits.found.solved[k], i))
+    rows = [-(-(min(len(solved.group.channels), CIRCLES) + 3) // ACROSS) for _, solved, _ in blocks]
+    figure = Figure(figsize=(11.4, 3.9 * sum(rows) + 0.5), layout="constrained")
+    parts = figure.subfigures(len(blocks), 1, height_ratios=rows, squeeze=False)[:, 0]
+    for part, count, (rotor, solved, i) in zip(parts, rows, blocks, strict=True):
+        if fits.found.several:
+            part.suptitle(f"rotor {fits.found.runs.rotors[rotor]}")
+        _block(part, count, fits, solved, i)
+    figure.get_layout_engine().set(rect=(0, 0, 1, 0.985), h_pad=0.07, w_pad=0.06)  # type: ignore[union-attr, call-arg]
+    figure.legend(handles=_handles(fits), loc="outside lower center", ncols=4, fontsize=9, frameon=False)
+    return figure
+
+
+def _block(part: SubFigure, rows: int, fits: LogFits, solved: Solved, i: int) -> None:
+    grid = part.add_gridspec(rows, ACROSS)
+    cells = [grid[k // ACROSS, k % ACROSS] for k in range(rows * ACROSS)]
+    shown = min(len(solved.group.channels), CIRCLES)
+    fitted = list(Fitted(solved.group).rows(i))
+    for s, channel in enumerate(solved.group.channels[:shown]):
+        axes: PolarAxes = part.add_subplot(cells[s], projection="polar")  # type: ignore[assignment]
+        _circle(axes, fits, solved, i, s)
+        for row in fitted:
+            if row.channel == channel and row.outlier:
+                at = [np.angle(row.value)], [abs(row.value)]
+                axes.plot(*at, "o", mfc="none", mec=AFTER, ms=9, mew=1.2)
+        axes.set_title(f"sensor {channel}, {amplitude_unit(fits.found)}", pad=12, fontsize=10)
+    _corrections(part.add_subplot(cells[shown], projection="polar"), fits, solved, i)  # type: ignore[arg-type]
+    _regions(part.add_subplot(cells[shown + 1]), fits, solved, i)
+    last = shown + 2
+    _residuals(part.add_subplot(grid[last // ACROSS, last % ACROSS :]), fits, solved, i, shown)
+
+
+def _circle(axes: PolarAxes, fits: LogFits, solved: Solved, i: int, s: int) -> None:
+    """Draw the runs of one sensor and state, what was fitted to them, and what is to be expected."""
+    assert solved.balance is not None
+    balance = solved.balance
+    fit, group = balance.fit, solved.group
+    here = np.flatnonzero(fit.present[i, :, s])
+    read = fit.readings[i, here, s]
+    fitted = read - fit.residuals[i, here, s]
+    before, after = complex(solved.initial[i, s]), complex(solved.residual[i, s])
+    regions = [(after, balance.vibration_covariance(solved.total)[i, s], AFTER)]
+    if fits.asked.predict is not None:
+        value, _ = fits.predicted(solved)
+        on = np.broadcast_to(fits.masses(solved.planes), solved.corrections.shape)
+        regions.append((complex(value[i, s]), balance.vibration_covariance(on, reading=True)[i, s], NEXT))
+    k = float(region_factor(0.95, balance.errors.degrees_of_freedom)[i])
+    outlines = [_ellipse(value, covariance, k) for value, covariance, _ in regions]
+    scale = float(np.abs([*read, *fitted, before, after, *np.concatenate(outlines)]).max()) or 1.0
+    scale = min(scale, 1.6 * (float(np.abs([*read, before, after]).max()) or 1.0))
+    for outline, (_, _, color) in zip(outlines, regions, strict=True):
+        axes.fill(np.angle(outline), np.abs(outline), color=color, alpha=0.18, lw=0)
+        axes.plot(np.angle(outline), np.abs(outline), color=color, lw=0.8)
+    arrow(axes, before, scale, BEFORE, 1.3, "--", "")
+    arrow(axes, after, scale, AFTER, 1.8, "-", "")
+    for v, w in zip(read, fitted, strict=True):
+        axes.plot(np.angle([w, v]), np.abs([w, v]), "-", color=FITTED, lw=1.1)
+    axes.plot(np.angle(fitted), np.abs(fitted), "o", mfc="none", mec=FITTED, ms=4.5, mew=1.0)
+    axes.plot(np.angle(read), np.abs(read), "o", color=READ, ms=3.5)
+    if fits.asked.predict is not None:
+        axes.plot([np.angle(regions[1][0])], [abs(regions[1][0])], "D", color=NEXT, ms=5)
+    axes.set_rlim(0, 1.15 * scale)
+    axes.set_rlabel_position(free_direction([*read, before, after]))
+    _quiet(axes)
+    names = list(_names(read, [group.logs[i].rows[j][0] for j in here], 0.06 * scale))
+    for at, name in names if len(names) <= NAMED else ():
+        out = at / abs(at) if at else 1.0
+        axes.annotate(
+            name,
+            xy=(float(np.angle(at)), abs(at)),
+            xytext=(8 * out.real, 8 * out.imag),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontsize=7.5,
+            color=READ,
+        )
+
+
+def _names(values: Complex, runs: list[str], near: float) -> Iterator[tuple[complex, str]]:
+    """Yield where readings lie, and which runs they are of: those near one another under one name."""
+    left = list(zip(values.tolist(), runs, strict=True))
+    while left:
+        first = left[0][0]
+        close = [pair for pair in left if abs(pair[0] - first) <= near]
+        left = [pair for pair in left if abs(pair[0] - first) > near]
+        yield (
+            complex(np.mean([value for value, _ in close])),
+            ", ".join(dict.fromkeys(run for _, run in close)),
+        )
+
+
+def _ellipse(center: complex, covariance: Real, k: float) -> Complex:
+    """Return the outline δᵀV⁻¹δ = k² about a vector, V along it and across; its own point where nothing is known."""
+    if not (np.isfinite(covariance).all() and np.isfinite(k)):
+        return np.array([center])
+    size, axes = np.linalg.eigh(covariance)
+    turn = np.linspace(0, 2 * np.pi, 91)
+    along, across = (axes * (k * np.sqrt(np.maximum(size, 0.0)))) @ np.stack([np.cos(turn), np.sin(turn)])
+    unit = center / abs(center) if center else 1.0
+    return np.asarray(center + unit * (along + 1j * across))
+
+
+def _corrections(axes: PolarAxes, fits: LogFits, solved: Solved, i: int) -> None:
+    """Draw the corrections and their 95 % regions; where one is asked for, the next run's masses."""
+    found = fits.found
+    masses = found.amount(solved.corrections[i])
+    outlines = [
+        _ellipse(complex(w), *region) for w, region in zip(masses, _spread(fits, solved, i), strict=False)
+    ]
+    size = float(np.abs(masses).max()) or 1.0
+    scale = min(float(np.abs(np.concatenate([masses, *outlines])).max()) or 1.0, 2.5 * size)
+    for outline in outlines:
+        axes.fill(np.angle(outline), np.abs(outline), color=AFTER, alpha=0.18, lw=0)
+        axes.plot(np.angle(outline), np.abs(outline), color=AFTER, lw=0.8)
+    for plane, w in zip(solved.planes, masses, strict=True):
+        arrow(axes, w, scale, AFTER, 2.2, "-", plane)
+    run = fits.suggested(solved, i) if fits.asked.suggest else None
+    if run is not None:
+        at = found.amount(run.masses)
+        scale = max(scale, float(np.abs(at).max()))
+        axes.plot(np.angle(at), np.abs(at), "s", color="tab:purple", ms=6)
+    axes.set_title(f"corrections to ADD, {found.unit}", pad=12, fontsize=10)
+    axes.set_rlim(0, 1.15 * scale)
+    axes.set_rlabel_position(free_direction(list(masses)))
+    _quiet(axes)
+
+
+def _spread(fits: LogFits, solved: Solved, i: int) -> list[tuple[Real, float]]:
+    """Return for each plane the covariance of the correction, in its unit, and the factor of its 95 % region."""
+    if solved.covariance is None or solved.balance is None:
+        return []
+    k = float(region_factor(0.95, solved.balance.errors.degrees_of_freedom)[i])
+    return [(covariance * fits.found.amount(1.0) ** 2, k) for covariance in solved.covariance[i]]
+
+
+def _regions(axes: Axes, fits: LogFits, solved: Solved, i: int) -> None:
+    """Draw the 95 % regions of the corrections enlarged, each about its own correction."""
+    known = _spread(fits, solved, i)
+    for k, (plane, region) in enumerate(zip(solved.planes, known, strict=False)):
+        outline = _ellipse(0j, *region)
+        color = AFTER if len(solved.planes) == 1 else f"C{k}"
+        axes.fill(outline.real, outline.imag, color=color, alpha=0.12, lw=0)
+        axes.plot(outline.real, outline.imag, color=color, lw=1.2, label=plane)
+    if known and len(solved.planes) > 1:
+        axes.legend(fontsize=7.5, frameon=False, loc="upper left", title="plane", title_fontsize=8)
+    axes.plot([0], [0], "+", color="0.2", ms=8)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel(f"along the correction, {fits.found.unit}", fontsize=9)
+    axes.set_ylabel(f"across, {fits.found.unit}", fontsize=9)
+    axes.tick_params(labelsize=8, colors="0.3")
+    axes.grid(color="0.88")
+    told = bool(known) and bool(np.isfinite([np.sum(covariance) * k for covariance, k in known]).all())
+    title = (
+        "95 % region of each correction, enlarged" if told else "nothing tells how sure the corrections are"
+    )
+    axes.set_title(title, pad=8, fontsize=10)
+
+
+def _residuals(axes: Axes, fits: LogFits, solved: Solved, i: int, shown: int) -> None:
+    """Draw the standardised residuals, run by run, and from where on one is an outlier."""
+    group = solved.group
+    rows = list(Fitted(group).rows(i))
+    runs = group.logs[i].runs
+    place = {run: k for k, run in enumerate(runs)}
+    for s, channel in enumerate(group.channels):
+        mine = [row for row in rows if row.channel == channel]
+        style = MARKS[s % len(MARKS)] if s < shown else "."
+        at = [place[row.run] + 0.5 * ((s + 1) / (len(group.channels) + 1) - 0.5) for row in mine]
+        axes.plot(at, [row.standardized for row in mine], style, ms=4.5, label=str(channel))
+    assert group.fit is not None
+    nu = int(group.fit.degrees_of_freedom[i])
+    told = int(np.isfinite([row.standardized for row in rows]).sum())
+    if nu >= 2 and told:
+        limit = float(np.sqrt(nu * (1 - (LEVEL / told) ** (1 / (nu - 1)))))
+        axes.axhline(limit, color=AFTER, lw=1.0, ls="--")
+        axes.annotate(
+            f"outliers lie above ({LEVEL:.0%})",
+            (1, limit),
+            (0, 3),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            ha="right",
+            fontsize=8,
+            color=AFTER,
+        )
+        axes.set_ylim(0, 1.25 * max(limit, *(row.standardized for row in rows if row.standardized < np.inf)))
+    else:
+        axes.set_ylim(0, None)
+    few = range(0, len(runs), 1 + len(runs) // 16)
+    axes.set_xticks(list(few), [runs[k] for k in few], fontsize=8)
+    axes.set_xlabel("run", fontsize=9)
+    axes.tick_params(labelsize=8, colors="0.3")
+    axes.grid(axis="y", color="0.88")
+    axes.set_title("standardised residuals" if nu else "nothing left over for residuals", pad=8, fontsize=10)
+    if 1 < len(group.channels) <= CIRCLES:
+        axes.legend(fontsize=7.5, frameon=False, loc="upper left", ncols=2)
+
+
+def _quiet(axes: PolarAxes) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    axes.yaxis.set_major_locator(MaxNLocator(4))
+    axes.tick_params(labelsize=7.5, colors="0.35", pad=-1)
+    axes.grid(color="0.87")
+
+
+def _handles(fits: LogFits) -> list[Line2D]:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=READ, marker="o", ls="", ms=4, label="reading, named by its run"),
+        Line2D([], [], color=FITTED, marker="o", mfc="none", lw=1.1, ms=5, label="vibration fitted to it"),
+        Line2D([], [], color=BEFORE, lw=1.3, ls="--", label="fitted without masses"),
+        Line2D([], [], color=AFTER, lw=1.8, label="with the corrections; with its 95 % region"),
+    ]
+    if any((Fitted(solved.group).chance < LEVEL).any() for solved in fits.found.solved):
+        handles.append(Line2D([], [], color=AFTER, marker="o", mfc="none", ls="", ms=8, label="outlier"))
+    if fits.asked.predict is not None:
+        handles.append(
+            Line2D(
+                [], [], color=NEXT, marker="D", ls="", ms=5, label="predicted run, 95 % region of a reading"
+            )
+        )
+    if fits.asked.suggest:
+        handles.append(
+            Line2D([], [], color="tab:purple", marker="s", ls="", ms=6, label="masses of the next run")
+        )
+    return handles

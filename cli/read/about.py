@@ -1,0 +1,31 @@
+"""The head of a report: what the table `[report]` of a TOML file says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cli.errors import DataError, nearest
+
+HEAD = ("title", "machine", "customer", "date", "author")
+
+
+def about(file: str, document: Mapping[str, Any]) -> dict[str, str]:
+    """Read the table `[report]`: texts, a date may be TOML's own.
+
+    Raises
+    ------
+    DataError
+        No table, an unknown key, or a value that is no text.
+    """
+    found = document.get("report", {})
+    if not isinstance(found, dict):
+        raise DataError(f"{file}: [report]: expected a table with some of {', '.join(HEAD)}")
+    for key, value in found.items():
+        if key not in HEAD:
+            raise DataError(
+                f"{file}: [report]: unknown key '{key}': expected {', '.join(HEAD)}{nearest(key, HEAD)}"
+            )
+        if isinstance(value, (dict, list)):
+            raise DataError(f"{file}: [report] {key}: expected text")
+    return {key: str(value) for key, value in found.items()}

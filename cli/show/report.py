@@ -1,0 +1,247 @@
+"""`--report`: what was given, what was found, the picture, the method, on pages to be handed on (HTML, Markdown)."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from cli.read.about import HEAD
+from cli.read.files import load
+from cli.read.sources import open_source
+from cli.read.units import UNITS, dimensions, is_number, parse_quantity, written
+from cli.show.columns import Column, Section, Sheet, Table
+from cli.show.text import has_names, heading, in_blocks, printed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cli.show.columns import Cell, Result
+
+ROWS = 36  # so many rows of a result are shown
+READ = 24  # so many rows of an input
+LINES = 100  # so many lines of a file
+WIDE = 88  # characters beside each other that fit A4 and Letter
+_THINNED = ("step", "t_s")  # of tables that begin so every k-th row is shown: they are sweeps
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A table as it is printed: a header and rows of text, and which columns are numbers, to the right."""
+
+    header: list[str]
+    rows: list[list[str]]
+    numbers: list[bool]
+
+
+Part = str | Grid
+
+
+@dataclass(frozen=True)
+class Page:
+    """A sheet whose tables are text."""
+
+    title: str
+    sections: list[tuple[str, list[Part]]]
+    figure: Callable[[], Figure] | None
+
+
+@dataclass(frozen=True)
+class Report:
+    """All that a report says."""
+
+    title: str
+    about: list[tuple[str, str]]
+    pages: list[Page]
+    closing: list[str]
+    """Warnings are said on the first page; method, sources and version here."""
+    warnings: list[str]
+
+
+def report(
+    result: Result,
+    head: Mapping[str, str],
+    asked: Mapping[str, str],
+    files: Sequence[str],
+    finish: Callable[[Table], Table],
+    check: Section | None = None,
+) -> Report:
+    """Put a report together.
+
+    Parameters
+    ----------
+    head
+        What stands at the head, as options have it: before what the file itself says.
+    asked
+        The command's own options that were given, and their values.
+    files
+        What was read, as the user named it.
+    finish
+        Puts a table into the units and digits asked for.
+    check
+        How the result compares with what was expected.
+    """
+    from datetime import date
+    from importlib.metadata import version
+
+    about = {"date": date.today().isoformat(), **result.about, **head}
+    sheets = list(result.sheets() if result.sheets is not None else [_plain_sheet(result)])
+    given = list(_given(asked, () if result.shows_input else files))
+    if sheets and (given or check):
+        first, *others = sheets
+        sections = [*([Section("Given", given)] if given else []), *first.sections]
+        sheets = [replace(first, sections=[*sections, *([check] if check else [])]), *others]
+    pages = [
+        Page(sheet.title, [(s.title, list(_printed(s.parts, finish))) for s in sheet.sections], sheet.figure)
+        for sheet in sheets
+    ]
+    call = " ".join(["dalembert", *map(_quoted, sys.argv[1:])])
+    closing = [*([result.method] if result.method else []), f"dalembert {version('dalembert')}: {call}"]
+    shown = [(key, about[key]) for key in HEAD[1:] if about.get(key)]
+    return Report(about.get("title") or "Report", shown, pages, closing, result.warnings)
+
+
+def _quoted(word: str) -> str:
+    from shlex import quote
+
+    return word if re.fullmatch(r"[\w@%+=:,./°µ-]+", word) else quote(word)
+
+
+def _plain_sheet(result: Result) -> Sheet:
+    """The notes, every table, the afterword."""
+    (name, first), *others = result.tables.items()
+    sections = [
+        Section(heading(name), [result.notes(), (result.screen or first)(), result.afterword()]),
+        *(Section(heading(name), [table()]) for name, table in others),
+    ]
+    return Sheet("", sections, result.figure)
+
+
+def _given(asked: Mapping[str, str], files: Sequence[str]) -> Iterator[str | Table]:
+    """Yield the options that were given, and what the files hold."""
+    if asked:
+        yield "; ".join(
+            name if value == "yes" else f"{name} {_spaced(value)}" for name, value in asked.items()
+        )
+    for path in files:
+        shown = "standard input" if path == "-" else path
+        if path.lower().endswith(".toml") or (path == "-" and _is_toml()):
+            lines = load(path).decode("utf-8-sig").splitlines()
+            more = f"\n… and {len(lines) - LINES} further lines" if len(lines) > LINES else ""
+            yield f"{shown}:"
+            yield CODE + "\n".join(lines[:LINES]) + more
+            continue
+        source = open_source(path, {}, None)
+        rows = source.rows()
+        read = [cells for _, cells in islice(rows, READ)]
+        left = sum(1 for _ in rows)
+        yield f"{shown}{source.of_sheet}:"
+        width = len(source.header)
+        cells = [[*row[:width], *[""] * (width - len(row))] for row in read]
+        yield Table([Column(said(h), "", [row[k] for row in cells]) for k, h in enumerate(source.header)])
+        if left:
+            yield f"… and {left} further rows"
+
+
+CODE = "\0"
+"""What a paragraph begins with that is the text of a file."""
+
+
+def _is_toml() -> bool:
+    import tomllib
+
+    try:
+        tomllib.loads(load("-").decode("utf-8-sig"))
+    except ValueError:
+        return False
+    return True
+
+
+def _spaced(text: str) -> str:
+    """Write quantities as people do: `12kg` as 12 kg, `1480rpm` as 1480 rpm."""
+
+    def spoken(part: str) -> str:
+        for dimension in UNITS:
+            try:
+                _, unit = parse_quantity(part, dimension)
+            except ValueError:
+                continue
+            number = re.match(r"\s*[-+.\deE]*\d\.?", part)
+            if unit and number:
+                return f"{number[0].strip()}{'' if unit == 'deg' else ' '}{written(unit)}"
+        return part
+
+    return re.sub(r"[^,:@=\s]+(?: [^,:@=\s\d]+)?", lambda found: spoken(found[0]), text).replace(",", ", ")
+
+
+def _printed(parts: Iterable[str | Table], finish: Callable[[Table], Table]) -> Iterator[Part]:
+    for part in parts:
+        if isinstance(part, str):
+            if part.strip():
+                yield part
+        elif part.columns and len(part.columns[0].values):
+            yield from _grids(finish(part))
+
+
+def _grids(table: Table) -> Iterator[Part]:
+    """Yield a table in blocks that fit the page, and what is left out of it."""
+    length = len(table.columns[0].values)
+    thinned = table.columns[0].header in _THINNED
+    every = -(-length // ROWS) if thinned else 1
+    kept = range(0, length, every) if thinned else range(min(length, ROWS))
+    headers: list[str] = []
+    texts: list[list[str]] = []
+    for column in table.columns:
+        values = [column.values[i] for i in kept]
+        if thinned:
+            values = _without_noise(values)
+        cells = [
+            "yes" if v is True else "no" if v is False else t
+            for v, t in zip(values, printed(column.header, values), strict=True)
+        ]
+        if column.name in ("quantity", "column"):
+            cells = [said(cell) for cell in cells]
+        texts.append(cells)
+        headers.append(
+            f"{_words(column.name)} [{written(column.unit)}]" if column.unit else _words(column.name)
+        )
+    numbers = [not has_names(column.values) or all(is_number(c.replace(",", ".")) or not c for c in cells) for column, cells in zip(table.columns, texts, strict=True)]  # fmt: skip
+    widths = {
+        str(k): max(map(len, [*cells, *header.split()]))
+        for k, (cells, header) in enumerate(zip(texts, headers, strict=True))
+    }
+    keys = [str(k) for k, column in enumerate(table.columns) if column.header in table.keys]
+    for block in in_blocks(widths, keys, WIDE):
+        here = [int(k) for k in block]
+        rows = [list(row) for row in zip(*(texts[k] for k in here), strict=True)]
+        yield Grid([headers[k] for k in here], rows, [numbers[k] for k in here])
+    if every > 1:
+        yield f"every {every}th of {length} rows"
+    elif length > len(kept):
+        yield f"… and {length - len(kept)} further rows"
+
+
+def _without_noise(values: list[Cell]) -> list[Cell]:
+    """What is within the rounding of the largest of a sweep is nothing."""
+    sizes = [abs(v) for v in values if isinstance(v, float) and v == v]
+    floor = 1e-12 * max(sizes, default=0.0)
+    return [0.0 if isinstance(v, float) and abs(v) < floor else v for v in values]
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def said(header: str) -> str:
+    """Return a header that stands in a cell as people write it: `inertia_x_kg_m2` is inertia x [kg·m²]."""
+    if " " in header.partition(":")[0] or "_" not in header:
+        return header
+    parts = header.split("_")
+    for k in range(1, len(parts)):
+        unit = "_".join(parts[k:])
+        if dimensions(unit) or unit in ("kg_m2_s", "J", "W", "rad_s3", "m_s3"):
+            return f"{' '.join(parts[:k])} [{written(unit)}]"
+    return _words(header)
