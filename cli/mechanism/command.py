@@ -36,7 +36,7 @@ def _print_schema(asked: bool) -> None:
 EXAMPLE = "klann"
 PANELS = {
     "What": "at sweep inputs only branch change vary variants",
-    "How": "order newton",
+    "How": "order newton time accuracy until",
     "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states schema",
 }
 
@@ -168,6 +168,7 @@ def run(
     for each pose and link (what `dalembert work` reads); with --only or --forces a row for each pose. In a pipe
     --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
     """
+    from cli.mechanism.in_time import InTime, times_and_accuracy
     from cli.mechanism.many import Many
     from cli.mechanism.read import wanted
     from cli.mechanism.solve import ORDERS, Analysis, load
@@ -216,15 +217,21 @@ def run(
         beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
         beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}
         beside |= {"--branch all": branch == "all"}
+        beside |= {"--vary": vary, "--variants": variants}
         clash = [flag for flag, value in beside.items() if value and flag != "--forces"]
         if clash:
             raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
-        return _in_time(file, (time, accuracy, until), names, branch, forces)
-    if accuracy is not None or until is not None:
+    elif accuracy is not None or until is not None:
         raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
     with _told(file):
         mechanism, bare, said, about = load(file)
         mechanism = assigned(mechanism, bare, change) if change else mechanism
+        if time is not None:
+            home = Analysis.of(file, mechanism, wanted(mechanism, None, None, None, bare), 2, names, branch)
+            home.warnings += said
+            home.check_names()
+            motion = InTime(home, *times_and_accuracy(time, accuracy), until, bare, forces)
+            return replace(motion.result(about), within=lambda: _told(file))
         several = asked(mechanism, bare, vary, variants, said)
         q = wanted(mechanism, at, sweep, inputs, bare)
         rates = None if order is None else ORDERS.index(order)
@@ -258,30 +265,6 @@ def run(
             method=METHOD,
             about={"title": mechanism.name or "Mechanism"} | about,
         )
-
-
-def _in_time(
-    file: str,
-    asked: tuple[str, str | None, str | None],
-    only: list[str] | None,
-    branch: str | None,
-    forces: bool,
-) -> Result:
-    """The motion under forces."""
-    from cli.mechanism import in_time
-    from cli.mechanism.read import wanted
-    from cli.mechanism.solve import Analysis, load
-
-    time, accuracy, until = asked
-    times, error = in_time.asked(time, accuracy)
-    with _told(file):
-        mechanism, bare, said = load(file)
-        home = wanted(mechanism, None, None, None, bare)
-        analysis = Analysis.of(file, mechanism, home, 2, only, branch)
-        analysis.warnings += said
-        analysis.check_names()
-        found = in_time.InTime(analysis, times, error, until, bare, forces)
-        return replace(in_time.result(found), within=lambda: _told(file))
 
 
 def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:

@@ -31,8 +31,14 @@ if TYPE_CHECKING:
     # kind -> name -> quantity -> values; a reaction's name is (joint, on, from)
     Parts = dict[str, dict[Any, dict[str, Reals]]]
 
+METHOD = (
+    "Motion under forces: the effort at the inputs by virtual work with d'Alembert's forces is M·q̈ + h; let go, it is "
+    "zero, and q̈ is integrated in the inputs. Loops are closed at every evaluation. The error is estimated from a "
+    "second solution of another tolerance."
+)
 
-def asked(time: str, accuracy: str | None) -> tuple[list[float], float]:
+
+def times_and_accuracy(time: str, accuracy: str | None) -> tuple[list[float], float]:
     """The times and the accuracy."""
     times = options.time_range("--time", time)
     if len(times) > 1 and times[1] < times[0]:
@@ -205,6 +211,22 @@ class InTime:
             f"energy that the work of the loads does not explain: {drift:.1e} J"
         )
 
+    def result(self, about: dict[str, str]) -> Result:
+        """The call in every form it can be shown in."""
+        from cli.mechanism.time_picture import draw
+
+        a = self.analysis
+        return Result(
+            document=self.document,
+            tables={"time": self.table},
+            notes=lambda: a.mechanism.name,
+            afterword=self.words,
+            figure=lambda: draw(self.run, a.mechanism),
+            method=METHOD,
+            about={"title": a.mechanism.name or "Mechanism"} | about,
+            warnings=[*a.warnings, *self.run.warnings],
+        )
+
 
 def _xy(z: NDArray[np.complex128]) -> tuple[Reals, Reals]:
     return z.real, z.imag
@@ -223,18 +245,3 @@ def _header(kind: str, name: Any, key: str, *, several: bool) -> str:
         joint, on, of = name
         return f"{joint}_{of}_on_{on}_{key}"
     return f"{name}_{key}"
-
-
-def result(simulation: InTime) -> Result:
-    """The call in every form it can be shown in."""
-    from cli.mechanism.time_picture import draw
-
-    a = simulation.analysis
-    return Result(
-        document=simulation.document,
-        tables={"time": simulation.table},
-        notes=lambda: a.mechanism.name,
-        afterword=simulation.words,
-        figure=lambda: draw(simulation.run, a.mechanism),
-        warnings=[*a.warnings, *simulation.run.warnings],
-    )

@@ -15,12 +15,10 @@ from itertools import product
 
 import numpy as np
 
-from dalembert.arithmetic.engines import floats
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.errors import MechanismError
 from virtualwork.describe.parts import GROUND, Guess, Input
 from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.recording import Recording
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.watch import Floats
 from virtualwork.motion import Motion
@@ -75,26 +73,28 @@ class Coordinates:
 
     # --- how far from folding -----------------------------------------------------------------------------------
     @cached_property
-    def _margins(self) -> Callable[[float, Floats], float] | None:
+    def _margins(self) -> Callable[[Floats], float] | None:
         """The least radicand of all loops; None where there is none to look at."""
         a = self.equations.assembly
         names = [g.name for g in a.plan.groups if g.kind not in ("Newton", "PRP")]
         if not names or a.geared or len(names) < len(a.plan.groups):
             return None
-        recording = Recording(a.mechanism, a.plan, a.signs, (False,) * 3)
-        tape = recording.tape([("margin", name) for name in names])
-        function = floats.compiled(tape)
-        order = [int(name[1:]) for name in tape.inputs]
-        return lambda t, q: min(function(*(q[j] for j in order)))
+        recording = self.equations.recording(False, False, False)
+        function = self.equations.function(recording.tape([("margin", name) for name in names]))
+        return lambda q: min(function(0.0, q, q))
 
     def margin(self, q: Floats) -> float:
         """How far every loop is from folding: the least relative radicand, 1 at a right angle."""
         if self._margins is None:
             return 1.0
         try:
-            return self._margins(0.0, q)
+            return self._margins(q)
         except (ZeroDivisionError, ValueError, OverflowError):
             return 0.0
+
+    def folds(self, q: Floats) -> bool:
+        """Whether other coordinates should be looked for: a loop folds, and not towards a change point."""
+        return self.margin(q) < FOLDING and not self.equations.passes(q[0])
 
     def others(self, q: Floats) -> Iterator[Coordinates]:
         """The same pose in other coordinates: the inputs themselves, then every link's angle for one of those now used."""

@@ -5,8 +5,8 @@ its derivative to the accelerations (one sweep backwards over the tape), h its v
 every evaluation, so that nothing drifts.
 
 What a tape cannot decide enters it as a number: the sign of a closed form at the pose, the whole turns of a spring,
-what a table says. Where a tape cannot go, near change points and with groups that have no closed form, the poses'
-own formulas give M and h from k + 1 motions at once.
+what a table says. Near change points what is smooth is interpolated (`crossing`). With groups that have no closed form
+the poses' own formulas give M and h from k + 1 motions at once.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.scene import Scene
+from virtualwork.intime.crossing import Crossing, crossings, nearest
+from virtualwork.intime.tables import Value, ends, kinks, place, reader
 from virtualwork.intime.watch import Floats, Watch
 
 # of a turn: how far beyond an input its change points are looked for
 AHEAD = 1.0
+# how near a change point a fold is its own
+NEAR = 0.1
 TURN = 2 * math.pi
-# of a table's span: how far beyond its ends it is read
-EDGE = 1e-9
-Value = Callable[[float, Floats, Floats], float]
-Rate = Callable[[float, Floats, Floats, Floats], float]
 
 
 class Lost(ArithmeticError):
@@ -69,7 +69,7 @@ class Equations:
         self.warnings: list[str] = []
         self._covered = (math.inf, -math.inf)
         self._flips: dict[str, list[float]] = {}
-        self._near: list[tuple[float, float]] = []
+        self._crossings: list[Crossing] = []
         self._cover(self.mechanism.at[0])
 
     def __call__(self, t: float, q: Floats, v: Floats) -> Floats:
@@ -82,18 +82,28 @@ class Equations:
         """
         if not self._covered[0] <= q[0] <= self._covered[1]:
             self._cover(q[0])
-        if self._careful(q[0]):
-            found = self.many(np.array([t]), np.array([q]), np.array([v]))[0].tolist()
+        crossing = self._crossing(q[0])
+        if crossing is not None:
+            found = crossing.interpolated(lambda x: self._plain(t, [x], v), q[0])
         else:
-            try:
-                found = self._function(*self._filled(t, q, v))
-            except (ZeroDivisionError, ValueError, OverflowError):
-                raise Lost from None
+            found = self._plain(t, q, v)
         for value in found:
             # NaN and infinity
             if value - value != 0.0:
                 raise Lost
-        return list(found)
+        return found
+
+    def _plain(self, t: float, q: Floats, v: Floats) -> Floats:
+        """The same away from change points."""
+        if self._untaped:
+            mass, rest, power, _ = self.by_poses(np.array([t]), np.array([q]), np.array([v]))
+            if not np.isfinite(mass).all():
+                raise Lost
+            return [*np.linalg.solve(mass[0], -rest[0]).tolist(), float(power[0])]
+        try:
+            return list(self._function(*self._filled(t, q, v)))
+        except (ZeroDivisionError, ValueError, OverflowError):
+            raise Lost from None
 
     def refuse(self, t: float, q: Floats, v: Floats) -> None:
         """Refuse a start from which nothing can be followed.
@@ -123,18 +133,17 @@ class Equations:
             return out
         for end in (float(q[:, 0].min()), float(q[:, 0].max())):
             self._cover(end)
-        careful = np.array([self._careful(x) for x in q[:, 0].tolist()])
+        careful = self._careful(q)
         rows = np.flatnonzero(~careful)
         if len(rows):
             found = self._run(self._tape, t, q, v, rows)
             for j, name in enumerate(self._tape.names):
                 out[rows, j] = found[name]
-        rows = np.flatnonzero(careful)
-        if len(rows):
-            mass, rest, power, _ = self.by_poses(t[rows], q[rows], v[rows])
-            good = np.isfinite(mass).all(axis=(1, 2)) & np.isfinite(rest).all(axis=1)
-            out[rows[good], : self.k] = np.linalg.solve(mass[good], -rest[good, :, None])[..., 0]
-            out[rows[good], self.k] = power[good]
+        for i in np.flatnonzero(careful):
+            try:
+                out[i] = self(float(t[i]), q[i].tolist(), v[i].tolist())
+            except Lost:
+                continue
         return out
 
     def by_poses(self, t: Reals, q: Reals, v: Reals) -> tuple[Reals, Reals, Reals, Reals]:
@@ -159,14 +168,9 @@ class Equations:
 
     def watches(self) -> list[Watch]:
         """What a step must not pass: the kinks of tables over what hangs on the inputs alone."""
-        found = []
-        for number, load in enumerate(self._tables):
-            of = self._linear(load)
-            if of is not None and load.axis != "time":
-                knots = [x for x, _ in load.table]
-                period = knots[-1] - knots[0] if load.periodic else None
-                found.append(Watch(f"table {number}", *of, knots[:-1] if period else knots, period))
-        return found
+        plan = self.assembly.plan
+        found = (kinks(load, plan, f"table {number}") for number, load in enumerate(self._tables))
+        return [watch for watch in found if watch is not None]
 
     @cached_property
     def stops(self) -> list[float]:
@@ -175,45 +179,14 @@ class Equations:
 
     def outside(self, t: float, q: Floats, v: Floats) -> str:
         """Which table ends at a state; empty where none does."""
-        for load in self._tables:
-            of, (first, last) = self._linear(load), (load.table[0][0], load.table[-1][0])
-            if of is None or load.periodic:
-                continue
-            at, near = of[0](t, q, v), 1e-6 * (last - first)
-            if not first + near < at < last - near:
-                unit = {"time": "s", "speed": "rad/s"}.get(load.axis, "rad")
-                return f"the table of the {load.kind} on {load.body} ends at {last if at > first + near else first:.6g} {unit}"
-        return ""
-
-    def _linear(self, load: Tabled) -> tuple[Value, Rate] | None:
-        """What a table is over and its derivative, where it is a sum of inputs or of their speeds; None where not."""
-        if load.axis == "time":
-            return lambda t, q, v: t, lambda t, q, v, a: 1.0
-        if load.axis == "input":
-            return lambda t, q, v: q[0], lambda t, q, v, a: v[0]
-        angle = self.assembly.plan.angles[load.body]
-        if angle.bases:
-            return None
-        const, terms = angle.const, angle.inputs
-        if load.axis == "angle":
-            return (
-                lambda t, q, v: const + sum(c * q[j] for j, c in terms),
-                lambda t, q, v, a: sum(c * v[j] for j, c in terms),
-            )
-        return (
-            lambda t, q, v: sum(c * v[j] for j, c in terms),
-            lambda t, q, v, a: sum(c * a[j] for j, c in terms),
-        )
+        every = (ends(load, self.assembly.plan, t, q, v) for load in self._tables)
+        return next((said for said in every if said), "")
 
     # --- the tape ---------------------------------------------------------------------------------------------
     @cached_property
     def _recorded(self) -> tuple[Tape, Tape]:
         """The tapes of accelerations and power, and of the energies."""
-        a = self.assembly
-        turning = {name for name, flips in a.track.flips.items() if len(flips)}
-        recording = Recording(
-            self.mechanism, a.plan, a.signs, (True, True, False), turning_over=turning, geared=a.geared
-        )
+        recording = self.recording(True, True, False)
         k, names = self.k, [f"effort {j}" for j in range(self.k)]
         motion = recording.tape([("effort", j) for j in range(k)])
         free = derivatives(motion, [f"a{j}" for j in range(k)])
@@ -243,6 +216,17 @@ class Equations:
         case = LoadCase(self.mechanism, self.assembly.plan, moves=True)
         return [load for load in case.loads if isinstance(load, Tabled)]
 
+    def recording(self, *moves: bool) -> Recording:
+        """The formulas of the assembly, with what the equations can fill in: speeds and accelerations as `moves`."""
+        a = self.assembly
+        turning = {name for name, flips in a.track.flips.items() if len(flips)}
+        return Recording(self.mechanism, a.plan, a.signs, moves, turning_over=turning, geared=a.geared)
+
+    def function(self, tape: Tape) -> Callable[[float, Floats, Floats], tuple[float, ...]]:
+        """A tape of such a recording as a function of a state."""
+        function, fillers = floats.compiled(tape), [self._filler(name) for name in tape.inputs]
+        return lambda t, q, v: function(*(of(t, q, v) for of in fillers))
+
     @property
     def _tape(self) -> Tape:
         return self._recorded[0]
@@ -253,15 +237,27 @@ class Equations:
 
     def energies(self, t: Reals, q: Reals, v: Reals) -> Reals:
         """Kinetic energy and that of gravity and springs together, (n,) J."""
-        careful = np.array([self._careful(x) for x in q[:, 0].tolist()], dtype=bool)
+        careful = self._careful(q)
         out = np.empty(len(q))
-        if careful.any():
-            mass, _, _, stored = self.by_poses(t[careful], q[careful], v[careful])
-            out[careful] = stored + 0.5 * np.einsum("ni,nij,nj->n", v[careful], mass, v[careful])
-        if not careful.all():
-            found = self._run(self._recorded[1], t, q, v, np.flatnonzero(~careful))
-            out[~careful] = found["energy"]
+        rows = np.flatnonzero(~careful)
+        if len(rows):
+            out[rows] = self._run(self._recorded[1], t, q, v, rows)["energy"]
+        for i in np.flatnonzero(careful):
+            crossing = self._crossing(float(q[i, 0]))
+            places = q[i : i + 1] if crossing is None else np.array(crossing.nodes)[:, None]
+            found = self._energies(np.full(len(places), t[i]), places, np.tile(v[i], (len(places), 1)))
+            if crossing is not None:
+                of = dict(zip(crossing.nodes, found.tolist(), strict=True))
+                (out[i],) = crossing.interpolated(lambda x, of=of: [of[x]], float(q[i, 0]))  # type: ignore[misc]
+            else:
+                (out[i],) = found
         return out
+
+    def _energies(self, t: Reals, q: Reals, v: Reals) -> Reals:
+        if not self._untaped:
+            return np.asarray(self._run(self._recorded[1], t, q, v, np.arange(len(q)))["energy"])
+        mass, _, _, stored = self.by_poses(t, q, v)
+        return np.asarray(stored + 0.5 * np.einsum("ni,nij,nj->n", v, mass, v))
 
     def _run(self, tape: Tape, t: Reals, q: Reals, v: Reals, rows: Any) -> Mapping[str, Any]:
         states = zip(t[rows].tolist(), q[rows].tolist(), v[rows].tolist(), strict=True)
@@ -286,58 +282,34 @@ class Equations:
             return self._turns(int(of.removeprefix("spring ")))
         if kind == "table":
             number, axis = of.split()
-            return self._table(int(number), axis == "y")
+            load = self._tables[int(number)]
+            known = place(load, self.assembly.plan)
+            at = self._followed(load) if known is None else known[0]
+            return reader(load, at, imaginary=axis == "y")
         j = int(name[1:])
         if name[0] == "q":
             return lambda t, q, v: q[j]
         return lambda t, q, v: v[j]
 
-    def _table(self, number: int, imaginary: bool) -> Value:
-        """One component of what a table gives."""
-        load = self._tables[number]
-        known = self._linear(load)
-        place = self._followed(load) if known is None else known[0]
-        at = [x for x, _ in load.table]
-        given = [y.imag if imaginary else y.real for _, y in load.table]
-        slopes = [
-            (b - a) / (y - x) for a, b, x, y in zip(given[:-1], given[1:], at[:-1], at[1:], strict=True)
-        ]
-        first, span = at[0], at[-1] - at[0]
-
-        def value(t: float, q: Floats, v: Floats) -> float:
-            x = place(t, q, v)
-            if load.periodic:
-                x = first + (x - first) % span
-            i = bisect_right(at, x) - 1
-            if not 0 <= i < len(slopes):
-                # a step may reach beyond the last row by its rounding
-                if not -EDGE * span <= x - first <= (1 + EDGE) * span:
-                    return math.nan
-                i = min(max(i, 0), len(slopes) - 1)
-            return given[i] + slopes[i] * (x - at[i])
-
-        return value
-
     def _followed(self, load: Tabled) -> Value:
         """The angle or speed of a link that hangs on more than the inputs, by a tape of its own."""
-        a = self.assembly
-        recording = Recording(self.mechanism, a.plan, a.signs, (True, False, False), self._flips)
         order = 1 if load.axis == "speed" else 0
-        tape = recording.tape([("angle", load.body, order)])
-        function, first = floats.compiled(tape), load.table[0][0]
+        function = self.function(self.recording(True, False, False).tape([("angle", load.body, order)]))
+        first = load.table[0][0]
 
-        def place(t: float, q: Floats, v: Floats) -> float:
-            (x,) = function(*(self._fillers[name](t, q, v) for name in tape.inputs))
+        def at(t: float, q: Floats, v: Floats) -> float:
+            (x,) = function(t, q, v)
             return x if order else first + (x - first) % TURN
 
-        return place
+        return at
 
     def _turns(self, number: int) -> Value:
         """The whole turns of a torsion spring, followed from the guess."""
         spring = self.mechanism.torsion_springs[number]
         a = self.assembly
-        recording = Recording(self.mechanism, a.plan, a.signs, (False,) * 3, self._flips)
-        tape = recording.tape([("turn", body) for body in spring.links])
+        function = self.function(
+            self.recording(False, False, False).tape([("turn", body) for body in spring.links])
+        )
         known: list[Setting] = []
 
         def turns(t: float, q: Floats, v: Floats) -> float:
@@ -347,8 +319,8 @@ class Equations:
                 known.append(
                     Setting(Poses(a, [min(q[0], ends[0]) - span, max(q[0], ends[-1]) + span]), False)
                 )
-            e = run(tape, {name: self._fillers[name](t, q, v) for name in tape.inputs})
-            first, second = (complex(e[f"turn {body} x"], e[f"turn {body} y"]) for body in spring.links)
+            x, y, *other = function(t, q, v)
+            first, second = complex(x, y), complex(*other)
             within = cmath.phase(second * first.conjugate() * rotation(-spring.free_angle))
             return float(round((known[-1].wound(spring, State(list(q)), within) - within) / TURN))
 
@@ -374,14 +346,24 @@ class Equations:
             track.cover(q - ahead, q + ahead)
             low, high = min(low, q - ahead), max(high, q + ahead)
             self._flips.update({name: at.tolist() for name, at in track.flips.items()})
-            self._near = sorted((c.input, c.reach) for of in track.changes.values() for c in of)
+            self._crossings = crossings(track.crossings, self.scale[0])
         self._covered = (low, high) if track.active and not track.settled else (-math.inf, math.inf)
 
-    def _careful(self, q: float) -> bool:
-        """Whether a state needs the poses' own formulas: near a change point, or wherever no tape goes."""
+    def _crossing(self, q: float) -> Crossing | None:
+        """The change point that an input is close to."""
+        found = nearest(self._crossings, q) if self._crossings else None
+        return found if found is not None and abs(q - found.at) < found.inner else None
+
+    def _careful(self, q: Reals) -> Any:
+        """Which states no tape can do by itself, (n,)."""
         if self._untaped:
-            return True
-        return any(abs(q - at) < reach for at, reach in self._near)
+            return np.ones(len(q), dtype=bool)
+        return np.array([self._crossing(x) is not None for x in q[:, 0].tolist()], dtype=bool)
+
+    def passes(self, q: float) -> bool:
+        """Whether a change point is near: there every loop folds, in all coordinates, and goes on."""
+        found = nearest(self._crossings, q)
+        return found is not None and abs(q - found.at) < NEAR * self.assembly.track.length
 
     @cached_property
     def _untaped(self) -> bool:

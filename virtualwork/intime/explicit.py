@@ -1,42 +1,20 @@
 """Dormand and Prince's explicit Runge-Kutta method of order 8, for q̈ = a(t, q, q̇).
 
-Coefficients are those of scipy's `DOP853` (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential
-Equations I, 2nd ed., Springer 1993, §II.5 and II.10). A step runs on Python's floats, for a mechanism has few inputs;
+Coefficients in `tableau`. A step runs on Python's floats, for a mechanism has few inputs;
 the same step over arrays, from the node before each time asked for, is the dense output: it has the method's own order.
 """
 
 from __future__ import annotations
 
-from functools import cache
 from operator import mul
-from typing import NamedTuple
 
 import numpy as np
 
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.step import Step
+from virtualwork.intime.tableau import AT, FIFTH, STAGES, THIRD, WEIGHTS
 from virtualwork.intime.watch import Floats
-
-
-class Tableau(NamedTuple):
-    """Where the stages stand, how they hang on each other, and the weights of the result and of its two errors."""
-
-    at: Floats
-    rows: list[Floats]
-    weights: Floats
-    third: Floats
-    fifth: Floats
-
-
-@cache
-def tableau() -> Tableau:
-    """The coefficients."""
-    # scipy.integrate takes some 0.1 s to load
-    from scipy.integrate import DOP853
-
-    rows = [DOP853.A[i, :i].tolist() for i in range(1, 12)]
-    return Tableau(DOP853.C[1:].tolist(), rows, DOP853.B.tolist(), DOP853.E3.tolist(), DOP853.E5.tolist())
 
 
 class DormandPrince:
@@ -49,11 +27,10 @@ class DormandPrince:
 
     def step(self, f: Equations, t: float, q: Floats, v: Floats, rates: Floats, h: float) -> Step:
         """One step of length h from a state whose rates are known."""
-        own = tableau()
         k = len(q)
         speeds, others = [[x] for x in v], [[x] for x in rates]
         place: tuple[Floats, Floats] = ([], [])
-        for c, row in zip(own.at, own.rows, strict=True):
+        for c, row in zip(AT, STAGES, strict=True):
             place = (
                 [x + h * sum(map(mul, row, s)) for x, s in zip(q, speeds, strict=True)],
                 [x + h * sum(map(mul, row, s)) for x, s in zip(v, others, strict=False)],
@@ -63,8 +40,8 @@ class DormandPrince:
                 s.append(x)
             for s, x in zip(others, found, strict=True):
                 s.append(x)
-        dq = [h * sum(map(mul, own.weights, s)) for s in speeds]
-        *dv, work = [h * sum(map(mul, own.weights, s)) for s in others]
+        dq = [h * sum(map(mul, WEIGHTS, s)) for s in speeds]
+        *dv, work = [h * sum(map(mul, WEIGHTS, s)) for s in others]
         end = [x + d for x, d in zip(q, dq, strict=True)], [x + d for x, d in zip(v, dv, strict=True)]
         found = f(t + h, *end)
         # the last two evaluations stand at one time: how fast the rates change between them is what is stiff
@@ -76,8 +53,7 @@ class DormandPrince:
         for s, x in zip(others, found, strict=True):
             s.append(x)
         errors = (
-            [h * sum(map(mul, weights, s)) for s in (*speeds, *others[:k])]
-            for weights in (own.third, own.fifth)
+            [h * sum(map(mul, weights, s)) for s in (*speeds, *others[:k])] for weights in (THIRD, FIFTH)
         )
         return Step(dq, dv, work, found, tuple(errors), stiffness)
 
@@ -85,17 +61,16 @@ class DormandPrince:
         self, f: Equations, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals
     ) -> tuple[Reals, Reals, Reals]:
         """Changes of q and q̇ (n, k) and the work (n,) over a step from each of n states, each of its own length."""
-        own = tableau()
         k = q.shape[1]
         length = h[:, None]
         y = np.concatenate([q, v], axis=1)
-        slopes = np.empty((len(own.rows) + 1, len(q), 2 * k + 1))
+        slopes = np.empty((len(STAGES) + 1, len(q), 2 * k + 1))
         slopes[0] = np.concatenate([v, rates], axis=1)
-        for i, (c, row) in enumerate(zip(own.at, own.rows, strict=True)):
+        for i, (c, row) in enumerate(zip(AT, STAGES, strict=True)):
             place = y + length * np.tensordot(row, slopes[: i + 1, :, : 2 * k], 1)
             slopes[i + 1, :, :k] = place[:, k:]
             slopes[i + 1, :, k:] = f.many(t + c * h, place[:, :k], place[:, k:])
-        change = length * np.tensordot(own.weights, slopes, 1)
+        change = length * np.tensordot(WEIGHTS, slopes, 1)
         return change[:, :k], change[:, k : 2 * k], change[:, 2 * k]
 
     def size(self, done: Step, scale: Floats) -> float:

@@ -29,7 +29,6 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Reals, dot, minus
-from virtualwork.formulas.recording import Recording
 from virtualwork.intime.equations import Equations, Lost, potential, wasted
 from virtualwork.intime.watch import Floats, Watch
 
@@ -84,8 +83,7 @@ class Rubbing(Equations):
     @cached_property
     def _contacts(self) -> tuple[bool, list[float]]:
         """Whether joint forces are not determined; μ r of each pair that rubs, or μ in a guide."""
-        a = self.assembly
-        paths, of, _ = Recording(self.mechanism, a.plan, a.signs).forces
+        paths, of, _ = self.recording(True, True, False).forces
         return of.redundant, [
             coefficient * (radius if joint.guide is None else 1.0)
             for joint, _, _, coefficient, radius in paths.case.contacts
@@ -98,9 +96,8 @@ class Rubbing(Equations):
 
     @cached_property
     def _recorded(self) -> tuple[Tape, Tape]:
-        a, k = self.assembly, self.k
-        turning = {name for name, flips in a.track.flips.items() if len(flips)}
-        recording = Recording(self.mechanism, a.plan, a.signs, (True, True, False), turning_over=turning)
+        k = self.k
+        recording = self.recording(True, True, False)
         again = recording.recorder
         paths, of, block = recording.forces
         contacts = paths.case.contacts

@@ -2,13 +2,12 @@
 
 The errors of the steps add up, and the motion itself makes them grow. How large the error of the answer is, at each
 time, is seen from two solutions: with tolerances a ratio r apart the finer's error is about r times the coarser's,
-and their distance is the coarser's. √r of the distance is given as the estimate, which leaves room where the two
-powers of the step's error do not go together. The tolerance is chosen so that the estimate meets the accuracy asked for.
+and their distance is the coarser's. The estimate is ten times that, at most the distance itself, for the errors of the
+steps do not add up in just the same way. The tolerance is chosen so that the estimate meets the accuracy asked for.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -29,7 +28,9 @@ from virtualwork.intime.watch import Floats
 from virtualwork.motion import Motion
 
 # the tolerance of a step over the accuracy asked for, at first; between two solutions
-FIRST, APART = 0.1, 0.1
+FIRST, APART = 0.1, 0.03
+# of the estimate
+SAFETY = 10.0
 # below which no tolerance makes a difference; below which rounding has its share in what two solutions differ by
 LEAST, SMALL = 1e-15, 1e-13
 # solutions at most, until the estimate meets the accuracy
@@ -105,7 +106,7 @@ class Run:
 
     def spread(self, fine: Reals, coarse: Reals) -> Reals:
         """The error of a quantity from its values in the two solutions: the largest so far, and its rounding."""
-        apart = np.abs(fine - coarse) * math.sqrt(self.ratio)
+        apart = np.abs(fine - coarse) * min(1.0, SAFETY * self.ratio)
         return np.asarray(np.maximum.accumulate(apart, axis=0) + 4 * EPS * np.abs(fine))
 
     @cached_property

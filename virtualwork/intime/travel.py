@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from virtualwork.formulas.numbers import Reals
-from virtualwork.intime.coordinates import FOLDING, TURN, Coordinates
+from virtualwork.intime.coordinates import TURN, Coordinates
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.friction import Rubbing
@@ -150,7 +150,7 @@ class Monitor:
     def __call__(self, t: float, q: Floats, v: Floats) -> str:
         if self.follows:
             self.near = self.inputs(q, v)
-        was, self.folding = self.folding, self.coordinates.margin(q) < FOLDING
+        was, self.folding = self.folding, self.coordinates.folds(q)
         return "folding" if self.folding and not was else ""
 
     def inputs(self, q: Floats, v: Floats) -> Floats:
@@ -189,9 +189,7 @@ def travel(
         equations = coordinates.equations
         if isinstance(equations, Rubbing):
             equations, v = _in_mode(equations, t, q, v, resting)
-        monitor = Monitor(
-            coordinates, inputs, coordinates.margin(q) < FOLDING, bool(until) and not coordinates.own
-        )
+        monitor = Monitor(coordinates, inputs, coordinates.folds(q), bool(until) and not coordinates.own)
         watches = [*(monitor.until(j, level) for j, level in until.items()), *equations.watches()]
         stops, budget = equations.stops, MOST - found.steps
         path = walk(
