@@ -34,8 +34,12 @@ def run(
         typer.Argument(metavar="RUNS", help="CSV of runs; - is standard input.", show_default=False),
     ] = None,
     influence: Annotated[
-        str | None,
-        typer.Option(metavar="COEFFICIENTS.csv", help="Stored coefficients in place of trial runs."),
+        list[str] | None,
+        typer.Option(
+            metavar="COEFFICIENTS.csv",
+            help="Stored coefficients in place of trial runs; of several machines (repeatable), or with uncertainties: prior "
+            "knowledge of a fit.",
+        ),
     ] = None,
     save_influence: Annotated[
         Path | None,
@@ -176,7 +180,7 @@ def run(
         }
         for flag in (flag for flag, given in needs_phase.items() if given):
             raise options.bad(flag, "has no meaning with --method four-run, which uses no phase")
-    if influence is not None and from_here:
+    if influence and from_here:
         raise options.bad("--from-here", "has no meaning with --influence: there are no trial masses")
     if monte_carlo and reading_error is None:
         raise options.bad("--monte-carlo", "needs --reading-error")
@@ -197,11 +201,12 @@ def run(
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
 
     from cli.field import request as asked
-    from cli.field.files import read_runout, read_stored
+    from cli.field.files import read_runout, read_stored, stored_alpha
     from cli.field.fit import Asked, LogFits, masses_at
-    from cli.field.layouts import is_log
+    from cli.field.layouts import alpha_of, is_log
     from cli.field.log import read_log
     from cli.field.read import NotOneInitialRun, read_runs
+    from cli.field.sisters import Sisters
     from cli.field.solve import FieldBalancing
     from cli.read.tolerance import tolerance_of
 
@@ -211,8 +216,7 @@ def run(
     ceiling = options.with_unit("--max-residual", max_residual, "amplitude", positive=True)
     # a phase that lags, or a shaft that turns clockwise, turns the sense of the phase against the mass angles
     against = phase_lag != (rotation == "cw")
-    stored = read_stored(influence) if influence is not None else None
-    stored_unit = None if stored is None else stored.unit
+    files = [read_stored(path) for path in influence or ()]
     of_fit = {
         "--fit": fit,
         "--exclude": exclude,
@@ -220,12 +224,18 @@ def run(
         "--suggest": suggest,
         "--robust": robust,
     }
-    fit = any(of_fit.values())
-    if four_run or stored is not None:
+    if four_run:
         for flag in (flag for flag, given in of_fit.items() if given):
-            raise options.bad(flag, "fits all runs: it does not go with --influence or --method four-run")
-    elif not fit:
+            raise options.bad(flag, "fits all runs: it does not go with --method four-run")
+    if files and robust:
+        raise options.bad("--robust", "is of the runs alone: it does not go with --influence")
+    fit = any(of_fit.values()) or len(files) > 1 or any(one.along is not None for one in files)
+    if not four_run and not fit:
         fit = is_log(runs)
+    if fit and not files and (own := alpha_of(runs)) is not None and not own.trials:
+        files = [stored_alpha(own)]
+    stored = files[0] if files and not fit else None
+    stored_unit = None if stored is None else stored.unit
     measured = None
     if not fit:
         try:
@@ -239,19 +249,27 @@ def run(
             fit = unknowns_beaten and stored is None and not four_run
     if fit or measured is None:
         said = phase_lag or rotation is not None
-        measured = read_log(runs, lagging=against if said else None, exclude=exclude or [])
-    if stored is not None:
-        measured.warnings += stored.table.warnings
+        measured = read_log(
+            runs,
+            lagging=against if said else None,
+            exclude=exclude or [],
+            sisters=Sisters(files) if files else None,
+            reading_error=error,
+        )
+    for one in files:
+        measured.warnings += one.table.warnings
     if tolerance is not None and measured.per == "mass" and arm is None:
         raise options.bad(
             "--radius", "the tolerance is of unbalances: expected the radius of the trial masses"
         )
+    lags = against or measured.lags
+    still = {sensor: v.conjugate() if lags else v for sensor, v in measured.runout.items()}
     request = asked.Request(
         objective=objective,
         max_mass=asked.limits_in(limits, measured) or measured.max_mass,
         max_residual=None if ceiling is None else asked.ceiling_in(ceiling, measured),
         from_here=from_here,
-        runout={} if runout is None else read_runout(runout, measured, lagging=against or measured.lags),
+        runout=still if runout is None else read_runout(runout, measured, lagging=lags),
         reading_error=error,
         monte_carlo=monte_carlo,
         four_run=four_run,
@@ -269,6 +287,7 @@ def run(
 
 def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | None) -> Result:
     from cli.field import columns, fit, fit_columns, fit_words, remarks, report, words
+    from cli.field.coefficient_columns import coefficients
     from cli.show.columns import Result
     from cli.show.text import csv_text
 
@@ -290,16 +309,17 @@ def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | 
 
     beside = {}
     if save_influence is not None:
-        beside[save_influence] = lambda: csv_text(columns.coefficients(found).cells).encode()
+        beside[save_influence] = lambda: csv_text(coefficients(found).cells).encode()
     return Result(
         document=document,
         tables={
             "corrections": lambda: columns.corrections(found, warnings),
-            "influence": lambda: columns.coefficients(found),
+            "influence": lambda: coefficients(found),
             "prediction": lambda: columns.prediction(found),
             **({} if found.request.places is None else {"split": lambda: columns.split(found)}),
             **({} if fits is None else {"residuals": residuals}),
         },
+        companions=["prediction"] if found.request.places is None else ["prediction", "split"],
         notes=lambda: (fit_words.notes(fits) if fits is not None else "") + words.notes(found),
         afterword=lambda: words.afterword(found) + (fit_words.afterword(fits) if fits is not None else ""),
         figure=figure,

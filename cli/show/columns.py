@@ -77,6 +77,8 @@ class Result:
     """The JSON document, without its warnings."""
     tables: Mapping[str, Callable[[], Table]]
     """Name -> table; the first is the CSV."""
+    companions: Sequence[str] = ()
+    """Which further tables go beside a file that holds one table, as FILE-name.csv."""
     screen: Callable[[], Table] | None = None
     """The terminal's table, where another layout reads better than that of the CSV."""
     notes: Callable[[], str] = lambda: ""
@@ -98,7 +100,9 @@ class Result:
     failed: Callable[[], bool] = lambda: False
     """Whether nothing that was asked for could be found: status 1, once all is shown."""
     blocks: Callable[[], Iterator[Table]] | None = None
-    """The table in parts, where it is too long to be held: written as CSV, and nothing else."""
+    """The table in parts, where it is too long to be held: written as CSV, Parquet or a workbook, and nothing else."""
+    blocks_name: str = "poses"
+    """What the table in parts is called."""
     within: Callable[[], AbstractContextManager[None]] = nullcontext
     """What the forms are made within: it turns errors of a library into those that a user is told."""
     late_warnings: Callable[[], list[str]] = list

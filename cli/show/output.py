@@ -55,8 +55,8 @@ class ShowOptions:
             "-o",
             "--output",
             metavar="FILE",
-            help="Write the result to FILE (.csv, .json, .xlsx, .md, .tex or .html).",
-            callback=suffix_among(".csv", ".json", ".xlsx", ".md", ".tex", ".html"),
+            help="Write the result to FILE (.csv, .json, .xlsx, .parquet, .md, .tex or .html).",
+            callback=suffix_among(".csv", ".json", ".xlsx", ".parquet", ".md", ".tex", ".html"),
         ),
     ] = None
     plot: Annotated[
@@ -126,11 +126,24 @@ class ShowOptions:
         return {name: text for name in HEAD if (text := getattr(self, name)) is not None}
 
     @property
-    def as_csv(self) -> bool:
-        """Whether the result is written as CSV: to a file, or to a pipe."""
+    def form(self) -> str:
+        """The suffix of what is written to a file, or to a pipe; empty for the terminal's table and for checks."""
         if self.output is not None:
-            return self.output.suffix.lower() == ".csv"
-        return not (self.json or self.text or self.expect is not None or sys.stdout.isatty())
+            return self.output.suffix.lower()
+        if self.json:
+            return ".json"
+        return "" if self.text or self.expect is not None or sys.stdout.isatty() else ".csv"
+
+    @property
+    def holds_one(self) -> bool:
+        """Whether what is written holds one table."""
+        return self.form in (".csv", ".parquet")
+
+    @property
+    def streams(self) -> bool:
+        """Whether a table is all that is asked for, so that it can be written block by block."""
+        others = self.json or self.text or self.plot or self.expect or self.report
+        return self.form in (".csv", ".parquet", ".xlsx") and not others
 
     @property
     def as_json(self) -> bool:
@@ -219,7 +232,12 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         result, cut = _with_digits_that_hold(result, first)
         first = cache(lambda: cut)
     pages = _report_files(result, options, asked, files, checked)
-    refuse_inputs([path for path in (output, options.plot, *result.beside, *pages) if path is not None])
+    tables = _tables_beside(result, options)
+    refuse_inputs(
+        [path for path in (output, options.plot, *result.beside, *pages, *tables) if path is not None]
+    )
+    for path, table_of in tables.items():
+        write(path, _one_table(options.form, iter([table_of()])))
     for path, data in result.beside.items():
         write(path, data())
     for path, page in pages.items():
@@ -228,16 +246,21 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         from cli.show.picture import drawn
 
         write(options.plot, drawn(result.figure, options.plot.suffix.lower()[1:]))
-    if output is not None and output.suffix.lower() == ".csv":
-        write(output, csv_text(first().cells).encode())
-    elif output is not None and output.suffix.lower() == ".json":
+    if output is not None and options.form == ".json":
         write(output, (part.encode() for part in json_parts(_document(result))))
+    elif output is not None and options.holds_one:
+        write(output, _one_table(options.form, iter([first()])))
     elif output is not None:
-        from cli.show.handed_on import handed_on
-
         (name, _), *others = result.tables.items()
         formed = {name.strip("-"): first()} | {name.strip("-"): table() for name, table in others}
-        write(output, handed_on(output.suffix.lower(), formed, result.warnings))
+        if options.form == ".xlsx":
+            from cli.show.parts import workbook
+
+            write(output, workbook({name: [table] for name, table in formed.items()}))
+        else:
+            from cli.show.handed_on import handed_on
+
+            write(output, handed_on(options.form, formed, result.warnings))
     # a long table would carry the warnings out of sight
     at_the_end = output is None and not options.json and sys.stdout.isatty()
     if not at_the_end:
@@ -261,6 +284,17 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         _warn(result.warnings, options)
     if result.failed() or (checked is not None and not checked.passed):
         raise typer.Exit(1)
+
+
+def _tables_beside(result: Result, options: ShowOptions) -> dict[Path, Callable[[], Table]]:
+    """Return the tables that go beside a file of one table, each in a file of its own."""
+    output = options.output
+    if output is None or not options.holds_one:
+        return {}
+    return {
+        output.with_name(f"{output.stem}-{name}{output.suffix}"): result.tables[name]
+        for name in result.companions
+    }
 
 
 def _report_files(
@@ -321,31 +355,47 @@ def _in_chosen_units(result: Result, units: str | None) -> Result:
 def _stream(result: Result, blocks: Iterator[Table], options: ShowOptions) -> None:
     """Write a table that comes in parts."""
     from cli.show.files import write
-    from cli.show.text import csv_text
 
     unknown = 0
 
-    def parts() -> Iterator[str]:
+    def tables() -> Iterator[Table]:
         nonlocal unknown
-        for i, table in enumerate(blocks):
+        for table in blocks:
             if options.digits:
                 from cli.show.digits import digits_that_hold
 
                 table, without = digits_that_hold(table)
                 unknown += without
-            yield csv_text(table.cells, header=i == 0)
+            yield table
 
     refuse_inputs([path for path in (options.output, *result.beside) if path is not None])
     for path, data in result.beside.items():
         write(path, data())
-    if options.output is not None:
-        write(options.output, (part.encode() for part in parts()))
+    if options.form == ".xlsx" and options.output is not None:
+        from cli.show.parts import workbook
+
+        write(options.output, workbook({result.blocks_name: tables()}))
+    elif options.output is not None:
+        write(options.output, _one_table(options.form, tables()))
     else:
-        sys.stdout.writelines(parts())
+        sys.stdout.writelines(part.decode() for part in _one_table(".csv", tables()))
         sys.stdout.flush()
     _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)], options)
     if result.failed():
         raise typer.Exit(1)
+
+
+def _one_table(form: str, blocks: Iterator[Table]) -> Iterator[bytes]:
+    """Yield a file of a single table, which comes in parts."""
+    from cli.show.text import csv_text
+
+    if form == ".parquet":
+        from cli.show.parts import parquet
+
+        yield from parquet(blocks)
+        return
+    for i, table in enumerate(blocks):
+        yield csv_text(table.cells, header=i == 0).encode()
 
 
 def _warn(warnings: Iterable[str], options: ShowOptions) -> None:

@@ -40,6 +40,10 @@ class One:
         """1/(c1 × c2), or NaN."""
         return inverse if abs(inverse) * (abs(c1) * abs(c2)) < 1 / PARALLEL else math.nan
 
+    def inverse(self, length: float, least: float) -> float:
+        """1/length, or NaN."""
+        return 1 / length if length > least else math.nan
+
     solve, transposed = staticmethod(solve_columns), staticmethod(solve_transposed)
 
 
@@ -77,18 +81,35 @@ class Many:
             return inverse
         return np.where(np.abs(inverse) * (np.abs(c1) * np.abs(c2)) < 1 / PARALLEL, inverse, np.nan)
 
+    def inverse(self, length: Number, least: float) -> Number:
+        """1/length, or NaN."""
+        return 1 / np.where(length > least, length, np.nan)
+
 
 class Folded:
     """A kind for two assemblies that meet in every pose: the root is zero, and its noise is left out."""
 
     def __init__(self, kind: Kind) -> None:
         self.exp, self.join, self.regular = kind.exp, kind.join, kind.regular
-        self.constant, self.angle = kind.constant, kind.angle
+        self.constant, self.angle, self.inverse = kind.constant, kind.angle, kind.inverse
         self.solve, self.transposed = kind.solve, kind.transposed
 
     def sqrt(self, x: Number) -> Number:
         """Zero."""
         return 0.0 * x
+
+
+def real_part(z: Number) -> Number:
+    """The real part of any number."""
+    return bare(z).real
+
+
+def imaginary_part(z: Number) -> Number:
+    """The imaginary part."""
+    return bare(z).imag
+
+
+PARTS = real_part, imaginary_part
 
 
 class Written:
@@ -119,24 +140,21 @@ class Written:
         size = (c1.conjugate() * c1).real * (c2.conjugate() * c2).real * (inverse * inverse)
         return RECORDED.select(1 / PARALLEL**2 - bare(size), bare(inverse), math.nan)
 
+    def inverse(self, length: Number, least: Number) -> Number:
+        """1/length, or NaN."""
+        length = bare(length)
+        return 1 / RECORDED.select(length - bare(least), length, math.nan)
+
     def solve(self, cols: list[list[Number]], right: list[Number]) -> list[Number]:
         """Solve Σ column·x + right = 0."""
-        rows = [[part(c) for c in row] for row in cols for part in (_real, _imag)]
-        return solved(rows, [-part(w) for w in right for part in (_real, _imag)])
+        rows = [[part(c) for c in row] for row in cols for part in PARTS]
+        return solved(rows, [-part(w) for w in right for part in PARTS])
 
     def transposed(self, cols: list[list[Number]], loads: list[Number]) -> list[Number]:
         """Solve Σ_c λ_c·column_c + load = 0."""
-        rows = [[part(row[j]) for row in cols for part in (_real, _imag)] for j in range(len(loads))]
+        rows = [[part(row[j]) for row in cols for part in PARTS] for j in range(len(loads))]
         x = solved(rows, [0.0 if load is None else -bare(load) for load in loads], least=PARALLEL)
         return [self.join(x[2 * c], x[2 * c + 1]) for c in range(len(cols))]
-
-
-def _real(z: Number) -> Number:
-    return bare(z).real
-
-
-def _imag(z: Number) -> Number:
-    return bare(z).imag
 
 
 ONE, MANY, WRITTEN = One(), Many(), Written()

@@ -18,7 +18,7 @@ from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.loads import Spring, TorsionSpring
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
-from virtualwork.formulas.numbers import Complexes, Number, Reals, dot, minus, plus, times
+from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, dot, minus, plus, times
 from virtualwork.formulas.quantities import Combination, Given, Quantities, Turned
 from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Path, path_reads
@@ -200,19 +200,26 @@ class Tabled(Load):
         if self.axis == "input":
             return block.st.inputs[0]
         if self.axis == "time":
-            if block.time is None:
-                raise DescriptionError(
-                    f"the torque on {self.body} is given over the time: only a motion in time has it"
-                )
-            return block.time
+            return self.timed(block.time)
         if self.axis == "speed":
             return 0.0 if block.omega(self.body) is None else block.omega(self.body)
         known = block.setting.plan.angles[self.body]
         if not known.bases:
             return block.st.affine(known)
-        # whole turns are not known: the one that lies in the table
+        return self.in_turn(block.st.kind.angle(block.st.turn[self.body]))
+
+    def timed(self, time: Number) -> Number:
+        """The time; refused where the poses have none."""
+        if time is None:
+            raise DescriptionError(
+                f"the torque on {self.body} is given over the time: only a motion in time has it"
+            )
+        return time
+
+    def in_turn(self, angle: Number) -> Number:
+        """An angle whose whole turns are not known: in the turn that begins with the table."""
         first = self.table[0][0]
-        return first + (block.st.kind.angle(block.st.turn[self.body]) - first) % (2 * np.pi)
+        return first + (angle - first) % (2 * np.pi)
 
     def over(self, q: Number, many: bool) -> Number:
         """The force at places of the table, in the axes that it is given in; NaN outside."""
@@ -305,7 +312,13 @@ class SpringEnd(Load):
         if not s.free_length:
             # the pull is k·d: no direction is needed, and none is asked for at zero length
             return s.stiffness * d
-        return s.stiffness * (1 - s.free_length / block.st.kind.sqrt(d.real * d.real + d.imag * d.imag)) * d
+        return s.stiffness * (1 - s.free_length * self._inverse(block, d)) * d
+
+    def _inverse(self, block: Block, d: Number) -> Number:
+        """1/l; NaN where the spring has no length, and its pull no direction."""
+        kind = block.st.kind
+        length = kind.sqrt(d.real * d.real + d.imag * d.imag)
+        return kind.inverse(length, TOGETHER * block.setting.mechanism.size)
 
     def form(self, block: Block) -> Number:
         s, d = self.spring, self._between(block.position)
@@ -317,7 +330,8 @@ class SpringEnd(Load):
         rate = self._between(block.velocity) if self.spring.damping else None
         if rate is None:
             return None
-        return (self.spring.damping * dot(d, rate) / (d.real * d.real + d.imag * d.imag)) * d
+        inverse = self._inverse(block, d)
+        return (self.spring.damping * dot(d, rate) * (inverse * inverse)) * d
 
     def displacement(self, block: Block, j: int) -> Number:
         if not self.carries:
@@ -350,8 +364,8 @@ class SpringEnd(Load):
         share: Number = 1.0
         bend: Number = 0.0
         if s.free_length:
-            length = abs(d)
-            share, bend = 1 - s.free_length / length, s.free_length / length**3 * dot(d, d1) ** 2
+            inverse = self._inverse(block, d)
+            share, bend = 1 - s.free_length * inverse, s.free_length * inverse**3 * dot(d, d1) ** 2
         return -s.stiffness * (share * plus(dot(d1, d1), times_dot(d, d2)) + bend)
 
 

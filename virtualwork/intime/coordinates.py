@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from itertools import product
@@ -42,6 +43,12 @@ class Coordinates:
     def __init__(self, equations: Equations, inputs: tuple[Input, ...]) -> None:
         self.equations, self.inputs = equations, inputs
         self.own = equations.mechanism.inputs == inputs
+
+    def of(self, equations: Equations) -> Coordinates:
+        """The same coordinates with the equations in another mode of friction."""
+        other = copy(self)
+        other.equations = equations
+        return other
 
     def motion(
         self, q: Reals, v: Reals | float = 0.0, a: Reals | float = 0.0, t: Reals | None = None

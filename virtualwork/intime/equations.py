@@ -343,7 +343,11 @@ class Equations:
         low, high = self._covered
         if track.active and math.isfinite(q) and not low <= q <= high:
             ahead = AHEAD * track.length
-            track.cover(q - ahead, q + ahead)
+            try:
+                track.cover(q - ahead, q + ahead)
+            except MechanismError:
+                # too far away: a stage of a step that is too long
+                raise Lost from None
             low, high = min(low, q - ahead), max(high, q + ahead)
             self._flips.update({name: at.tolist() for name, at in track.flips.items()})
             self._crossings = crossings(track.crossings, self.scale[0])

@@ -56,6 +56,8 @@ class Rubbing(Equations):
     """The equations of motion of an assembly with friction, in one mode."""
 
     mode: Mode = ()
+    # whether nothing moves in this mode
+    locked = False
 
     def __init__(self, assembly: Assembly) -> None:
         super().__init__(assembly)
@@ -76,7 +78,7 @@ class Rubbing(Equations):
     def in_mode(self, mode: Mode) -> Rubbing:
         """The same equations in another mode."""
         other = copy(self)
-        other.mode = mode
+        other.mode, other.locked = mode, False
         return other
 
     # --- the tape ---------------------------------------------------------------------------------------------
@@ -184,9 +186,9 @@ class Rubbing(Equations):
     # --- friction at a state --------------------------------------------------------------------------------------
     def __call__(self, t: float, q: Floats, v: Floats) -> Floats:
         """The accelerations at a state in this mode, and the power."""
-        values = self.values(t, q, v)
         if self.locked:
             return [0.0] * (self.k + 1)
+        values = self.values(t, q, v)
         phi = self.friction(values)
         power = values.power + sum(f * r for f, r in zip(phi, values.rate, strict=True))
         found = [*_moved(values, phi), power]
@@ -196,6 +198,8 @@ class Rubbing(Equations):
 
     def many(self, t: Reals, q: Reals, v: Reals) -> Reals:
         """The same of many states, (n, k + 1); NaN where there are none."""
+        if self.locked:
+            return np.zeros((len(q), self.k + 1))
         out = np.full((len(q), self.k + 1), np.nan)
         for i, state in enumerate(zip(t.tolist(), q.tolist(), v.tolist(), strict=True)):
             try:
@@ -203,11 +207,6 @@ class Rubbing(Equations):
             except Lost:
                 continue
         return out
-
-    @property
-    def locked(self) -> bool:
-        """Whether nothing moves in this mode."""
-        return self.k == 1 and bool(self.mode) and not any(self.mode)
 
     def friction(self, values: Values) -> Floats:
         """The friction of every joint in this mode.
@@ -233,6 +232,8 @@ class Rubbing(Equations):
                 for n, x in zip(stuck, (inverse @ rest).tolist(), strict=True):
                     after[n] = -x
             change = max(abs(x - y) for x, y in zip(after, phi, strict=True))
+            if not change < 1e300:
+                break
             phi = after
             if change <= CLOSE * max(map(abs, phi)):
                 return phi
@@ -250,22 +251,62 @@ class Rubbing(Equations):
         except Lost:
             return 0.0
 
-    def decided(self, t: float, q: Floats, v: Floats, resting: Sequence[int]) -> Mode:
-        """The mode in which the motion goes on where the rates of some joints are zero."""
+    def going_on(self, t: float, q: Floats, v: Floats, ended: str) -> tuple[Rubbing, Floats]:
+        """The equations in the mode that follows the end of a path, and the speeds, zero where joints stick.
+
+        `ended` is the watch that ended it; empty at the beginning.
+        """
+        of = ended.removeprefix("friction").strip()
+        if self.k == 1:
+            if of.startswith("away"):
+                direction = float(of.removeprefix("away"))
+                return self.in_mode(tuple(_sign(r) for r in self.values(t, q, [direction]).rate)), v
+            if ended and of != "rest":
+                # a joint turns back while the input goes on
+                return self.in_mode(tuple(-s if str(n) == of else s for n, s in enumerate(self.mode))), v
+            if ended:
+                v = [0.0]
+            found = self.in_mode(self._decided_alone(t, q, v))
+            found.locked = not any(found.mode)
+            return found, v
+        rates = self.values(t, q, v).rate
+        resting = (
+            [n for n, s in enumerate(self.mode) if not s or str(n) == of]
+            if ended
+            else [n for n, rate in enumerate(rates) if not rate]
+        )
+        found = self.in_mode(self._decided(t, q, v, resting))
+        stuck = [n for n, s in enumerate(found.mode) if not s]
+        if not stuck:
+            return found, v
+        by_input = np.array([self.values(t, q, row).rate for row in np.eye(self.k).tolist()]).T[stuck]
+        inverse = np.linalg.pinv(by_input)
+        found.locked = not any(found.mode) and np.linalg.matrix_rank(by_input) == self.k
+        # without what rounding leaves in joints that stick
+        slowed = np.array(v) - inverse @ (by_input @ np.array(v))
+        return found, [0.0] * self.k if found.locked else slowed.tolist()
+
+    def _decided_alone(self, t: float, q: Floats, v: Floats) -> Mode:
+        """The mode of one degree of freedom: it moves, begins to move one way, or sticks."""
+        if v[0]:
+            return tuple(_sign(r) for r in self.values(t, q, v).rate)
+        for direction in (1.0, -1.0):
+            if self.tendency(t, q, direction) * direction > 0:
+                return tuple(_sign(r) for r in self.values(t, q, [direction]).rate)
+        return (0,) * len(self.arms)
+
+    def _decided(self, t: float, q: Floats, v: Floats, resting: Sequence[int]) -> Mode:
+        """The mode of several degrees of freedom in which the motion goes on where some joints rest.
+
+        Friction of a resting joint is what keeps it at rest, at most μ r |R|: found joint by joint, over and over.
+        """
         values = self.values(t, q, v)
         signs = [_sign(r) for r in values.rate]
-        if not resting:
-            return tuple(signs)
-        if self.k == 1:
-            for direction in (1.0, -1.0):
-                if self.tendency(t, q, direction) * direction > 0:
-                    return tuple(_sign(r) for r in self.values(t, q, [direction]).rate)
-            return (0,) * len(self.arms)
         phi = [0.0] * len(self.arms)
-        for _ in range(20 * LIMIT):
+        for _ in range(20 * LIMIT if resting else 0):
             before = list(phi)
             for n in range(len(phi)):
-                most = self.arms[n] * abs(values.p[n] + sum(map(mul, values.q[n], phi)))
+                most = self.arms[n] * abs(_forces(values, phi)[n])
                 if n not in resting:
                     phi[n] = -signs[n] * most
                 elif values.slips[n][n] > 0:
@@ -274,27 +315,37 @@ class Rubbing(Equations):
             if max(abs(x - y) for x, y in zip(phi, before, strict=True)) <= CLOSE * max(map(abs, phi)):
                 break
         for n in resting:
-            most = self.arms[n] * abs(values.p[n] + sum(map(mul, values.q[n], phi)))
-            signs[n] = -_sign(phi[n]) if abs(phi[n]) >= most * (1 - 1e-9) else 0
+            most = self.arms[n] * abs(_forces(values, phi)[n])
+            slip = values.slip[n] + sum(map(mul, values.slips[n], phi))
+            slides = abs(phi[n]) >= most * (1 - 1e-9) and abs(slip) > 1e-9 * abs(values.slip[n])
+            signs[n] = _sign(slip) if slides else 0
         return tuple(signs)
-
-    def brought_to_rest(self, t: float, q: Floats, v: Floats, stuck: Sequence[int]) -> Floats:
-        """The speeds without what rounding leaves in joints that stick."""
-        if not stuck:
-            return v
-        rates = np.array([self.values(t, q, row).rate for row in np.eye(self.k).tolist()]).T[list(stuck)]
-        return [float(x) for x in np.array(v) - np.linalg.pinv(rates) @ (rates @ np.array(v))]
 
     def watches(self) -> list[Watch]:
         """What ends a path in this mode: a sliding joint at rest, a sticking one that breaks away."""
-        if self.locked:
-            return [
-                Watch("friction", lambda t, q, v, d=d: self.tendency(t, q, d), None, [0.0], ends=True)  # type: ignore[misc]
-                for d in (1.0, -1.0)
-            ]
-        return super().watches() + [
-            self._sliding(n) if s else self._sticking(n) for n, s in enumerate(self.mode)
-        ]
+        if self.locked and self.k == 1:
+            return [self._breaking_away(1), self._breaking_away(-1)]
+        found = super().watches()
+        if self.k == 1:
+            found.append(
+                Watch("friction rest", lambda t, q, v: v[0], lambda t, q, v, a: a[0], [0.0], ends=True)
+            )
+            return found + [self._turning_back(n) for n in range(len(self.mode))]
+        return found + [self._sliding(n) if s else self._sticking(n) for n, s in enumerate(self.mode)]
+
+    def _breaking_away(self, direction: int) -> Watch:
+        """A mechanism that stands, and would begin to move one way."""
+
+        def tendency(t: float, q: Floats, v: Floats) -> float:
+            return self.tendency(t, q, float(direction))
+
+        return Watch(f"friction away {direction}", tendency, None, [0.0], ends=True)
+
+    def _turning_back(self, n: int) -> Watch:
+        """A joint whose rate changes its sign while the one input goes on: its coefficient does."""
+        return Watch(
+            f"friction {n}", lambda t, q, v: self.values(t, q, [1.0]).rate[n], None, [0.0], ends=True
+        )
 
     def _sliding(self, n: int) -> Watch:
         def slip(t: float, q: Floats, v: Floats, rates: Floats) -> float:

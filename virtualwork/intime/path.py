@@ -70,6 +70,7 @@ def walk(
     stops: Sequence[float] = (),
     check: Callable[[float, Floats, Floats], str] | None = None,
     budget: int = MOST,
+    left: Mapping[str, float] | None = None,
 ) -> Path:
     """Go from a state to a time.
 
@@ -82,6 +83,8 @@ def walk(
         No step passes them.
     check : callable
         Asked at every node; the path ends where it says why.
+    left : mapping of a watch's name to its level
+        Levels at which the path begins, and which the first step does not meet again.
 
     Returns
     -------
@@ -96,7 +99,7 @@ def walk(
     fastest = [max(abs(x), s / span if span else 1.0) for x, s in zip(v, equations.scale, strict=True)]
     low_q, low_v = [0.0] * k, [0.0] * k
     h, grow, stiff = 0.0, GROW, 0
-    left: dict[str, float] = {}
+    left = left or {}
     power = -1.0 / method.order
     while t < end:
         if len(path.t) > budget:

@@ -21,8 +21,10 @@ from virtualwork.describe.parts import Input
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
+from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.path import MOST
+from virtualwork.intime.step import Method
 from virtualwork.intime.travel import Travel, travel
 from virtualwork.intime.watch import Floats
 from virtualwork.motion import Motion
@@ -145,8 +147,14 @@ def simulate(
     levels = _levels(m.inputs, until)
     own = Coordinates(equations, m.inputs)
 
+    method: Method = DormandPrince()
+
     def at(tolerance: float) -> Travel:
-        return travel(own, (float(t[0]), q, v), float(t[-1]), tolerance, levels)
+        nonlocal method
+        found = travel(own, (float(t[0]), q, v), float(t[-1]), tolerance, levels, method)
+        # what was found to be stiff once is from the beginning
+        method = found.legs[-1].path.method
+        return found
 
     tolerance = max(LEAST, FIRST * accuracy)
     coarse, fine, ratio = at(tolerance / APART), at(tolerance), APART

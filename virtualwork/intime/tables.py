@@ -13,7 +13,7 @@ from virtualwork.plan.steps import Plan
 Value = Callable[[float, Floats, Floats], float]
 Rate = Callable[[float, Floats, Floats, Floats], float]
 # of a table's span: how far beyond its ends it is read, for a step may reach there by its rounding
-EDGE = 1e-9
+EDGE = 1e-12
 
 
 def place(load: Tabled, plan: Plan) -> tuple[Value, Rate] | None:

@@ -11,11 +11,11 @@ import numpy as np
 
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.coordinates import TURN, Coordinates
-from virtualwork.intime.equations import Equations
-from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.friction import Rubbing
+from virtualwork.intime.implicit import Radau
 from virtualwork.intime.joined import Joined
 from virtualwork.intime.path import MOST, Path, walk
+from virtualwork.intime.step import Method
 from virtualwork.intime.watch import Floats, Watch
 
 # changes of coordinates in one simulation
@@ -171,6 +171,7 @@ def travel(
     end: float,
     tolerance: float,
     until: Mapping[int, float],
+    method: Method,
 ) -> Travel:
     """Go from a state of the inputs to a time, or until an input has a value.
 
@@ -179,31 +180,36 @@ def travel(
     coordinates : Coordinates
         The inputs themselves.
     until : mapping of an input's number to its value
+    method : Method
+        Where it is found to be stiff, the implicit one goes on.
     """
     found = Travel()
     t, q, v = start
     inputs, work = q, 0.0
-    # joints that rub and came to rest just now; at first all that stand
-    resting: list[int] | None = None
+    ended = ""
     while True:
         equations = coordinates.equations
         if isinstance(equations, Rubbing):
-            equations, v = _in_mode(equations, t, q, v, resting)
+            equations, v = equations.going_on(t, q, v, ended)
         monitor = Monitor(coordinates, inputs, coordinates.folds(q), bool(until) and not coordinates.own)
         watches = [*(monitor.until(j, level) for j, level in until.items()), *equations.watches()]
         stops, budget = equations.stops, MOST - found.steps
-        path = walk(
-            equations, DormandPrince(), (t, q, v, work), end, tolerance, watches, stops, monitor, budget
-        )
+        begin = t, q, v, work
+        left = {ended: 0.0} if ended.startswith("friction") else None
+        path = walk(equations, method, begin, end, tolerance, watches, stops, monitor, budget, left)
         leg = Leg(coordinates, path, inputs)
         found.legs.append(leg)
         found.ended = path.ended
         if path.ended in ("end", "until", "budget") or len(found.legs) > CHANGES:
             return found
         t, q, v, work = path.t[-1], path.q[-1], path.v[-1], path.work[-1]
-        inputs, resting = leg.inputs[-1].tolist(), []
-        if path.ended.startswith("friction"):
-            resting = _resting(equations, path.ended)
+        inputs, ended = leg.inputs[-1].tolist(), path.ended
+        if ended.startswith("friction"):
+            # the mode of this leg, out of which the next one comes
+            coordinates = coordinates.of(equations)
+            continue
+        if path.ended == "stiff":
+            method = Radau()
             continue
         found.ended = equations.outside(t, q, v) if path.ended == "lost" else ""
         other = None if found.ended else coordinates.better(q)
@@ -215,28 +221,6 @@ def travel(
         if other is not None:
             q, v = _in(coordinates, other, q, v)
             coordinates = other
-
-
-def _in_mode(
-    equations: Rubbing, t: float, q: Floats, v: Floats, resting: list[int] | None
-) -> tuple[Rubbing, Floats]:
-    """The mode of friction in which a motion goes on, and its speeds, those of joints that stick exactly zero."""
-    if resting is None:
-        resting = [n for n, rate in enumerate(equations.values(t, q, v).rate) if not rate]
-    mode = equations.decided(t, q, v, resting)
-    return equations.in_mode(mode), equations.brought_to_rest(
-        t, q, v, [n for n, s in enumerate(mode) if not s]
-    )
-
-
-def _resting(equations: Equations, ended: str) -> list[int]:
-    """The joints whose rate is zero at the end of a path: that which ended it, and those that stick."""
-    assert isinstance(equations, Rubbing)
-    stuck = [n for n, s in enumerate(equations.mode) if not s]
-    own = ended.removeprefix("friction").strip()
-    if equations.k == 1 or not own:
-        return list(range(len(equations.mode)))
-    return sorted({*stuck, int(own)})
 
 
 def _in(old: Coordinates, new: Coordinates, q: Floats, v: Floats) -> tuple[Floats, Floats]:
