@@ -179,7 +179,7 @@ class Mechanism(Description):
         >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=1, center=1)}, inputs=Input(link="bob"),
         ...                      gravity=-9.81j)
         >>> pendulum.simulate([0, 1], angle=0.0).angle[-1].round(9)
-        array([-2.73764919])
+        array([-2.975823638])
         """
         from virtualwork.intime.run import simulate
 
