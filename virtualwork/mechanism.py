@@ -178,8 +178,8 @@ class Mechanism(Description):
         >>> from virtualwork import Input, Link
         >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=1, center=1)}, inputs=Input(link="bob"),
         ...                      gravity=-9.81j)
-        >>> pendulum.simulate([0, 1], angle=0.0).angle[-1].round(9)
-        array([-2.975823638])
+        >>> pendulum.simulate([0, 1], angle=0.0).angle[-1].round(6)
+        array([-2.975824])
         """
         from virtualwork.intime.run import simulate
 
