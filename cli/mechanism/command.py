@@ -176,12 +176,9 @@ def run(
     for each pose and link (what `dalembert work` reads); with --only or --forces a row for each pose. In a pipe
     --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
     """
-    from cli.mechanism.in_time import InTime, times_and_accuracy
-    from cli.mechanism.many import Many
     from cli.mechanism.read import wanted
     from cli.mechanism.solve import ORDERS, Analysis, load
     from cli.mechanism.studies import Request
-    from cli.mechanism.variants import asked, assigned
     from cli.mechanism.words import METHOD
 
     if branch is not None and branch != "all" and options.whole(branch) < 1:
@@ -225,7 +222,7 @@ def run(
         beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
         beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}
         beside |= {"--branch all": branch == "all"}
-        beside |= {"--vary": vary, "--variants": variants}
+        beside |= {"--vary": vary, "--variants": variants, "--html": html}
         clash = [flag for flag, value in beside.items() if value and flag != "--forces"]
         if clash:
             raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
@@ -233,14 +230,20 @@ def run(
         raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
     with _told(file):
         mechanism, bare, said, about = load(file)
-        mechanism = assigned(mechanism, bare, change) if change else mechanism
+        several = None
+        if change or vary or variants is not None:
+            from cli.mechanism.variants import asked, assigned
+
+            mechanism = assigned(mechanism, bare, change) if change else mechanism
+            several = asked(mechanism, bare, vary, variants, said)
         if time is not None:
+            from cli.mechanism.in_time import InTime, times_and_accuracy
+
             home = Analysis.of(file, mechanism, wanted(mechanism, None, None, None, bare), 2, names, branch)
             home.warnings += said
             home.check_names()
             motion = InTime(home, *times_and_accuracy(time, accuracy), until, bare, forces)
             return replace(motion.result(about), within=lambda: _told(file))
-        several = asked(mechanism, bare, vary, variants, said)
         q = wanted(mechanism, at, sweep, inputs, bare)
         rates = None if order is None else ORDERS.index(order)
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)
@@ -265,6 +268,8 @@ def run(
             home = at is None and sweep is None and inputs is None
             its = wanted(variant, at, sweep, inputs, bare) if home and several.moves_inputs else q
             return Analysis.of(file, variant, its, rates, names, branch)
+
+        from cli.mechanism.many import Many
 
         found = Many(
             mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
@@ -310,7 +315,7 @@ def _result(
     graph: str | None,
     about: dict[str, str],
 ) -> Result:
-    from cli.mechanism import columns, picture, poses, remarks, words
+    from cli.mechanism import columns, poses, remarks, words
     from cli.mechanism import forces as of_forces
     from cli.mechanism.states import table as link_states
     from cli.mechanism.studies import Studies
@@ -319,6 +324,8 @@ def _result(
     studies = Studies(analysis, request)
     found = studies.document
     if graph:
+        from cli.mechanism import picture
+
         picture.check_names(analysis, graph)  # a bad name is an error before anything is written
 
     def of_poses() -> Table:
@@ -333,6 +340,8 @@ def _result(
         return {"name": analysis.mechanism.name, "poses": listed, **found}
 
     def figure() -> Figure:
+        from cli.mechanism import picture
+
         several = len(analysis.inputs.shown) > 2 and analysis.motions[0].assembled.any()
         if graph:
             return picture.draw_curves(analysis, graph)
