@@ -167,7 +167,7 @@ def phase_sense(fit: JointFit) -> tuple[Real, Real, Real]:
     """
     from scipy.special import fdtri
 
-    turned = joint_fit(fit.readings.conj(), fit.masses, fit.weights)
+    turned = fit.again(fit.readings.conj())
     nu = np.asarray(fit.degrees_of_freedom, dtype=float)
     square = np.square(np.abs(np.where(fit.present, fit.readings, 0.0)))
     weighed = square if fit.weights is None else fit.weights * square
