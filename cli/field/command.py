@@ -157,6 +157,9 @@ def run(
             metavar="FILE.csv", help="Once-per-turn vectors of a recording: t_s, mark, A_um …; no RUNS."
         ),
     ] = None,
+    pulses: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Pulses of the mark in a turn, for --signal.")
+    ] = 1,
 ) -> Result:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
@@ -196,7 +199,9 @@ def run(
             raise options.bad("--signal", "reads a recording: expected no RUNS")
         from cli.field.signal import signal as recorded
 
-        return recorded(signal)
+        return recorded(signal, pulses)
+    if pulses != 1:
+        raise options.bad("--pulses", "goes with --signal")
     if runs is None:
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
 
