@@ -26,6 +26,10 @@ COMMANDS = {
     "body": ("cli.body.command", "Put a body together: inertia, angular momentum, shaft reactions."),
     "spin": ("cli.spin.command", "Turn a body through time: free, under gravity, under a torque."),
     "import": ("cli.imports.command", "Take over a mechanism drawn in another program."),
+    "export": (
+        "cli.exports.command",
+        "Write a mechanism for other programs: DXF, SVG, CSV, URDF, SDF, MJCF.",
+    ),
     "completion": ("cli.completion.command", "Print the completion script for bash, zsh or fish."),
     "examples": ("cli.examples.command", "List the worked examples, or write one into the current folder."),
 }

@@ -39,7 +39,7 @@ ROLES = {
 
 SYMBOL = 0.016
 """The radius of a pin, of the size of the mechanism."""
-UNKNOWN_TRAVEL = 0.3
+UNKNOWN_TRAVEL = 0.2
 """Where nobody says how far a guide is used: so much of the size of the mechanism either way."""
 
 
@@ -125,34 +125,57 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
     Parameters
     ----------
     travel : sequence of (least, largest)
-        Of each guide, m: over which slides it is drawn. Default: some way about its `through`.
+        Of each guide, m: over which slides it is drawn. Default, and where NaN: some way about its `through`; of a guide
+        that is hardly used some way about its block or pin.
     """
     s = SYMBOL * mechanism.size
     reach = UNKNOWN_TRAVEL * mechanism.size
-    spans = [
-        span if all(map(isfinite, span)) else (-reach, reach)
-        for span in (travel or [(-reach, reach)] * len(mechanism.guides))
-    ]
+    spans = [_long_enough(span, reach, s) for span in (travel or [(-reach, reach)] * len(mechanism.guides))]
     guides = list(zip(mechanism.guides, spans, strict=True))
     wheels = [circle for gear in mechanism.gears for circle in _wheels(mechanism, gear)]
     wheels = list(dict.fromkeys(wheels))
+    slots = {
+        name: [span for span in guides if span[0].on == name and not span[0].is_slider]
+        for name in mechanism.bodies
+    }
+    # a slot hides its own link, and lies under the links that run in it
+    order = [GROUND, *sorted(mechanism.links, key=lambda name: not slots[name])]
     layers: list[Iterable[Shape]] = [
         *(_in_ground(mechanism, guide, span, s) for guide, span in guides),
         *(_foot(z, s) for name, z in mechanism.ground.items() if name in mechanism.pins),
-        *(_link(mechanism, name, guides, wheels, s) for name in mechanism.links),
+    ]
+    for name in order:
+        layers += [_link(mechanism, name, guides, wheels, s)] if name != GROUND else []
+        layers += [_slot(mechanism, guide, span, s) for guide, span in slots[name]]
+    layers += [
         wheels,
         [
             Line("spoke", w.body, (w.centre, w.centre + w.radius))
             for w in wheels
             if w.body != GROUND and len(mechanism.bodies[w.body]) < 2
         ],
-        *(_slot(mechanism, guide, span, s) for guide, span in guides if not guide.is_slider),
         *(_block(mechanism, guide, s) for guide, _ in guides if guide.is_slider),
         (_coil(mechanism, spring, s) for spring in mechanism.springs),
         *(_mass(body, own.center, s) for body, own in mechanism.rigid.items() if own.mass),
         _points(mechanism, s),
     ]
     return Drawing(tuple(chain.from_iterable(layers)), tuple(_labels(mechanism)), s)
+
+
+def tracers(mechanism: Description) -> list[str]:
+    """Return the points whose paths are of interest: those of a link alone, that no joint holds.
+
+    A fixed pin in a moving slot is the ground's; the point of any other guide runs along a line that is drawn.
+    """
+    held = {*mechanism.ground, *mechanism.pins, *(guide.point for guide in mechanism.guides)}
+    return list(dict.fromkeys(p for link in mechanism.links.values() for p in link.points if p not in held))
+
+
+def _long_enough(span: tuple[float, float], reach: float, s: float) -> tuple[float, float]:
+    """Return over what to draw a guide: some way about its block or pin where it is hardly used, as in a single pose."""
+    low, high = span if all(map(isfinite, span)) else (0.0, 0.0)
+    middle = (low + high) / 2
+    return (low, high) if high - low > 4 * s else (middle - reach, middle + reach)
 
 
 def _coil(mechanism: Description, spring: Spring, s: float) -> Coil:
@@ -301,5 +324,4 @@ def _labels(mechanism: Description) -> Iterator[Label]:
                 yield Label("point", body, z, name)
             seen.add(name)
     for name, link in mechanism.links.items():
-        if len(link.points) > 1:
-            yield Label("link", name, sum(link.points.values()) / len(link.points), name)
+        yield Label("link", name, sum(link.points.values()) / len(link.points), name)

@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike
 
 from virtualwork.branch.assembly import Assembly, all_assemblies
 from virtualwork.describe.description import Description
+from virtualwork.describe.errors import MechanismError
 from virtualwork.describe.reader import read, read_text
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
+    from virtualwork.evaluator import Evaluator
     from virtualwork.study.check import Check
     from virtualwork.study.equilibrium import Equilibria
     from virtualwork.study.newton_table import AllAtOnce
@@ -91,6 +93,16 @@ class Mechanism(Description):
         """The assembly that the guess chooses, ready to move."""
         return Assembly.from_guess(self)
 
+    def _repr_html_(self) -> str | None:
+        """Draw it in its own pose; None, which shows its `repr`, where it has none."""
+        from virtualwork.still import svg
+
+        try:
+            motion = self.motion()
+            return svg(motion.poses, motion.drawing)
+        except MechanismError:
+            return None
+
     def motion(
         self,
         angle: ArrayLike | None = None,
@@ -123,6 +135,32 @@ class Mechanism(Description):
         if angle is None:
             return Motion(self.assembly)
         return Motion(self.assembly, angle, speed, acceleration, jerk)
+
+    def evaluator(self, *wanted: str) -> Evaluator:
+        """Named quantities of the assembly that the guess chooses, made ready once to be asked for again and again.
+
+        Parameters
+        ----------
+        wanted : str
+            Called as in the JSON output: `points.H`, `points.H.velocity`, `links.coupler.omega`, `slides.S.speed`,
+            `effort`, `reactions.B.coupler` (the force on that link), `shaking.force`, `shaking.moment`.
+
+        Raises
+        ------
+        DescriptionError
+            Where a name is not known.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link
+        >>> m = Mechanism({"O": 0j}, {"arm": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="arm"),
+        ...               gravity=-9.81j)
+        >>> m.evaluator("effort")(0.0)
+        {'effort': 9.81}
+        """
+        from virtualwork.evaluator import Evaluator
+
+        return Evaluator(self.assembly, *wanted)
 
     @cached_property
     def check(self) -> Check:

@@ -23,166 +23,25 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.drawing import Drawing, draw
-from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
+from virtualwork.formulas.lanes import FORCES, Lanes, over_blocks
+from virtualwork.formulas.numbers import Complexes, Number, Reals
 from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.recording import Key
 from virtualwork.formulas.sweep import EvenSweep
+from virtualwork.parts_of_motion import LinkMotion, PointMotion, SlideMotion
 from virtualwork.plan.steps import Step
+from virtualwork.table import columns
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
     from pandas import DataFrame
 
+    from dalembert.page import Page
     from virtualwork.bounds.motion import MotionErrors
+    from virtualwork.drawing import Drawing
     from virtualwork.forces import Forces
     from virtualwork.study.cycle import Cycle
-
-
-class PointMotion:
-    """Motion of one point of a link.
-
-    Attributes
-    ----------
-    position, velocity, acceleration, jerk : array (n, 2)
-        m, m/s, m/s², m/s³, in ground axes; NaN where the pose cannot be assembled.
-    """
-
-    def __init__(self, motion: Motion, body: str, place: complex, node: str | None = None) -> None:
-        self.motion, self.body, self.place, self.node = motion, body, place, node
-
-    def __repr__(self) -> str:
-        return f"PointMotion({self.node or self.place!r} of {self.body}, {self.motion.n} poses)"
-
-    @property
-    def position(self) -> Reals:
-        """(n, 2) m."""
-        return xy(self.complex(0))
-
-    @property
-    def velocity(self) -> Reals:
-        """(n, 2) m/s (Ibrahim eq. 1.4.1)."""
-        return xy(self.complex(1))
-
-    @property
-    def acceleration(self) -> Reals:
-        """(n, 2) m/s² (Ibrahim eq. 1.5.1)."""
-        return xy(self.complex(2))
-
-    @property
-    def jerk(self) -> Reals:
-        """(n, 2) m/s³ (Ibrahim eq. 1.5.3)."""
-        return xy(self.complex(3))
-
-    def complex(self, order: int) -> Complexes:
-        """The order-th time derivative as x + iy, (n,)."""
-        return self.motion.poses.point_derivative(self.body, self.place, order, self.node)
-
-    def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the position (order 0), velocity (1), acceleration (2) or jerk.
-
-        It is the length of the error, in the unit of the quantity; the dimensions and the input are taken as exact.
-        Infinite where no digit is known, within rounding of a limit of the input. See `virtualwork.bounds`.
-
-        Examples
-        --------
-        A crank of length 1 at 60°: y = √3/2.
-
-        >>> from virtualwork import Input, Link, Mechanism
-        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
-        >>> point = crank.motion(np.pi / 3).point("P")
-        >>> bool(abs(point.position[0, 1] - np.sqrt(0.75)) <= point.error_estimate()[0] < 1e-15)
-        True
-        """
-        return self.motion.rounding.point(self.body, self.place, self.node, order)
-
-    def coefficient(self, j: int = 0) -> Complexes:
-        """The velocity coefficient dP/dq_j as x + iy, (n,): the point's virtual displacement for a unit of input j."""
-        return self.motion.poses.point_coefficient(self.body, self.place, j, self.node)
-
-
-class LinkMotion:
-    """Motion of one link.
-
-    Attributes
-    ----------
-    angle : array (n,)
-        rad, of the link's own x-axis, in (−π, π].
-    omega, alpha, jerk : array (n,)
-        rad/s, rad/s², rad/s³.
-    """
-
-    def __init__(self, motion: Motion, body: str) -> None:
-        self.motion, self.body = motion, body
-
-    def __repr__(self) -> str:
-        return f"LinkMotion({self.body}, {self.motion.n} poses)"
-
-    @property
-    def angle(self) -> Reals:
-        """(n,) rad."""
-        return self.motion.poses.angle(self.body)
-
-    @property
-    def omega(self) -> Reals:
-        """(n,) rad/s (Ibrahim eq. 1.4.2)."""
-        return self.motion.poses.angle_derivative(self.body, 1)
-
-    @property
-    def alpha(self) -> Reals:
-        """(n,) rad/s² (Ibrahim eq. 1.5.2)."""
-        return self.motion.poses.angle_derivative(self.body, 2)
-
-    @property
-    def jerk(self) -> Reals:
-        """(n,) rad/s³ (Ibrahim eq. 1.5.3)."""
-        return self.motion.poses.angle_derivative(self.body, 3)
-
-    def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the angle (order 0, rad), ω (1), α (2) or the angular jerk (3).
-
-        The dimensions and the input are taken as exact. See `virtualwork.bounds`.
-        """
-        return self.motion.rounding.angle(self.body, order)
-
-    def coefficient(self, j: int = 0) -> Reals:
-        """The velocity coefficient dθ/dq_j, (n,): the link's virtual rotation for a unit of input j."""
-        return self.motion.poses.angle_coefficient(self.body, j)
-
-
-class SlideMotion:
-    """Motion along one guide: `position`, `speed`, `acceleration`, `jerk`, each (n,), m from the guide's `through`."""
-
-    def __init__(self, motion: Motion, guide: int) -> None:
-        self.motion, self.guide = motion, guide
-
-    def __repr__(self) -> str:
-        return f"SlideMotion({self.motion.mechanism.guides[self.guide].point}, {self.motion.n} poses)"
-
-    @property
-    def position(self) -> Reals:
-        """(n,) m."""
-        return self.motion.poses.slide_derivative(self.guide, 0)
-
-    @property
-    def speed(self) -> Reals:
-        """(n,) m/s."""
-        return self.motion.poses.slide_derivative(self.guide, 1)
-
-    @property
-    def acceleration(self) -> Reals:
-        """(n,) m/s²."""
-        return self.motion.poses.slide_derivative(self.guide, 2)
-
-    @property
-    def jerk(self) -> Reals:
-        """(n,) m/s³."""
-        return self.motion.poses.slide_derivative(self.guide, 3)
-
-    def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the slide (order 0, m), its speed (1), acceleration (2) or jerk (3).
-
-        The dimensions and the input are taken as exact. See `virtualwork.bounds`.
-        """
-        return self.motion.rounding.slide(self.guide, order)
 
 
 class Motion:
@@ -209,6 +68,7 @@ class Motion:
     ) -> None:
         self.assembly = assembly
         self.poses = Poses(assembly, angle, speed, acceleration, jerk, block_of)
+        self.lanes = Lanes(assembly, self.poses)
         self._units: dict[int, Motion] = {}
 
     def __repr__(self) -> str:
@@ -311,6 +171,12 @@ class Motion:
                 return SlideMotion(self, i)
         raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
 
+    def value(self, key: Key) -> Any:
+        """A quantity by its key (`Recording.value`), (n,): from the tape where that pays, else over blocks of poses."""
+        if self.lanes.pays((key,)):
+            return self.lanes.values((key,))[0].copy()
+        return over_blocks(self.poses, key, self.dynamics if key[0] in FORCES else None)
+
     @cached_property
     def rounding(self) -> MotionErrors:
         """Bounds of the rounding errors of this motion, each formed when first asked for."""
@@ -332,8 +198,12 @@ class Motion:
 
         Static where speed and acceleration are zero (Riul, unit II, eq. 3), else with inertia loads (eq. 5).
         """
-        found = self.dynamics.effort
-        return found[:, 0] if self.inputs.shape[1] == 1 else found
+        k = self.inputs.shape[1]
+        return (
+            self.value(("effort", 0))
+            if k == 1
+            else np.stack([self.value(("effort", j)) for j in range(k)], axis=1)
+        )
 
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2) N (Ibrahim §2.2).
@@ -369,26 +239,59 @@ class Motion:
         return Cycle(self)
 
     def counterweights(self, links: Sequence[str]) -> tuple[dict[str, complex], Complexes, Complexes]:
-        """The counterweights on links with a fixed pivot that leave the least RMS shaking force.
-
-        See `virtualwork.study.counterweights.least_squares`.
-        """
+        """Counterweights of the least RMS shaking force: see `virtualwork.study.counterweights.least_squares`."""
         from virtualwork.study.counterweights import least_squares
 
         return least_squares(self, links)
 
-    # --- as a picture ---------------------------------------------------------------------------------------------
+    # --- as a picture -----------------------------------------------------------------------------------------------
     @cached_property
     def drawing(self) -> Drawing:
-        """What the mechanism is drawn as, its guides as long as they are used in these poses.
+        """What the mechanism is drawn as, its guides as long as they are used; `at(shape.body, z)` carries shapes along."""
+        from virtualwork.picture.shapes import shapes_of
 
-        `at(shape.body, z)` carries the shapes' points along.
+        return shapes_of(self.poses)
+
+    def plot(self, points: Sequence[str] | None = None, figure: FigureBase | None = None) -> Axes:
+        """Draw the mechanism to scale and the paths of points (default: of all that are no joint); return the axes.
+
+        Without a figure it is a new one of pyplot's; without matplotlib (the extra `plot`) an ImportError.
         """
-        slides = [self.poses.slide_derivative(i, 0) for i in range(len(self.mechanism.guides))]
-        used = [s[np.isfinite(s)] for s in slides]
-        return draw(
-            self.mechanism, [(float(s.min()), float(s.max())) if len(s) else (-np.inf, np.inf) for s in used]
-        )
+        from virtualwork.picture.paper import on_paper
+
+        return on_paper(self.poses, points, figure)
+
+    def plot_curves(self, *names: str, figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw `H.x`, `coupler.omega` … against the input, a panel for each unit; return their axes."""
+        from virtualwork.picture.over_input import curves
+
+        return curves(self.poses, names, figure)
+
+    def animate(self, forces: bool = False) -> Page:
+        """Return a page that moves: the mechanism over these poses with play, slider, curves and values.
+
+        A notebook shows it; `.save("motion.html")` writes it to a file that any browser opens.
+
+        Parameters
+        ----------
+        forces : bool
+            Draw the joint forces too.
+
+        Raises
+        ------
+        ValueError
+            More poses than a page can hold.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 2})}, inputs=Input(link="crank"))
+        >>> "P_vx_m_s" in crank.motion(np.linspace(0, 6, 37), speed=3.0).animate().html
+        True
+        """
+        from virtualwork.animation import of_motion
+
+        return of_motion(self.poses, self.drawing, self.dynamics if forces else None)
 
     # --- as a table -------------------------------------------------------------------------------------------------
     def to_frame(self) -> DataFrame:
@@ -405,26 +308,7 @@ class Motion:
         """
         from pandas import DataFrame
 
-        m = self.mechanism
-        units = (
-            ("m", "m_s", "m_s2") if any(np.any(rate) for of in self.poses.rates for rate in of) else ("m",)
-        )
-        table: dict[str, Any] = {
-            f"{e.name}_{'m' if e.is_slide else 'rad'}": self.inputs[:, j] for j, e in enumerate(m.inputs)
-        }
-        table["assembled"] = self.assembled
-        for name in m.links:
-            link = self.link(name)
-            table[f"{name}_angle_rad"] = link.angle
-            if len(units) > 1:
-                table[f"{name}_omega_rad_s"], table[f"{name}_alpha_rad_s2"] = link.omega, link.alpha
-        for name in dict.fromkeys(p for link in m.links.values() for p in link.points if p not in m.ground):
-            point = self.point(name)
-            for order, unit in enumerate(units):
-                z = point.complex(order)
-                table[f"{name}_{'va'[order - 1] if order else ''}x_{unit}"] = z.real
-                table[f"{name}_{'va'[order - 1] if order else ''}y_{unit}"] = z.imag
-        return DataFrame(table)
+        return DataFrame(columns(self.poses))
 
     def _repr_html_(self) -> str:
         return str(self.to_frame().to_html(max_rows=20))

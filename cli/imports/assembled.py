@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from itertools import chain
+from dataclasses import replace
+from itertools import chain, product
 
 import numpy as np
 
 from cli.imports.drawn import GROUND, Drawing
 from cli.imports.toml import text
-from virtualwork import Mechanism
+from virtualwork import Guess, Mechanism
 from virtualwork.describe.errors import MechanismError
 
 # degrees of an input that says nothing of where it begins
@@ -18,6 +20,9 @@ TRIED = tuple(range(0, 360, 15))
 NEAR = 1e-9
 # a little way of an input: rad, or of the mechanism's size
 LITTLE = 1e-3
+# guesses near a singular pose that are tried on either side
+TRIES = 6
+NEARBY = 0.6  # rad, of any link
 
 
 def described(d: Drawing, source: str) -> str:
@@ -34,7 +39,10 @@ def described(d: Drawing, source: str) -> str:
             return made
         d.notes += warnings
         if not _moves(d, m):
-            d.notes.append("its input moves to neither side of the drawn pose: it stands at a limit there")
+            d.notes.append(
+                "its input moves to neither side of the drawn pose: it stands at a limit there, or where assemblies meet"
+                f"{_moving_near(d, m)}"
+            )
         if d.posed:
             off, point = max(_gaps(d, m, motion), default=(0.0, ""))
             if not off <= NEAR * m.size:
@@ -53,6 +61,31 @@ def _moves(d: Drawing, m: Mechanism) -> bool:
     return bool(m.motion(inputs if len(ways) > 1 else inputs[:, 0]).assembled.any())
 
 
+def _moving_near(d: Drawing, m: Mechanism) -> str:
+    """Return a guess near the drawn pose from which it moves, as far as one of some tries finds it."""
+    if len(d.drives) > 1 or d.drives[0].slide is not None:
+        return ""
+    draw = np.random.default_rng(1)
+    start = m.guess.angles
+    for _, turn in product(range(TRIES), (0.05, -0.05)):
+        off = draw.normal(scale=0.3, size=len(start))
+        at = d.drives[0].at + turn
+        angles = {name: a + float(o) for (name, a), o in zip(start.items(), off, strict=True)}
+        driven = str(d.drives[0].link)
+        angles[driven] = start.get(driven, 0.0) + turn
+        try:
+            near = replace(m, guess=Guess(at, angles))
+            motion = near.motion(np.array([at, at + 0.2 * turn]))
+            found = np.array([motion.link(name).angle for name in start])
+        except (MechanismError, np.linalg.LinAlgError):
+            continue
+        way = float(np.abs(np.angle(np.exp(1j * (found[:, 0] - np.array(list(start.values())))))).max())
+        if motion.assembled.all() and way < NEARBY:
+            rows = (f'{n} = "{a:.6g} rad"' for n, a in zip(start, found[:, 0], strict=True))
+            return f'; it moves from the [guess] at = "{at:.6g} rad", {", ".join(rows)}'
+    return ""
+
+
 def _gaps(d: Drawing, m: Mechanism, motion: object) -> list[tuple[float, str]]:
     """Return how far each point stands from its drawn place."""
     factor = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048}[d.length]
@@ -60,9 +93,11 @@ def _gaps(d: Drawing, m: Mechanism, motion: object) -> list[tuple[float, str]]:
     for name, body in d.bodies.items():
         if name == GROUND:
             continue
+        turned = cmath.rect(1.0, body.turn)
         for point, z in body.points.items():
             x, y = motion.point(point).position[0]  # type: ignore[attr-defined]
-            found.append((math.hypot(x - float(z[0]) * factor, y - float(z[1]) * factor), point))
+            drawn = complex(*map(float, body.at)) + complex(*map(float, z)) * turned
+            found.append((abs(complex(x, y) - drawn * factor), point))
     return found
 
 

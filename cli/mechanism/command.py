@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -37,7 +37,7 @@ EXAMPLE = "klann"
 PANELS = {
     "What": "at sweep inputs only branch change vary variants",
     "How": "order newton",
-    "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states schema",
+    "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states html schema",
 }
 
 
@@ -111,6 +111,14 @@ def run(
             metavar="FILE.csv",
             help="Write a row for each pose and link to FILE: what `dalembert work` reads.",
             callback=suffix_among(".csv"),
+        ),
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.html",
+            help="Write a page that moves to FILE: play, slider, curves, values; with --forces their arrows.",
+            callback=suffix_among(".html"),
         ),
     ] = None,
     change: Annotated[
@@ -206,14 +214,20 @@ def run(
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)
         analysis.warnings += said
         analysis.check_names()
-        if several is None and show.streams and own in ([], ["--forces"]) and analysis.is_long:
+        if html is not None:
+            from cli.show.page import refuse_long
+
+            refuse_long(q.n * (1 if several is None else several.count))
+        alone = several is None and html is None and own in ([], ["--forces"])
+        if alone and show.streams and analysis.is_long:
             return _long(analysis, forces, states)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not show.json or show.expect is not None or show.output is not None
         times = 1 if several is None or show.streams else several.count
         analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces, times=times)
         if several is None:
-            return _result(analysis, request, states, explain, graph, about)
+            result = _result(analysis, request, states, explain, graph, about)
+            return _with_page(result, html, lambda: [("", analysis)], forces, show.units)
 
         def analysis_of(variant: Mechanism) -> Analysis:
             home = at is None and sweep is None and inputs is None
@@ -223,7 +237,9 @@ def run(
         found = Many(
             mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
         )
-        result = found.result(show.streams, show.as_json, table)
+        result = _with_page(
+            found.result(show.streams, show.as_json, table), html, found.analyses, forces, show.units
+        )
         return replace(
             result,
             warnings=[*said, *result.warnings],
@@ -262,7 +278,7 @@ def _result(
     graph: str | None,
     about: dict[str, str],
 ) -> Result:
-    from cli.mechanism import columns, graphs, poses, remarks, words
+    from cli.mechanism import columns, picture, poses, remarks, words
     from cli.mechanism import forces as of_forces
     from cli.mechanism.states import table as link_states
     from cli.mechanism.studies import Studies
@@ -271,7 +287,7 @@ def _result(
     studies = Studies(analysis, request)
     found = studies.document
     if graph:
-        graphs.quantities(analysis, graph)  # a bad name is an error before anything is written
+        picture.check_names(analysis, graph)  # a bad name is an error before anything is written
 
     def of_poses() -> Table:
         if request.forces:
@@ -285,12 +301,10 @@ def _result(
         return {"name": analysis.mechanism.name, "poses": listed, **found}
 
     def figure() -> Figure:
-        from cli.mechanism import force_picture, picture
-
         several = len(analysis.inputs.shown) > 2 and analysis.motions[0].assembled.any()
         if graph:
-            return picture.graphs(analysis, graph)
-        return force_picture.draw(analysis) if request.forces and several else picture.draw(analysis)
+            return picture.draw_curves(analysis, graph)
+        return picture.draw_forces(analysis) if request.forces and several else picture.draw(analysis)
 
     def beside() -> Iterable[bytes]:
         # every link, whatever --only names
@@ -317,6 +331,25 @@ def _result(
         failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),
         within=lambda: _told(analysis.file),
     )
+
+
+def _with_page(
+    result: Result,
+    html: Path | None,
+    analyses: Callable[[], list[tuple[str, Analysis]]],
+    forces: bool,
+    units: str | None,
+) -> Result:
+    """Add the page that moves to what a result writes beside, where it is asked for."""
+    if html is None:
+        return result
+
+    def page() -> bytes:
+        from cli.mechanism.animation import page
+
+        return page(analyses(), forces, units).html.encode()
+
+    return replace(result, beside={**result.beside, html: page})
 
 
 @contextmanager

@@ -51,6 +51,10 @@ class Many:
                 found = str(error)
             yield str(number), row, found
 
+    def analyses(self) -> list[tuple[str, Analysis]]:
+        """What is asked of each variant whose parts can be put together."""
+        return [(name, found) for name, _, found in self._each() if not isinstance(found, str)]
+
     def _formed(self, name: str, analysis: Analysis | str, form: Callable[[Result], Any]) -> Any:
         """A form of a variant's result; None where its parts cannot be put together, which is remembered."""
         from virtualwork import MechanismError
