@@ -131,7 +131,7 @@ def once_per_turn(
         if pulses != 1:
             raise ValueError("the pulses of a turn are counted from mark to mark, beside a tacho")
         knots, at, pulses = _counted(time, np.asarray(tacho, dtype=float), at)
-    angle = 2 * np.pi / pulses * np.arange(len(knots))
+    angle = np.asarray(2 * np.pi / pulses * np.arange(len(knots)), dtype=float)
     each = np.diff(at)
     vectors = np.array([_turn(time, x, start, end, knots, angle) for start, end in pairwise(at.tolist())])
     turns = len(each)
