@@ -63,7 +63,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("animation", "freebody", "gyroscope", "integration", "momentum", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("picture",),
-        ("rounding_in_time", "solids"),
+        ("rounding_in_time", "solids", "traced"),
         ("inertia",),
         ("rounding",),
         ("attitude", "elliptic", "shapes", "top_roots"),
