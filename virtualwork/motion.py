@@ -180,7 +180,8 @@ class Motion:
 
     def value(self, key: Key) -> Any:
         """A quantity by its key (`Recording.value`), (n,): from the tape where that pays, else over blocks of poses."""
-        if pays(self.assembly.recordings.setdefault("asked", {}), self.n, (key,)):
+        way = pays(self.assembly.recordings.setdefault("asked", {}), self.n, (key,))
+        if way == "lanes" or (way == "one" and (key in self.lanes.known or self.lanes.one((key,)))):
             return self.lanes.values((key,))[0].copy()
         return over_blocks(self.poses, key, self.dynamics if key[0] in FORCES else None)
 

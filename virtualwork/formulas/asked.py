@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.poses import Poses
@@ -13,26 +13,25 @@ from virtualwork.formulas.poses import Poses
 Key = tuple[Any, ...]
 # what the loads have a part in; a pose that is not assembled has none of it
 FORCES = {"effort", "newton-euler", "force", "moment", "shaking", "shaking moment"}
-# poses that are few: Python's floats are faster than arrays
-FEW = 4
-# times that a few poses are asked for, and poses, from which on the tape pays
+# times that one pose is asked for, and poses, from which on the tape pays
 OFTEN = 50
 MANY_POSES = 1_000_000
 
 
-def pays(asked: dict[Any, int], n: int, keys: Sequence[Key]) -> bool:
-    """Whether quantities are asked for so often, or of so many poses, that writing them down pays.
+def pays(asked: dict[Any, int], n: int, keys: Sequence[Key]) -> Literal["blocks", "one", "lanes"]:
+    """The way that pays: blocks of arrays, one pose by a function of floats, or lanes of the tape.
 
-    A few poses: some milliseconds to write down against some ten microseconds each time. Many: where compiled code may
-    run, and what it takes to make it is less than what it saves. `asked` counts for an assembly.
+    One pose: some milliseconds to write down against some ten microseconds each time, so it must be asked for often.
+    Very many: where compiled code may run, and what it takes to make it is less than what it saves. `asked` counts for an
+    assembly.
     """
     if os.environ.get("DALEMBERT_ENGINE"):
-        return True
-    key = n <= FEW, *keys
-    asked[key] = asked.get(key, 0) + (1 if n <= FEW else n)
-    if n <= FEW:
-        return asked[key] > OFTEN
-    return asked[key] > MANY_POSES and _compiled_code()
+        return "lanes"
+    key = n == 1, *keys
+    asked[key] = asked.get(key, 0) + n
+    if n == 1:
+        return "one" if asked[key] > OFTEN else "blocks"
+    return "lanes" if asked[key] > MANY_POSES and _compiled_code() else "blocks"
 
 
 def _compiled_code() -> bool:

@@ -22,7 +22,7 @@ from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.poses import Branch, Poses
-from virtualwork.formulas.recording import COMPLEX, NAMES, Recording, names
+from virtualwork.formulas.recording import NAMES, Recording, names
 from virtualwork.formulas.scene import Scene
 
 # sin² of a transmission angle below which a force may have no digit left
@@ -115,7 +115,7 @@ class Lanes:
         What `takes` does not take, and poses close to a change point, are worked out over blocks.
         """
         new = [key for key in keys if key not in self.known]
-        if new and self.poses.n == 1 and self._one(tuple(new)):
+        if new and self.poses.n == 1 and self.one(tuple(new)):
             return [self.known[key] for key in keys]
         if new and not self.takes(new):
             for key in new:
@@ -124,8 +124,8 @@ class Lanes:
             self._run(new)
         return [self.known[key] for key in keys]
 
-    def _one(self, keys: tuple[Key, ...]) -> bool:
-        """One pose that hangs on nothing but its input, by a function of floats."""
+    def one(self, keys: tuple[Key, ...]) -> bool:
+        """Work out one pose that hangs on nothing but its input, by a function of floats; False where it hangs on more."""
         given = [self.poses.inputs, *(rates[0] for rates in self.poses.rates)]
         values = [x if isinstance(x, float) else float(np.ravel(x)[0]) for x in given]
         made = ready(self.branch, tuple(x != 0.0 for x in values[1:]), keys)
@@ -161,11 +161,13 @@ class Lanes:
         nowhere = ~np.isfinite(self.poses.inputs).all(axis=1)
         for key in keys:
             where = names(key)
-            value = np.empty(n, complex if key[0] in COMPLEX else float)
             if len(where) == 2:
+                value = np.empty(n, complex)
                 value.real, value.imag = out[where[0]], out[where[1]]
             else:
-                value[:] = out[where[0]]
+                value = out[where[0]]
+                # a row of the run's own table needs no copy
+                value = value if np.ndim(value) else np.full(n, value)
             if key in closed:
                 value[~np.isfinite(np.broadcast_to(out[names(closed[key])[0]], n))] = np.nan
             value[nowhere] = np.nan

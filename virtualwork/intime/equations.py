@@ -22,7 +22,8 @@ import numpy as np
 
 from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.engines import floats, run
-from dalembert.arithmetic.recorded import RECORDED, Number, rotation
+from dalembert.arithmetic.recorded import RECORDED, Number
+from dalembert.arithmetic.varied import rotation
 from dalembert.arithmetic.systems import solved
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
