@@ -127,6 +127,18 @@ def run(
             help="Variants as a table: a column for each path, links.crank.B.x_mm, a row for each variant.",
         ),
     ] = None,
+    tolerance: Annotated[
+        bool,
+        typer.Option("--tolerance", help="What [tolerances] of the file do to every number shown."),
+    ] = False,
+    draws: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Draw so many mechanisms within the tolerances, and solve each."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn.")] = 0,
+    distribution: Annotated[
+        str, typer.Option(help="normal (a limit is three standard deviations) or uniform: of what is drawn.")
+    ] = "normal",
     schema: Annotated[
         bool,
         typer.Option(

@@ -386,6 +386,13 @@ def rotation(angle: Any) -> Any:
     return complex(math.cos(angle), math.sin(angle))
 
 
+def heading(z: Any) -> Any:
+    """The angle of a complex constant, plain or varied, in (−π, π]."""
+    if isinstance(z, Varied):
+        return made(cmath.phase(complex(z)), RECORDED.angle(z.recorded))
+    return cmath.phase(z)
+
+
 def bare(value: Number) -> Number:
     """What is recorded of a constant that varies; any other number as it is."""
     return value.recorded if isinstance(value, Varied) else value

@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.guess import choose
@@ -18,6 +19,7 @@ from virtualwork.branch.solutions import every_solution
 from virtualwork.branch.track import Track
 from virtualwork.describe.description import Description
 from virtualwork.formulas.newton import write_unknowns
+from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.rates import Passage
 from virtualwork.plan.steps import Group, Step
@@ -56,6 +58,51 @@ class Assembly(Choice):
     def passage(self) -> Passage | None:
         """How derivatives go through change points; None with several inputs."""
         return self.track if self.track.active else None
+
+    @cached_property
+    def recordings(self) -> dict[Any, Any]:
+        """What has been written down of it on tapes."""
+        return {}
+
+    @property
+    def turning_over(self) -> frozenset[str]:
+        """The closed forms that change their sign somewhere in what was covered."""
+        flips = self.track.flips
+        return frozenset(name for name in flips if len(flips[name]) and name not in self.folded)
+
+    @property
+    def folded(self) -> set[str]:
+        """The groups that are singular in every pose."""
+        return self.track.folded
+
+    @property
+    def may_open(self) -> bool:
+        """Whether it cannot be assembled somewhere in what was covered, as far as is known."""
+        track = self.track
+        simple = (
+            track.active
+            and not self.mechanism.inputs[0].is_slide
+            and len(self.plain) == len(self.plan.groups)
+        )
+        return not simple or track.has_limits or not self._stands
+
+    @cached_property
+    def _stands(self) -> bool:
+        """Whether it is assembled at the guess."""
+        st = self.state(self.mechanism.at)
+        return all(margin >= 0 for margin in st.margin.values())
+
+    def sign(self, group: str, q: Reals) -> Number:
+        """The sign of a closed form at inputs."""
+        return self.track.sign(self.cases[group].group, q)
+
+    def close_to_change(self, q: Reals) -> NDArray[np.bool_]:
+        """Which inputs are close to a change point."""
+        near = np.zeros(np.shape(q), dtype=bool)
+        for changes in self.track.changes.values():
+            for change in changes:
+                near |= np.abs(q - change.input) < change.reach
+        return near
 
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""

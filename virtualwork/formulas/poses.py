@@ -139,6 +139,14 @@ class Poses:
             other.rates = rates
         return other
 
+    def some(self, which: NDArray[np.bool_]) -> Poses:
+        """Some of these poses, `which` of them (n,), with their rates."""
+
+        def of(rate: Number) -> Number:
+            return rate[which] if np.ndim(rate) else rate
+
+        return self.again(self.inputs[which], [[of(rate) for rate in rates] for rates in self.rates])
+
     @cached_property
     def assembled(self) -> NDArray[np.bool_]:
         """(n,) bool: which poses can be assembled."""

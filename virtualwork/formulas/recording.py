@@ -9,14 +9,13 @@ Inputs of a tape
 `q0`, `v0`, `a0`, `j0`   input 0 of the mechanism and its derivatives in time; `q1` … of further ones
 `sign GROUP`             ±1, of a closed form that changes its sign along the input
 `x GROUP 0`              the unknowns of a group without a closed form: angles, then slides
-`turns BODY`             whole turns of a body whose angle itself is needed, beyond what lies within (−π, π]
-`turns spring 0`         the same of a torsion spring's twist
+`near BODY`              the angle, with its whole turns, of a body of which the angle itself is needed
+`near spring 0`          the same of a torsion spring's twist
 `table 0 x`, `table 0 y` the force of the first load that is given by a table
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -43,7 +42,6 @@ from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
 # (kind, of what …): see `Recording.value`
 Key = tuple[Any, ...]
 NAMES = ("q", "v", "a", "j")
-TURN = 2 * math.pi
 
 
 class Recording:
@@ -118,7 +116,12 @@ class Recording:
             sign = self.recorder.input(f"sign {group.name}")
         self._cases[group.name].solve(st, sign, bare(self.mechanism.size))
         for body in sorted(self.geared.intersection(group.members)):
-            st.angle[body] = WRITTEN.angle(st.turn[body]) + TURN * self.recorder.input(f"turns {body}")
+            st.angle[body] = self.unwrapped(f"near {body}", st.turn[body])
+
+    def unwrapped(self, near: str, turn: Number) -> Number:
+        """The angle of a rotation next to one that enters, and is it but for rounding: with its whole turns."""
+        about = self.recorder.input(near)
+        return about + WRITTEN.angle(turn * WRITTEN.exp(about).conjugate())
 
     def solve(self, targets: Iterable[str], order: int) -> None:
         """Write down what targets hang on, up to an order of derivatives."""
@@ -218,7 +221,7 @@ class Recording:
         ("effort", j), ("newton-euler", j)
         ("force", joint's key, body), ("moment", joint's key, body)
         ("shaking",), ("shaking moment",)            complex; real
-        ("closed",)                                  a finite number where every group is assembled
+        ("closed", groups' names …)                  a finite number where these groups are assembled
         ("margin", group's name)                     the radicand of a closed form, relative
         """
         if key not in self._values:
@@ -315,14 +318,33 @@ class Recording:
         paths, _, block = self.forces
         return resultant(shaking_loads(paths.case.loads), block)[1]
 
-    def _closed(self) -> Number:
-        self.solve([key for g in self.plan.groups for key in self.plan.writes(g)], 0)
+    def hangs_on(self, key: Key) -> tuple[str, ...]:
+        """The groups that a quantity hangs on, by name: where one of them is not assembled, it has no value.
+
+        What cancels is not on the tape: a platform that stays level has the angle 0 there, whatever carries it.
+        """
+        kind, *of = key
+        targets: Iterable[str] = [key for g in self.plan.groups for key in self.plan.writes(g)]
+        if kind in ("point", "dpoint"):
+            targets = self._path_reads(self._path(*of[:3]))
+        elif kind in ("angle", "dangle", "turn"):
+            targets = [f"angle:{of[0]}"]
+        elif kind in ("slide", "dslide"):
+            targets = [f"slide:{of[0]}"]
+        return tuple(step.name for step in self.plan.needed(targets) if isinstance(step, Group))
+
+    def _closed(self, *groups: str) -> Number:
+        chosen = [g for g in self.plan.groups if g.name in groups]
+        self.solve([key for g in chosen for key in self.plan.writes(g)], 0)
         total: Number = 0.0
-        for group in self.plan.groups:
-            for body in group.angles:
-                total = total + self.st.turn[body].real
-            for guide in group.slides:
-                total = total + self.st.slide[guide]
+        for group in chosen:
+            if group.kind == "Newton":
+                unknowns = [self.st.angle[b] for b in group.angles] + [self.st.slide[s] for s in group.slides]
+                total = sum((abs(x) for x in unknowns), total)
+            else:
+                total = total + WRITTEN.sqrt(self.st.margin[group.name])
+                if group.kind == "PRP":
+                    total = total + abs(self.st.slide[group.slides[0]])
         return total
 
     def _margin(self, group: str) -> Number:
@@ -357,9 +379,9 @@ class _Setting(Shared):
         return speed[0], acceleration[0]
 
     def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
-        """A twist with the whole turns that enter."""
+        """The twist next to the one that enters."""
         number = self.mechanism.torsion_springs.index(spring)
-        return within + TURN * self.recording.recorder.input(f"turns spring {number}")
+        return self.recording.unwrapped(f"near spring {number}", WRITTEN.exp(within))
 
 
 class _Block(Block):

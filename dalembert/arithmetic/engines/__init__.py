@@ -112,6 +112,13 @@ def chosen(tape: Tape, n: int) -> str:
     return "llvm" if _done[tape] > PAYS else "numpy"
 
 
+def compiled_code() -> bool:
+    """Whether LLVM's code may run here, as far as is known without loading it."""
+    from importlib.util import find_spec
+
+    return find_spec("llvmlite") is not None
+
+
 def _on_floats(tape: Tape, columns: list[Reals], table: Reals) -> None:
     function = floats.compiled(tape)
     given = (

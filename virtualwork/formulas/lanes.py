@@ -1,0 +1,268 @@
+"""Quantities of many poses, or of one, from the tape: each pose is a lane.
+
+What is wanted is written down once for an assembly (`recording`), pruned, and run by the engine that suits the count of
+poses. Poses close to a change point, where two branches meet, are left to `Poses`, whose series carry them through.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+from threading import Lock
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dalembert.arithmetic.engines import FEW, compiled_code, run
+from dalembert.arithmetic.tape import Tape
+from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.load_case import LoadCase
+from virtualwork.formulas.loads import Tabled
+from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.formulas.poses import Branch, Poses
+from virtualwork.formulas.recording import COMPLEX, NAMES, Key, Recording, names
+from virtualwork.formulas.scene import Scene
+
+# what the loads have a part in; a pose that is not assembled has none of it
+FORCES = {"effort", "newton-euler", "force", "moment", "shaking", "shaking moment"}
+# sin² of a transmission angle below which a force may have no digit left
+NEAR = 1e-18
+
+
+# times that a few poses are asked for, and poses, from which on the tape pays
+OFTEN = 50
+MANY_POSES = 1_000_000
+
+# two threads that ask one assembly at once
+_writing = Lock()
+
+
+class Turning(Branch, Protocol):
+    """A branch whose closed forms may change their sign along the input."""
+
+    @property
+    def signs(self) -> Mapping[str, int]:
+        """The sign of each closed form at the guess."""
+
+    @property
+    def geared(self) -> set[str]:
+        """Bodies whose angle itself is needed."""
+
+    @property
+    def recordings(self) -> dict[Any, Any]:
+        """What has been written down of it."""
+
+    @property
+    def turning_over(self) -> frozenset[str]:
+        """The closed forms that change their sign somewhere in what was covered."""
+
+    @property
+    def may_open(self) -> bool:
+        """Whether it cannot be assembled somewhere in what was covered, as far as is known."""
+
+    @property
+    def folded(self) -> set[str]:
+        """The groups that are singular in every pose."""
+
+    def sign(self, group: str, q: Reals) -> Number:
+        """The sign of a closed form at inputs."""
+
+    def close_to_change(self, q: Reals) -> NDArray[np.bool_]:
+        """Which inputs are close to a change point."""
+
+
+class Lanes:
+    """Quantities of the poses of one assembly over given inputs and rates, by their keys (`Recording.value`)."""
+
+    def __init__(self, branch: Turning, poses: Poses) -> None:
+        self.branch, self.poses = branch, poses
+        self.known: dict[Key, Any] = {}
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The formulas of the branch, for rates that are zero where these are."""
+        inputs = self.poses.inputs
+        if inputs.shape[1] == 1 and len(inputs):
+            self.branch.cover(float(np.nanmin(inputs)), float(np.nanmax(inputs)))
+        moves = tuple(any(np.any(rate) for rate in rates) for rates in self.poses.rates)
+        return recorded(self.branch, moves)
+
+    def pays(self, keys: Sequence[Key]) -> bool:
+        """Whether these quantities are asked for so often, or of so many poses, that writing them down pays.
+
+        A few poses: some milliseconds to write down against some ten microseconds each time. Many: where compiled code
+        may run, and what it takes to make it is less than what it saves.
+        """
+        if os.environ.get("DALEMBERT_ENGINE"):
+            return True
+        asked = self.branch.recordings.setdefault("asked", {})
+        few = self.poses.n <= FEW
+        key = few, *keys
+        asked[key] = asked.get(key, 0) + (1 if few else self.poses.n)
+        if few:
+            return bool(asked[key] > OFTEN)
+        return bool(asked[key] > MANY_POSES and compiled_code())
+
+    def takes(self, keys: Iterable[Key]) -> bool:
+        """Whether the tape has these quantities: friction iterates, and redundant statics is a system of its own."""
+        if self.branch.folded:
+            return False
+        if not any(key[0] in FORCES for key in keys):
+            return True
+        if self.branch.mechanism.friction:
+            return False
+        return not (
+            any(key[0] in ("newton-euler", "force", "moment") for key in keys)
+            and self.recording.forces[0].order.redundant
+        )
+
+    def values(self, keys: Sequence[Key]) -> list[Any]:
+        """The quantities, each (n,), real or complex.
+
+        What `takes` does not take, and poses close to a change point, are worked out over blocks.
+        """
+        new = [key for key in keys if key not in self.known]
+        if new and not self.takes(new):
+            for key in new:
+                self.known[key] = over_blocks(self.poses, key)
+        elif new:
+            self._run(new)
+        return [self.known[key] for key in keys]
+
+    def _run(self, keys: list[Key]) -> None:
+        forces = any(key[0] in FORCES for key in keys)
+        groups = [g.name for g in self.branch.plan.groups if g.kind not in ("Newton", "PRP")]
+        more: list[Key] = [("margin", name) for name in groups] if forces else []
+        closed: dict[Key, Key] = {}
+        if self.branch.may_open:
+            closed = {key: ("closed", *self.recording.hangs_on(key)) for key in keys}
+        tape = taped(self.branch, self.recording, (*keys, *more, *dict.fromkeys(closed.values())))
+        out = run(tape, self.entering(tape.inputs))
+        n = self.poses.n
+        careful = self.branch.close_to_change(self.poses.inputs[:, 0]) if self.branch.turning_over else None
+        for _, name in more:
+            near = np.abs(out[names(("margin", name))[0]]) < NEAR
+            if np.any(near):
+                near = np.broadcast_to(near, n)
+                careful = near if careful is None else careful | near
+        nowhere = ~np.isfinite(self.poses.inputs).all(axis=1)
+        for key in keys:
+            where = names(key)
+            value = np.empty(n, complex if key[0] in COMPLEX else float)
+            if len(where) == 2:
+                value.real, value.imag = out[where[0]], out[where[1]]
+            else:
+                value[:] = out[where[0]]
+            if key in closed:
+                value[~np.isfinite(np.broadcast_to(out[names(closed[key])[0]], n))] = np.nan
+            value[nowhere] = np.nan
+            if key[0] in FORCES:
+                value += 0.0
+            self.known[key] = value
+        if careful is not None and careful.any():
+            some = self.poses.some(careful)
+            for key in keys:
+                self.known[key][careful] = over_blocks(some, key)
+
+    def entering(self, names: Iterable[str]) -> dict[str, Any]:
+        """The inputs of a tape."""
+        poses, found = self.poses, {}
+        one = poses.n == 1
+        for name in names:
+            kind, _, of = name.partition(" ")
+            if not of:
+                j = int(name[1:])
+                value = poses.inputs[:, j] if name[0] == "q" else poses.rates[NAMES.index(name[0]) - 1][j]
+                found[name] = float(value[0]) if one and np.ndim(value) else value
+            elif kind == "sign":
+                found[name] = np.asarray(self.branch.sign(of, poses.inputs[:, 0]), dtype=float)
+            elif kind == "x":
+                found[name] = self._unknown(*of.rsplit(" ", 1))
+            elif kind == "table":
+                number, part = of.split()
+                force = self._table(int(number))
+                found[name] = force.real if part == "x" else force.imag
+            elif of.startswith("spring "):
+                found[name] = self._spring(int(of.removeprefix("spring ")))
+            else:
+                self.poses.solve((f"angle:{of}",), 0)
+                found[name] = self.poses.over(lambda _, st, body=of: st.angle[body])
+        if one:
+            found = {name: float(np.ravel(value)[0]) for name, value in found.items()}
+        return found
+
+    def _unknown(self, group: str, i: str) -> Reals:
+        """An unknown of a group without a closed form, from its own iteration."""
+        of = next(g for g in self.branch.plan.groups if g.name == group)
+        self.poses.solve(self.branch.plan.writes(of), 0)
+        at = int(i)
+        if at < len(of.angles):
+            return self.poses.over(lambda _, st: st.angle[of.angles[at]])  # type: ignore[no-any-return]
+        return self.poses.over(lambda _, st: st.slide[of.slides[at - len(of.angles)]])  # type: ignore[no-any-return]
+
+    def _spring(self, number: int) -> Reals:
+        """A torsion spring's twist."""
+        spring = self.branch.mechanism.torsion_springs[number]
+        setting = Scene(self.poses).setting
+        self.poses.solve(tuple(f"angle:{body}" for body in spring.links if body != "ground"), 0)
+        return self.poses.over(lambda _, st: setting.twist(st, spring))  # type: ignore[no-any-return]
+
+    def _table(self, number: int) -> Any:
+        """The force of a table over the inputs."""
+        case: LoadCase = self.recording.forces[0].case
+        table = [load for load in case.loads if isinstance(load, Tabled)][number]
+        return table.over(self.poses.inputs[:, 0], True)
+
+
+def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
+    """The formulas of a branch, written down once for rates that are zero or not."""
+    key = moves, branch.turning_over
+    if key not in branch.recordings:
+        branch.recordings[key] = Recording(
+            branch.mechanism, branch.plan, branch.signs, moves, branch.turning_over, branch.geared
+        )
+    found: Recording = branch.recordings[key]
+    return found
+
+
+def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
+    """The tape of quantities, pruned once."""
+    key = recording.moves, recording.turning_over, keys
+    with _writing:
+        if key not in branch.recordings:
+            branch.recordings[key] = recording.tape(keys)
+    found: Tape = branch.recordings[key]
+    return found
+
+
+def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:
+    """A quantity worked out over blocks of poses, (n,)."""
+    kind, *of = key
+    if kind in FORCES:
+        forces = forces or Dynamics(poses)
+        if kind == "effort":
+            return forces.effort[:, of[0]]
+        if kind == "newton-euler":
+            return forces.newton_euler[:, of[0]]
+        if kind.startswith("shaking"):
+            force, moment = forces.shaking
+            return moment if kind == "shaking moment" else force[:, 0] + 1j * force[:, 1]
+        joint = forces.reactions.by_key[of[0]]
+        return forces.joint_force(joint, of[1]) if kind == "force" else forces.joint_moment(joint, of[1])
+    match kind:
+        case "point":
+            body, z, node, order = of
+            return poses.point_derivative(body, z, order, node)
+        case "angle":
+            body, order = of
+            return poses.angle_derivative(body, order) if order else poses.angle(body)
+        case "slide":
+            return poses.slide_derivative(*of)
+        case "dpoint":
+            body, z, node, j, order = of
+            return poses.point_coefficient(body, z, j, node, order)
+        case "dangle":
+            return poses.angle_coefficient(*of)
+    raise KeyError(key)
