@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from balancing.log_balance import LogBalance, region_factor
     from balancing.next_run import NextRun, suggest_run
     from balancing.placement import Placement, drill_depth, place, place_from_stock, transfer
+    from balancing.prior import Prior, fit_with_prior, pooled_prior, stored_prior
     from balancing.rotor import by_size
     from balancing.rounding import influence_error
     from balancing.run_log import JointFit, Undetermined, determined, joint_fit
@@ -55,6 +56,7 @@ _HOMES = {
     "balancing.log_balance": "LogBalance region_factor",
     "balancing.next_run": "NextRun suggest_run",
     "balancing.synchronous": "OncePerTurn once_per_turn",
+    "balancing.prior": "Prior fit_with_prior pooled_prior stored_prior",
     "balancing.placement": "Placement drill_depth place place_from_stock transfer",
     "balancing.rotor": "by_size",
     "balancing.rounding": "influence_error",
@@ -92,6 +94,7 @@ __all__ = [
     "NextRun",
     "OncePerTurn",
     "Placement",
+    "Prior",
     "Readings",
     "TrialEffect",
     "Unbalances",
@@ -104,6 +107,7 @@ __all__ = [
     "drift",
     "drill_depth",
     "error_budget",
+    "fit_with_prior",
     "grade_value",
     "index_balancing",
     "influence_coefficients",
@@ -120,10 +124,12 @@ __all__ = [
     "place",
     "place_from_stock",
     "plane_significance",
+    "pooled_prior",
     "region_factor",
     "repeats",
     "robust_fit",
     "spread",
+    "stored_prior",
     "suggest_run",
     "transfer",
     "trial_effect",

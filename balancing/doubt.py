@@ -73,6 +73,7 @@ def repeats(fit: JointFit) -> Iterator[Repeat]:
     >>> [(one.runs, round(one.probability, 2)) for one in found]
     [((0, 1), 0.68), ((2, 3), 0.68)]
     """
+    fit = fit.alone
     size = np.abs(fit.masses).max(initial=0.0)
     close = np.abs(fit.masses[:, None] - fit.masses[None]).max(axis=-1) <= NEAR * size
     pairs = np.argwhere(np.triu(close, 1))
@@ -127,6 +128,7 @@ def drift(fit: JointFit, times: ArrayLike) -> Drift:
     """
     from scipy.special import betainc
 
+    fit = fit.alone
     time = np.asarray(times, dtype=float)
     time = time - time.mean(axis=-1, keepdims=True)
     shared = np.where(fit.present, time[..., None], 0.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,14 @@ def region_factor(probability: float, degrees_of_freedom: ArrayLike, dimensions:
         known, 2 * gammaincinv(dimensions / 2, probability), dimensions * fdtri(dimensions, real, probability)
     )
     return np.asarray(np.sqrt(np.where(nu > 0, square, np.nan)))
+
+
+@record
+class Spread(NamedTuple):
+    """Covariances along a vector and across it, (..., 2, 2), and the complex degrees of freedom of each, (...)."""
+
+    covariance: Real
+    degrees_of_freedom: Real
 
 
 @record
@@ -93,9 +102,18 @@ class LogBalance:
         flat = (*unit.shape[:-2], -1)
         return unit.reshape(flat), along.reshape(flat), across.reshape(flat)
 
-    @cached_property
+    @property
     def covariance(self) -> Real:
         """Of each correction along itself (its size) and across (its angle), (..., p, 2, 2), kg²."""
+        return self._spread.covariance
+
+    @property
+    def degrees_of_freedom(self) -> Real:
+        """Complex, of the covariance of each correction, (..., p)."""
+        return self._spread.degrees_of_freedom
+
+    @cached_property
+    def _spread(self) -> Spread:
         fit = self.fit
         weights = np.ones(fit.initial.shape) if self.weights is None else self.weights
         left = fit.fitted(self.corrections[..., None, :])[..., 0, :]
@@ -108,7 +126,28 @@ class LogBalance:
         )
         flat = [part.reshape(*part.shape[:-2], -1) for part in of_readings]
         along = self.corrections if self.along is None else self.along
-        return components(flat[0], flat[1], along, *self._each())
+        own = components(flat[0], flat[1], along, *self._each())
+        known = fit.foreknown
+        if known is None:
+            return self._together(own, None)
+        # what was known before has errors that channels share
+        shared = np.einsum("...psn,...snq->...pq", linear, known.sources)
+        other = np.einsum("...psn,...snq->...pq", antilinear, known.sources.conj())
+        return self._together(own, components(shared, other, along, *_unit_errors(known.sources)))
+
+    def _together(self, own: Real, before: Real | None) -> Spread:
+        """Add the covariances (..., k, 2, 2) that readings and what was known before bring."""
+        nu = np.asarray(self.errors.degrees_of_freedom, dtype=float)[..., None]
+        if before is None or self.fit.foreknown is None:
+            return Spread(own, np.broadcast_to(nu, own.shape[:-2]))
+        # Welch and Satterthwaite
+        a, b = (np.trace(part, axis1=-2, axis2=-1) for part in (own, before))
+        whole = np.square(a) / nu + np.square(b) / self.fit.foreknown.degrees_of_freedom[..., None]
+        both = np.square(a + b)
+        freedom = np.where(
+            whole > 0, both / np.where(whole > 0, whole, 1.0), np.where(np.isnan(whole), np.nan, np.inf)
+        )
+        return Spread(own + before, freedom)
 
     def problem_samples(self, machine: int, n: int = 200, seed: int = 0) -> Iterator[tuple[Complex, Complex]]:
         """Draw coefficients (s, p) and vibration (s,) of one of the machines (leading axis) from its readings' errors."""
@@ -118,6 +157,10 @@ class LogBalance:
             one, other = rng.standard_normal((2, *unit.shape))
             error = unit * (along * one + 1j * across * other)
             unknowns = self.fit.unknowns[machine] + np.matvec(self.fit.gain[machine], error)
+            if self.fit.foreknown is not None:
+                sources = self.fit.foreknown.sources[machine]
+                one, other = rng.standard_normal((2, sources.shape[-1])) / np.sqrt(2)
+                unknowns = unknowns + np.matvec(sources, one + 1j * other)
             yield unknowns[:, 1:], unknowns[:, 0]
 
     def residual_samples(self, machine: int, n: int = 4000, seed: int = 0) -> Complex:
@@ -131,9 +174,14 @@ class LogBalance:
         share = np.vecmat(masses.conj(), self.fit.gain[machine]) * unit
         one, other = rng.standard_normal((2, n, *share.shape))
         error = np.vecdot(share.conj(), along * one + 1j * across * other)
-        nu = float(self.errors.degrees_of_freedom[machine])
-        wider = np.sqrt(nu / rng.gamma(nu, size=n))[:, None] if 0 < nu < np.inf else 1.0
-        return np.asarray(self.residual[machine] + wider * error)
+        error = error * _wider(rng, float(self.errors.degrees_of_freedom[machine]), n)
+        known = self.fit.foreknown
+        if known is not None:
+            share = np.vecmat(masses.conj(), known.sources[machine])
+            one, other = rng.standard_normal((2, n, share.shape[-1])) / np.sqrt(2)
+            wider = _wider(rng, float(known.degrees_of_freedom[machine]), n)
+            error = error + wider * ((one + 1j * other) @ share.T)
+        return np.asarray(self.residual[machine] + error)
 
     @property
     def deviations(self) -> tuple[Real, Real]:
@@ -146,14 +194,14 @@ class LogBalance:
         Its columns are the semi-axes, kg, in the coordinates along the correction and across it.
         """
         size, axes = np.linalg.eigh(self.covariance)
-        k = region_factor(probability, self.errors.degrees_of_freedom)[..., None, None]
+        k = region_factor(probability, self.degrees_of_freedom)[..., None]
         return np.asarray(axes * (k * np.sqrt(np.maximum(size, 0.0)))[..., None, :])
 
     def vibration_deviation(self, masses: ArrayLike, *, reading: bool = False) -> Real:
         """Standard deviation of the fitted vibration's amplitude with these masses on, (..., p) -> (..., s)."""
-        return np.asarray(np.sqrt(self.vibration_covariance(masses, reading=reading)[..., 0, 0]))
+        return np.asarray(np.sqrt(self.vibration_spread(masses, reading=reading).covariance[..., 0, 0]))
 
-    def vibration_covariance(self, masses: ArrayLike, *, reading: bool = False) -> Real:
+    def vibration_spread(self, masses: ArrayLike, *, reading: bool = False) -> Spread:
         """Covariance of the fitted vibration with these masses on, along itself and across, (..., p) -> (..., s, 2, 2).
 
         With `reading` the scatter of one more reading is included: that of the mean weight, or of the errors stated.
@@ -162,9 +210,15 @@ class LogBalance:
         value = self.fit.fitted(w[..., None, :])[..., 0, :]
         rows = np.concatenate([np.ones((*w.shape[:-1], 1), dtype=complex), w], axis=-1)
         gain = np.vecmat(rows[..., None, :].conj(), self.fit.gain)
-        covariance = components(gain[..., None, :], None, value[..., None], *self._by_channel())
-        covariance = covariance[..., 0, :, :]
-        return np.asarray(covariance + self._own(value) if reading else covariance)
+        own = components(gain[..., None, :], None, value[..., None], *self._by_channel())[..., 0, :, :]
+        if reading:
+            own = own + self._own(value)
+        known = self.fit.foreknown
+        if known is None:
+            return self._together(own, None)
+        share = np.vecmat(rows[..., None, :].conj(), known.sources)
+        before = components(share[..., None, :], None, value[..., None], *_unit_errors(share))
+        return self._together(own, before[..., 0, :, :])
 
     def _own(self, value: Complex) -> Real:
         """Covariance of a reading of this value, along itself and across, (..., s, 2, 2)."""
@@ -189,8 +243,8 @@ class LogBalance:
         from scipy.special import chndtr, gammaincinv
 
         ceiling = np.broadcast_to(np.asarray(limit, dtype=float), self.residual.shape)
-        variance = np.square(self.vibration_deviation(self.corrections))
-        nu = np.broadcast_to(self.errors.degrees_of_freedom[..., None], variance.shape)
+        spread = self.vibration_spread(self.corrections)
+        variance, nu = spread.covariance[..., 0, 0], spread.degrees_of_freedom
         node, share = np.polynomial.legendre.leggauss(80)
         node, share = (node + 1) / 2, share / 2
         known = np.isinf(nu)
@@ -203,3 +257,16 @@ class LogBalance:
         sure = (np.abs(self.residual) <= ceiling).astype(float)
         found = np.where(variance > 0, within @ share, sure)
         return np.asarray(np.where(nu > 0, found, np.nan))
+
+
+def _unit_errors(sources: Complex) -> tuple[Complex, Real, Real]:
+    """Direction and deviations of circular errors z, E|z|² = 1, one for each column of (..., q)."""
+    ones = np.ones(sources.shape[-1])
+    return ones.astype(complex), ones / np.sqrt(2), ones / np.sqrt(2)
+
+
+def _wider(rng: np.random.Generator, degrees_of_freedom: float, n: int) -> Real:
+    """Draw by what factor σ may be larger than its estimate, (n, 1)."""
+    if not 0 < degrees_of_freedom < np.inf:
+        return np.ones((n, 1))
+    return np.asarray(np.sqrt(degrees_of_freedom / rng.gamma(degrees_of_freedom, size=n))[:, None])

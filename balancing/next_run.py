@@ -109,6 +109,9 @@ class _Spread:
         gain, unit = fit.gain, errors.unit.T  # (s, n, r), (s, r)
         self.covariance = (gain * (along + across)[:, None]) @ np.swapaxes(gain, 1, 2).conj()
         self.relation = (gain * (np.square(unit) * (along - across))[:, None]) @ np.swapaxes(gain, 1, 2)
+        if fit.foreknown is not None:
+            sources = fit.foreknown.sources
+            self.covariance = self.covariance + sources @ np.swapaxes(sources, 1, 2).conj()
         read = fit.present.T
         self.own = np.where(read, along + across, 0.0).sum(axis=1) / read.sum(axis=1)
         self.before = float(self._trace(self.covariance, self.relation))

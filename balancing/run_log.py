@@ -11,7 +11,7 @@ circular, E|ε|² = σ²/weight, of one σ for all channels of a machine.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -50,6 +50,19 @@ class Errors:
 
 @record
 @dataclass(frozen=True, eq=False, repr=False)
+class Foreknown:
+    """What was known before the runs, in a fit with it."""
+
+    plain: JointFit
+    """The runs alone: of least norm where they do not determine the unknowns."""
+    sources: Complex
+    """Errors of θ for errors z, E|z|² = 1, of what was known, (..., s, 1 + p, q)."""
+    degrees_of_freedom: Real
+    """Complex, of the estimate that these are, (...)."""
+
+
+@record
+@dataclass(frozen=True, eq=False, repr=False)
 class JointFit:
     """Initial vibration and influence coefficients of every channel; see `joint_fit`."""
 
@@ -65,19 +78,34 @@ class JointFit:
     """θ = gain y, (..., s, 1 + p, r); 0 where a reading is missing."""
     leverage: Real
     """h, how far a reading is its own fitted value, in [0, 1], (..., r, s)."""
+    count: NDArray[np.intp] | None = None
+    """How many unknowns the runs determine, (...), where these are not all."""
+    foreknown: Foreknown | None = None
+    """Where more than the runs was fitted: see `balancing.prior`."""
 
     def machine(self, i: int) -> JointFit:
         """Return the fit of one of many machines, along the leading axis."""
-        weights = None if self.weights is None else self.weights[i]
         parts = (self.readings, self.masses, self.unknowns, self.gain, self.leverage)
         y, t, unknowns, gain, leverage = (part[i] for part in parts)
-        return JointFit(y, t, weights, unknowns, gain, leverage)
+        weights, count = (None if part is None else part[i] for part in (self.weights, self.count))
+        known = self.foreknown
+        if known is not None:
+            known = Foreknown(known.plain.machine(i), known.sources[i], known.degrees_of_freedom[i])
+        return JointFit(y, t, weights, unknowns, gain, leverage, count, known)
 
     def without(self, runout: Complex) -> JointFit:
         """Return the fit with the run-out (s,) subtracted from every reading."""
         unknowns = self.unknowns.copy()
         unknowns[..., 0] -= runout
-        return JointFit(self.readings - runout, self.masses, self.weights, unknowns, self.gain, self.leverage)
+        known = self.foreknown
+        if known is not None:
+            known = replace(known, plain=known.plain.without(runout))
+        return replace(self, readings=self.readings - runout, unknowns=unknowns, foreknown=known)
+
+    @property
+    def alone(self) -> JointFit:
+        """The fit of the runs alone: itself, where nothing else was known."""
+        return self if self.foreknown is None else self.foreknown.plain
 
     @property
     def initial(self) -> Complex:
@@ -110,13 +138,17 @@ class JointFit:
 
     @cached_property
     def degrees_of_freedom(self) -> NDArray[np.intp]:
-        """ν: complex readings less complex unknowns, (...)."""
-        unknowns = self.unknowns.shape[-2] * self.unknowns.shape[-1]
+        """ν: complex readings less complex unknowns that they determine, (...)."""
+        if self.foreknown is not None:
+            return self.alone.degrees_of_freedom
+        unknowns = self.unknowns.shape[-2] * self.unknowns.shape[-1] if self.count is None else self.count
         return np.asarray(self.present.sum(axis=(-2, -1)) - unknowns)
 
     @cached_property
     def sum_of_squares(self) -> Real:
-        """Σ weight·|residual|², (...)."""
+        """Σ weight·|residual|², (...); of the runs alone."""
+        if self.foreknown is not None:
+            return self.alone.sum_of_squares
         square = np.square(np.abs(np.where(self.present, self.residuals, 0.0)))
         return np.asarray((square if self.weights is None else self.weights * square).sum(axis=(-2, -1)))
 
@@ -130,8 +162,10 @@ class JointFit:
     def standardized(self) -> Real:
         """|residual|/(s √(1 - h)), the internally studentised residual, (..., r, s); NaN where there is none.
 
-        Where h is 1 the reading alone determines an unknown and has no residual.
+        Where h is 1 the reading alone determines an unknown and has no residual. Of the runs alone.
         """
+        if self.foreknown is not None:
+            return self.alone.standardized
         free = np.where(self.leverage < 1 - 1e-9, 1 - self.leverage, np.nan)
         root = 1.0 if self.weights is None else np.sqrt(self.weights)
         sd = self.residual_sd[..., None, None]
@@ -172,6 +206,12 @@ class JointFit:
             each = np.where(self.present, each / np.sqrt(np.where(self.present, self.weights, 1.0)), 0.0)
         ones = np.ones(self.readings.shape, dtype=complex)
         return Errors(ones, each, each, np.asarray(self.degrees_of_freedom, dtype=float))
+
+    def known(self, sd: ArrayLike, degrees_of_freedom: ArrayLike = np.inf) -> Errors:
+        """Return errors of √E|ε|² = sd, (...), known with so many complex degrees of freedom."""
+        each = np.broadcast_to(np.asarray(sd, dtype=float)[..., None, None] / np.sqrt(2), self.readings.shape)
+        nu = np.broadcast_to(np.asarray(degrees_of_freedom, dtype=float), self.readings.shape[:-2])
+        return Errors(np.ones(self.readings.shape, dtype=complex), each, each, nu)
 
     def stated(self, amplitude: float, phase: float) -> Errors:
         """Return errors that are known: relative ones of the amplitude, and those of the phase in rad."""

@@ -10,6 +10,7 @@ from importlib import import_module
 import typer
 
 from cli.errors import DataError, one_line
+from cli.help import with_panels
 from cli.read.files import forget
 
 # name -> (module with a function `run`, the line shown by `dalembert --help`)
@@ -25,6 +26,10 @@ COMMANDS = {
     "body": ("cli.body.command", "Put a body together: inertia, angular momentum, shaft reactions."),
     "spin": ("cli.spin.command", "Turn a body through time: free, under gravity, under a torque."),
     "import": ("cli.imports.command", "Take over a mechanism drawn in another program."),
+    "export": (
+        "cli.exports.command",
+        "Write a mechanism for other programs: DXF, SVG, CSV, URDF, SDF, MJCF.",
+    ),
     "completion": ("cli.completion.command", "Print the completion script for bash, zsh or fish."),
     "examples": ("cli.examples.command", "List the worked examples, or write one into the current folder."),
 }
@@ -57,12 +62,17 @@ def build(called: str | None) -> typer.Typer:
         pretty_exceptions_enable=False,
         add_completion=False,
         no_args_is_help=True,
-        context_settings={"help_option_names": ["-h", "--help"]},
+        # help is as wide as the terminal
+        context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 10_000},
     )
     app.callback()(_front)
     for name, (module, line) in COMMANDS.items():
-        run = import_module(module).run if name == called else _elsewhere
-        app.command(name, short_help=line)(run)
+        if name == called:
+            file = import_module(module)
+            kind = with_panels(getattr(file, "PANELS", {}), getattr(file, "EXAMPLE", ""))
+            app.command(name, short_help=line, cls=kind)(file.run)
+        else:
+            app.command(name, short_help=line)(_elsewhere)
     return app
 
 

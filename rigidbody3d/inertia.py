@@ -257,3 +257,62 @@ def check(inertia: ArrayLike, rtol: float = RTOL) -> Validity:
                 f"{I1:.6g} + {I2:.6g} < {I3:.6g}"
             )
     return Validity(np.asarray(valid), np.asarray(margin), moments, reason)
+
+
+def second_moments(inertia: ArrayLike) -> Array:
+    """Return ∫ r rᵀ dm at the same point, ½ tr(I) E − I, (..., 3, 3), kg·m²: a body has it where no eigenvalue is negative.
+
+    Its eigenvalues are (I2 + I3 − I1)/2 …: definiteness and the triangle inequality of a tensor in one.
+
+    Examples
+    --------
+    >>> second_moments(np.diag([2.0, 3.0, 4.0])).diagonal()
+    array([2.5, 1.5, 0.5])
+    """
+    I = np.asarray(inertia, dtype=float)
+    return np.asarray(np.trace(I, axis1=-2, axis2=-1)[..., None, None] / 2 * np.eye(3) - I)
+
+
+def nearest(inertia: ArrayLike) -> Array:
+    """Return the tensor that a body can have which lies nearest to a given one (3, 3), in the sum of squared entries.
+
+    Parameters
+    ----------
+    inertia
+        A symmetric tensor (3, 3), kg·m².
+
+    Raises
+    ------
+    ValueError
+        Not finite, not symmetric, or another shape.
+
+    Notes
+    -----
+    The axes stay, since the set of such tensors and the distance are the same in all axes; the moments go to the nearest
+    point of the cone I1 ≤ I2 + I3 …: of its faces, edges and tip those are tried that the point may lie on (a projection
+    on each, the nearest that is in the cone).
+
+    Examples
+    --------
+    >>> nearest(np.diag([1.0, 1.0, 2.3])).diagonal().round(12)
+    array([1.1, 1.1, 2.2])
+    """
+    I = np.asarray(inertia, dtype=float)
+    if I.shape != (3, 3):
+        raise ValueError(f"inertia must be a 3 x 3 tensor, found the shape {I.shape}")
+    found = principal(I)
+    if found.moments[0] + found.moments[1] >= found.moments[2] and found.moments[0] >= 0:
+        return np.asarray((I + I.T) / 2)
+    # rows a of a·moments ≥ 0
+    sides = np.ones((3, 3)) - 2 * np.eye(3)
+    best = np.zeros(3)
+    for chosen in ([0], [1], [2], [0, 1], [0, 2], [1, 2]):
+        A = sides[chosen]
+        point = found.moments - A.T @ np.linalg.solve(A @ A.T, A @ found.moments)
+        inside = (sides @ point >= -1e-14 * np.abs(found.moments).max()).all()
+        if inside and np.linalg.norm(point - found.moments) < np.linalg.norm(best - found.moments):
+            best = point
+    # on a face or an edge, to the last bit
+    best[np.abs(best) <= 1e-15 * np.abs(best).max()] = 0.0
+    made = found.axes.T @ np.diag(best) @ found.axes
+    return np.asarray((made + made.T) / 2)

@@ -125,7 +125,7 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
     Parameters
     ----------
     travel : sequence of (least, largest)
-        Of each guide, m: over which slides it is drawn. Default: some way about its `through`.
+        Of each guide, m: over which slides it is drawn. Default, and where NaN: some way about its `through`.
     """
     s = SYMBOL * mechanism.size
     reach = UNKNOWN_TRAVEL * mechanism.size
@@ -136,17 +136,26 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
     guides = list(zip(mechanism.guides, spans, strict=True))
     wheels = [circle for gear in mechanism.gears for circle in _wheels(mechanism, gear)]
     wheels = list(dict.fromkeys(wheels))
+    slots = {
+        name: [span for span in guides if span[0].on == name and not span[0].is_slider]
+        for name in mechanism.bodies
+    }
+    # a slot hides its own link, and lies under the links that run in it
+    order = [GROUND, *sorted(mechanism.links, key=lambda name: not slots[name])]
     layers: list[Iterable[Shape]] = [
         *(_in_ground(mechanism, guide, span, s) for guide, span in guides),
         *(_foot(z, s) for name, z in mechanism.ground.items() if name in mechanism.pins),
-        *(_link(mechanism, name, guides, wheels, s) for name in mechanism.links),
+    ]
+    for name in order:
+        layers += [_link(mechanism, name, guides, wheels, s)] if name != GROUND else []
+        layers += [_slot(mechanism, guide, span, s) for guide, span in slots[name]]
+    layers += [
         wheels,
         [
             Line("spoke", w.body, (w.centre, w.centre + w.radius))
             for w in wheels
             if w.body != GROUND and len(mechanism.bodies[w.body]) < 2
         ],
-        *(_slot(mechanism, guide, span, s) for guide, span in guides if not guide.is_slider),
         *(_block(mechanism, guide, s) for guide, _ in guides if guide.is_slider),
         (_coil(mechanism, spring, s) for spring in mechanism.springs),
         *(_mass(body, own.center, s) for body, own in mechanism.rigid.items() if own.mass),
@@ -301,5 +310,4 @@ def _labels(mechanism: Description) -> Iterator[Label]:
                 yield Label("point", body, z, name)
             seen.add(name)
     for name, link in mechanism.links.items():
-        if len(link.points) > 1:
-            yield Label("link", name, sum(link.points.values()) / len(link.points), name)
+        yield Label("link", name, sum(link.points.values()) / len(link.points), name)

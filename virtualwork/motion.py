@@ -29,10 +29,12 @@ from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import Key
 from virtualwork.formulas.sweep import EvenSweep
 from virtualwork.plan.steps import Step
+from virtualwork.table import columns
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+    from dalembert.page import Page
     from virtualwork.bounds.motion import MotionErrors
     from virtualwork.family.sensitivity import Sensitivities
     from virtualwork.forces import Forces
@@ -420,15 +422,35 @@ class Motion:
     # --- as a picture ---------------------------------------------------------------------------------------------
     @cached_property
     def drawing(self) -> Drawing:
-        """What the mechanism is drawn as, its guides as long as they are used in these poses.
+        """What the mechanism is drawn as, its guides as long as used; `at(shape.body, z)` carries its points along."""
+        slides = (self.poses.slide_derivative(i, 0) for i in range(len(self.mechanism.guides)))
+        return draw(self.mechanism, [(float(np.fmin.reduce(s)), float(np.fmax.reduce(s))) for s in slides])
 
-        `at(shape.body, z)` carries the shapes' points along.
+    def animate(self, forces: bool = False) -> Page:
+        """Return a page that moves: the mechanism over these poses with play, slider, curves and values.
+
+        A notebook shows it; `.save("motion.html")` writes it to a file that any browser opens.
+
+        Parameters
+        ----------
+        forces : bool
+            Draw the joint forces too.
+
+        Raises
+        ------
+        ValueError
+            More poses than a page can hold.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 2})}, inputs=Input(link="crank"))
+        >>> "P_vx_m_s" in crank.motion(np.linspace(0, 6, 37), speed=3.0).animate().html
+        True
         """
-        slides = [self.poses.slide_derivative(i, 0) for i in range(len(self.mechanism.guides))]
-        used = [s[np.isfinite(s)] for s in slides]
-        return draw(
-            self.mechanism, [(float(s.min()), float(s.max())) if len(s) else (-np.inf, np.inf) for s in used]
-        )
+        from virtualwork.animation import of_motion
+
+        return of_motion(self.poses, self.drawing, self.dynamics if forces else None)
 
     # --- how it hangs on the dimensions ---------------------------------------------------------------------------
     @cached_property
@@ -493,26 +515,7 @@ class Motion:
         """
         from pandas import DataFrame
 
-        m = self.mechanism
-        units = (
-            ("m", "m_s", "m_s2") if any(np.any(rate) for of in self.poses.rates for rate in of) else ("m",)
-        )
-        table: dict[str, Any] = {
-            f"{e.name}_{'m' if e.is_slide else 'rad'}": self.inputs[:, j] for j, e in enumerate(m.inputs)
-        }
-        table["assembled"] = self.assembled
-        for name in m.links:
-            link = self.link(name)
-            table[f"{name}_angle_rad"] = link.angle
-            if len(units) > 1:
-                table[f"{name}_omega_rad_s"], table[f"{name}_alpha_rad_s2"] = link.omega, link.alpha
-        for name in dict.fromkeys(p for link in m.links.values() for p in link.points if p not in m.ground):
-            point = self.point(name)
-            for order, unit in enumerate(units):
-                z = point.complex(order)
-                table[f"{name}_{'va'[order - 1] if order else ''}x_{unit}"] = z.real
-                table[f"{name}_{'va'[order - 1] if order else ''}y_{unit}"] = z.imag
-        return DataFrame(table)
+        return DataFrame(columns(self.poses))
 
     def _repr_html_(self) -> str:
         return str(self.to_frame().to_html(max_rows=20))

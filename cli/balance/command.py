@@ -15,6 +15,14 @@ if TYPE_CHECKING:
     from cli.show.columns import Result
 
 
+EXAMPLE = "riul-rotor"
+PANELS = {
+    "What": "plane planes gravity",
+    "How": "remove round_mass round_angle",
+    "How: the tolerance": "grade speed rotor_mass permissible bearings center_z",
+}
+
+
 @command
 def run(
     table: Annotated[
@@ -30,7 +38,7 @@ def run(
         str | None,
         typer.Option(metavar="FILE.csv", help="The planes as a table: plane, z_*, radius_*, rotor."),
     ] = None,
-    gravity: Annotated[float, typer.Option(help="g for weights, m/s².")] = 9.80665,
+    gravity: Annotated[float, typer.Option(metavar="G", help="g for weights, m/s².")] = 9.80665,
     remove: Annotated[
         bool, typer.Option("--remove", help="Corrections as material to remove, not to add.")
     ] = False,
@@ -45,9 +53,11 @@ def run(
         typer.Option(metavar="Z", help="Where the centre of mass lies: for the couple and the tolerance."),
     ] = None,
     grade: Annotated[
-        str | None, typer.Option(help="Balance quality grade of ISO 21940-11, such as G2.5.")
+        str | None, typer.Option(metavar="GRADE", help="Balance quality grade of ISO 21940-11, such as G2.5.")
     ] = None,
-    speed: Annotated[str | None, typer.Option(help="Highest service speed, such as 3000rpm.")] = None,
+    speed: Annotated[
+        str | None, typer.Option(metavar="SPEED", help="Highest service speed, such as 3000rpm.")
+    ] = None,
     rotor_mass: Annotated[
         str | None, typer.Option(metavar="MASS", help="Mass of the rotor, such as 12kg.")
     ] = None,

@@ -18,6 +18,14 @@ if TYPE_CHECKING:
 _VECTOR = "X,Y,Z"
 
 
+EXAMPLE = "riul-rod"
+PANELS = {
+    "What": "omega alpha frame_omega about fixed velocity acceleration",
+    "What: a robot": "check_inertias",
+    "What: a shaft": "shaft speed speed_rate gravity correct",
+}
+
+
 @command
 def run(
     parts: Annotated[str, typer.Argument(metavar="PARTS", help="CSV of parts; - is standard input.")],
@@ -52,7 +60,9 @@ def run(
         str | None,
         typer.Option(metavar="Z1:Z2", help="The parts turn about z on bearings there, such as 0mm:400mm."),
     ] = None,
-    speed: Annotated[str | None, typer.Option(help="Speed of the shaft, such as 1200rpm.")] = None,
+    speed: Annotated[
+        str | None, typer.Option(metavar="SPEED", help="Speed of the shaft, such as 1200rpm.")
+    ] = None,
     speed_rate: Annotated[
         str | None, typer.Option(metavar="RATE", help="Its rate, such as 10rad_s2.")
     ] = None,
@@ -63,6 +73,12 @@ def run(
         list[str] | None,
         typer.Option(metavar="NAME:Z:RADIUS", help="A correction plane of the shaft, such as A:0mm:20mm."),
     ] = None,
+    check_inertias: Annotated[
+        bool,
+        typer.Option(
+            "--check-inertias", help="PARTS is a robot (URDF, SDF, MJCF): can bodies have its tensors?"
+        ),
+    ] = False,
 ) -> Result:
     """Put a body together from parts: mass, centre of mass, inertia; its angular momentum and what its motion asks for.
 
@@ -87,6 +103,11 @@ def run(
         acceleration=options.vector("--acceleration", acceleration, "acceleration"),
         shaft=_shaft(shaft, speed, speed_rate, gravity, correct),
     )
+    if check_inertias:
+        others = request != Request()
+        if others or gravity or speed or speed_rate or correct:
+            raise options.bad("--check-inertias", "it is asked alone: expected no motion and no shaft")
+        return _inertias(parts)
     for flag, given in (("--velocity", velocity), ("--acceleration", acceleration)):
         if given is not None and fixed is not None:
             raise options.bad(
@@ -123,6 +144,26 @@ def run(
             else "Mass properties and motion of a body"
         },
         warnings=[*found.parts.warnings, *words.warnings(found)],
+    )
+
+
+def _inertias(file: str) -> Result:
+    from pathlib import Path
+
+    from cli.body.inertia_columns import document, table, warnings
+    from cli.body.inertias import checks
+    from cli.read.files import read_bytes
+    from cli.read.robots.reading import read
+    from cli.show.columns import Result
+
+    name, data = read_bytes(file)
+    robot = read(name, data, None if file == "-" else Path(file).parent)
+    found = checks(robot)
+    return Result(
+        document=lambda: document(found),
+        tables={"inertias": lambda: table(found)},
+        warnings=warnings(robot, found),
+        failed=lambda: not all(check.valid for check in found),
     )
 
 

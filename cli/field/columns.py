@@ -12,7 +12,7 @@ from cli.field.runs import Channel, Real
 from cli.field.solve import FieldBalancing
 from cli.field.tolerance import verdicts
 from cli.read.rounding import angle_error, size_error
-from cli.read.units import degrees, from_si, to_si
+from cli.read.units import degrees, from_si
 from cli.show.columns import Column, Table
 
 if TYPE_CHECKING:
@@ -61,30 +61,6 @@ def corrections(found: FieldBalancing, warnings: list[str]) -> Table:
             Column("angle_uncertainty", "deg", across, lambda: share(across)),
         ]
     return Table(columns, keys=("rotor", "plane"))
-
-
-def coefficients(found: FieldBalancing) -> Table:
-    """The influence coefficients, as --save-influence stores them."""
-    rows = []
-    per, unit = found.runs.per, found.runs.mass_unit
-    for rotor, solved, i in found.each():
-        for s, channel in enumerate(solved.group.channels):
-            speed = None
-            if channel.speed is not None and channel.speed_given is not None:
-                rpm = found.runs.speed_unit == "rpm"
-                speed = channel.speed_given if rpm else from_si(channel.speed, "speed", "rpm")
-            for plane, a in zip(solved.planes, solved.alpha[i, s].tolist(), strict=True):
-                size = to_si(abs(a), per, unit)
-                rows.append(
-                    (rotor, channel.sensor, speed, plane, size, degrees(a), found.runs.amplitude_unit)
-                )
-    units = {"speed": "rpm", "magnitude_per": unit, "phase": "deg"}
-    names = ("rotor", "sensor", "speed", "plane", "magnitude_per", "phase", "amplitude_unit")
-    columns = [
-        Column(name, units.get(name, ""), values)
-        for name, values in zip(names, zip(*rows, strict=True), strict=True)
-    ]
-    return Table(columns if found.several else columns[1:])
 
 
 def channels(found: FieldBalancing, of: Sequence[Channel]) -> list[Column]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -18,6 +18,15 @@ if TYPE_CHECKING:
     from cli.show.columns import Document, Result, Table
 
 
+EXAMPLE = "fan-one-plane"
+PANELS = {
+    "What": "influence runout phase_lag rotation signal exclude",
+    "How": "method fit robust objective max_mass max_residual from_here ridge reading_error monte_carlo",
+    "How: the tolerance, the first trial mass": "grade speed rotor_mass permissible radius suggest_trial planes",
+    "Output: where masses go, the next run": "blades positions first predict suggest save_influence",
+}
+
+
 @command
 def run(
     runs: Annotated[
@@ -25,14 +34,21 @@ def run(
         typer.Argument(metavar="RUNS", help="CSV of runs; - is standard input.", show_default=False),
     ] = None,
     influence: Annotated[
-        str | None,
-        typer.Option(metavar="COEFFICIENTS.csv", help="Stored coefficients in place of trial runs."),
+        list[str] | None,
+        typer.Option(
+            metavar="COEFFICIENTS.csv",
+            help="Stored coefficients in place of trial runs; of several machines (repeatable), or with uncertainties: prior "
+            "knowledge of a fit.",
+        ),
     ] = None,
     save_influence: Annotated[
         Path | None,
         typer.Option(metavar="FILE.csv", help="Store the coefficients.", callback=suffix_among(".csv")),
     ] = None,
-    objective: Annotated[str, typer.Option(help="least-squares or minimax.")] = "least-squares",
+    objective: Annotated[
+        Literal["least-squares", "minimax"],
+        typer.Option(help="Least sum of squares of the residuals, or the smallest largest one."),
+    ] = "least-squares",
     max_mass: Annotated[
         list[str] | None,
         typer.Option(metavar="[PLANE=]MASS", help="Limit of each correction (5g), or of one plane's (A=5g)."),
@@ -57,20 +73,26 @@ def run(
         typer.Option(metavar="N", min=0, max=100_000, help="Uncertainties from N drawn sets of readings."),
     ] = 0,
     method: Annotated[
-        str, typer.Option(help="influence, or four-run: amplitudes only, one plane.")
+        Literal["influence", "four-run"],
+        typer.Option(help="By influence coefficients, or by amplitudes only in one plane."),
     ] = "influence",
     ridge: Annotated[
-        float, typer.Option(min=0.0, help="Damp the corrections of nearly dependent planes, such as 0.1.")
+        float,
+        typer.Option(
+            metavar="NUMBER", min=0.0, help="Damp the corrections of nearly dependent planes, such as 0.1."
+        ),
     ] = 0.0,
     phase_lag: Annotated[bool, typer.Option("--phase-lag", help="The instrument's phase lags.")] = False,
     rotation: Annotated[
-        str | None,
-        typer.Option(help="ccw or cw, seen against +z: phases lead in that sense, mass angles are ccw."),
+        Literal["ccw", "cw"] | None,
+        typer.Option(help="Seen against +z: phases lead in that sense, mass angles are ccw."),
     ] = None,
     grade: Annotated[
-        str | None, typer.Option(help="Balance quality grade of ISO 21940-11, such as G6.3.")
+        str | None, typer.Option(metavar="GRADE", help="Balance quality grade of ISO 21940-11, such as G6.3.")
     ] = None,
-    speed: Annotated[str | None, typer.Option(help="Highest service speed, such as 3000rpm.")] = None,
+    speed: Annotated[
+        str | None, typer.Option(metavar="SPEED", help="Highest service speed, such as 3000rpm.")
+    ] = None,
     rotor_mass: Annotated[
         str | None, typer.Option(metavar="MASS", help="Mass of the rotor, such as 120kg.")
     ] = None,
@@ -88,11 +110,16 @@ def run(
             help="Suggest a trial mass for --rotor-mass, --speed, --radius and --planes; no RUNS.",
         ),
     ] = False,
-    planes: Annotated[int, typer.Option(min=1, help="Number of planes, for --suggest-trial.")] = 1,
+    planes: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Number of planes, for --suggest-trial.")
+    ] = 1,
     blades: Annotated[
         int | None,
         typer.Option(
-            min=1, max=options.PLACES, help="Split the corrections onto so many places, evenly spaced."
+            metavar="N",
+            min=1,
+            max=options.PLACES,
+            help="Split the corrections onto so many places, evenly spaced.",
         ),
     ] = None,
     positions: Annotated[
@@ -138,12 +165,6 @@ def run(
     and trial_kept (yes: the trial mass stays on in all later runs). Several trial masses in one run are joined
     by ';'. Phase and mass angle are counted in one common sense. amplitude_um_pp, _pk, _rms tell how it is read.
     """
-    if objective not in ("least-squares", "minimax"):
-        raise options.bad("--objective", f"'{objective}': expected least-squares or minimax")
-    if method not in ("influence", "four-run"):
-        raise options.bad("--method", f"'{method}': expected influence or four-run")
-    if rotation not in (None, "ccw", "cw"):
-        raise options.bad("--rotation", f"'{rotation}': expected ccw or cw")
     if not ridge < float("inf"):
         raise options.bad("--ridge", "expected a finite number")
     if ridge and (objective == "minimax" or max_mass or max_residual is not None):
@@ -159,7 +180,7 @@ def run(
         }
         for flag in (flag for flag, given in needs_phase.items() if given):
             raise options.bad(flag, "has no meaning with --method four-run, which uses no phase")
-    if influence is not None and from_here:
+    if influence and from_here:
         raise options.bad("--from-here", "has no meaning with --influence: there are no trial masses")
     if monte_carlo and reading_error is None:
         raise options.bad("--monte-carlo", "needs --reading-error")
@@ -180,11 +201,12 @@ def run(
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
 
     from cli.field import request as asked
-    from cli.field.files import read_runout, read_stored
+    from cli.field.files import read_runout, read_stored, stored_alpha
     from cli.field.fit import Asked, LogFits, masses_at
-    from cli.field.layouts import is_log
+    from cli.field.layouts import alpha_of, is_log
     from cli.field.log import read_log
     from cli.field.read import NotOneInitialRun, read_runs
+    from cli.field.sisters import Sisters
     from cli.field.solve import FieldBalancing
     from cli.read.tolerance import tolerance_of
 
@@ -194,8 +216,7 @@ def run(
     ceiling = options.with_unit("--max-residual", max_residual, "amplitude", positive=True)
     # a phase that lags, or a shaft that turns clockwise, turns the sense of the phase against the mass angles
     against = phase_lag != (rotation == "cw")
-    stored = read_stored(influence) if influence is not None else None
-    stored_unit = None if stored is None else stored.unit
+    files = [read_stored(path) for path in influence or ()]
     of_fit = {
         "--fit": fit,
         "--exclude": exclude,
@@ -203,12 +224,18 @@ def run(
         "--suggest": suggest,
         "--robust": robust,
     }
-    fit = any(of_fit.values())
-    if four_run or stored is not None:
+    if four_run:
         for flag in (flag for flag, given in of_fit.items() if given):
-            raise options.bad(flag, "fits all runs: it does not go with --influence or --method four-run")
-    elif not fit:
+            raise options.bad(flag, "fits all runs: it does not go with --method four-run")
+    if files and robust:
+        raise options.bad("--robust", "is of the runs alone: it does not go with --influence")
+    fit = any(of_fit.values()) or len(files) > 1 or any(one.along is not None for one in files)
+    if not four_run and not fit:
         fit = is_log(runs)
+    if fit and not files and (own := alpha_of(runs)) is not None and not own.trials:
+        files = [stored_alpha(own)]
+    stored = files[0] if files and not fit else None
+    stored_unit = None if stored is None else stored.unit
     measured = None
     if not fit:
         try:
@@ -222,19 +249,27 @@ def run(
             fit = unknowns_beaten and stored is None and not four_run
     if fit or measured is None:
         said = phase_lag or rotation is not None
-        measured = read_log(runs, lagging=against if said else None, exclude=exclude or [])
-    if stored is not None:
-        measured.warnings += stored.table.warnings
+        measured = read_log(
+            runs,
+            lagging=against if said else None,
+            exclude=exclude or [],
+            sisters=Sisters(files) if files else None,
+            reading_error=error,
+        )
+    for one in files:
+        measured.warnings += one.table.warnings
     if tolerance is not None and measured.per == "mass" and arm is None:
         raise options.bad(
             "--radius", "the tolerance is of unbalances: expected the radius of the trial masses"
         )
+    lags = against or measured.lags
+    still = {sensor: v.conjugate() if lags else v for sensor, v in measured.runout.items()}
     request = asked.Request(
         objective=objective,
         max_mass=asked.limits_in(limits, measured) or measured.max_mass,
         max_residual=None if ceiling is None else asked.ceiling_in(ceiling, measured),
         from_here=from_here,
-        runout={} if runout is None else read_runout(runout, measured, lagging=against or measured.lags),
+        runout=still if runout is None else read_runout(runout, measured, lagging=lags),
         reading_error=error,
         monte_carlo=monte_carlo,
         four_run=four_run,
@@ -252,6 +287,7 @@ def run(
 
 def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | None) -> Result:
     from cli.field import columns, fit, fit_columns, fit_words, remarks, report, words
+    from cli.field.coefficient_columns import coefficients
     from cli.show.columns import Result
     from cli.show.text import csv_text
 
@@ -273,12 +309,12 @@ def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | 
 
     beside = {}
     if save_influence is not None:
-        beside[save_influence] = lambda: csv_text(columns.coefficients(found).cells).encode()
+        beside[save_influence] = lambda: csv_text(coefficients(found).cells).encode()
     return Result(
         document=document,
         tables={
             "corrections": lambda: columns.corrections(found, warnings),
-            "influence": lambda: columns.coefficients(found),
+            "influence": lambda: coefficients(found),
             "prediction": lambda: columns.prediction(found),
             **({} if found.request.places is None else {"split": lambda: columns.split(found)}),
             **({} if fits is None else {"residuals": residuals}),

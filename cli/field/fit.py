@@ -167,7 +167,8 @@ def remarks(found: FieldBalancing) -> Iterator[str]:
         if fit is None or solved.balance is None:
             continue
         bare = np.flatnonzero(fit.degrees_of_freedom == 0)
-        if len(bare) and found.request.reading_error is None:
+        known = group.before is not None and group.before.reading is not None
+        if len(bare) and found.request.reading_error is None and not known:
             yield (
                 f"{found.of(group, int(bare[0]))}as many readings as unknowns: nothing is left over to show their scatter; expected "
                 "a further run, or --reading-error, for uncertainties"

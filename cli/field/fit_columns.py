@@ -103,6 +103,12 @@ def _fill(entry: Document, fits: LogFits, solved: Solved, fitted: Fitted, i: int
             for row in fitted.rows(i)
         ],
     }
+    if group.before is not None:
+        entry["fit"]["prior"] = {  # type: ignore[index]
+            "machines": group.before.machines,
+            "scatter_between_machines": group.before.scatter,
+            "reading_sd": None if group.before.reading is None else group.before.reading[0],
+        }
     if parts.drift is not None:
         chance = _number(parts.drift.probability[i])
         entry["fit"]["drift"] = {  # type: ignore[index]

@@ -76,13 +76,15 @@ def _circle(axes: PolarAxes, fits: LogFits, solved: Solved, i: int, s: int) -> N
     read = fit.readings[i, here, s]
     fitted = read - fit.residuals[i, here, s]
     before, after = complex(solved.initial[i, s]), complex(solved.residual[i, s])
-    regions = [(after, balance.vibration_covariance(solved.total)[i, s], AFTER)]
+    regions = [(after, balance.vibration_spread(solved.total), AFTER)]
     if fits.asked.predict is not None:
         value, _ = fits.predicted(solved)
         on = np.broadcast_to(fits.masses(solved.planes), solved.corrections.shape)
-        regions.append((complex(value[i, s]), balance.vibration_covariance(on, reading=True)[i, s], NEXT))
-    k = float(region_factor(0.95, balance.errors.degrees_of_freedom)[i])
-    outlines = [_ellipse(value, covariance, k) for value, covariance, _ in regions]
+        regions.append((complex(value[i, s]), balance.vibration_spread(on, reading=True), NEXT))
+    outlines = [
+        _ellipse(value, spread.covariance[i, s], float(region_factor(0.95, spread.degrees_of_freedom[i, s])))
+        for value, spread, _ in regions
+    ]
     scale = float(np.abs([*read, *fitted, before, after, *np.concatenate(outlines)]).max()) or 1.0
     scale = min(scale, 1.6 * (float(np.abs([*read, before, after]).max()) or 1.0))
     for outline, (_, _, color) in zip(outlines, regions, strict=True):
@@ -167,8 +169,11 @@ def _spread(fits: LogFits, solved: Solved, i: int) -> list[tuple[Real, float]]:
     """Return for each plane the covariance of the correction, in its unit, and the factor of its 95 % region."""
     if solved.covariance is None or solved.balance is None:
         return []
-    k = float(region_factor(0.95, solved.balance.errors.degrees_of_freedom)[i])
-    return [(covariance * fits.found.amount(1.0) ** 2, k) for covariance in solved.covariance[i]]
+    factors = region_factor(0.95, solved.balance.degrees_of_freedom[i])
+    unit = fits.found.amount(1.0) ** 2
+    return [
+        (covariance * unit, float(k)) for covariance, k in zip(solved.covariance[i], factors, strict=True)
+    ]
 
 
 def _regions(axes: Axes, fits: LogFits, solved: Solved, i: int) -> None:

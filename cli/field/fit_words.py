@@ -53,8 +53,13 @@ def summary(fits: LogFits, solved: Solved, i: int) -> str:
     if of_time is not None and np.isfinite(chance := of_time.probability[i]):
         told = "the vibration drifts with time" if chance < LEVEL else "no drift with time is told"
         sense += f"; {told} (F test at {LEVEL:.0%}: by chance in {chance:.2g} of logs)"
+    before = solved.group.before
+    if before is not None:
+        scatter = "" if before.scatter is None else f", which differ from one another by {before.scatter:.1%}"
+        many = f"{before.machines} machines" if before.machines > 1 else "one machine"
+        sense += f"; coefficients of {many}{scatter} are known before"
     return (
-        f"{len(log.runs)} runs, {int(fit.present[i].sum())} readings fitted together, {nu} complex degree{'s' * (nu != 1)} of "
+        f"{len(log.runs)} run{'s' * (len(log.runs) != 1)}, {int(fit.present[i].sum())} readings fitted together, {nu} complex degree{'s' * (nu != 1)} of "
         f"freedom: {spread}; {sense}"
     )
 

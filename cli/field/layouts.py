@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from cli.errors import DataError
-from cli.read.sources import open_source
+from cli.read.sources import Source, open_source
 from cli.read.tables import Cells, Numbers, Table, read
-from cli.read.units import degrees, parse_number, phasor
+from cli.read.units import parse_number, phasor
 
 NAMES = {
     "mode": "state",
@@ -27,6 +29,17 @@ NAMES = {
 WITH = re.compile(
     r"without\b.*|with\s+(?P<mass>[\d.,]+)\s*(?P<unit>[a-z]+)(?:\s*(?:@|at)\s*(?P<angle>[-+\d.,]+)\s*(?:°|deg)?)?"
 )
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A log as a table of runs, and what it states besides."""
+
+    table: Table
+    max_mass: dict[str, float] = field(default_factory=dict)
+    """Limits of the corrections, plane -> kg."""
+    runout: dict[str, complex] = field(default_factory=dict)
+    """Slow roll, sensor -> vector."""
 
 
 def headed(header: list[str]) -> list[str]:
@@ -53,17 +66,49 @@ def headed(header: list[str]) -> list[str]:
 def is_log(path: str) -> bool:
     """Tell by its first line whether a file is a log in a layout of its own, and no table of runs."""
     source = open_source(path, {}, None)
-    if source.sheet is None and _keyed(source.text):
+    if _keyed_text(source) is not None:
         return True
     columns = {each.name.lower() for each in source.headings}
     return not source.headings[0].name or bool(columns & {"state", *NAMES} - {"plane", "amplitude"})
 
 
-def log_table(path: str) -> tuple[Table, dict[str, float]]:
-    """Read a log in any of the layouts, and the limits of masses that it states."""
+class Alpha(NamedTuple):
+    """The coefficients `ALPHA` of a file of vectors."""
+
+    file: str
+    rows: list[list[tuple[float, float]]]
+    """(size, degrees), a row for each sensor, a column for each plane."""
+    trials: bool
+    """Whether the file has trial runs too."""
+
+
+def alpha_of(path: str) -> Alpha | None:
+    """Return the coefficients of a file of vectors; None where it is none, or has no ALPHA."""
     source = open_source(path, {}, None)
-    if source.sheet is None and _keyed(source.text):
-        return _vectors(source.file, source.text)
+    text = _keyed_text(source)
+    given = {} if text is None else _values(source.file, text)
+    if "ALPHA" not in given:
+        return None
+    rows = [
+        [
+            (float(size), float(turn))
+            for size, turn in (_polar(source.file, "ALPHA", cell) for cell in _flat(row))
+        ]
+        for row in _listed(given["ALPHA"])
+    ]
+    if len({len(row) for row in rows}) > 1:
+        raise DataError(
+            f"{source.file}: ALPHA has rows of different lengths: expected a column for each plane"
+        )
+    return Alpha(source.file, rows, "B" in given)
+
+
+def log_table(path: str) -> Layout:
+    """Read a log in any of the layouts, and what it states besides."""
+    source = open_source(path, {}, None)
+    text = _keyed_text(source)
+    if text is not None:
+        return _vectors(source.file, text)
     table = read(
         path,
         numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},
@@ -75,7 +120,7 @@ def log_table(path: str) -> tuple[Table, dict[str, float]]:
     states = [WITH.fullmatch(state.lower()) for state in table.texts.get("state", ())]
     if states and all(states) and "trial_mass" not in table.cells:
         _states_are_masses(table, [match for match in states if match])
-    return table, {}
+    return Layout(table)
 
 
 def _states_are_masses(table: Table, states: list[re.Match[str]]) -> None:
@@ -97,6 +142,23 @@ def _states_are_masses(table: Table, states: list[re.Match[str]]) -> None:
     del table.texts["state"]
 
 
+def _keyed_text(source: Source) -> str | None:
+    """Return the text of a file of vectors, or of a sheet with a key in the first cell of a row; None of any other."""
+    text = source.text
+    if source.sheet is not None:
+        lines = []
+        for row in source.sheet.rows:
+            first, *rest = [cell.strip() for cell in row] or [""]
+            cells = [cell for cell in rest if cell]
+            if not cells or not first:
+                # a cell that holds a line as the file would, or the row of a further sensor
+                lines.append(first or (f"  - [{', '.join(cells)}]" if cells else ""))
+            else:
+                lines.append(f"{first.rstrip(':=')}: [{', '.join(cells)}]")
+        text = "\n".join(lines)
+    return text if _keyed(text) else None
+
+
 def _keyed(text: str) -> bool:
     """Tell whether the first line that says something is `KEY:` and a list."""
     for line in text.splitlines():
@@ -106,18 +168,24 @@ def _keyed(text: str) -> bool:
     return False
 
 
-def _vectors(file: str, text: str) -> tuple[Table, dict[str, float]]:
+def _vectors(file: str, text: str) -> Layout:
     """Read `A`, `B`, `U` … whose cells are `amplitude@phase`."""
     given = _values(file, text)
-    for key in ("A", "B", "U"):
+    # with coefficients no trial run is needed
+    known = "ALPHA" in given and "B" not in given
+    for key in ("A",) if known else ("A", "B", "U"):
         if key not in given:
-            more = ": stored coefficients go to --influence" if key == "B" and "ALPHA" in given else ""
+            more = ": its coefficients are for --influence" if key == "A" and "ALPHA" in given else ""
             raise DataError(
-                f"{file}: no {key}: expected A (initial vectors), B (trial runs) and U (trial masses){more}"
+                f"{file}: no {key}: expected A (initial vectors), B (trial runs) and U (trial masses), or A and ALPHA{more}"
             )
     first = [_polar(file, "A", cell) for cell in _flat(given["A"])]
-    trials = [[_polar(file, "B", cell) for cell in _flat(row)] for row in _listed(given["B"])]
-    masses = [_polar(file, "U", cell) for cell in _flat(given["U"])]
+    trials = (
+        [[] for _ in first]
+        if known
+        else [[_polar(file, "B", cell) for cell in _flat(row)] for row in _listed(given["B"])]
+    )
+    masses = [] if known else [_polar(file, "U", cell) for cell in _flat(given["U"])]
     slow = [_polar(file, "A0", cell) for cell in _flat(given.get("A0", []))]
     if len(trials) != len(first) or any(len(row) != len(masses) for row in trials):
         raise DataError(
@@ -142,17 +210,26 @@ def _vectors(file: str, text: str) -> tuple[Table, dict[str, float]]:
         "trial_angle": Cells("U", "deg", [turn for _, turn in on]),
     }
     size, turn = (np.array([float(read[k]) for _, _, read in runs]) for k in (0, 1))
-    if slow:
-        at_rest, at_angle = (np.array([float(one[k]) for one in slow]) for k in (0, 1))
-        still = phasor(at_rest, at_angle, "deg")
-        v = phasor(size, turn, "deg") - still[[s for _, s, _ in runs]]
-        size, turn = np.abs(v), degrees(v)
     table.numbers = {"amplitude": Numbers("A", "um", size), "phase": Numbers("A", "deg", turn)}
-    for key in set(given) - {"A", "B", "U", "A0", "keep_trial", "weight_const"}:
-        table.warnings.append(f"{file}: {key} is not used")
+    for key in set(given) - {
+        "A",
+        "B",
+        "U",
+        "A0",
+        "keep_trial",
+        "weight_const",
+        *(["ALPHA"] if known else []),
+    }:
+        why = ": the trial runs tell the coefficients" if key == "ALPHA" else ""
+        table.warnings.append(f"{file}: {key} is not used{why}")
+    rest, around = (np.array([float(one[k]) for one in slow]) for k in (0, 1))
     limits = re.findall(r"([\d.]+)\s*:\s*([\d.]+)", str(given.get("weight_const", "")))
     # planes are numbered from 0 there
-    return table, {str(int(float(plane)) + 1): float(limit) for plane, limit in limits}
+    return Layout(
+        table,
+        {str(int(float(plane)) + 1): float(limit) for plane, limit in limits},
+        {str(s + 1): v for s, v in enumerate(phasor(rest, around, "deg").tolist())} if slow else {},
+    )
 
 
 def _values(file: str, text: str) -> dict[str, object]:
@@ -166,7 +243,7 @@ def _values(file: str, text: str) -> dict[str, object]:
             raise DataError(f"{file}: {key} stands twice: expected it once")
         if said.startswith("-"):
             said = _dashed(said)
-        listed = said.startswith("[") or (key in ("A", "B", "U", "A0") and "@" in said)
+        listed = said.startswith("[") or (key in ("A", "B", "U", "A0", "ALPHA") and "@" in said)
         out[key] = _nested(file, key, said if said.startswith("[") else f"[{said}]") if listed else said
     return out
 

@@ -12,23 +12,35 @@ from cli.field.layouts import log_table
 from cli.field.log_groups import LogRows, Logs
 from cli.field.read import NEAR_SPEED
 from cli.field.runs import Channel, Rows, Runs
+from cli.field.sisters import Sisters
 from cli.read.options import bad
 from cli.read.rounding import vector_error
 from cli.read.tables import Cells, Table, number_names
 from cli.read.units import UNITS, phasor, to_si
 
 
-def read_log(path: str, *, lagging: bool | None, exclude: Sequence[str] = ()) -> Runs:
-    """Read a log whose runs are all to be fitted together; `lagging` None: in the sense of the phase that fits better."""
-    table, max_mass = log_table(path)
+def read_log(
+    path: str,
+    *,
+    lagging: bool | None,
+    exclude: Sequence[str] = (),
+    sisters: Sisters | None = None,
+    reading_error: tuple[float, float] | None = None,
+) -> Runs:
+    """Read a log whose runs are all to be fitted together; `lagging` None: in the sense of the phase that fits better.
+
+    `sisters` is what is known of the coefficients; `reading_error` the errors with which its weight is found.
+    """
+    layout = log_table(path)
+    table = layout.table
     amplitude, phase = table.require("amplitude", "amplitude"), table.require("phase", "angle")
     table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
     vibration = phasor(amplitude.values, -phase.values if lagging else phase.values, phase.unit)
     both = [name for name in ("trial_mass", "trial_unbalance") if name in table.cells]
-    if len(both) != 1:
+    if len(both) > 1 or not (both or sisters):
         found = f"both {' and '.join(both)}" if both else f"none (the header is: {', '.join(table.header)})"
         raise DataError(f"{table.file}: expected one column of masses, found {found}")
-    size = table.cells[both[0]]
+    size = table.cells[both[0]] if both else Cells("", sisters.unit if sisters else "kg", [""] * table.rows)
     names, rotor = number_names(table.texts.get("rotor") or ["1"] * table.rows)
     speed = table.numbers.get("speed")
     runs = Runs(
@@ -39,8 +51,13 @@ def read_log(path: str, *, lagging: bool | None, exclude: Sequence[str] = ()) ->
         "mass" if size.unit in UNITS["mass"] else "unbalance",
         size.unit,
         speed.unit if speed is not None else "rpm",
-        max_mass=max_mass,
+        max_mass=layout.max_mass,
+        runout=layout.runout,
     )
+    if sisters is not None and sisters.unit not in UNITS[runs.per]:
+        raise DataError(
+            f"{table.file}: the runs have a {runs.per}, the stored coefficients are per {sisters.unit}"
+        )
     masses, mass_share = _masses(table, size, runs.per)
     if "ref" in table.texts:
         masses = _on_top(table, rotor, masses)
@@ -68,7 +85,7 @@ def read_log(path: str, *, lagging: bool | None, exclude: Sequence[str] = ()) ->
     by_rotor: list[list[int]] = [[] for _ in names]
     for i, r in enumerate(rotor.tolist()):
         by_rotor[r].append(i)
-    Logs(rows, runs, lagging, set(exclude)).read(by_rotor)
+    Logs(rows, runs, lagging, set(exclude), sisters, reading_error).read(by_rotor)
     runs.warnings = [*table.warnings, *runs.warnings]
     return runs
 

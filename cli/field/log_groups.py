@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from balancing import JointFit, determined, joint_fit, phase_sense
+from balancing import JointFit, determined, fit_with_prior, joint_fit, phase_sense
 from cli.errors import DataError
 from cli.field.read import NO, SHOWN, YES
 from cli.field.runs import Channel, Complex, Group, Log, Real, Rows, Runs
+from cli.field.sisters import Known, Sisters
 from cli.read.tables import Table
 
 
@@ -58,8 +59,17 @@ class _Rotor(NamedTuple):
 class Logs:
     """The logs of all rotors; those of like shape and names become a group."""
 
-    def __init__(self, rows: LogRows, runs: Runs, lagging: bool | None, exclude: set[str]) -> None:
+    def __init__(
+        self,
+        rows: LogRows,
+        runs: Runs,
+        lagging: bool | None,
+        exclude: set[str],
+        sisters: Sisters | None,
+        reading_error: tuple[float, float] | None,
+    ) -> None:
         self.rows, self.runs, self.lagging, self.exclude = rows, runs, lagging, exclude
+        self.sisters, self.reading_error = sisters, reading_error
         self.several = len(rows.rotors) > 1
         self.lost = 0
 
@@ -74,13 +84,17 @@ class Logs:
     def _fit(self, rotors: list[_Rotor]) -> None:
         alike: dict[tuple[object, ...], list[_Rotor]] = {}
         for one in rotors:
-            alike.setdefault((*one.channels, len(one.channels), *one.planes, len(one.masses)), []).append(one)
+            kind = (*one.channels, len(one.channels), *one.planes, len(one.masses), self._named(one))
+            alike.setdefault(kind, []).append(one)
         less = []
         for mine in alike.values():
             readings, masses = (
                 np.array([one.readings for one in mine]),
                 np.array([one.masses for one in mine]),
             )
+            if self.sisters is not None:
+                self._group(mine, readings, masses)
+                continue
             keep = determined(masses, np.isfinite(readings))
             whole = np.asarray(keep.all(axis=1))
             less += [self._without(mine[i], keep[i]) for i in np.flatnonzero(~whole).tolist()]
@@ -94,8 +108,11 @@ class Logs:
     def _group(self, mine: list[_Rotor], readings: Complex, masses: Complex) -> None:
         rotors = np.array([one.rotor for one in mine])
         channels, planes = mine[0].channels, mine[0].planes
-        fit = joint_fit(readings, masses)
-        fit, senses = self._sense(rotors, fit)
+        known = None
+        if self.sisters is not None:
+            known = self.sisters.known(self.rows.rotors[mine[0].rotor], channels, self.runs)
+        fit = self._fitted(readings, masses, known)
+        fit, senses = self._sense(rotors, fit, known)
         g, s, p = len(mine), len(channels), len(planes)
         none = np.zeros((g, 0, p), dtype=complex)
         self.runs.groups.append(
@@ -116,6 +133,7 @@ class Logs:
                 lambda: self._errors(fit),
                 fit=fit,
                 logs=[Log(one.rows, sense, one.years) for one, sense in zip(mine, senses, strict=True)],
+                before=None if known is None else known.before,
             )
         )
 
@@ -132,9 +150,28 @@ class Logs:
             self.rows.mass_share * size,
         )
 
-    def _sense(self, rotors: Rows, fit: JointFit) -> tuple[JointFit, list[str | None]]:
+    def _named(self, one: _Rotor) -> str | None:
+        """Return the name under which a rotor's own coefficients are known before; None where it shares those of others."""
+        return None if self.sisters is None else self.sisters.key(self.rows.rotors[one.rotor])
+
+    def _fitted(self, readings: Complex, masses: Complex, known: Known | None) -> JointFit:
+        """Fit runs, with what is known before."""
+        if known is None:
+            return joint_fit(readings, masses)
+        if self.reading_error is not None:
+            size = np.abs(np.where(np.isfinite(readings), readings, 0.0))
+            return fit_with_prior(readings, masses, known.prior, float(np.hypot(*self.reading_error)) * size)
+        fit = fit_with_prior(readings, masses, known.prior)
+        if known.before.reading is not None and (fit.degrees_of_freedom == 0).any():
+            sd = np.where(fit.degrees_of_freedom > 0, fit.residual_sd, known.before.reading[0])
+            fit = fit_with_prior(readings, masses, known.prior, sd[:, None, None])
+        return fit
+
+    def _sense(self, rotors: Rows, fit: JointFit, known: Known | None) -> tuple[JointFit, list[str | None]]:
         """Tell the sense of the phase, and fit again where the runs tell another than was taken and no option says it."""
-        told, taken, other = phase_sense(fit)
+        if known is not None and not determined(fit.masses, fit.present).all():
+            return fit, [None] * len(rotors)
+        told, taken, other = phase_sense(fit.alone)
         turn = -1 if self.lagging else 1
         against = np.flatnonzero(told < 0)
         nu = np.maximum(fit.degrees_of_freedom, 1)
@@ -153,7 +190,7 @@ class Logs:
             )
         if self.lagging is None and len(against):
             turned = np.where((told < 0)[:, None, None], fit.readings.conj(), fit.readings)
-            fit = joint_fit(turned, fit.masses)
+            fit = self._fitted(turned, fit.masses, known)
             self.runs.lags = True
         words = {1: "lead", -1: "lag", 0: None}
         return fit, [words[int(turn * sense)] for sense in told.tolist()]
@@ -169,7 +206,9 @@ class Logs:
         if not members:
             raise DataError(f"{rows.table.file}: {of}every run is excluded: expected runs to fit")
         planes = list(dict.fromkeys(plane for masses in on.values() for plane in masses))
-        if not any(mass for masses in on.values() for mass in masses.values()):
+        if self.sisters is not None:
+            planes = self._known_planes(rows.rotors[r], of, planes, on)
+        elif not any(mass for masses in on.values() for mass in masses.values()):
             raise DataError(
                 f"{rows.table.file}: {of}no mass ever changed: what a mass does to the vibration is not known; expected a "
                 "run with a mass on the rotor"
@@ -197,6 +236,24 @@ class Logs:
         last = [standing.get(plane, 0j) for plane in planes]
         when = None if rows.years is None else self._years(members, list(lines))
         return _Rotor(r, list(lines), list(first), planes, list(lines.values()), masses, last, weights, when)
+
+    def _known_planes(
+        self, rotor: str, of: str, planes: list[str], on: dict[str, dict[str, complex]]
+    ) -> list[str]:
+        """Return the planes whose coefficients are known before; a log that names none has the only one."""
+        assert self.sisters is not None
+        known = self.sisters.planes(rotor)
+        if len(known) == 1 and "trial_plane" not in self.rows.table.texts:
+            for run, masses in on.items():
+                on[run] = dict(zip(known, masses.values(), strict=False))
+            return known
+        for plane in planes:
+            if plane not in known:
+                raise DataError(
+                    f"{self.rows.table.file}: {of}a mass in plane {plane}, of which no coefficient is stored: expected "
+                    f"{', '.join(known)}"
+                )
+        return known
 
     def _years(self, members: list[int], lines: list[tuple[str, int]]) -> list[float]:
         """Return when each row of readings was read: each says it itself, or its run does once."""

@@ -42,6 +42,11 @@ def _fit_errors(group: Group) -> Real:
 def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]) -> Real:
     """Bound the errors of the corrections, (g, p), SI; NaN where they cannot be bounded."""
     request, group = found.request, solved.group
+    if group.fit is not None and group.fit.foreknown is not None:
+        said = "--digits: the corrections are given in full, for no bound of the rounding of a fit with --influence is known"
+        if said not in warnings:
+            warnings.append(said)
+        return np.full(solved.corrections.shape, np.nan)
     of_alpha = coefficient_errors(found, solved)
     initial, _, on = group.errors()
     if group.fit is not None:
@@ -87,6 +92,8 @@ def uncertainty_share(found: FieldBalancing, solved: Solved, bound: Real) -> Rea
     To first order: the pseudo-inverses of coefficients and trial masses are right to their condition numbers times
     the relative errors of what they are of, and the corrections they are for to their own.
     """
+    if solved.group.fit is not None and solved.group.fit.foreknown is not None:
+        return np.full(bound.shape, np.nan)
     of_alpha = np.linalg.norm(coefficient_errors(found, solved), axis=-2)
     norms = np.linalg.norm(solved.alpha, axis=-2)
     relative = 8 * EPS + (of_alpha / np.where(norms > 0, norms, 1.0)).max(axis=-1)

@@ -67,6 +67,17 @@ class Log:
         return list(dict.fromkeys(run for run, _ in self.rows))
 
 
+@dataclass(frozen=True)
+class Before:
+    """What was known of a machine before its runs: coefficients of so many machines."""
+
+    machines: int
+    scatter: float | None
+    """Between machines, as a share of the coefficients; None of one machine."""
+    reading: tuple[float, float] | None
+    """Standard deviation of their readings as vectors, in the runs' unit, and its complex degrees of freedom."""
+
+
 @dataclass
 class Group:
     """Rotors that were measured in the same way."""
@@ -98,6 +109,8 @@ class Group:
     fit: JointFit | None = None
     """Where all runs were fitted at once: `initial` is fitted then, and there are no trial runs."""
     logs: list[Log] = field(default_factory=list)
+    before: Before | None = None
+    """Where coefficients known before take part in the fit."""
 
     @property
     def repeats(self) -> int:
@@ -149,7 +162,14 @@ class Runs:
     """The limits that the file states, plane -> SI."""
     lags: bool = False
     """Whether the runs themselves told that the phase lags, and it was turned round."""
+    runout: dict[str, complex] = field(default_factory=dict)
+    """What the file itself states of it, sensor -> vector as read."""
     warnings: list[str] = field(default_factory=list)
+
+    def warn(self, text: str) -> None:
+        """Say something of the table once."""
+        if text not in self.warnings:
+            self.warnings.append(text)
 
 
 def apart(one: float | None, other: float) -> float:

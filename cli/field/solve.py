@@ -320,7 +320,18 @@ class FieldBalancing:
     def _doubt(self, solved: Solved, fit: JointFit, runout: Complex, limited: bool) -> None:
         """Carry the errors of a fit of all runs to the corrections."""
         request, weights = self.request, solved.group.weights
-        errors = fit.scatter() if request.reading_error is None else fit.stated(*request.reading_error)
+        before = solved.group.before
+        if request.reading_error is not None:
+            errors = fit.stated(*request.reading_error)
+        elif before is not None and before.reading is not None:
+            # where the runs leave nothing over, the readings scatter as those of the sisters did
+            told = fit.degrees_of_freedom > 0
+            errors = fit.known(
+                np.where(told, fit.residual_sd, before.reading[0]),
+                np.where(told, fit.degrees_of_freedom, before.reading[1]),
+            )
+        else:
+            errors = fit.scatter()
         still = fit.without(runout)
         balance = LogBalance(still, solved.total, errors, weights, solved.corrections, request.ridge)
         solved.balance = balance

@@ -155,7 +155,10 @@ def summary(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
             relative, angle = found.request.reading_error
             known.append(f"of {100 * relative:.3g} % and {np.degrees(angle):.3g}°")
         elif solved.balance is not None:
-            known.append("as the residuals of the fit scatter")
+            left = solved.balance.fit.degrees_of_freedom[i] > 0
+            known.append(
+                f"as the {'residuals of the fit' if left else 'readings behind the coefficients'} scatter"
+            )
         if solved.group.reading_sd[i]:
             known.append(
                 f"{'or ' if known else ''}as the repeats scatter{' where that is more' if known else ''}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from itertools import chain
 
@@ -60,9 +61,11 @@ def _gaps(d: Drawing, m: Mechanism, motion: object) -> list[tuple[float, str]]:
     for name, body in d.bodies.items():
         if name == GROUND:
             continue
+        turned = cmath.rect(1.0, body.turn)
         for point, z in body.points.items():
             x, y = motion.point(point).position[0]  # type: ignore[attr-defined]
-            found.append((math.hypot(x - float(z[0]) * factor, y - float(z[1]) * factor), point))
+            drawn = complex(*map(float, body.at)) + complex(*map(float, z)) * turned
+            found.append((abs(complex(x, y) - drawn * factor), point))
     return found
 
 

@@ -29,7 +29,7 @@ def run(
         Kind | None, typer.Option("--from", help="The program it is from; else told by the content.")
     ] = None,
 ) -> None:
-    """Read a mechanism of another program: PMKS text and links, PMKS+ links, MotionGen, Linkage, linkage_sim.
+    """Read a mechanism of another program: PMKS text and links, PMKS+ links, MotionGen, Linkage, linkage_sim, planar robots (URDF, SDF, MJCF).
 
     What is written is a file for `dalembert mechanism`. The links' axes are parallel to the ground's in the drawn pose,
     which is that of input 0. All that is not taken over is named on standard error. Several mechanisms in one file
@@ -42,7 +42,8 @@ def run(
     if output is not None and output.suffix.lower() != ".toml":
         raise typer.BadParameter(f"'{output}': expected a name that ends in .toml", param_hint="-o")
     name, data = read_bytes(file)
-    told, drawings = read(name, data, None if kind is None else str(kind.value))
+    folder = None if file == "-" else Path(file).parent
+    told, drawings = read(name, data, None if kind is None else str(kind.value), folder)
     stem = "" if file == "-" else Path(file).stem
     found: list[tuple[str, list[str]]] = []
     lost: list[str] = []

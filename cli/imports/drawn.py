@@ -45,10 +45,11 @@ def direction(a: Place, b: Place) -> float:
 
 @dataclass
 class Body:
-    """A rigid body: its named points and its centre of mass in its own axes; its angle in the pose, rad."""
+    """A rigid body: its named points and its centre of mass in its own axes; how these stand in the pose, rad."""
 
     points: dict[str, Place] = field(default_factory=dict)
     turn: float = 0.0
+    at: Place = (Fraction(0), Fraction(0))
     mass: float = 0.0
     center: Place = (Fraction(0), Fraction(0))
     inertia: float = 0.0
@@ -107,7 +108,9 @@ class Drawing:
     length: str = "m"
     angle: str = "deg"
     posed: bool = True
-    """The bodies' points stand where they are drawn; False: each in its own axes, at angles that are sought."""
+    """It stands as it is drawn; False: at angles that are sought."""
+    own_axes: bool = False
+    """Each body's points are in axes of its own, which the file gives; False: in the ground's, as they are drawn."""
     bodies: dict[str, Body] = field(default_factory=lambda: {GROUND: Body()})
     slides: list[Slide] = field(default_factory=list)
     meshes: list[Mesh] = field(default_factory=list)
@@ -264,7 +267,7 @@ def settle(d: Drawing) -> list[Drawing]:
         a, b = d.welds.pop()
         if a != b and a in d.bodies and b in d.bodies:
             merge(d, a, b)
-    while d.posed:
+    while not d.own_axes:
         if _one_pin_at_a_place(d):
             continue
         pair = _rigid_pair(d)

@@ -94,6 +94,7 @@ class _Reader:
         ) and not any(
             e.get("type") == "prismatic" and e.get("delta_theta_0", 0.0) != 0 for e in joints.values()
         )
+        d.own_axes = not d.posed
         for name, e in joints.items():
             if e.get("type") == "prismatic":
                 self._prism(name, e)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 from cli.errors import DataError
-from cli.imports import linkage2, linkage_sim, motiongen, pmks, pmksweb
+from cli.imports import linkage2, linkage_sim, motiongen, pmks, pmksweb, robots
 from cli.imports.drawn import Drawing
-from cli.imports.words import LARGEST_FILE, unknown
+from cli.imports.words import unknown
+from cli.read.robots import reading
+from cli.read.robots.elements import LARGEST_FILE
+from cli.read.robots.reading import ROOTS
 
 
 def decoded(file: str, data: bytes) -> str:
@@ -57,6 +61,9 @@ def kind_of(file: str, text: str) -> str:
     if start.startswith("<"):
         if re.search(r"<\s*linkage2\b", start[:2000], re.IGNORECASE):
             return "linkage"
+        tag = re.search(r"<([A-Za-z_][\w.-]*)", re.sub(r"<!--.*?-->", "", start, flags=re.DOTALL))
+        if tag and tag[1] in ROOTS:
+            return ROOTS[tag[1]]
         raise unknown(file)
     if start.startswith(("{", "[")):
         data = parsed(file, text)
@@ -80,10 +87,12 @@ def kind_of(file: str, text: str) -> str:
     raise unknown(file)
 
 
-def read(file: str, data: bytes, kind: str | None) -> tuple[str, list[Drawing]]:
-    """Return the kind and the drawings of a file."""
+def read(file: str, data: bytes, kind: str | None, folder: Path | None = None) -> tuple[str, list[Drawing]]:
+    """Return the kind and the drawings of a file; files that it includes must lie in its folder."""
     text = decoded(file, data)
     kind = kind or kind_of(file, text)
+    if kind in ROOTS.values():
+        return kind, [robots.drawing(reading.read(file, data, folder))]
     if kind == "linkage":
         return kind, linkage2.read(file, text)
     if kind == "pmks-text":

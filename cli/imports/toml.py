@@ -47,7 +47,7 @@ def text(d: Drawing, source: str) -> str:
 
 def _origin(d: Drawing, name: str, body: Body) -> Place:
     """Return where a link's axes begin: at the first of its joints."""
-    if not d.posed or name == GROUND:
+    if d.own_axes or name == GROUND:
         return ORIGIN
     joints = set(d.pins()) | {s.point for s in d.slides}
     first = next((z for p, z in body.points.items() if p in joints), None)

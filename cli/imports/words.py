@@ -10,8 +10,10 @@ KINDS = {
     "motiongen": "MotionGen JSON",
     "linkage": "Linkage (.linkage2)",
     "linkage_sim": "linkage_sim JSON",
+    "urdf": "URDF robot",
+    "sdf": "SDF model",
+    "mjcf": "MuJoCo's MJCF",
 }
-LARGEST_FILE = 10_000_000  # bytes
 
 
 def unknown(file: str) -> DataError:

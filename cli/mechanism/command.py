@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -33,6 +33,14 @@ def _print_schema(asked: bool) -> None:
         raise typer.Exit
 
 
+EXAMPLE = "klann"
+PANELS = {
+    "What": "at sweep inputs only branch change vary variants",
+    "How": "order newton",
+    "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states html schema",
+}
+
+
 @command
 def run(
     file: Annotated[str, typer.Argument(metavar="FILE.toml", help="The mechanism; - is standard input.")],
@@ -54,8 +62,8 @@ def run(
         str | None, typer.Option(metavar="NAME,...", help="These links and points; nothing else is computed.")
     ] = None,
     order: Annotated[
-        str | None,
-        typer.Option(help="position, velocity, acceleration or jerk (default: what the file's input gives)."),
+        Literal["position", "velocity", "acceleration", "jerk"] | None,
+        typer.Option(help="How far to differentiate (default: as the file's input gives it)."),
     ] = None,
     branch: Annotated[
         str | None, typer.Option(metavar="all|NUMBER", help="Every assembly, or one of them.")
@@ -103,6 +111,14 @@ def run(
             metavar="FILE.csv",
             help="Write a row for each pose and link to FILE: what `dalembert work` reads.",
             callback=suffix_among(".csv"),
+        ),
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.html",
+            help="Write a page that moves to FILE: play, slider, curves, values; with --forces their arrows.",
+            callback=suffix_among(".html"),
         ),
     ] = None,
     change: Annotated[
@@ -164,8 +180,6 @@ def run(
     from cli.mechanism.variants import asked, assigned
     from cli.mechanism.words import METHOD
 
-    if order is not None and order not in ORDERS:
-        raise options.bad("--order", f"'{order}': expected {', '.join(ORDERS)}")
     if branch is not None and branch != "all" and options.whole(branch) < 1:
         raise options.bad("--branch", f"'{branch}': expected all, or the number of an assembly")
     names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
@@ -198,7 +212,7 @@ def run(
         swept=sweep is not None or inputs is not None,
     )
     own = request.tables
-    if show.as_csv and len(own) > 1:
+    if show.holds_one and len(own) > 1:
         raise options.bad(
             own[1],
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
@@ -212,16 +226,20 @@ def run(
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)
         analysis.warnings += said
         analysis.check_names()
-        others = show.json or show.text or show.plot or show.expect or show.report
-        streams = show.as_csv and not others
-        if several is None and streams and own in ([], ["--forces"]) and analysis.is_long:
+        if html is not None:
+            from cli.show.page import refuse_long
+
+            refuse_long(q.n * (1 if several is None else several.count))
+        alone = several is None and html is None and own in ([], ["--forces"])
+        if alone and show.streams and analysis.is_long:
             return _long(analysis, forces, states)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not show.json or show.expect is not None or show.output is not None
-        times = 1 if several is None or streams else several.count
+        times = 1 if several is None or show.streams else several.count
         analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces, times=times)
         if several is None:
-            return _result(analysis, request, states, explain, graph, about)
+            result = _result(analysis, request, states, explain, graph, about)
+            return _with_page(result, html, lambda: [("", analysis)], forces, show.units)
 
         def analysis_of(variant: Mechanism) -> Analysis:
             home = at is None and sweep is None and inputs is None
@@ -231,7 +249,9 @@ def run(
         found = Many(
             mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
         )
-        result = found.result(streams, show.as_json, table)
+        result = _with_page(
+            found.result(show.streams, show.as_json, table), html, found.analyses, forces, show.units
+        )
         return replace(
             result,
             warnings=[*said, *result.warnings],
@@ -325,6 +345,25 @@ def _result(
         failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),
         within=lambda: _told(analysis.file),
     )
+
+
+def _with_page(
+    result: Result,
+    html: Path | None,
+    analyses: Callable[[], list[tuple[str, Analysis]]],
+    forces: bool,
+    units: str | None,
+) -> Result:
+    """Add the page that moves to what a result writes beside, where it is asked for."""
+    if html is None:
+        return result
+
+    def page() -> bytes:
+        from cli.mechanism.animation import page
+
+        return page(analyses(), forces, units).html.encode()
+
+    return replace(result, beside={**result.beside, html: page})
 
 
 @contextmanager

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from virtualwork.plan.joints import Joint
 
 Column = list[Any]
-GROUND = "ground"
 
 
 def effort_name(slide: bool) -> str:
@@ -22,16 +21,11 @@ def effort_name(slide: bool) -> str:
 
 def rows_of(analysis: Analysis, motion: Motion) -> list[tuple[Joint, str, str]]:
     """The reactions asked for: (joint, on, from), each pair once, `on` the later in the file."""
-    wanted = []
-    for joint in motion.dynamics.reactions.joints:
-        if len(joint.bodies) == 2:
-            pairs = [(joint.bodies[1], joint.bodies[0])]
-        else:
-            pairs = [(body, "pin") for body in joint.bodies if body != GROUND]
-        for on, of in pairs:
-            if analysis.only is None or joint.name in analysis.only or on in analysis.only:
-                wanted.append((joint, on, of))
-    return wanted
+    return [
+        (joint, on, of)
+        for joint, on, of in motion.dynamics.reactions.order.pairs
+        if analysis.only is None or joint.name in analysis.only or on in analysis.only
+    ]
 
 
 def poses(analysis: Analysis) -> list[dict[str, Any]]:

@@ -51,6 +51,10 @@ class Many:
                 found = str(error)
             yield str(number), row, found
 
+    def analyses(self) -> list[tuple[str, Analysis]]:
+        """What is asked of each variant whose parts can be put together."""
+        return [(name, found) for name, _, found in self._each() if not isinstance(found, str)]
+
     def _formed(self, name: str, analysis: Analysis | str, form: Callable[[Result], Any]) -> Any:
         """A form of a variant's result; None where its parts cannot be put together, which is remembered."""
         from virtualwork import MechanismError
@@ -144,12 +148,13 @@ class Many:
 
     # --- in every form ------------------------------------------------------------------------------------------
     def result(self, streams: bool, json: bool, table: bool) -> Result:
-        """The result: as CSV alone, written part by part, or the forms asked for, at once."""
+        """The result: as one table alone, written part by part, or the forms asked for, at once."""
         if streams:
             return Result(
                 document=dict,
                 tables={},
                 blocks=self.tables,
+                blocks_name="variants",
                 late_warnings=self.said,
                 failed=lambda: not self.any_assembled,
             )

@@ -133,6 +133,13 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
     for motion in analysis.motions:
         d = motion.dynamics
         there = motion.assembled
+        for number, meet in d.without_length.items():
+            note(
+                there & meet,
+                f"the ends of [[springs]] {number} meet, so that its pull has no direction: the forces that hang "
+                "on it have no value",
+            )
+            there = there & ~meet
         for values, what in (
             (
                 d.effort,

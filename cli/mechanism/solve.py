@@ -194,7 +194,7 @@ class Analysis:
         if poses * each > room:
             raise DataError(
                 f"{self.file}: {poses} poses{f' of {times} variants' if times > 1 else ''} of {len(self.links)} links and {len(self.points)} points would take "
-                f"{float(f'{poses * each / 1e9:.2g}'):g} GB: expected at most {room / each:.0f} poses, or fewer names by --only, or CSV, which is not limited"
+                f"{float(f'{poses * each / 1e9:.2g}'):g} GB: expected at most {room / each:.0f} poses, or fewer names by --only, or CSV, Parquet or a workbook, which are not limited"
             )
 
     def assembled(self, motion: Motion) -> NDArray[np.bool_]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from cli.mechanism.columns import column
 from cli.show.columns import Table
+from cli.show.progress import progress
 from virtualwork.formulas.positions import BLOCK
 from virtualwork.formulas.sweep import EvenSweep
 from virtualwork.motion import Motion
@@ -77,7 +78,8 @@ class Stream:
     def tables(self) -> Iterator[Table]:
         """The table block by block; all have the columns of the first block and of the guess's own pose."""
         names: list[str] = []
-        for block in self.blocks():
+        count = -(-self.analysis.inputs.n // BLOCK) * len(self.analysis.assemblies)
+        for block in progress(self.blocks(), count, f"blocks of {BLOCK} poses"):
             table = self.form(block)
             if not names:
                 here, home = (

@@ -110,7 +110,7 @@ def check_document(analysis: Analysis) -> Document:
             }
             for f in check.four_bars
         ],
-        f"input_limits_{unit}": shown(check.input_limits),
+        f"input_limits_{unit}": shown(check.printed_limits),
         f"dead_points_{unit}": shown(check.dead_points),
         f"change_points_{unit}": shown(check.change_points),
         **({"singular": list(check.singular)} if check.singular else {}),

@@ -16,6 +16,14 @@ if TYPE_CHECKING:
     from cli.show.columns import Result
 
 
+EXAMPLE = "blades"
+PANELS = {
+    "What": "positions blades first stock pieces max_pieces max_mass",
+    "How: elsewhere": "at_radius to_radius at_z to_z",
+    "How: drilling": "drill density drill_point max_depth remove",
+}
+
+
 @command
 def run(
     corrections: Annotated[
@@ -27,7 +35,9 @@ def run(
     ] = None,
     blades: Annotated[
         int | None,
-        typer.Option(min=1, max=options.PLACES, help="So many places, evenly spaced, numbered from 1."),
+        typer.Option(
+            metavar="N", min=1, max=options.PLACES, help="So many places, evenly spaced, numbered from 1."
+        ),
     ] = None,
     first: Annotated[str, typer.Option(metavar="ANGLE", help="Angle of the first blade.")] = "0deg",
     max_mass: Annotated[
@@ -36,9 +46,11 @@ def run(
     stock: Annotated[
         str | None, typer.Option(metavar="MASSES", help="Weights in stock, such as 1g,2g,5g; one a place.")
     ] = None,
-    pieces: Annotated[int, typer.Option(min=1, help="How many weights from stock go on one place.")] = 1,
+    pieces: Annotated[
+        int, typer.Option(metavar="N", min=1, help="How many weights from stock go on one place.")
+    ] = 1,
     max_pieces: Annotated[
-        int | None, typer.Option(min=1, help="How many weights from stock altogether.")
+        int | None, typer.Option(metavar="N", min=1, help="How many weights from stock altogether.")
     ] = None,
     at_radius: Annotated[
         str | None, typer.Option(metavar="R", help="Radius the corrections were found for.")
@@ -57,7 +69,8 @@ def run(
         str | None, typer.Option(metavar="DIAMETER", help="Remove material instead, by drilling opposite.")
     ] = None,
     density: Annotated[
-        str | None, typer.Option(help="Density of the material drilled, such as 7850kg_m3.")
+        str | None,
+        typer.Option(metavar="DENSITY", help="Density of the material drilled, such as 7850kg_m3."),
     ] = None,
     drill_point: Annotated[
         str, typer.Option(metavar="ANGLE", help="Point angle of the drill, such as 118deg; 180deg is flat.")

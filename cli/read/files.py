@@ -42,7 +42,8 @@ def named() -> list[str]:
 def note(path: str | Path) -> Path:
     """Remember that a file is read."""
     with suppress(OSError, ValueError):
-        found = os.stat(path)
+        # standard input may be a file too
+        found = os.fstat(sys.stdin.fileno()) if path == "-" else os.stat(path)
         _read.add((found.st_dev, found.st_ino))
     return Path(path)
 
@@ -52,7 +53,8 @@ def load(path: str | Path) -> bytes:
     name = str(path)
     if name in _held:
         return _held[name]
-    data = sys.stdin.buffer.read() if path == "-" else note(path).read_bytes()
+    file = note(path)
+    data = sys.stdin.buffer.read() if path == "-" else file.read_bytes()
     if path == "-" or not os.path.isfile(path):
         _held[name] = data
     return data

@@ -98,7 +98,9 @@ class Result:
     failed: Callable[[], bool] = lambda: False
     """Whether nothing that was asked for could be found: status 1, once all is shown."""
     blocks: Callable[[], Iterator[Table]] | None = None
-    """The table in parts, where it is too long to be held: written as CSV, and nothing else."""
+    """The table in parts, where it is too long to be held: written as CSV, Parquet or a workbook, and nothing else."""
+    blocks_name: str = "poses"
+    """What the table in parts is called."""
     within: Callable[[], AbstractContextManager[None]] = nullcontext
     """What the forms are made within: it turns errors of a library into those that a user is told."""
     late_warnings: Callable[[], list[str]] = list

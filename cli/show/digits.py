@@ -24,8 +24,11 @@ def _cut_column(column: Column) -> tuple[Column, int]:
     errors = column.error()
     values = [_cut(value, error) for value, error in zip(column.values, errors, strict=True)]
     if column.unit == "deg":
-        # output angles lie in [0, 360)
-        values = [0.0 if value == 360 else value for value in values]
+        # output angles lie in [0, 360); an input of 360 is one that was asked for
+        values = [
+            0.0 if cut == 360 and value != 360 else cut
+            for value, cut in zip(column.values, values, strict=True)
+        ]
     return replace(column, values=values), sum(error == inf for error in errors)
 
 

@@ -1,14 +1,12 @@
-"""Tables as files that are handed on: workbooks, Markdown, LaTeX, HTML."""
+"""Tables as text that is handed on: Markdown, LaTeX, HTML."""
 
 from __future__ import annotations
 
 import html
-import io
 import re
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from cli.errors import DataError
 from cli.show.text import plain, printed
 
 if TYPE_CHECKING:
@@ -20,8 +18,6 @@ Cells = tuple[list[str], list[list[str]], list[bool]]
 
 def handed_on(suffix: str, tables: Mapping[str, Table], warnings: list[str]) -> bytes:
     """Return the file of this suffix: all tables, each with its name where there are several."""
-    if suffix == ".xlsx":
-        return _workbook(tables)
     form: Callable[[Cells], str] = {".md": markdown, ".tex": _latex, ".html": _html}[suffix]
     title = {".md": "## {}\n\n", ".tex": "% {}\n", ".html": "<h2>{}</h2>\n"}[suffix]
     several = len(tables) > 1
@@ -94,35 +90,3 @@ def _html(cells: Cells) -> str:
         return f"<tr>{inner}</tr>\n"
 
     return f"<table>\n{line(header, 'th')}{''.join(line(row, 'td') for row in rows)}</table>\n"
-
-
-def _workbook(tables: Mapping[str, Table]) -> bytes:
-    """A sheet for each table, numbers with every digit."""
-    try:
-        from openpyxl import Workbook
-        from openpyxl.styles import Font
-        from openpyxl.utils import get_column_letter
-    except ImportError:
-        raise DataError(
-            "-o .xlsx needs openpyxl: install dalembert with its extra, dalembert[excel]"
-        ) from None
-    book = Workbook()
-    book.remove(book.worksheets[0])
-    for name, table in tables.items():
-        sheet = book.create_sheet(re.sub(r"[\[\]:*?/\\']", " ", name)[:31])
-        sheet.freeze_panes = "A2"
-        for k, column in enumerate(table.columns, 1):
-            sheet.cell(1, k, column.header).font = Font(bold=True)
-            longest = len(column.header)
-            for i, value in enumerate(map(plain, column.values), 2):
-                if isinstance(value, str):
-                    value = re.sub(r"[\0-\x08\x0b\x0c\x0e-\x1f]", " ", value)
-                if value != "":
-                    # a number as its text: openpyxl keeps 16 digits of a float; a name that begins with = is no formula
-                    cell = sheet.cell(i, k, value if isinstance(value, str) else repr(value))
-                    cell.data_type = "s" if isinstance(value, str) else "n"
-                longest = max(longest, len(f"{value:.6g}" if isinstance(value, float) else str(value)))
-            sheet.column_dimensions[get_column_letter(k)].width = min(longest + 2, 40)
-    stream = io.BytesIO()
-    book.save(stream)
-    return stream.getvalue()

@@ -15,10 +15,20 @@ import typer
 
 from cli.errors import one_line
 from cli.read.files import named, refuse_inputs
+from cli.show.colour import coloured
 
 if TYPE_CHECKING:
     from cli.show.columns import Document, Result, Table
     from cli.show.expect import Comparison
+
+
+PANELS = {
+    "What": "column",
+    "Output": "json output units digits plot report expect rtol",
+    "Head of the report": "title machine customer date author",
+    "Terminal": "text no_color help",
+}
+"""Heading of the help -> the options below it that every command shares."""
 
 
 def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
@@ -45,8 +55,8 @@ class ShowOptions:
             "-o",
             "--output",
             metavar="FILE",
-            help="Write the result to FILE (.csv, .json, .xlsx, .md, .tex or .html).",
-            callback=suffix_among(".csv", ".json", ".xlsx", ".md", ".tex", ".html"),
+            help="Write the result to FILE (.csv, .json, .xlsx, .parquet, .md, .tex or .html).",
+            callback=suffix_among(".csv", ".json", ".xlsx", ".parquet", ".md", ".tex", ".html"),
         ),
     ] = None
     plot: Annotated[
@@ -67,7 +77,10 @@ class ShowOptions:
         ),
     ] = None
     rtol: Annotated[
-        float, typer.Option("--rtol", min=0.0, help="Relative tolerance of --expect (for angles: radians).")
+        float,
+        typer.Option(
+            "--rtol", metavar="NUMBER", min=0.0, help="Relative tolerance of --expect (for angles: radians)."
+        ),
     ] = 1e-3
     text: Annotated[bool, typer.Option("--text", help="Print the aligned table even into a pipe.")] = False
     digits: Annotated[
@@ -100,6 +113,10 @@ class ShowOptions:
     customer: Annotated[str | None, typer.Option(metavar="TEXT", help="Whom it is for.")] = None
     date: Annotated[str | None, typer.Option(metavar="TEXT", help="Its date, if not today's.")] = None
     author: Annotated[str | None, typer.Option(metavar="TEXT", help="Who made it.")] = None
+    no_color: Annotated[
+        bool,
+        typer.Option("--no-color", help="No colours on a terminal; so does NO_COLOR in the environment."),
+    ] = False
 
     @property
     def head(self) -> dict[str, str]:
@@ -109,11 +126,24 @@ class ShowOptions:
         return {name: text for name in HEAD if (text := getattr(self, name)) is not None}
 
     @property
-    def as_csv(self) -> bool:
-        """Whether the result is written as CSV: to a file, or to a pipe."""
+    def form(self) -> str:
+        """The suffix of what is written to a file, or to a pipe; empty for the terminal's table and for checks."""
         if self.output is not None:
-            return self.output.suffix.lower() == ".csv"
-        return not (self.json or self.text or self.expect is not None or sys.stdout.isatty())
+            return self.output.suffix.lower()
+        if self.json:
+            return ".json"
+        return "" if self.text or self.expect is not None or sys.stdout.isatty() else ".csv"
+
+    @property
+    def holds_one(self) -> bool:
+        """Whether what is written holds one table."""
+        return self.form in (".csv", ".parquet")
+
+    @property
+    def streams(self) -> bool:
+        """Whether a table is all that is asked for, so that it can be written block by block."""
+        others = self.json or self.text or self.plot or self.expect or self.report
+        return self.form in (".csv", ".parquet", ".xlsx") and not others
 
     @property
     def as_json(self) -> bool:
@@ -211,31 +241,42 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         from cli.show.picture import drawn
 
         write(options.plot, drawn(result.figure, options.plot.suffix.lower()[1:]))
-    if output is not None and output.suffix.lower() == ".csv":
-        write(output, csv_text(first().cells).encode())
-    elif output is not None and output.suffix.lower() == ".json":
+    if output is not None and options.form == ".json":
         write(output, (part.encode() for part in json_parts(_document(result))))
+    elif output is not None and options.holds_one:
+        write(output, _one_table(options.form, iter([first()])))
     elif output is not None:
-        from cli.show.handed_on import handed_on
-
         (name, _), *others = result.tables.items()
         formed = {name.strip("-"): first()} | {name.strip("-"): table() for name, table in others}
-        write(output, handed_on(output.suffix.lower(), formed, result.warnings))
-    _warn(result.warnings)
+        if options.form == ".xlsx":
+            from cli.show.parts import workbook
+
+            write(output, workbook({name: [table] for name, table in formed.items()}))
+        else:
+            from cli.show.handed_on import handed_on
+
+            write(output, handed_on(options.form, formed, result.warnings))
+    # a long table would carry the warnings out of sight
+    at_the_end = output is None and not options.json and sys.stdout.isatty()
+    if not at_the_end:
+        _warn(result.warnings, options)
     if options.json:
         sys.stdout.writelines(json_parts(_document(result)))
         if checked is not None:
             print(verdict, file=sys.stderr)
     elif checked is not None:
-        print(verdict)
+        print(coloured(verdict, sys.stdout, not options.no_color))
     elif options.text or (sys.stdout.isatty() and output is None):
         table = (result.screen or first)()
         width = get_terminal_size().columns if sys.stdout.isatty() else None
         text = table_text(table.cells, table.keys, width)
-        sys.stdout.write(paragraphs(result.notes(), text, result.afterword()))
+        said = paragraphs(result.notes(), text, result.afterword())
+        sys.stdout.write(coloured(said, sys.stdout, not options.no_color))
     elif output is None:
         sys.stdout.write(csv_text(first().cells))
     sys.stdout.flush()
+    if at_the_end:
+        _warn(result.warnings, options)
     if result.failed() or (checked is not None and not checked.passed):
         raise typer.Exit(1)
 
@@ -298,36 +339,53 @@ def _in_chosen_units(result: Result, units: str | None) -> Result:
 def _stream(result: Result, blocks: Iterator[Table], options: ShowOptions) -> None:
     """Write a table that comes in parts."""
     from cli.show.files import write
-    from cli.show.text import csv_text
 
     unknown = 0
 
-    def parts() -> Iterator[str]:
+    def tables() -> Iterator[Table]:
         nonlocal unknown
-        for i, table in enumerate(blocks):
+        for table in blocks:
             if options.digits:
                 from cli.show.digits import digits_that_hold
 
                 table, without = digits_that_hold(table)
                 unknown += without
-            yield csv_text(table.cells, header=i == 0)
+            yield table
 
     refuse_inputs([path for path in (options.output, *result.beside) if path is not None])
     for path, data in result.beside.items():
         write(path, data())
-    if options.output is not None:
-        write(options.output, (part.encode() for part in parts()))
+    if options.form == ".xlsx" and options.output is not None:
+        from cli.show.parts import workbook
+
+        write(options.output, workbook({result.blocks_name: tables()}))
+    elif options.output is not None:
+        write(options.output, _one_table(options.form, tables()))
     else:
-        sys.stdout.writelines(parts())
+        sys.stdout.writelines(part.decode() for part in _one_table(".csv", tables()))
         sys.stdout.flush()
-    _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)])
+    _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)], options)
     if result.failed():
         raise typer.Exit(1)
 
 
-def _warn(warnings: Iterable[str]) -> None:
+def _one_table(form: str, blocks: Iterator[Table]) -> Iterator[bytes]:
+    """Yield a file of a single table, which comes in parts."""
+    from cli.show.text import csv_text
+
+    if form == ".parquet":
+        from cli.show.parts import parquet
+
+        yield from parquet(blocks)
+        return
+    for i, table in enumerate(blocks):
+        yield csv_text(table.cells, header=i == 0).encode()
+
+
+def _warn(warnings: Iterable[str], options: ShowOptions) -> None:
     for warning in warnings:
-        print(f"warning: {one_line(warning)}", file=sys.stderr)
+        line = coloured(f"warning: {one_line(warning)}", sys.stderr, not options.no_color)
+        print(line, file=sys.stderr)
 
 
 def _unknown(count: int) -> list[str]:

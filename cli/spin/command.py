@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.read import options
-from cli.show.output import command
+from cli.show.output import ShowOptions, command, suffix_among
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,6 +31,10 @@ class Integrator(StrEnum):
     splitting = "splitting"
 
 
+EXAMPLE = "tennis-racket"
+PANELS = {"What": "time at", "How": "method integrator", "Output: of the rotation": "html"}
+
+
 @command
 def run(
     body: Annotated[
@@ -49,6 +54,16 @@ def run(
     integrator: Annotated[
         Integrator, typer.Option(help="For integration; the splitting is for a symmetric top.")
     ] = Integrator.dop853,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.html",
+            help="Write a page that moves to FILE: play, slider, curves, values.",
+            callback=suffix_among(".html"),
+        ),
+    ] = None,
+    *,
+    show: ShowOptions,
 ) -> Result:
     """Turn a body through time: angular velocity, attitude, momentum and energy at any instant.
 
@@ -67,6 +82,10 @@ def run(
     if time is not None and at:
         raise options.bad("--at", "expected --time or --at, not both")
     times = options.time_range("--time", time) if time is not None else [_time(text) for text in at or ["0"]]
+    if html is not None:
+        from cli.show.page import refuse_long
+
+        refuse_long(len(times))
     given = read_body(body)
     found = Rotation(given, np.array(times), method.value if method else None, integrator.value)
     found.states  # noqa: B018  faults of the data are found before anything is shown
@@ -76,14 +95,20 @@ def run(
 
         return draw(found)
 
+    def page() -> bytes:
+        from cli.spin.animation import page
+
+        return page(found, show.units).html.encode()
+
     return Result(
         document=lambda: columns.document(found),
         tables={"states": lambda: columns.states(found)},
         notes=lambda: words.notes(found),
         figure=figure,
+        beside={} if html is None else {html: page},
         method=words.METHOD,
         about={"title": given.name or "Rotation in time"} | given.about,
-        warnings=[*given.warnings, *words.warnings(found)],
+        warnings=[*given.warnings, *words.warnings(found), *(words.coarse(found) if html else ())],
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from cli.spin.solve import Rotation
 
 METHOD = (
@@ -19,6 +21,21 @@ def warnings(found: Rotation) -> list[str]:
     if steady is not None and steady["slow_rad_s"] is None:
         said.append("the spin is too slow for steady precession at this tilt")
     return said
+
+
+def coarse(found: Rotation) -> list[str]:
+    """Say where a page that moves would show a body that jumps, and which steps show it turn."""
+    if len(found.time) < 2:
+        return []
+    step = float(np.abs(np.diff(found.time)).max())
+    fastest = float(np.linalg.norm(found.states.omega, axis=-1).max())
+    if step * fastest <= np.pi / 4:
+        return []
+    smaller = float(f"{np.pi / 12 / fastest:.1g}")
+    return [
+        f"--html: the body turns up to {np.degrees(step * fastest):.0f} deg from one pose to the next: "
+        f"steps of {smaller:g} s show it turn"
+    ]
 
 
 def notes(found: Rotation) -> str:

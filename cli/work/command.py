@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from cli.show.columns import Result
 
 
+EXAMPLE = "riul-slider-crank"
+PANELS = {"What": "gravity", "Output: of the balance": "ledger"}
+
+
 @command
 def run(
     states: Annotated[

@@ -228,3 +228,9 @@ def test_tables_of_every_kind(dalembert: Dalembert, name: str) -> None:
                     assert a[key] == b[key]
                 else:
                     assert other == pytest.approx(value, rel=1e-9, abs=1e-9)
+
+
+def test_an_input_of_a_whole_turn_is_shown_as_it_was_asked(dalembert: Dalembert, tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_text(FOUR_BAR)
+    done = dalembert("mechanism", "m.toml", "--at", "0deg", "--at", "360deg", "--digits", "--only", "C")
+    assert [row["input_deg"] for row in csv.DictReader(io.StringIO(done.stdout))] == ["0.0", "360.0"]

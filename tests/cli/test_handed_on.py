@@ -83,7 +83,7 @@ def test_text_documents(dalembert: Dalembert, tmp_path: Path) -> None:
 def test_no_known_suffix(dalembert: Dalembert, tmp_path: Path) -> None:
     done = dalembert(*BALANCE, "-o", "out.doc", stdin=ROTOR)
     assert done.returncode == 2
-    assert "expected .csv, .json, .xlsx, .md, .tex, .html" in " ".join(done.stderr.split())
+    assert "expected .csv, .json, .xlsx, .parquet, .md, .tex, .html" in " ".join(done.stderr.split())
 
 
 def test_units_of_choice(dalembert: Dalembert, tmp_path: Path) -> None:

@@ -452,7 +452,7 @@ def test_coordinates_in_are_coordinates_out(places: list[tuple[float, float]]) -
     [
         ("", "of no known kind: expected pmks-text"),
         ("hello world", "of no known kind"),
-        ("<robot/>", "of no known kind"),
+        ("<html/>", "of no known kind"),
         ("\0\1\2", "of no known kind"),
         ("ground a R 0 0\na b R 1", "line 2: found 'a b R 1', expected link"),
         ("ground a R 0 0\na ground R nan 1", "expected link"),

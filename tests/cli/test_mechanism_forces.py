@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 from collections.abc import Callable
@@ -397,3 +399,37 @@ def test_newton_where_the_pose_cannot_be_assembled(dalembert, tmp_path) -> None:
     document = json.loads(done.stdout)
     assert document["poses"][0]["assembled"] is False
     assert document["newton_difference_rad"] is None
+
+
+@pytest.mark.parametrize("damping", [0, 2])
+def test_a_spring_whose_ends_meet_has_no_direction(damping: float, dalembert: Run, tmp_path: Path) -> None:
+    """Nothing is printed of what it does there, nor made of the rounding of its length, and the reason is said."""
+    (tmp_path / "m.toml").write_text(
+        f"""ground = {{ O = [0, 0], S = [1, 0] }}
+links.crank.points = {{ O = [0, 0], P = [1, 0] }}
+input = {{ link = "crank", angle = "30deg", speed = {damping} }}
+[[springs]]
+between = ["P", "S"]
+stiffness = 100
+free_length = 0.5
+damping = {damping}
+"""
+    )
+    named = "the ends of [[springs]] 1 meet, so that its pull has no direction"
+    for poses in (
+        ["--at", "0deg"],
+        ["--at", "0deg", "--at", "90deg"],
+        ["--at", "360deg"],
+        ["--at", "-360deg"],
+    ):
+        for more in ([], ["--digits"]):
+            done = dalembert("mechanism", "m.toml", *poses, "--forces", *more)
+            assert done.returncode == 0
+            assert named in done.stderr
+            assert "RuntimeWarning" not in done.stderr
+            assert "dead point" not in done.stderr
+            row, *others = csv.DictReader(io.StringIO(done.stdout))
+            assert row["input_torque_N_m"] == row["O_ground_on_crank_fx_N"] == ""
+            assert all(float(other["input_torque_N_m"]) > 0 for other in others)
+    for study in ("--equilibrium", "--check"):
+        assert "RuntimeWarning" not in dalembert("mechanism", "m.toml", study).stderr

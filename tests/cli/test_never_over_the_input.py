@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from subprocess import CompletedProcess
 
 import pytest
+
+from tests.conftest import COMMAND
 
 Run = Callable[..., "CompletedProcess[str]"]
 
@@ -56,6 +59,20 @@ def test_runs_are_kept(option: str, link: str | None, dalembert: Run, tmp_path: 
     refused(dalembert("field", "runs.csv", option, name, "--report", "page.html"), name)
     assert (tmp_path / "runs.csv").read_text() == RUNS
     assert not (tmp_path / "page.html").exists()
+
+
+def test_what_standard_input_is_read_from_is_kept(tmp_path: Path) -> None:
+    with (tmp_path / "runs.csv").open("rb") as runs:
+        done = subprocess.run(
+            [str(COMMAND), "field", "-", "-o", "runs.csv"],
+            stdin=runs,
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+            check=False,
+        )
+    refused(done, "runs.csv")
+    assert (tmp_path / "runs.csv").read_text() == RUNS
 
 
 @pytest.mark.parametrize("name", ["law.csv", "gas.csv"])

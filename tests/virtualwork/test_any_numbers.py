@@ -19,6 +19,9 @@ class Digits:
     def regular(self, inverse: mp.mpf, c1: mp.mpc, c2: mp.mpc) -> mp.mpf:
         return inverse
 
+    def inverse(self, length: mp.mpf, least: float) -> mp.mpf:
+        return 1 / length
+
 
 @pytest.mark.parametrize("kind", ["four-bar", "Watt"])
 def test_positions_and_rates_in_forty_digits(kind, random_mechanism) -> None:

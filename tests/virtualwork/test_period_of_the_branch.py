@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import mpmath as mp
 import numpy as np
 import pytest
 
@@ -55,6 +56,37 @@ def test_a_dead_point_of_the_second_turn_is_not_printed_in_the_first():
     assert low < m.at[0] < high
     just = np.array([low + 1e-9, high - 1e-9, low - 1e-9, high + 1e-9])
     assert m.motion(just).assembled.tolist() == [True, True, False, False]
+
+
+def test_a_dead_point_at_446_degrees_and_none_at_86():
+    """Rod 160 and lever 155 from C to F: stretched where |C − F| = 315, which C reaches on the other side of the rocker."""
+    m = change_point_four_bar(dyad=True)
+    m = Mechanism(
+        m.ground | {"F": (-0.105, -0.175)},
+        m.links | {"rod": Link({"C": (0, 0), "E": (0.16, 0)}), "lever": Link({"F": (0, 0), "E": (0.155, 0)})},
+        inputs=m.inputs,
+        guess=Guess(m.at, {"coupler": -1.45, "rocker": 3.7, "rod": 3.14, "lever": 1.57}),
+    )
+
+    def over(q: mp.mpf) -> mp.mpf:
+        """|C − F| − 315 mm, with C to the left of the way from B to D: the rocker's place of the second turn."""
+        w = 100 - 60 * mp.expj(q)
+        along = (abs(w) ** 2 + 90**2 - 70**2) / (2 * abs(w))
+        c = 100 - w + w / abs(w) * (along + mp.j * mp.sqrt(90**2 - along**2))
+        return abs(c - mp.mpc(-105, -175)) - 315
+
+    with mp.workdps(30):
+        second, first = (float(mp.degrees(mp.findroot(over, mp.radians(q)))) for q in (86.3, 347.2))
+    assert round(second, 2) == 86.26
+    check = Check(m.assembly)
+    assert np.degrees(check.dead_points) == pytest.approx([first, second + 360], abs=1e-9)
+    assert np.degrees(check.input_limits) == pytest.approx([second - 360, first], abs=1e-9)
+    assert np.degrees(check.printed_limits) == pytest.approx([second + 360, first], abs=1e-9)
+    # 86.26 lies in the middle of the range, and a sweep passes it as any other place
+    at = np.radians(np.linspace(86.16, 86.36, 21))
+    e = m.motion(at).point("E").position
+    assert np.isfinite(e).all()
+    assert np.abs(np.diff(e, 2, axis=0)).max() < 1e-7
 
 
 def test_a_mechanism_behind_a_reducing_gear_repeats_after_its_own_number_of_turns():

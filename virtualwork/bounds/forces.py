@@ -101,6 +101,8 @@ class ForceErrors:
         ends = [(body, self.mechanism.place(body, point)) for body, point in s.between]
         moved = sum(r.point(body, z) for body, z in ends)
         d = np.abs(np.subtract(*(p.point_derivative(body, z, 0) for body, z in ends)))
+        # a spring without length has no direction, and its pull no value
+        d = np.where(d > 0, d, np.nan)
         slack = s.free_length / d if s.free_length else np.zeros(self.n)
         error: Any = s.stiffness * ((np.abs(1 - slack) + slack) * moved + 4 * EPS * s.free_length)
         if s.damping and self.scene.moves:

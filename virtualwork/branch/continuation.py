@@ -43,22 +43,23 @@ class Continuation:
         self._found: dict[tuple[float, float], float] = {}
         x = np.asarray(self.assembly.starts[group.name], dtype=float)
         q = track.start
-        rate, det = self._rate(q, x)
+        rate, det = self._rate(self._state(q, x))
         self.q, self.x, self.rate, self.det = [q], [x], [rate], [det]
         self.stopped = {1: False, -1: False}
         # the last one that was taken
         self.step = {1: np.inf, -1: np.inf}
 
-    def _state(self, q: float) -> State:
+    def _state(self, q: float, x: Reals | None = None) -> State:
+        """What the group hangs on at one input; its own unknowns too, where they are given."""
         st = State([np.array([q])], many=True)
         with np.errstate(all="ignore"):
             self.track.run(self.before, st)
+        if x is not None:
+            write_unknowns(self.group, st, x[None])
         return st
 
-    def _rate(self, q: float, x: Reals) -> tuple[Reals, float]:
-        """dx/dq and the determinant (its sign is the branch)."""
-        st = self._state(q)
-        write_unknowns(self.group, st, x[None])
+    def _rate(self, st: State) -> tuple[Reals, float]:
+        """dx/dq and the determinant (its sign is the branch) at a pose whose unknowns are written."""
         d = Rates(self.assembly.plan, st, [[1.0]], self.track)
         d.advance(self.before, 1)
         jacobian = stack(columns(self.group, st), 1)
@@ -94,7 +95,7 @@ class Continuation:
             with np.errstate(all="ignore"):
                 found, closed = newton(self.group, st, guess[None], self.size, limit=8)
             if closed[0]:
-                new, det = self._rate(to, found[0])
+                new, det = self._rate(st)
                 # a slide that runs away is measured by itself
                 far = np.maximum(np.abs(x), self.size)
                 far[: len(self.group.angles)] = 1.0
@@ -140,7 +141,8 @@ class Continuation:
                 centre, half = (a + b) / 2, (b - a) / 2
                 nodes = chebyshev_nodes(12)
                 x = self.unknowns(centre + half * nodes)
-                det = [self._rate(q, row)[1] for q, row in zip(centre + half * nodes, x, strict=True)]
+                places = zip((centre + half * nodes).tolist(), x, strict=True)
+                det = [self._rate(self._state(q, row))[1] for q, row in places]
                 # a pose between the two that does not close: no more is known
                 if not np.isfinite(det).all():
                     self._found[a, b] = centre

@@ -15,7 +15,7 @@ from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort, finished, write_effort
 from virtualwork.formulas.friction import settle
 from virtualwork.formulas.loads import EXTERNAL, OWN, Load
-from virtualwork.formulas.numbers import Complexes, Number, Reals, cross, plus, xy
+from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, cross, plus, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.reactions import Reactions
 from virtualwork.formulas.scene import Scene
@@ -56,6 +56,18 @@ class Dynamics:
     def locked(self) -> NDArray[np.bool_]:
         """(n,): poses in which friction locks the mechanism: no reaction balances its own friction."""
         return ~self._settled[1]
+
+    @cached_property
+    def without_length(self) -> dict[int, NDArray[np.bool_]]:
+        """Of the springs whose pull needs a direction, by number: the poses in which their ends meet, (n,)."""
+        m, found = self.poses.mechanism, {}
+        for number, spring in enumerate(m.springs, 1):
+            if (spring.stiffness and spring.free_length) or (spring.damping and self.scene.moves):
+                a, b = (self.poses.point_derivative(link, m.place(link, p), 0) for link, p in spring.between)
+                meet = np.broadcast_to(np.abs(a - b) <= TOGETHER * m.size, self.poses.n)
+                if meet.any():
+                    found[number] = meet
+        return found
 
     @property
     def effort(self) -> Reals:

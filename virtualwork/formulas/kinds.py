@@ -40,6 +40,10 @@ class One:
         """1/(c1 × c2), or NaN."""
         return inverse if abs(inverse) * (abs(c1) * abs(c2)) < 1 / PARALLEL else math.nan
 
+    def inverse(self, length: float, least: float) -> float:
+        """1/length, or NaN."""
+        return 1 / length if length > least else math.nan
+
     solve, transposed = staticmethod(solve_columns), staticmethod(solve_transposed)
 
 
@@ -77,13 +81,17 @@ class Many:
             return inverse
         return np.where(np.abs(inverse) * (np.abs(c1) * np.abs(c2)) < 1 / PARALLEL, inverse, np.nan)
 
+    def inverse(self, length: Number, least: float) -> Number:
+        """1/length, or NaN."""
+        return 1 / np.where(length > least, length, np.nan)
+
 
 class Folded:
     """A kind for two assemblies that meet in every pose: the root is zero, and its noise is left out."""
 
     def __init__(self, kind: Kind) -> None:
         self.exp, self.join, self.regular = kind.exp, kind.join, kind.regular
-        self.constant, self.angle = kind.constant, kind.angle
+        self.constant, self.angle, self.inverse = kind.constant, kind.angle, kind.inverse
         self.solve, self.transposed = kind.solve, kind.transposed
 
     def sqrt(self, x: Number) -> Number:
@@ -118,6 +126,11 @@ class Written:
         """1/(c1 × c2), or NaN."""
         size = (c1.conjugate() * c1).real * (c2.conjugate() * c2).real * (inverse * inverse)
         return RECORDED.select(1 / PARALLEL**2 - bare(size), bare(inverse), math.nan)
+
+    def inverse(self, length: Number, least: Number) -> Number:
+        """1/length, or NaN."""
+        length = bare(length)
+        return 1 / RECORDED.select(length - bare(least), length, math.nan)
 
     def solve(self, cols: list[list[Number]], right: list[Number]) -> list[Number]:
         """Solve Σ column·x + right = 0."""

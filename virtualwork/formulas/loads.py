@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from virtualwork.describe.loads import Spring, TorsionSpring
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
-from virtualwork.formulas.numbers import Complexes, Number, Reals, dot, minus, plus, times
+from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, dot, minus, plus, times
 from virtualwork.formulas.quantities import Combination, Given, Quantities, Turned
 from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Path, path_reads
@@ -258,7 +258,13 @@ class SpringEnd(Load):
         if not s.free_length:
             # the pull is k·d: no direction is needed, and none is asked for at zero length
             return s.stiffness * d
-        return s.stiffness * (1 - s.free_length / block.st.kind.sqrt(d.real * d.real + d.imag * d.imag)) * d
+        return s.stiffness * (1 - s.free_length * self._inverse(block, d)) * d
+
+    def _inverse(self, block: Block, d: Number) -> Number:
+        """1/l; NaN where the spring has no length, and its pull no direction."""
+        kind = block.st.kind
+        length = kind.sqrt(d.real * d.real + d.imag * d.imag)
+        return kind.inverse(length, TOGETHER * block.setting.mechanism.size)
 
     def form(self, block: Block) -> Number:
         s, d = self.spring, self._between(block.position)
@@ -266,8 +272,8 @@ class SpringEnd(Load):
         if s.damping:
             rate = self._between(block.velocity)
             if rate is not None:
-                length2 = d.real * d.real + d.imag * d.imag
-                pull = plus(pull, (s.damping * dot(d, rate) / length2) * d)
+                inverse = self._inverse(block, d)
+                pull = plus(pull, (s.damping * dot(d, rate) * (inverse * inverse)) * d)
         return pull
 
     def displacement(self, block: Block, j: int) -> Number:
@@ -296,8 +302,8 @@ class SpringEnd(Load):
         share: Number = 1.0
         bend: Number = 0.0
         if s.free_length:
-            length = abs(d)
-            share, bend = 1 - s.free_length / length, s.free_length / length**3 * dot(d, d1) ** 2
+            inverse = self._inverse(block, d)
+            share, bend = 1 - s.free_length * inverse, s.free_length * inverse**3 * dot(d, d1) ** 2
         return -s.stiffness * (share * plus(dot(d1, d1), times_dot(d, d2)) + bend)
 
 

@@ -65,7 +65,7 @@ def newton(
     table: list[Iterate] | None = None,
     damped: bool = True,
 ) -> tuple[Reals, NDArray[np.bool_]]:
-    """Close the loops of a group from a start, over all poses at once.
+    """Close the loops of a group from a start, over all poses at once; the state holds what was found.
 
     Parameters
     ----------
@@ -126,6 +126,5 @@ def newton(
         done = done | worse if damped else done
         small = (norm <= 64 * EPS * far) & (big <= 1e-7)
         done = done | small | ~np.isfinite(norm)
-    write_unknowns(group, st, x)
     closed = np.isfinite(norm) & (norm <= 1e-12 * far)
     return x, closed

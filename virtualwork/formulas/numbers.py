@@ -18,6 +18,8 @@ Complexes = NDArray[np.complex128]
 EPS = float(np.finfo(float).eps)
 # sine of the angle between two columns below which the joint forces have no digit left that counts
 PARALLEL = 1e-11
+# of the mechanism's size: two points nearer than this have no direction from one to the other
+TOGETHER = 64 * EPS
 
 
 class Kind(Protocol):
@@ -40,6 +42,9 @@ class Kind(Protocol):
 
     def regular(self, inverse: Number, c1: Number, c2: Number) -> Number:
         """1/(c1 × c2); NaN where two columns are parallel to rounding, for the joint forces have no value there."""
+
+    def inverse(self, length: Number, least: float) -> Number:
+        """1/length; NaN of one that is not above the least, which has no direction."""
 
     def solve(self, cols: list[list[Number]], right: list[Number]) -> list[Number]:
         """Solve Σ column·x + right = 0, complex, for the real unknowns x of a group."""

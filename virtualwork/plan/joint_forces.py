@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import MechanismError
 from virtualwork.describe.parts import GROUND
-from virtualwork.plan.joints import joints, relations
+from virtualwork.plan.joints import Joint, joints, relations
 from virtualwork.plan.steps import Group, Plan
 
 Reals = NDArray[np.float64]
@@ -26,6 +26,17 @@ class Order:
         self.mechanism, self.plan = mechanism, plan
         self.joints = joints(mechanism)
         self.by_key = {joint.key: joint for joint in self.joints}
+
+    @cached_property
+    def pairs(self) -> list[tuple[Joint, str, str]]:
+        """Every joint force once, as (joint, on, from): of two bodies on the later, of more on each from the pin."""
+        found: list[tuple[Joint, str, str]] = []
+        for joint in self.joints:
+            if len(joint.bodies) == 2:
+                found.append((joint, joint.bodies[1], joint.bodies[0]))
+            else:
+                found += [(joint, body, "pin") for body in joint.bodies if body != GROUND]
+        return found
 
     @cached_property
     def multipliers(self) -> dict[Side, tuple[Group, int]]:

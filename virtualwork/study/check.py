@@ -158,14 +158,28 @@ class Check:
         track.cover(*self._span())
         return self._in_period(track.crossings)
 
-    def _in_period(self, found: list[float]) -> tuple[float, ...]:
+    @property
+    def printed_limits(self) -> tuple[float, ...] | None:
+        """The same ends in [0, period of the branch), as tables and JSON have them.
+
+        The range goes from the first up to the second, through the end of the period where the second is the smaller.
+        """
+        return None if self.input_limits is None else tuple(map(self._turned_back, self.input_limits))
+
+    def _turned_back(self, q: float) -> float:
+        """An input in [0, period of the branch)."""
         period = self.assembly.track.period
-        if period is None:
+        if period is None or not math.isfinite(q):
+            return q
+        q %= period
+        # an input of −1e-15 is 0, not a whole period
+        return 0.0 if period - q < 1e-9 or q < 1e-9 else q
+
+    def _in_period(self, found: list[float]) -> tuple[float, ...]:
+        if self.assembly.track.period is None:
             return tuple(sorted(found))
         unique: list[float] = []
-        for q in sorted(q % period for q in found):
-            # an input of −1e-15 is 0, not a whole period
-            q = 0.0 if period - q < 1e-9 or q < 1e-9 else q
+        for q in sorted(map(self._turned_back, found)):
             if all(abs(q - other) > 1e-8 for other in unique):
                 unique.append(q)
         return tuple(sorted(unique))

@@ -1,0 +1,226 @@
+"""What is known of a machine before its own runs: influence coefficients of sister machines, as prior knowledge of the fit.
+
+Of m sister machines the coefficients α_k are known, each with the error of its own runs. The mean α̂ of m differs from the
+α of a further machine as machines differ from one another, and their scatter shows by how much. The trade calls the use of it
+one-shot balancing: the first correction comes before any trial run. It enters the fit of a machine's own runs
+as mixed estimation (Theil and Goldberger, Int. Econ. Rev. 2 (1961) 65-78),
+
+    min  Σ_j |y_j - x₀ - Σ_p α_p w_jp|²/σ²  +  (α - α̂)ᴴ Γ⁻¹ (α - α̂),
+
+so that the runs count the more, the more they tell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from balancing.dependence import adjoint, columns_scaled, threshold
+from balancing.run_log import Foreknown, JointFit
+from dalembert.arithmetic.records import record
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@record
+@dataclass(frozen=True, eq=False, repr=False)
+class Prior:
+    """Influence coefficients as known before, and how far a machine's own may lie from them."""
+
+    mean: Complex
+    """α̂, (..., s, p)."""
+    factor: Complex
+    """(..., s, p, q): a machine's α lies from α̂ by factor·z, the q errors z circular with E|z|² = 1."""
+    degrees_of_freedom: Real
+    """Complex, of the estimate that the factor is; inf where it is known. (...)"""
+    root: Complex
+    """A root of the Γ that each channel's coefficients are weighed with, (..., s, p, p)."""
+    scatter: Real
+    """Between machines, as a share of the coefficients' size: √(mean of |α_k - α̂|²/|α̂|²), readings' errors taken off; NaN
+    of one machine. (...)"""
+
+
+def stored_prior(mean: ArrayLike, covariance: ArrayLike, degrees_of_freedom: ArrayLike = np.inf) -> Prior:
+    """Take the coefficients of one machine (..., s, p) with their covariance E δδᴴ of each channel (..., s, p, p).
+
+    How machines differ one machine does not tell: this is for coefficients of the same machine, or of one just like it.
+
+    >>> stored_prior([[2.0]], [[[0.04]]]).factor
+    array([[[0.2+0.j]]])
+    """
+    alpha, c = np.asarray(mean, dtype=complex), np.asarray(covariance, dtype=complex)
+    channels, planes = alpha.shape[-2:]
+    if c.shape != (*alpha.shape, planes):
+        raise ValueError(f"shapes do not fit: mean {alpha.shape}, covariance {c.shape}")
+    size, axes = np.linalg.eigh(c)
+    if not (size > -1e-9 * np.abs(size).max(axis=-1, keepdims=True, initial=1e-300)).all():
+        raise ValueError("a covariance must not be negative")
+    root = axes * np.sqrt(np.maximum(size, 0.0))[..., None, :]
+    # the channels' errors are independent of one another
+    factor = np.zeros((*alpha.shape, channels, planes), dtype=complex)
+    for s in range(channels):
+        factor[..., s, :, s, :] = root[..., s, :, :]
+    lead = alpha.shape[:-2]
+    nu = np.broadcast_to(np.asarray(degrees_of_freedom, dtype=float), lead)
+    return Prior(alpha, factor.reshape(*alpha.shape, channels * planes), nu, root, np.full(lead, np.nan))
+
+
+def pooled_prior(coefficients: ArrayLike, covariances: ArrayLike | None = None) -> Prior:
+    """Pool the coefficients of sister machines, (m, s, p) with m ≥ 2, and estimate how machines differ.
+
+    Parameters
+    ----------
+    coefficients
+        α of each machine.
+    covariances
+        E δδᴴ of the error with which each is known, (m, s, p, p); None: exact.
+
+    Notes
+    -----
+    All machines count alike. With D the deviations from their mean, T = DDᴴ/(m - 1) is the covariance of all coefficients of a
+    machine together, whatever is common to its sensors and planes, with m - 1 complex degrees of freedom; it holds the scatter
+    of machines and the mean S of `covariances`. A further machine differs from the mean by T - S + T/m, taken as
+    T·(1 + 1/m - min(1, tr S/tr T)), the traces of relative sizes. In the fit each coefficient is weighed with the mean relative
+    scatter of all.
+
+    Examples
+    --------
+    >>> found = pooled_prior([[[2.0]], [[2.4]], [[1.6]]])
+    >>> found.mean, found.scatter.round(3), found.degrees_of_freedom
+    (array([[2.+0.j]]), np.float64(0.2), array(2.))
+    """
+    each = np.asarray(coefficients, dtype=complex)
+    if each.ndim != 3 or len(each) < 2:
+        raise ValueError(f"expected coefficients (m, s, p) of two machines or more, found shape {each.shape}")
+    machines = len(each)
+    mean = each.mean(axis=0)
+    d = np.moveaxis(each - mean, 0, -1) / np.sqrt(machines - 1)
+    square = np.square(np.abs(mean))
+    scale = np.where(square > 0, square, square.max() or 1.0)
+    whole = float((np.square(np.abs(d)).sum(axis=-1) / scale).mean())
+    of_readings = 0.0
+    if covariances is not None:
+        c = np.asarray(covariances, dtype=complex)
+        of_readings = float((np.diagonal(c, axis1=-2, axis2=-1).real.mean(axis=0) / scale).mean())
+    taken = min(of_readings / whole, 1.0) if whole else 0.0
+    left = 1 + 1 / machines - taken
+    root = np.sqrt(whole * left * scale)[..., None] * np.eye(mean.shape[-1], dtype=complex)
+    return Prior(
+        mean,
+        d * np.sqrt(left),
+        np.asarray(float(machines - 1)),
+        root,
+        np.asarray(np.sqrt(whole * (1 - taken))),
+    )
+
+
+def fit_with_prior(
+    readings: ArrayLike, masses: ArrayLike, prior: Prior, deviation: ArrayLike | None = None
+) -> JointFit:
+    """Fit initial vibration and coefficients to runs and to what was known of the coefficients.
+
+    Parameters
+    ----------
+    readings, masses
+        As for `joint_fit`, (..., r, s) and (..., r, p); no run with a mass is needed.
+    prior
+        Of (s, p), or (..., s, p).
+    deviation
+        √E|ε|² of the readings, (..., r, s) or what broadcasts; None: as the runs alone scatter, and where they leave no
+        degree of freedom 0, so that what is known serves for what the runs do not determine.
+
+    Returns
+    -------
+    JointFit
+        Its degrees of freedom, `residual_sd` and `standardized` residuals are those of the runs alone; `foreknown` carries the
+        errors of the prior to the unknowns.
+
+    Raises
+    ------
+    ValueError
+        A channel without a reading, infinite, or shapes that do not fit.
+
+    Notes
+    -----
+    With α = α̂ + Γ^½u and σ taken to be known it is the least squares of u and x₀ in one, by the SVD, so that Γ may be
+    singular and σ zero. The unknowns are linear in y and α̂, and errors of both are carried on whatever Γ was.
+
+    Examples
+    --------
+    One shot: a single run of 80 at 40°, and sisters with 2, 2.4, 1.6 at 150°.
+
+    >>> turn = lambda degrees: np.exp(1j * np.radians(degrees))
+    >>> sisters = pooled_prior(np.array([2.0, 2.4, 1.6])[:, None, None] * turn(150))
+    >>> fit = fit_with_prior([[80 * turn(40)]], [[0]], sisters)
+    >>> np.abs(fit.initial).round(9), np.abs(fit.influence).round(9)
+    (array([80.]), array([[2.]]))
+    """
+    y, t = np.asarray(readings, dtype=complex), np.asarray(masses, dtype=complex)
+    if y.ndim < 2 or t.ndim < 2 or y.shape[:-1] != t.shape[:-1]:
+        raise ValueError(f"shapes do not fit: readings {y.shape}, masses {t.shape}")
+    if prior.mean.shape[-2:] != (y.shape[-1], t.shape[-1]):
+        raise ValueError(f"shapes do not fit: readings {y.shape}, masses {t.shape}, prior {prior.mean.shape}")
+    if np.isinf(y).any() or not np.isfinite(t).all():
+        raise ValueError("masses must be finite, and readings finite or NaN")
+    present = np.isfinite(y)
+    if not present.any(axis=-2).all():
+        raise ValueError("a channel has no reading")
+    plain = _runs_alone(y, t, present)
+    if deviation is None:
+        deviation = np.nan_to_num(plain.residual_sd)[..., None, None]
+    sd = np.swapaxes(
+        np.where(present, np.broadcast_to(np.asarray(deviation, dtype=float), y.shape), 0.0), -1, -2
+    )
+    read = np.swapaxes(present, -1, -2)
+    typical = sd.sum(axis=-1) / read.sum(axis=-1)
+    floor = np.maximum(sd, 1e-3 * typical[..., None])
+    # weights relative to the typical reading, so that all errors may be zero
+    root = np.where(read, np.where(floor > 0, typical[..., None] / np.where(floor > 0, floor, 1.0), 1.0), 0.0)
+    share = np.square(root) / np.square(root).sum(axis=-1, keepdims=True)
+    w = t[..., None, :, :]
+
+    def centred(rows: Complex) -> Complex:
+        """Take off x₀: root·(rows - their weighted mean)."""
+        return np.asarray(root[..., None] * (rows - share[..., None, :] @ rows))
+
+    steps = centred(w) @ prior.root
+    below = np.broadcast_to(
+        typical[..., None, None] * np.eye(t.shape[-1]), (*steps.shape[:-2], *[t.shape[-1]] * 2)
+    )
+    inverse = np.linalg.pinv(
+        np.concatenate([steps, below], axis=-2), rcond=threshold(y.shape[-2], t.shape[-1])
+    )
+    of_u = inverse[..., : y.shape[-2]]
+    of_alpha = prior.root @ of_u @ centred(np.eye(y.shape[-2], dtype=complex))
+    of_alpha = np.where(read[..., None, :], of_alpha, 0.0)
+    follows = np.eye(t.shape[-1]) - of_alpha @ w
+    of_initial = share[..., None, :] - share[..., None, :] @ w @ of_alpha
+    gain = np.concatenate([of_initial, of_alpha], axis=-2)
+    of_mean = np.concatenate([-share[..., None, :] @ w @ follows, follows], axis=-2)
+    b = np.swapaxes(np.where(present, y, 0.0), -1, -2)
+    unknowns = np.matvec(gain, b) + np.matvec(
+        of_mean, np.broadcast_to(prior.mean, of_mean.shape[:-2] + t.shape[-1:])
+    )
+    rows = np.concatenate([np.ones((*t.shape[:-1], 1), dtype=complex), t], axis=-1)
+    leverage = np.clip(np.einsum("...rn,...snr->...rs", rows, gain).real, 0.0, 1.0)
+    nu = np.broadcast_to(prior.degrees_of_freedom, y.shape[:-2])
+    known = Foreknown(plain, of_mean @ prior.factor, nu)
+    return JointFit(y, t, None, np.asarray(unknowns + 0.0), gain, leverage, foreknown=known)
+
+
+def _runs_alone(y: Complex, t: Complex, present: NDArray[np.bool_]) -> JointFit:
+    """Fit the runs alone, of least norm where they do not determine the unknowns, which are counted."""
+    rows = np.concatenate([np.ones((*t.shape[:-1], 1), dtype=complex), t], axis=-1)[..., None, :, :]
+    scaled, scale = columns_scaled(np.swapaxes(present, -1, -2)[..., None] * rows)
+    left, sigma, right = np.linalg.svd(scaled, full_matrices=False)
+    seen = sigma > threshold(*scaled.shape[-2:]) * sigma[..., :1]
+    left = np.where(seen[..., None, :], left, 0.0)
+    back = adjoint(right) / np.where(seen, sigma, 1.0)[..., None, :]
+    gain = scale[..., None] * (back @ adjoint(left))
+    unknowns = np.matvec(gain, np.swapaxes(np.where(present, y, 0.0), -1, -2))
+    leverage = np.swapaxes(np.square(np.abs(left)).sum(axis=-1), -1, -2)
+    count = np.asarray(seen.sum(axis=(-2, -1)))
+    return JointFit(y, t, None, np.asarray(unknowns), gain, leverage, count=count)

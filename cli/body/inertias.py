@@ -1,0 +1,180 @@
+"""The inertias of a robot file: can a body have them, which is the nearest that it can, what has likely slipped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.read.robots.robot import Inertial, Robot, RobotLink
+from rigidbody3d import inertia
+
+Array = NDArray[np.float64]
+
+PLACES = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
+# the orders in which formats and tables print a tensor
+ORDERS = (("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+SLIPS = {1: "a slipped decimal", 2: "a slipped decimal", 3: "g for kg", 6: "mm for m"}
+ROUNDING = 1e-12
+# without shapes a link is taken to reach no farther than this many times its joints
+ROOM = 3.0
+
+
+class Guess(NamedTuple):
+    """What may have slipped, and how far apart the moments would then be."""
+
+    what: str
+    entry: str
+    spread: float
+
+
+@dataclass(frozen=True)
+class Check:
+    """A link's inertia, looked at."""
+
+    link: RobotLink
+    held: Inertial
+    reach: float | None
+    """How far from its centre of mass the link has shapes or joints, m."""
+
+    @cached_property
+    def moments(self) -> Array:
+        """The principal moments, ascending, kg·m²."""
+        return inertia.principal(self.held.tensor).moments
+
+    @cached_property
+    def missing(self) -> float:
+        """By how much no body has the tensor, whatever its digits behind the last printed one are, kg·m²; 0 if one has.
+
+        The least eigenvalue of the second moments, raised as far as half units of the last digits can: vᵀ(δS)v for its
+        own vector v is the most that it can gain (Rayleigh).
+        """
+        S = inertia.second_moments(self.held.tensor)
+        values, vectors = np.linalg.eigh(S)
+        v = vectors[:, 0]
+        gain = np.abs(np.eye(3) / 2 - np.outer(v, v))
+        room = float((self.held.half * gain).sum()) + ROUNDING * float(np.abs(self.held.tensor).max())
+        return max(0.0, -float(values[0]) - room)
+
+    @property
+    def valid(self) -> bool:
+        """Whether some body has this mass and tensor, to the digits that are printed."""
+        return self.missing == 0 and self.held.mass >= 0
+
+    @cached_property
+    def nearest(self) -> Array:
+        """The nearest tensor that a body can have."""
+        return inertia.nearest(self.held.tensor)
+
+    @cached_property
+    def likely(self) -> str | None:
+        """What has likely slipped; None where nothing is to be seen."""
+        if self.held.mass < 0:
+            return "a stray minus sign in the mass"
+        if self.missing == 0:
+            return self._too_large()
+        guesses = self._signs() or self._decimals()
+        if guesses:
+            least = min(g.spread for g in guesses)
+            best = [g for g in guesses if g.spread <= least * 1.0001]
+            return f"{best[0].what} in {' or '.join(g.entry for g in best)}"
+        if _can_be(self._reordered()):
+            return "entries in another order"
+        if _can_be(self.held.tensor + self._carried()):
+            return "the term m·d² of the parallel axis taken off once too often: about the origin instead of the centre"
+        return None
+
+    def _carried(self) -> Array:
+        """What the parallel axis theorem adds at the link's origin, in the tensor's axes."""
+        inside = self.held.pose[:3, :3].T @ self.held.pose[:3, 3]
+        return inertia.shift(self.held.mass, inside)
+
+    def _with(self, entry: str, value: float) -> Array:
+        made = self.held.tensor.copy()
+        i, j = PLACES[entry]
+        made[i, j] = made[j, i] = value
+        return made
+
+    def _signs(self) -> list[Guess]:
+        found = []
+        for entry in ("ixx", "iyy", "izz"):
+            value = self.held.tensor[PLACES[entry]]
+            changed = self._with(entry, -value)
+            if value < 0 and _can_be(changed):
+                found.append(Guess("a stray minus sign", entry, _spread(changed)))
+        return found
+
+    def _decimals(self) -> list[Guess]:
+        """One entry off by a power of ten, the smallest that mends it."""
+        for power, what in SLIPS.items():
+            found = []
+            for entry, factor in product(PLACES, (10.0**-power, 10.0**power)):
+                value = self.held.tensor[PLACES[entry]]
+                changed = self._with(entry, value * factor)
+                if value != 0 and _can_be(changed):
+                    found.append(Guess(what, entry, _spread(changed)))
+            if found:
+                return found
+        return []
+
+    def _reordered(self) -> Array:
+        """The same numbers, typed in the other order."""
+        typed, meant = ORDERS
+        made = np.zeros((3, 3))
+        for here, there in zip(typed, meant, strict=True):
+            i, j = PLACES[there]
+            made[i, j] = made[j, i] = self.held.tensor[PLACES[here]]
+        return made
+
+    def _too_large(self) -> str | None:
+        """A body that reaches no farther than r from its centre has no moment above m·r²."""
+        held = self.held
+        if self.reach is None or held.mass <= 0:
+            return None
+        most = held.mass * self.reach**2
+        if self.moments[2] <= most * (1 + 1e-9):
+            return None
+        if np.linalg.norm(held.pose[:3, 3]) > 0:
+            central = held.tensor - self._carried()
+            if _can_be(central, 1e-3) and inertia.principal(central).moments[2] <= most * (1 + 1e-9):
+                return "about the origin instead of the centre of mass"
+        for factor, what in ((1e3, "g for kg"), (1e6, "mm for m"), (1e9, "g mm² for kg m²")):
+            if self.moments[2] / factor <= most and self.moments[2] / factor >= 1e-3 * most:
+                return what
+        return None
+
+
+def _can_be(tensor: Array, room: float = 1e-9) -> bool:
+    return bool(np.linalg.eigvalsh(inertia.second_moments(tensor))[0] >= -room * np.abs(tensor).max())
+
+
+def _spread(tensor: Array) -> float:
+    moments = inertia.principal(tensor).moments
+    return float(moments[2] / max(moments[0], 1e-300))
+
+
+def checks(robot: Robot) -> list[Check]:
+    """Return the check of every link whose tensor the file gives."""
+    found = []
+    for link in robot.links.values():
+        held = link.inertial
+        if held is None:
+            continue
+        center = (link.pose @ held.pose)[:3, 3]
+        ends = [
+            end
+            for j in robot.joints.values()
+            for body, end in zip((j.parent, j.child), j.ends, strict=True)
+            if body == link.name
+        ]
+        reaches = [float(np.linalg.norm(end - center)) for end in ends]
+        reach: float | None = ROOM * max(reaches) if reaches else None
+        if link.shapes:
+            at = held.pose[:3, 3]
+            reach = max(float(np.linalg.norm(c - at)) + r for c, r in link.shapes)
+        found.append(Check(link, held, reach or None))
+    return found

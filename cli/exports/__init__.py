@@ -1,0 +1,1 @@
+"""`dalembert export`: a mechanism for other programs: drawings, curves, robots."""

@@ -1,0 +1,268 @@
+"""A mechanism as bodies and joints of two bodies each, standing in its start pose; its tree and what closes its loops.
+
+A pin of several bodies becomes joints of two each; a slot becomes a massless block that slides and is pinned.
+"""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from cli.errors import DataError
+from virtualwork.describe.parts import GROUND
+from virtualwork.drawing import hull
+from virtualwork.motion import SlideMotion
+
+if TYPE_CHECKING:
+    from virtualwork import Mechanism
+
+
+@dataclass
+class Part:
+    """A body: where its axes stand, m and rad; its points, m; its mass, kg, centre and inertia, kg·m²."""
+
+    name: str
+    at: complex
+    turn: float
+    points: dict[str, complex] = field(default_factory=dict)
+    mass: float = 0.0
+    center: complex = 0j
+    inertia: float = 0.0
+
+    def world(self, z: complex) -> complex:
+        """Return a place of its axes in the ground's."""
+        return self.at + z * cmath.rect(1.0, self.turn)
+
+    @property
+    def strokes(self) -> list[tuple[complex, complex]]:
+        """What it looks like: the sides of the hull of its points, in its axes."""
+        ends = hull(self.points.values())
+        return list(zip(ends, ends[1:] + (ends[:1] if len(ends) > 2 else ()), strict=False))
+
+    def inside(self, z: complex) -> complex:
+        """Return a place of the ground in its axes."""
+        return (z - self.at) * cmath.rect(1.0, -self.turn)
+
+
+@dataclass
+class Joint:
+    """A joint: `link` turns against `on`, or slides along a direction of the ground, rad, in the start pose.
+
+    `ends` is its place in the axes of `on` and of `link`; `value` its coordinate in the start pose, `rate` its speed.
+    """
+
+    name: str
+    kind: Literal["turn", "slide"]
+    on: str
+    link: str
+    ends: tuple[complex, complex]
+    point: str
+    direction: float = 0.0
+    value: float = 0.0
+    rate: float = 0.0
+    input: int | None = None
+    guide: int | None = None
+    limits: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Branching:
+    """A joint of the tree: `sense` is −1 where the parent is the link that moves along its coordinate."""
+
+    joint: Joint
+    parent: str
+    child: str
+    sense: float
+
+
+class Skeleton:
+    """The bodies, the joints, the tree and the loops of a mechanism at given inputs."""
+
+    def __init__(
+        self, m: Mechanism, inputs: tuple[float, ...], limits: tuple[float, float] | None = None
+    ) -> None:
+        self.m, self.inputs = m, inputs
+        rates = [[e.speed or 0.0 for e in m.inputs]]
+        self.start = m.motion(
+            np.array([inputs]) if len(inputs) > 1 else inputs[0],
+            speed=rates if len(inputs) > 1 else rates[0][0],
+        )
+        if not self.start.assembled[0]:
+            raise DataError("it cannot be assembled at that input: nothing is exported")
+        self.parts = {GROUND: Part(GROUND, 0j, 0.0, dict(m.ground))}
+        for name, link in m.links.items():
+            held = m.rigid[name]
+            at = complex(self.start.at(name, 0j).complex(0)[0])
+            turn = float(self.start.link(name).angle[0])
+            self.parts[name] = Part(name, at, turn, dict(link.points), held.mass, held.center, held.inertia)
+        self.joints: list[Joint] = []
+        self._pins()
+        self._guides()
+        for joint in self.joints:
+            joint.limits = limits if joint.input is not None else None
+        self._branch()
+
+    # --- joints -----------------------------------------------------------------------------------------------
+    def _wanted(self) -> list[tuple[str, str]]:
+        """Pairs of bodies between which a joint is wanted: of inputs, then of gears and their arms."""
+        pairs = [(e.on, str(e.link)) for e in self.m.inputs if not e.is_slide]
+        return pairs + [(g.arm, link) for g in self.m.gears for link in g.links]
+
+    def _pins(self) -> None:
+        wanted = self._wanted()
+        for point, bodies in self.m.pins.items():
+            pairs = [p for p in wanted if set(p) <= set(bodies)]
+            pairs += [(bodies[0], other) for other in bodies[1:]]
+            for on, link in (pairs[k] for k in _spanning(bodies, pairs)):
+                ends = self.m.bodies[on][point], self.m.bodies[link][point]
+                self._turn(point, on, link, (ends[0], ends[1]))
+
+    def _turn(self, point: str, on: str, link: str, ends: tuple[complex, complex]) -> None:
+        """Add a pin; an input's coordinate is that of the input, any other's is 0 in the start pose."""
+        joint = Joint(self._name(point), "turn", on, link, ends, point)
+        for j, e in enumerate(self.m.inputs):
+            if not e.is_slide and {e.link, e.on} == {on, link} and not any(x.input == j for x in self.joints):
+                joint.input, joint.value = j, self.inputs[j]
+                if e.link == on:
+                    joint.on, joint.link, joint.ends = link, on, (ends[1], ends[0])
+        joint.rate = self._omega(joint.link) - self._omega(joint.on)
+        self.joints.append(joint)
+
+    def _omega(self, body: str) -> float:
+        return float(self.start.link(body).omega[0]) if body in self.m.links else 0.0
+
+    def _guides(self) -> None:
+        m = self.m
+        for k, g in enumerate(m.guides):
+            on, link = self.parts[g.on], self.parts[g.link]
+            slide = SlideMotion(self.start, k)
+            value, at = float(slide.position[0]), link.points[g.point]
+            direction = on.turn + g.angle
+            if not g.is_slider:
+                block = Part(
+                    _unused(f"block {g.point}", self.parts), link.world(at), direction, {g.point: 0j}
+                )
+                self.parts[block.name] = block
+                self._turn(g.point, g.link, block.name, (at, 0j))
+                link, at = block, 0j
+                self.joints[-1].rate = self._omega(g.on) - self._omega(g.link)
+            joint = Joint(
+                self._name(g.point), "slide", on.name, link.name, (on.inside(link.world(at)), at), g.point
+            )
+            joint.direction, joint.value, joint.rate = direction, value, float(slide.speed[0])
+            joint.guide = k
+            driver = m.driver_of(k)
+            if driver is not None and m.guide_of(m.inputs[driver]) == k:
+                joint.input = driver
+            self.joints.append(joint)
+
+    def _name(self, wanted: str) -> str:
+        return _unused(wanted, (j.name for j in self.joints))
+
+    # --- tree -------------------------------------------------------------------------------------------------
+    def _branch(self) -> None:
+        """Take joints into the tree: those that are driven, then slides, then those on which gears turn."""
+        wanted = [set(pair) for pair in self._wanted()]
+
+        def rank(j: Joint) -> int:
+            if j.input is not None:
+                return 0
+            if j.kind == "slide":
+                return 1
+            # a light block hangs between two links, and no loop is closed on it where that can be
+            if not {j.on, j.link} <= {GROUND, *self.m.links}:
+                return 2
+            return 3 if {j.on, j.link} in wanted else 4
+
+        order = sorted(self.joints, key=rank)
+        taken = [order[k] for k in _spanning(self.parts, [(j.on, j.link) for j in order])]
+        self.closing = [j for j in self.joints if j not in taken]
+        # a slide that closes a loop carries a block, which is fixed to the link
+        self.welds: list[tuple[str, str]] = []
+        for j in [j for j in self.closing if j.kind == "slide"]:
+            link = self.parts[j.link]
+            block = Part(_unused(f"carriage {j.point}", self.parts), link.at, link.turn)
+            self.parts[block.name] = block
+            self.welds.append((j.link, block.name))
+            self.closing.remove(j)
+            j.link = block.name
+            taken.append(j)
+        self.children: dict[str, list[Branching]] = {}
+        # the pins that turn each body against the ground, with their sense
+        self.path: dict[str, dict[str, float]] = {GROUND: {}}
+        waiting = [GROUND]
+        while waiting:
+            parent = waiting.pop(0)
+            for j in [j for j in taken if parent in (j.on, j.link)]:
+                taken.remove(j)
+                if parent == j.link and j.kind == "turn" and j.input is None:
+                    j.on, j.link, j.ends, j.rate = j.link, j.on, (j.ends[1], j.ends[0]), -j.rate
+                child = j.link if parent == j.on else j.on
+                branching = Branching(j, parent, child, 1.0 if child == j.link else -1.0)
+                self.children.setdefault(parent, []).append(branching)
+                turned = {j.name: branching.sense} if j.kind == "turn" else {}
+                self.path[child] = self.path[parent] | turned
+                waiting.append(child)
+        lost = [name for name in self.parts if name not in self.path]
+        if lost:
+            raise DataError(f"{', '.join(lost)}: no pin or guide leads there from the ground: not exported")
+
+    def walk(self, parent: str = GROUND) -> Iterator[Branching]:
+        """Yield the tree's joints, each branch to its end."""
+        for b in self.children.get(parent, ()):
+            yield b
+            yield from self.walk(b.child)
+
+    def terms(self, shares: Mapping[str, float]) -> dict[str, float]:
+        """Return a sum of the bodies' angles as one of the tree's pins."""
+        found: dict[str, float] = {}
+        for body, c in shares.items():
+            for name, sense in self.path[body].items():
+                found[name] = found.get(name, 0.0) + c * sense
+        return {name: c for name, c in found.items() if abs(c) > 1e-12}
+
+    def driven(self, k: int) -> Joint | None:
+        """Return the joint whose coordinate is an input; where none is, the one on which its link hangs in the tree."""
+        own = next((j for j in self.joints if j.input == k), None)
+        hanging = (
+            b.joint for b in self.walk() if b.child == self.m.inputs[k].link and b.joint.kind == "turn"
+        )
+        return own or next((j for j in hanging if j.input is None), None)
+
+    def free_input(self, j: int) -> dict[str, float]:
+        """Return an input's angle as a sum of the tree's pins, where no joint is it."""
+        e = self.m.inputs[j]
+        return self.terms({str(e.link): 1.0, e.on: -1.0})
+
+
+def _spanning(nodes: Iterable[str], pairs: list[tuple[str, str]]) -> list[int]:
+    """Return which of some pairs, the first before the last, join all nodes without a loop (Kruskal).
+
+    >>> _spanning("abc", [("a", "b"), ("b", "a"), ("b", "c"), ("a", "c")])
+    [0, 2]
+    """
+    root = {node: node for node in nodes}
+
+    def top(node: str) -> str:
+        while root[node] != node:
+            node = root[node]
+        return node
+
+    found = []
+    for k, (a, b) in enumerate(pairs):
+        if top(a) != top(b):
+            root[top(a)] = top(b)
+            found.append(k)
+    return found
+
+
+def _unused(wanted: str, used: Iterable[str]) -> str:
+    held, name, k = set(used), wanted, 1
+    while name in held:
+        k += 1
+        name = f"{wanted} {k}"
+    return name

@@ -1,0 +1,120 @@
+"""URDF: a tree, each link's axes at its joint; what closes the loops stands in `<gazebo>`, which other readers skip."""
+
+from __future__ import annotations
+
+import cmath
+from dataclasses import replace
+from xml.etree.ElementTree import Element
+
+from cli.exports import sdf
+from cli.exports.markup import add, digits, document, spatial
+from cli.exports.skeleton import Branching, Part, Skeleton
+from cli.exports.travel import Travel
+from virtualwork.describe.parts import GROUND, Gear
+
+THICK = 0.008
+# a limit that is none
+LARGE = 1e9
+AXES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def urdf(s: Skeleton, travel: Travel, said: str) -> bytes:
+    """Return the file of a mechanism."""
+    root = Element("robot", name=s.m.name or "mechanism")
+    # where each link's axes begin: at the joint on which it hangs, in its own axes of the mechanism's file
+    origin = {GROUND: 0j}
+    for b in s.walk():
+        origin[b.child] = b.joint.ends[1] if b.child == b.joint.link else b.joint.ends[0]
+    for name, part in s.parts.items():
+        _link(s, root, part, origin[name])
+    for b in s.walk():
+        _joint(s, root, b, origin, travel)
+    for name, part in s.parts.items():
+        _frames(s, root, part, origin[name])
+    gazebo = Element("gazebo")
+    for j in s.closing:
+        ends = (j.ends[0] - origin[j.on], j.ends[1] - origin[j.link])
+        sdf.joint(gazebo, s, replace(j, ends=ends), travel, GROUND)
+    for link, block in s.welds:
+        made = add(gazebo, "joint", name=f"{block} fixed", type="fixed")
+        add(made, "parent", link)
+        add(made, "child", block)
+    _gears(s, root, gazebo)
+    sdf.plugins(gazebo, s)
+    if len(gazebo):
+        root.append(gazebo)
+    return document(root, said)
+
+
+def _link(s: Skeleton, root: Element, part: Part, origin: complex) -> None:
+    link = add(root, "link", name=part.name)
+    if part.mass > 0:
+        inertial = add(link, "inertial")
+        add(inertial, "origin", xyz=spatial(part.center - origin), rpy="0 0 0")
+        add(inertial, "mass", value=part.mass)
+        # in the plane only izz acts
+        add(inertial, "inertia", None, **{n: part.inertia if n[1] == n[2] else 0.0 for n in AXES})
+    for a, b in part.strokes:
+        visual = add(link, "visual")
+        add(visual, "origin", xyz=spatial((a + b) / 2 - origin), rpy=digits(0.0, 0.0, cmath.phase(b - a)))
+        size = digits(abs(b - a), 2 * THICK * s.m.size, 2 * THICK * s.m.size)
+        add(add(visual, "geometry"), "box", size=size)
+
+
+def _joint(s: Skeleton, root: Element, b: Branching, origin: dict[str, complex], travel: Travel) -> None:
+    j, parent, part = b.joint, s.parts[b.parent], s.parts[b.child]
+    kind = "prismatic" if j.kind == "slide" else "continuous" if j.limits is None else "revolute"
+    made = add(root, "joint", name=j.name, type=kind)
+    at = parent.inside(part.world(origin[b.child])) - origin[b.parent]
+    add(made, "origin", xyz=spatial(at), rpy=digits(0.0, 0.0, part.turn - parent.turn))
+    add(made, "parent", link=b.parent)
+    add(made, "child", link=b.child)
+    along = cmath.rect(1.0, j.direction - part.turn) * b.sense
+    add(made, "axis", xyz=digits(0.0, 0.0, b.sense) if j.kind == "turn" else spatial(along))
+    if kind != "continuous" or j.input is not None:
+        limit = add(made, "limit")
+        low, high = (
+            j.limits
+            or (j.guide is not None and travel.way(j.guide))
+            or (j.value - s.m.size, j.value + s.m.size)
+        )
+        if kind != "continuous":
+            limit.attrib |= {"lower": digits(low - j.value), "upper": digits(high - j.value)}
+        peak = 0.0 if j.input is None else travel.peak
+        # the format wants both numbers; where nothing limits them they are large
+        limit.set("effort", digits(LARGE if peak is None else peak))
+        limit.set("velocity", digits(LARGE))
+
+
+def _frames(s: Skeleton, root: Element, part: Part, origin: complex) -> None:
+    """Named points that no joint holds: links without mass, fixed there."""
+    for point, z in part.points.items():
+        if part.name == GROUND or point in s.m.pins or any(point == j.point for j in s.joints):
+            continue
+        name = point if point not in s.parts else f"{point} point"
+        add(root, "link", name=name)
+        made = add(root, "joint", name=f"{name} fixed", type="fixed")
+        add(made, "origin", xyz=spatial(z - origin), rpy="0 0 0")
+        add(made, "parent", link=part.name)
+        add(made, "child", link=name)
+
+
+def _gears(s: Skeleton, root: Element, gazebo: Element) -> None:
+    """Gears of two joints of the tree are mimicked; others are gearboxes of the simulator."""
+    boxes: list[Gear] = []
+    for g in s.m.gears:
+        terms = s.terms(g.shares())
+        last = [name for name in terms if not _driven(s, name)]
+        joint = next((e for e in root.iter("joint") if last and e.get("name") == last[-1]), None)
+        if len(terms) == 2 and joint is not None and joint.find("mimic") is None:
+            (other,) = (name for name in terms if name != last[-1])
+            # of coordinates that may run against the pins' own sense
+            factor = -terms[other] / terms[last[-1]]
+            add(joint, "mimic", joint=other, multiplier=factor)
+        else:
+            boxes.append(g)
+    sdf.gearboxes(gazebo, boxes, GROUND)
+
+
+def _driven(s: Skeleton, name: str) -> bool:
+    return any(j.name == name and j.input is not None for j in s.joints)

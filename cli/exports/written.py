@@ -1,0 +1,119 @@
+"""A mechanism as the bytes of a file of another program, and what that file cannot hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cli.errors import DataError
+from cli.exports.drawing import draw
+from cli.exports.skeleton import Skeleton
+from cli.exports.travel import Travel
+from cli.read.units import UNITS
+from cli.show.text import csv_text
+from virtualwork.describe.units import unit
+
+if TYPE_CHECKING:
+    from virtualwork import Mechanism
+
+
+def written(
+    m: Mechanism, inputs: tuple[float, ...], suffix: str, file: str, bare: Mapping[str, str]
+) -> tuple[bytes, list[str]]:
+    """Return the file of a mechanism that starts at the inputs, rad or m, and what is left out of it.
+
+    `bare` are the units that the mechanism's own file uses.
+    """
+    travel = Travel(m)
+    length = bare.get("length", "m")
+    found = unit(length)
+    assert found is not None
+    if suffix == ".csv":
+        return _curves(travel, length, found[0], bare.get("angle", "rad")), []
+    s = Skeleton(m, inputs, travel.limits)
+    said = _said(m, inputs, file)
+    if suffix in (".dxf", ".svg"):
+        from cli.exports.dxf import UNITS as DRAWN
+        from cli.exports.dxf import dxf
+        from cli.exports.svg import svg
+
+        if length not in DRAWN:
+            length, found = "m", (1.0, found[1])
+        drawing = draw(s, travel, length, found[0])
+        notes = (
+            []
+            if travel.motion is not None
+            else ["curves are left out: they need one input, and it has several"]
+        )
+        if suffix == ".svg":
+            return svg(drawing, said, found[0] * 1000), notes
+        return dxf(drawing, said), notes
+    from cli.exports.mjcf import mjcf
+    from cli.exports.sdf import sdf
+    from cli.exports.urdf import urdf
+
+    write: Callable[[Skeleton, Travel, str], bytes] = {".xml": mjcf, ".sdf": sdf, ".urdf": urdf}[suffix]
+    return write(s, travel, said), _left_out(s, suffix)
+
+
+def _said(m: Mechanism, inputs: tuple[float, ...], file: str) -> str:
+    """Return the comment: what it is, from which file, by which version, in which pose."""
+    from importlib.metadata import version
+
+    poses = ", ".join(
+        f"{e.name} = {v if e.is_slide else np.degrees(v):.12g} {'m' if e.is_slide else 'deg'}"
+        for e, v in zip(m.inputs, inputs, strict=True)
+    )
+    title = f"{m.name}, " if m.name else ""
+    return " ".join(f"{title}from {file} by dalembert {version('dalembert')}, at {poses}".split())
+
+
+def _curves(travel: Travel, length: str, factor: float, angle: str) -> bytes:
+    """Return the table of the input and of every moving point over its travel."""
+    m = travel.m
+    if travel.motion is None:
+        raise DataError(
+            "curves are of one input, and it has several: `dalembert mechanism --inputs` takes them"
+        )
+    if length not in UNITS["length"]:
+        length, factor = "m", 1.0
+    q = travel.motion.inputs[:, 0]
+    if m.inputs[0].is_slide:
+        columns = {f"input_{length}": q / factor}
+    else:
+        columns = {"input_rad": q} if angle == "rad" else {"input_deg": np.degrees(q)}
+    for name in dict.fromkeys(p for link in m.links.values() for p in link.points if p not in m.ground):
+        for k, axis in enumerate("xy"):
+            columns[f"{name}_{axis}_{length}"] = travel.curve(name)[:, k] / factor
+    return csv_text({name: values.tolist() for name, values in columns.items()}).encode()
+
+
+def _left_out(s: Skeleton, suffix: str) -> list[str]:
+    """Name what a robot's format cannot hold."""
+    m = s.m
+    found = []
+    for what, loads in (
+        ("forces", m.forces),
+        ("torques", m.torques),
+        ("springs", m.springs),
+        ("torsion springs", m.torsion_springs),
+        ("friction", m.friction),
+    ):
+        if loads:
+            found.append(f"{what} are left out: {len(loads)}")
+    light = [name for name, part in s.parts.items() if part.mass <= 0 and name in m.links]
+    if light and suffix != ".urdf":
+        found.append(
+            f"without mass: {', '.join(light)}: the format takes none: a millionth of the heaviest is given"
+        )
+    for k, e in enumerate(m.inputs):
+        j = s.driven(k)
+        if suffix == ".xml" or (j is not None and j.input == k):
+            continue
+        instead = f": {j.link} is driven against {j.on} instead" if j is not None else ""
+        found.append(f"input {e.name} is left out: no pin joins {e.link} and {e.on}{instead}")
+    if suffix == ".urdf" and m.gravity:
+        found.append("gravity is left out: the format has none")
+    return found

@@ -1,0 +1,339 @@
+"""Planar robots: links and joints in space, laid into the plane in which they all move.
+
+A link keeps the axes that the file gives it, turned into the plane; its angle of the guess is that of the file's own
+configuration.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from fractions import Fraction
+
+import numpy as np
+
+from cli.errors import DataError
+from cli.imports.drawn import GROUND, Body, Drawing, Drive, Mesh, Place, Slide, unused
+from cli.imports.plane import plane_of
+from cli.imports.words import left_out
+from cli.read.robots.robot import Motor, Robot, RobotJoint, RobotLink
+
+# what the bodies are called that the export makes of slots
+BLOCK = "block "
+# two ends of a joint nearer than this share of the robot's size are one place
+SAME = 1e-6
+
+
+def drawing(robot: Robot) -> Drawing:
+    """Return a robot's drawing."""
+    return _Layer(robot).drawing()
+
+
+class _Group:
+    """Links that are fixed to one another: one body, in the axes of the first."""
+
+    def __init__(self, name: str, at: complex, turn: float) -> None:
+        self.name, self.at, self.turn = name, at, turn
+        self.body = Body(turn=turn)
+
+    def inside(self, z: complex) -> complex:
+        """Return a place of the plane in the body's axes."""
+        return (z - self.at) * cmath.rect(1.0, -self.turn)
+
+
+class _Layer:
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.d = Drawing(name=robot.name, angle="rad", own_axes=True, notes=robot.notes)
+
+    def drawing(self) -> Drawing:
+        robot, d = self.robot, self.d
+        self.root = {name: name for name in robot.links}
+        for j in robot.joints.values():
+            if j.kind == "fixed":
+                self._fix(j)
+        moving = [
+            j
+            for j in robot.joints.values()
+            if j.kind != "fixed" and self._top(j.parent) != self._top(j.child)
+        ]
+        if not moving:
+            raise DataError(f"{robot.file}: nothing in it moves: no joint that turns or slides")
+        self.plane = plane_of(robot.file, moving, d.notes)
+        places = [self.plane.place(end) for j in moving for end in j.ends]
+        places += [self.plane.place(link.pose[:3, 3]) for link in robot.links.values()]
+        self.size = max(abs(a - places[0]) for a in places) or 1.0
+        # digits after the point that say something: the rest is rounding of the way through the tree
+        self.digits = 15 - math.ceil(math.log10(self.size))
+        self._groups()
+        d.posed = all(self._closed(j) for j in moving)
+        self.pins: list[tuple[str, set[tuple[str, Place]]]] = []
+        self.slides: dict[str, Slide] = {}
+        for j in moving:
+            if j.kind != "slide":
+                self._pin(j)
+        for label, ends in self.pins:
+            for name, z in sorted(ends):
+                d.bodies[name].points[label] = z
+        for j in moving:
+            if j.kind == "slide":
+                self._slide(j)
+        self._slots()
+        self._named_points()
+        self._couplings()
+        self._drives(moving)
+        for what in dict.fromkeys(what for j in moving for what in j.more):
+            names = ", ".join(j.name for j in moving if what in j.more)
+            d.notes.append(
+                left_out(f"{what} of {names}", "`dalembert import` takes over what moves and what is heavy")
+            )
+        if robot.gravity is not None:
+            g = self.plane.direction(robot.gravity)
+            d.gravity = (g.real, g.imag) if abs(g) > 1e-12 * float(np.linalg.norm(robot.gravity)) else None
+        return d
+
+    # --- links ------------------------------------------------------------------------------------------------
+    def _top(self, name: str) -> str:
+        while self.root[name] != name:
+            name = self.root[name]
+        return name
+
+    def _fix(self, j: RobotJoint) -> None:
+        a, b = self._top(j.parent), self._top(j.child)
+        if a == b:
+            return
+        if b == self._top(self.robot.ground):
+            a, b = b, a
+        self.root[b] = a
+
+    def _groups(self) -> None:
+        robot, d = self.robot, self.d
+        ground = self._top(robot.ground)
+        self.groups: dict[str, _Group] = {}
+        for name, link in robot.links.items():
+            if self._top(name) != name:
+                continue
+            if name == ground:
+                self.groups[name] = _Group(GROUND, 0j, 0.0)
+                continue
+            at, turn = self.plane.place(link.pose[:3, 3]), self.plane.turn(link.pose[:3, :3])
+            label = unused(name, {GROUND})
+            group = self.groups[name] = _Group(label, at, turn)
+            group.body.at = self._place(at)
+            d.bodies[label] = group.body
+        d.bodies[GROUND] = self.groups[ground].body
+        for name, group in self.groups.items():
+            if name != ground:
+                self._masses(group, [k for n, k in robot.links.items() if self._top(n) == name])
+
+    def _masses(self, group: _Group, links: list[RobotLink]) -> None:
+        parts = []
+        for link in links:
+            held = link.inertial
+            if held is None or held.mass == 0:
+                continue
+            world = link.pose @ held.pose
+            n = self.plane.normal
+            turned = world[:3, :3] @ held.tensor @ world[:3, :3].T
+            z = group.inside(self.plane.place(world[:3, 3]))
+            if held.mass < 0:
+                raise DataError(
+                    f"{self.robot.file}: link '{link.name}', mass: found {held.mass:g}, expected one of zero or more"
+                )
+            parts.append((held.mass, z, float(n @ turned @ n)))
+        if not parts:
+            return
+        mass = math.fsum(m for m, _, _ in parts)
+        z = parts[0][1] if len(parts) == 1 else sum(m * c for m, c, _ in parts) / mass
+        inertia = math.fsum(i + (m * abs(c - z) ** 2 if len(parts) > 1 else 0.0) for m, c, i in parts)
+        if inertia < 0:
+            raise DataError(
+                f"{self.robot.file}: link '{links[0].name}', inertia about the plane's normal: found {inertia:g}, "
+                "expected one of zero or more: `dalembert body --check-inertias` says more"
+            )
+        group.body.mass, group.body.center, group.body.inertia = mass, self._place(z), inertia
+
+    def _place(self, z: complex) -> Place:
+        return (
+            Fraction(repr(round(z.real, self.digits) + 0.0)),
+            Fraction(repr(round(z.imag, self.digits) + 0.0)),
+        )
+
+    def group(self, link: str) -> _Group:
+        """Return the body that a link is, or is a part of."""
+        return self.groups[self._top(link)]
+
+    # --- joints -----------------------------------------------------------------------------------------------
+    def _closed(self, j: RobotJoint) -> bool:
+        a, b = (self.plane.place(end) for end in j.ends)
+        gap = abs(b - a)
+        if gap > SAME * self.size and j.kind != "slide":
+            self.d.notes.append(f"joint {j.name} is {gap:.3g} m open as the file stands")
+            return False
+        return True
+
+    def _sides(self, j: RobotJoint) -> list[tuple[str, complex]]:
+        return [
+            (group.name, group.inside(self.plane.place(end)))
+            for group, end in zip((self.group(j.parent), self.group(j.child)), j.ends, strict=True)
+        ]
+
+    def _pin(self, j: RobotJoint) -> None:
+        """Add a pin; pins at one place of a body are one."""
+        ends = {(name, self._place(z)) for name, z in self._sides(j)}
+        near = SAME * self.size
+        label = j.name
+        for held, others in list(self.pins):
+            if any(
+                name == other and abs(_complex(z) - _complex(w)) <= near
+                for name, z in ends
+                for other, w in others
+            ):
+                self.pins.remove((held, others))
+                label = min(label, held, key=len)
+                ends = others | {e for e in ends if e[0] not in {name for name, _ in others}}
+        self.pins.append((unused(label, (held for held, _ in self.pins)), ends))
+
+    def _slide(self, j: RobotJoint) -> None:
+        """Add a prism; its position is the joint's own coordinate."""
+        (on, through), (link, z) = self._sides(j)
+        a, b, sense = self.group(j.parent), self.group(j.child), 1.0
+        if link == GROUND:
+            on, link, through, z, a, b, sense = link, on, z, through, b, a, -1.0
+        angle = cmath.phase(self.plane.direction(j.axis) * sense) - a.turn
+        start = self._place(through - j.value * cmath.rect(1.0, angle))
+        at, held = self._place(z), self.d.bodies[link].points
+        taken = {s.point for s in self.d.slides}
+        point = next((p for p, w in held.items() if w == at and p not in taken), None) or self.d.fresh(j.name)
+        held[point] = at
+        self.slides[j.name] = Slide(point, link, on, start, _turn(angle), _turn(b.turn - a.turn - angle))
+        self.d.slides.append(self.slides[j.name])
+
+    def _slots(self) -> None:
+        """A body that `dalembert export` made the block of a slot, with one slide and one pin, is that again."""
+        d = self.d
+        for name, s in self.slides.items():
+            for block, carrier in ((s.link, s.on), (s.on, s.link)):
+                pins = [label for label, ends in self.pins if block in {body for body, _ in ends}]
+                if not block.startswith(BLOCK) or d.bodies[block].mass > 0 or len(pins) != 1:
+                    continue
+                riders = [n for n, body in d.bodies.items() if pins[0] in body.points and n != block]
+                if len(riders) == 1 and riders[0] != carrier:
+                    self._slot(s, self.robot.joints[name].value, block, carrier, riders[0], pins[0])
+                    break
+
+    def _slot(self, s: Slide, value: float, block: str, carrier: str, rider: str, pin: str) -> None:
+        """Make a slot of a slide and a pin: the line goes through the pin, in the axes of the carrier."""
+        d = self.d
+        frame, moved = d.bodies[carrier], d.bodies[block]
+        # where the carrier moves along the block, the block moves against that along the carrier
+        line = d.bodies[s.on].turn + s.angle + (0.0 if s.link == block else math.pi)
+        at = _complex(moved.at) + _complex(moved.points[pin]) * cmath.rect(1.0, moved.turn)
+        start = at - value * cmath.rect(1.0, line) - _complex(frame.at)
+        # a point made for the slide alone goes with it
+        if s.link == carrier and s.point not in {label for label, _ in self.pins}:
+            frame.points.pop(s.point)
+        del d.bodies[block]
+        s.point, s.link, s.on, s.turned = pin, rider, carrier, None
+        s.through, s.angle = self._place(start * cmath.rect(1.0, -frame.turn)), _turn(line - frame.turn)
+
+    def _named_points(self) -> None:
+        """Named places of the file, and origins of links that are fixed to others and have no mass."""
+        robot, d = self.robot, self.d
+        for name, link in robot.links.items():
+            group = self.group(name)
+            if group.name == GROUND or group.name not in d.bodies:
+                continue
+            named = {p: link.pose @ np.append(at, 1.0) for p, at in link.points.items()}
+            if self._top(name) != name and link.inertial is None:
+                named[name] = link.pose[:, 3]
+            for point, at in named.items():
+                z = self._place(group.inside(self.plane.place(at[:3])))
+                d.bodies[group.name].points[d.fresh(point)] = z
+
+    # --- what ties and what drives ---------------------------------------------------------------------------
+    def _shares(self, terms: list[tuple[str, float]], where: str) -> dict[str, float] | None:
+        """Return Σ factor·(joint's coordinate) as a sum of the bodies' angles; None where it holds a slide."""
+        found: dict[str, float] = {}
+        for name, factor in terms:
+            j = self.robot.joints.get(name)
+            if j is None:
+                raise DataError(f"{self.robot.file}: {where}: no joint is called '{name}'")
+            if j.kind != "turn":
+                return None
+            sense = factor * self.plane.sense(j.axis)
+            for link, c in ((j.child, sense), (j.parent, -sense)):
+                body = self.group(link).name
+                found[body] = found.get(body, 0.0) + c
+        scale = max(map(abs, found.values()), default=0.0)
+        return {body: c for body, c in found.items() if abs(c) > 1e-12 * scale}
+
+    def _couplings(self) -> None:
+        d = self.d
+        for a, b, ratio, arm in self.robot.gears:
+            d.meshes.append(Mesh(self.group(a).name, self.group(b).name, ratio, self.group(arm).name))
+        for name, terms in self.robot.couplings:
+            shares = self._shares(terms, name)
+            if shares is None or len(shares) not in (2, 3) or abs(sum(shares.values())) > 1e-9:
+                d.notes.append(left_out(f"coupling {name}", "it is no gear of two bodies on an arm"))
+                continue
+            first = self.robot.joints[terms[0][0]]
+            arm = GROUND if GROUND in shares else self.group(first.parent).name
+            if len(shares) == 2 and arm not in shares:
+                arm = GROUND
+            pair = [body for body in shares if body != arm]
+            if len(pair) == 1:
+                d.notes.append(left_out(f"coupling {name}", "it holds one body alone"))
+                continue
+            b, a = pair[:2]
+            d.meshes.append(Mesh(a, b, -shares[a] / shares[b], arm))
+
+    def _drives(self, moving: list[RobotJoint]) -> None:
+        d, robot = self.d, self.robot
+        motors = list(robot.motors)
+        if not motors:
+            ground = self.group(robot.ground)
+            here = [j for j in moving if ground in (self.group(j.parent), self.group(j.child))]
+            first = next((j for j in here if j.kind != "ball"), None)
+            if first is None:
+                raise DataError(f"{robot.file}: nothing is driven: no actuator, and no joint on the ground")
+            d.notes.append(f"the file says of no actuator: {first.name} is taken as the input")
+            motors = [Motor(first.name, [(first.name, 1.0)])]
+        for m in motors:
+            self._drive(m)
+
+    def _drive(self, m: Motor) -> None:
+        d, robot = self.d, self.robot
+        where = f"actuator {m.name}"
+        if len(m.terms) == 1 and m.terms[0][0] in self.slides:
+            s = self.slides[m.terms[0][0]]
+            j = robot.joints[m.terms[0][0]]
+            speed = None if m.speed is None else f"{m.speed!r} m/s"
+            if not any(e.slide is s for e in d.drives):
+                d.drives.append(Drive(slide=s, at=j.value, speed=speed))
+            return
+        shares = self._shares(m.terms, where)
+        if shares is None or len(shares) != 2:
+            d.notes.append(left_out(where, "it drives neither one slide nor the angle between two links"))
+            return
+        (link, c), (on, _) = sorted(shares.items(), key=lambda e: -e[1])
+        sense = 1.0
+        if link == GROUND:
+            link, on, sense = on, link, -1.0
+        turn = d.bodies[link].turn - d.bodies[on].turn
+        value = sense * sum(factor * robot.joints[name].value for name, factor in m.terms) / c
+        # the file's own coordinate may count whole turns
+        at = turn + 2 * math.pi * round((value - turn) / (2 * math.pi)) if value else turn
+        speed = None if m.speed is None else f"{sense * m.speed / c!r} rad/s"
+        if not any({e.link, e.on} == {link, on} for e in d.drives):
+            d.drives.append(Drive(link, on, at=at, speed=speed))
+
+
+def _turn(angle: float) -> float:
+    """Return an angle in (−π, π]; what is zero but for rounding is zero."""
+    a = math.remainder(angle, 2 * math.pi)
+    return 0.0 if abs(a) < 1e-15 else a
+
+
+def _complex(z: Place) -> complex:
+    return complex(float(z[0]), float(z[1]))

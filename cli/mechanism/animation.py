@@ -1,0 +1,60 @@
+"""The page of a mechanism that moves: the columns of the CSV, every assembly asked for as a series."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from cli.mechanism import columns
+from cli.mechanism.forces import rows_of
+from cli.mechanism.solve import Analysis
+from cli.show.page import shown
+from virtualwork import MechanismError
+from virtualwork.animation import JointForce, Series, moving_page
+
+if TYPE_CHECKING:
+    from dalembert.page import Page
+
+
+def page(analyses: Sequence[tuple[str, Analysis]], forces: bool, units: str | None) -> Page:
+    """Return the page of all points and links.
+
+    Parameters
+    ----------
+    analyses : sequence of (variant, analysis)
+        The first is drawn in full, the others as ghosts.
+    units : str, optional
+        As --units has them.
+    """
+    series = [one for name, analysis in analyses for one in _series(name, analysis, forces, units)]
+    if not series:
+        raise MechanismError("--html: no variant can be put together, and there is nothing to draw")
+    return moving_page(series[0].mechanism.name, series)
+
+
+def _series(variant: str, analysis: Analysis, forces: bool, units: str | None) -> Iterator[Series]:
+    """Every assembly asked for; none of a variant that cannot be put together, which the poses' own remarks name."""
+    try:
+        pairs = list(zip(analysis.assemblies, analysis.motions, strict=True))
+    except MechanismError:
+        if not variant:
+            raise
+        return
+    for assembly, motion in pairs:
+        # every point and link, whatever --only names: all of it is drawn
+        one = replace(analysis, only=None)
+        one.assemblies, one.motions = (assembly,), (motion,)
+        listed = shown(columns.poses(one), units)
+        if forces:
+            listed |= shown(columns.forces(one), units)
+        arrows = [
+            JointForce(joint.name, f"{joint.name}: {of} on {on}", f"{joint.name}_{of}_on_{on}_fx_N")
+            for joint, on, of in (rows_of(one, motion) if forces else ())
+        ]
+        names = [
+            f"variant {variant}" if variant else "",
+            f"branch {assembly.number}" if analysis.several else "",
+        ]
+        name = ", ".join(filter(None, names))
+        yield Series(motion.poses, motion.drawing, listed, one.input_columns, arrows, name)

@@ -1,0 +1,105 @@
+"""Elements of XML: entities and declarations are refused, numbers are read with their place named."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element, ParseError
+
+from cli.errors import DataError, quote
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+LARGEST_FILE = 10_000_000  # bytes
+LARGEST = 1e60
+DEEPEST = 100
+
+
+def parse(file: str, data: bytes) -> Element:
+    """Return the outermost element of a file; DataError names the line of what is wrong."""
+    from defusedxml import DefusedXmlException
+    from defusedxml.ElementTree import fromstring
+
+    if len(data) > LARGEST_FILE:
+        raise DataError(f"{file}: {len(data)} bytes: expected at most {LARGEST_FILE} (10 MB)")
+    try:
+        root: Element = fromstring(data, forbid_dtd=True, forbid_entities=True, forbid_external=True)
+    except DefusedXmlException:
+        raise DataError(f"{file}: declarations and entities of XML are refused") from None
+    except ParseError as error:
+        line, column = error.position
+        what = str(error).partition(":")[0]
+        raise DataError(
+            f"{file}: line {line}, column {column + 1}: no valid XML ({what}); is the file cut off?"
+        ) from None
+    except (ValueError, LookupError) as error:
+        raise DataError(f"{file}: no valid XML: {error}") from None
+    _shallow(file, root)
+    return root
+
+
+def _shallow(file: str, root: Element) -> None:
+    level = [root]
+    for _ in range(DEEPEST):
+        level = [inner for outer in level for inner in outer]
+    if level:
+        raise DataError(f"{file}: elements nested more than {DEEPEST} deep")
+
+
+def plain(element: Element) -> str:
+    """Return a tag without its name space."""
+    return element.tag.rpartition("}")[2]
+
+
+def children(element: Element, *tags: str) -> Iterator[Element]:
+    """Yield the elements of some tags directly inside."""
+    return (e for e in element if isinstance(e.tag, str) and plain(e) in tags)
+
+
+def child(element: Element, tag: str) -> Element | None:
+    """Return the first element of a tag directly inside."""
+    return next(children(element, tag), None)
+
+
+def words(file: str, where: str, text: str | None) -> list[str]:
+    """Return the numbers of a text as they are written."""
+    found = (text or "").split()
+    for word in found:
+        number(file, where, word)
+    return found
+
+
+def number(file: str, where: str, text: str | None) -> float:
+    """Return a finite number."""
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= LARGEST or "_" in (text or ""):
+        raise DataError(f"{file}: {where}: found {quote(str(text))}, expected a finite number")
+    return value
+
+
+def numbers(
+    file: str, where: str, text: str | None, n: int, default: tuple[float, ...] | None = None
+) -> list[float]:
+    """Return n finite numbers; `default` where there is no text."""
+    if text is None and default is not None:
+        return list(default)
+    found = [float(word) for word in words(file, where, text)]
+    if len(found) != n:
+        raise DataError(f"{file}: {where}: found {quote(text or '')}, expected {n} numbers")
+    return found
+
+
+def named(file: str, element: Element, attribute: str = "name") -> str:
+    """Return an attribute that must be there."""
+    value = element.get(attribute)
+    if not value:
+        raise DataError(f"{file}: a <{plain(element)}> has no '{attribute}'")
+    return value

@@ -1,0 +1,352 @@
+"""MJCF, MuJoCo's own format: nested bodies, joints inside them, equalities that close loops, tendons, actuators."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from cli.errors import DataError
+from cli.read.files import load
+from cli.read.robots.elements import child, children, named, number, numbers, parse, words
+from cli.read.robots.robot import (
+    WORLD,
+    Array,
+    Inertial,
+    Kind,
+    Motor,
+    Robot,
+    RobotJoint,
+    RobotLink,
+    about,
+    half_unit,
+    pose,
+    quaternion,
+    symmetric,
+    unit,
+)
+
+KINDS: dict[str, Kind] = {"hinge": "turn", "slide": "slide", "ball": "ball"}
+FULL = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+INCLUDES = 20
+
+
+class _Compiler(NamedTuple):
+    """How angles are written, and whether shapes give masses."""
+
+    degrees: bool
+    sequence: str
+    shapes: bool
+
+
+def read(file: str, root: Element, folder: Path | None) -> Robot:
+    """Read a `<mujoco>`; files that it includes are followed inside its folder alone."""
+    _include(file, root, folder, [0])
+    robot = Robot(file, "MJCF", root.get("model", ""))
+    degrees, sequence, shapes = True, "xyz", True
+    for e in children(root, "compiler"):
+        degrees = e.get("angle", "degree" if degrees else "radian") != "radian"
+        sequence = e.get("eulerseq", sequence)
+        shapes = e.get("inertiafromgeom", "auto") != "false"
+    if len(sequence) != 3 or not set(sequence.lower()) <= set("xyz"):
+        raise DataError(f"{file}: compiler: found eulerseq '{sequence}', expected three of x, y, z")
+    robot.gravity = np.array([0.0, 0.0, -9.81])
+    for e in children(root, "option"):
+        if e.get("gravity") is not None:
+            robot.gravity = np.array(numbers(file, "option, gravity", e.get("gravity"), 3))
+    _Reader(robot, _Compiler(degrees, sequence, shapes), root).read()
+    return robot
+
+
+def _include(file: str, element: Element, folder: Path | None, seen: list[int]) -> None:
+    """Put the files that are included in the place of their `<include>`."""
+    for i, e in reversed(list(enumerate(element))):
+        if e.tag != "include":
+            _include(file, e, folder, seen)
+            continue
+        name = named(file, e, "file")
+        if folder is None:
+            raise DataError(f"{file}: <include file='{name}'>: standard input has no folder")
+        path, home = (folder / name).resolve(), folder.resolve()
+        if not path.is_relative_to(home):
+            raise DataError(f"{file}: <include file='{name}'>: it lies outside the file's folder: not read")
+        seen[0] += 1
+        if seen[0] > INCLUDES:
+            raise DataError(f"{file}: more than {INCLUDES} files are included")
+        try:
+            inner = parse(name, load(path))
+        except (OSError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            raise DataError(f"{file}: <include file='{name}'>: {reason}") from None
+        _include(file, inner, folder, seen)
+        element[i : i + 1] = list(inner)
+
+
+class _Reader:
+    """Walks the bodies; `classes` are the defaults, by class and tag."""
+
+    def __init__(self, robot: Robot, compiler: _Compiler, root: Element) -> None:
+        self.robot, self.file, self.compiler, self.root = robot, robot.file, compiler, root
+        self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
+        self.sites: dict[str, tuple[str, Array]] = {}
+        for e in children(root, "default"):
+            self._defaults(e, "main", {})
+
+    def _defaults(self, element: Element, name: str, above: dict[str, dict[str, str]]) -> None:
+        mine = {tag: dict(values) for tag, values in above.items()}
+        for e in element:
+            if isinstance(e.tag, str) and e.tag != "default":
+                mine.setdefault(e.tag, {}).update(e.attrib)
+        self.classes[name] = mine
+        for e in children(element, "default"):
+            self._defaults(e, named(self.file, e, "class"), mine)
+
+    def whole(self, e: Element, of: str) -> dict[str, str]:
+        """Return an element's attributes with those of its class."""
+        name = e.get("class", of)
+        if name not in self.classes:
+            raise DataError(f"{self.file}: <{e.tag}>: no default class is called '{name}'")
+        return self.classes[name].get(e.tag, {}) | e.attrib
+
+    def angle(self, value: float) -> float:
+        """Return an angle of the file in rad."""
+        return float(np.radians(value)) if self.compiler.degrees else value
+
+    def read(self) -> None:
+        robot = self.robot
+        robot.add(RobotLink(WORLD, np.eye(4)))
+        for e in children(self.root, "worldbody"):
+            self._inside(e, WORLD, np.eye(4), "main")
+        for e in children(self.root, "equality"):
+            self._equalities(e)
+        self._tendons()
+        self._actuators()
+
+    def frame(self, where: str, e: dict[str, str]) -> Array:
+        """Return the pose that pos and one of quat, euler, axisangle, xyaxes, zaxis give."""
+        file = self.file
+        at = numbers(file, f"{where}, pos", e.get("pos"), 3, (0.0, 0.0, 0.0))
+        turned = np.eye(3)
+        try:
+            if "quat" in e:
+                turned = quaternion(*numbers(file, f"{where}, quat", e["quat"], 4))
+            elif "euler" in e:
+                for axis, angle in zip(
+                    self.compiler.sequence, numbers(file, f"{where}, euler", e["euler"], 3), strict=True
+                ):
+                    one = about("xyz".index(axis.lower()), self.angle(angle))
+                    turned = turned @ one if axis.islower() else one @ turned
+            elif "axisangle" in e:
+                v = numbers(file, f"{where}, axisangle", e["axisangle"], 4)
+                half = self.angle(v[3]) / 2
+                turned = quaternion(np.cos(half), *(np.sin(half) * unit(file, f"{where}, axisangle", v[:3])))
+            elif "xyaxes" in e:
+                v = numbers(file, f"{where}, xyaxes", e["xyaxes"], 6)
+                x = unit(file, f"{where}, xyaxes", v[:3])
+                y = np.array(v[3:]) - x * (x @ v[3:])
+                y = unit(file, f"{where}, xyaxes", list(y))
+                turned = np.column_stack([x, y, np.cross(x, y)])
+            elif "zaxis" in e:
+                z = unit(file, f"{where}, zaxis", numbers(file, f"{where}, zaxis", e["zaxis"], 3))
+                turned = _onto(z)
+        except ValueError as error:
+            raise DataError(f"{file}: {where}: {error}") from None
+        return pose(at, turned)
+
+    def _inside(self, element: Element, link: str, base: Array, of: str) -> None:
+        """Read bodies, sites and frames inside a body; `base` is the pose, in the world, in which they are written."""
+        for e in element:
+            if e.tag == "frame":
+                frame = self.frame(f"frame '{e.get('name', '')}'", dict(e.attrib))
+                self._inside(e, link, base @ frame, e.get("childclass", of))
+            elif e.tag == "site":
+                values = self.whole(e, of)
+                name = e.get("name")
+                if name:
+                    at = np.linalg.inv(self.robot.links[link].pose) @ base
+                    at = at @ self.frame(f"site '{name}'", values)
+                    self.sites[name] = link, at[:3, 3]
+            elif e.tag == "body":
+                self._body(e, link, base, e.get("childclass", of))
+            elif e.tag in ("replicate", "attach", "composite", "flexcomp"):
+                self.robot.notes.append(
+                    f"<{e.tag}> is left out: bodies that are made while reading are not read"
+                )
+
+    def _body(self, e: Element, parent: str, base: Array, of: str) -> None:
+        robot = self.robot
+        name = e.get("name") or f"body {len(robot.links)}"
+        where = f"body '{name}'"
+        here = base @ self.frame(where, dict(e.attrib))
+        joints = list(children(e, "joint"))
+        if child(e, "freejoint") is not None or any(self.whole(j, of).get("type") == "free" for j in joints):
+            robot.notes.append(f"{where}: its free joint is left out: it is taken as fixed")
+            joints = []
+        robot.add(RobotLink(name, here, self._inertial(where, child(e, "inertial"))))
+        if self.compiler.shapes and child(e, "inertial") is None and child(e, "geom") is not None:
+            robot.notes.append(f"{where}: a mass that follows from its shapes is not taken over")
+        above = parent
+        if not joints:
+            robot.join(
+                RobotJoint(f"{name} fixed", "fixed", parent, name, (here[:3, 3], here[:3, 3]), np.zeros(3))
+            )
+        for k, j in enumerate(joints, 1):
+            # several joints of a body follow one another, with nothing between them
+            below = name if k == len(joints) else f"{name} {k}"
+            if below != name:
+                robot.add(RobotLink(below, here))
+            self._joint(self.whole(j, of), f"{name} joint {k}", above, below, here)
+            above = below
+        self._inside(e, name, here, of)
+
+    def _joint(self, values: dict[str, str], name: str, parent: str, below: str, here: Array) -> None:
+        file = self.file
+        name = values.get("name") or name
+        where = f"joint '{name}'"
+        type_ = values.get("type", "hinge")
+        kind = KINDS.get(type_, "other")
+        at = here @ pose(numbers(file, f"{where}, pos", values.get("pos"), 3, (0.0, 0.0, 0.0)))
+        axis = numbers(file, f"{where}, axis", values.get("axis"), 3, (0.0, 0.0, 1.0))
+        direction = here[:3, :3] @ unit(file, f"{where}, axis", axis)
+        keys = ("range", "damping", "stiffness", "frictionloss", "armature")
+        more = tuple("limits" if k == "range" else k for k in keys if values.get(k, "0").strip("0. "))
+        value = number(file, f"{where}, ref", values.get("ref", "0"))
+        value = self.angle(value) if kind == "turn" else value
+        self.robot.join(
+            RobotJoint(
+                name, kind, parent, below, (at[:3, 3], at[:3, 3]), np.asarray(direction), value, type_, more
+            )
+        )
+
+    def _inertial(self, where: str, e: Element | None) -> Inertial | None:
+        if e is None:
+            return None
+        file = self.file
+        place = self.frame(f"{where}, inertial", dict(e.attrib))
+        mass = number(file, f"{where}, mass", e.get("mass"))
+        texts = dict.fromkeys(FULL, "0")
+        for key, names in (("diaginertia", FULL[:3]), ("fullinertia", FULL)):
+            if e.get(key) is not None:
+                found = words(file, f"{where}, {key}", e.get(key))
+                if len(found) != len(names):
+                    raise DataError(
+                        f"{file}: {where}, {key}: found {len(found)} numbers, expected {len(names)}"
+                    )
+                texts |= dict(zip(names, found, strict=True))
+        return Inertial(
+            mass,
+            place,
+            symmetric({key: float(text) for key, text in texts.items()}),
+            symmetric({key: half_unit(text) for key, text in texts.items()}),
+        )
+
+    # --- what closes loops ----------------------------------------------------------------------------------
+    def _equalities(self, element: Element) -> None:
+        robot, file = self.robot, self.file
+        for k, e in enumerate(element, 1):
+            if not isinstance(e.tag, str):
+                continue
+            values = self.whole(e, "main")
+            name = values.get("name") or f"{e.tag} {k}"
+            where = f"equality '{name}'"
+            if values.get("active") == "false":
+                robot.notes.append(f"{where}: left out: it is not active")
+            elif e.tag in ("connect", "weld"):
+                self._connect(e.tag, name, where, values)
+            elif e.tag == "joint":
+                terms = [(named(file, e, "joint1"), 1.0)]
+                powers = numbers(file, f"{where}, polycoef", values.get("polycoef", "0 1 0 0 0"), 5)
+                if any(powers[2:]):
+                    robot.notes.append(f"{where}: left out: its polynomial is not a straight line")
+                    continue
+                if "joint2" in values:
+                    terms.append((values["joint2"], -powers[1]))
+                robot.couplings.append((name, terms))
+            elif e.tag == "tendon" and "tendon2" not in values:
+                robot.couplings.append((name, self._fixed(named(file, e, "tendon1"), where)))
+            else:
+                robot.notes.append(f"{where}: left out: <{e.tag}> has no like here")
+
+    def _connect(self, tag: str, name: str, where: str, values: dict[str, str]) -> None:
+        robot, file = self.robot, self.file
+        if "site1" in values or "site2" in values:
+            sides = []
+            for key in ("site1", "site2"):
+                if values.get(key) not in self.sites:
+                    raise DataError(f"{file}: {where}: no site is called '{values.get(key)}'")
+                link, inside = self.sites.pop(values[key])
+                sides.append((link, (robot.links[link].pose @ pose(inside))[:3, 3]))
+            (a, at), (b, other) = sides
+        else:
+            a, b = values.get("body1", ""), values.get("body2") or WORLD
+            anchor = numbers(file, f"{where}, anchor", values.get("anchor"), 3, (0.0, 0.0, 0.0))
+            base = robot.link(a, where).pose
+            robot.link(b, where)
+            # at the file's own configuration the place is the same on both
+            at = other = (base @ pose(anchor))[:3, 3]
+        kind: Kind = "fixed" if tag == "weld" else "ball"
+        robot.join(RobotJoint(name, kind, a, b, (at, other), np.zeros(3)))
+
+    def _fixed(self, name: str, where: str) -> list[tuple[str, float]]:
+        """Return the terms of a fixed tendon."""
+        for element in children(self.root, "tendon"):
+            for e in children(element, "fixed"):
+                if e.get("name") == name:
+                    return [
+                        (named(self.file, j, "joint"), number(self.file, f"tendon '{name}'", j.get("coef")))
+                        for j in children(e, "joint")
+                    ]
+        raise DataError(f"{self.file}: {where}: no fixed tendon is called '{name}'")
+
+    def _tendons(self) -> None:
+        for element in children(self.root, "tendon"):
+            for e in children(element, "spatial"):
+                self.robot.notes.append(f"tendon '{e.get('name', '')}': left out: springs are not taken over")
+        points: dict[str, dict[str, Array]] = {}
+        for name, (link, at) in self.sites.items():
+            points.setdefault(link, {})[name] = at
+        for link, held in points.items():
+            self.robot.links[link].points = held
+
+    def _actuators(self) -> None:
+        robot = self.robot
+        speeds = self._speeds()
+        for element in children(self.root, "actuator"):
+            for k, e in enumerate(element, 1):
+                if not isinstance(e.tag, str):
+                    continue
+                values = self.whole(e, "main")
+                name = values.get("name") or f"actuator {k}"
+                if "joint" in values:
+                    terms = [(values["joint"], 1.0)]
+                elif "tendon" in values:
+                    terms = self._fixed(values["tendon"], f"actuator '{name}'")
+                else:
+                    robot.notes.append(f"actuator '{name}': left out: it drives no joint")
+                    continue
+                speed = sum(factor * speeds.get(joint, 0.0) for joint, factor in terms)
+                robot.motors.append(Motor(name, terms, speed or None))
+
+    def _speeds(self) -> dict[str, float]:
+        """The joints' speeds in the first key frame."""
+        keys = [key for e in children(self.root, "keyframe") for key in children(e, "key")]
+        own = [j.name for j in self.robot.joints.values() if j.kind in ("turn", "slide")]
+        if not keys or keys[0].get("qvel") is None:
+            return {}
+        found = words(self.file, "key, qvel", keys[0].get("qvel"))
+        if len(found) != len(own):
+            return {}
+        # a key frame at rest says of no speed
+        return {name: float(v) for name, v in zip(own, found, strict=True) if float(v) != 0}
+
+
+def _onto(z: Array) -> Array:
+    """Return the least rotation that turns the z-axis onto a direction."""
+    axis = np.cross([0.0, 0.0, 1.0], z)
+    s, c = float(np.linalg.norm(axis)), float(z[2])
+    if s < 1e-15:
+        return np.eye(3) if c > 0 else about(0, np.pi)
+    half = np.arctan2(s, c) / 2
+    return quaternion(np.cos(half), *(np.sin(half) * axis / s))

@@ -1,0 +1,199 @@
+"""A robot in space, whatever its format: links with a pose and an inertia, joints, couplings of joints, what drives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cli.errors import DataError
+
+Array = NDArray[np.float64]
+Kind = Literal["turn", "slide", "ball", "fixed", "other"]
+WORLD = "world"
+
+
+@dataclass
+class Inertial:
+    """Mass and inertia tensor of a link; `pose` are the tensor's axes at the centre of mass, in the link's axes.
+
+    `half` is half a unit of each entry's last printed digit; `entries` are the names the file gives them.
+    """
+
+    mass: float
+    pose: Array
+    tensor: Array
+    half: Array
+
+
+@dataclass
+class RobotLink:
+    """A link: its pose in the file's own configuration, its inertia, its named points in its own axes.
+
+    `shapes` are spheres around its shapes, (centre in its axes, radius), m; none where one is a mesh.
+    """
+
+    name: str
+    pose: Array
+    inertial: Inertial | None = None
+    points: dict[str, Array] = field(default_factory=dict)
+    shapes: list[tuple[Array, float]] = field(default_factory=list)
+
+
+@dataclass
+class RobotJoint:
+    """A joint; `ends` are where it stands as each of its two links has it, `axis` its axis, all in the world.
+
+    `value` is its coordinate in the file's own configuration. A `ball` is pinned in every plane; `type` is what the file
+    calls it, `more` what else it says of it: limits, damping.
+    """
+
+    name: str
+    kind: Kind
+    parent: str
+    child: str
+    ends: tuple[Array, Array]
+    axis: Array
+    value: float = 0.0
+    type: str = ""
+    more: tuple[str, ...] = ()
+
+
+@dataclass
+class Motor:
+    """What drives: a sum of joint coordinates, Σ factor·coordinate, at a speed."""
+
+    name: str
+    terms: list[tuple[str, float]]
+    speed: float | None = None
+
+
+@dataclass
+class Robot:
+    """All that a file says; `gears` are (a, b, ratio, arm), `couplings` sums of joint coordinates that stay as they are."""
+
+    file: str
+    format: str
+    name: str
+    links: dict[str, RobotLink] = field(default_factory=dict)
+    joints: dict[str, RobotJoint] = field(default_factory=dict)
+    couplings: list[tuple[str, list[tuple[str, float]]]] = field(default_factory=list)
+    gears: list[tuple[str, str, float, str]] = field(default_factory=list)
+    motors: list[Motor] = field(default_factory=list)
+    ground: str = WORLD
+    gravity: Array | None = None
+    notes: list[str] = field(default_factory=list)
+
+    def link(self, name: str, where: str) -> RobotLink:
+        """Return a link that must be there."""
+        if name not in self.links:
+            known = ", ".join(self.links)[:200]
+            raise DataError(f"{self.file}: {where}: no link is called '{name}': expected one of {known}")
+        return self.links[name]
+
+    def add(self, link: RobotLink) -> None:
+        """Add a link; a name is there once."""
+        if link.name in self.links:
+            raise DataError(f"{self.file}: two links are called '{link.name}'")
+        self.links[link.name] = link
+
+    def join(self, joint: RobotJoint) -> None:
+        """Add a joint; a name is there once."""
+        if joint.name in self.joints:
+            raise DataError(f"{self.file}: two joints are called '{joint.name}'")
+        self.joints[joint.name] = joint
+
+
+def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), rotation: Array | None = None) -> Array:
+    """Return a pose (4, 4) from a place and a rotation."""
+    made = np.eye(4)
+    made[:3, 3] = np.asarray(xyz, dtype=float)
+    if rotation is not None:
+        made[:3, :3] = rotation
+    return made
+
+
+def about(axis: int, angle: float) -> Array:
+    """Return the rotation about one of the axes x, y, z (0, 1, 2), rad.
+
+    >>> about(2, np.pi / 2).round(9)[0]
+    array([ 0., -1.,  0.])
+    """
+    c, s = np.cos(angle), np.sin(angle)
+    made = np.eye(3)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    made[i, i] = made[j, j] = c
+    made[i, j], made[j, i] = -s, s
+    return made
+
+
+def rpy(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation by fixed axes x, y, z in that order (URDF, SDF)."""
+    return np.asarray(about(2, yaw) @ about(1, pitch) @ about(0, roll))
+
+
+def quaternion(w: float, x: float, y: float, z: float) -> Array:
+    """Return the rotation of a quaternion of any length but zero.
+
+    >>> quaternion(1, 0, 0, 1).round(9)[0]
+    array([ 0., -1.,  0.])
+    """
+    n = w * w + x * x + y * y + z * z
+    if not n > 0:
+        raise ValueError("found 0 0 0 0, expected a quaternion of some length")
+    rows = [
+        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ]
+    return np.array(rows) / n
+
+
+def unit(file: str, where: str, vector: list[float]) -> Array:
+    """Return a direction of length 1."""
+    v = np.array(vector)
+    length = float(np.linalg.norm(v))
+    if not length > 0:
+        raise DataError(f"{file}: {where}: found 0 0 0, expected a direction")
+    return np.asarray(v / length)
+
+
+def half_unit(word: str) -> float:
+    """Return half a unit of the last printed digit of a number; a whole number, and zero, is exact.
+
+    >>> half_unit("0.250"), half_unit("1.2e-3"), half_unit("0.0"), half_unit("12")
+    (0.0005, 5e-05, 0.0, 0.0)
+    """
+    digits, _, exponent = word.lower().partition("e")
+    places = len(digits.partition(".")[2])
+    if float(digits) == 0 or not (places or exponent):
+        return 0.0
+    return float(f"0.5e{int(exponent or 0) - places}")
+
+
+def symmetric(entries: dict[str, float]) -> Array:
+    """Return the matrix of ixx, iyy, izz, ixy, ixz, iyz as it is written: the products are the matrix's own entries."""
+    e = entries
+    return np.array(
+        [
+            [e["ixx"], e["ixy"], e["ixz"]],
+            [e["ixy"], e["iyy"], e["iyz"]],
+            [e["ixz"], e["iyz"], e["izz"]],
+        ]
+    )
+
+
+def sphere_around(shape: str, size: list[float]) -> float | None:
+    """Return the radius of the sphere around a box (edges), cylinder or capsule (radius, length), or sphere (radius).
+
+    >>> sphere_around("box", [3.0, 4.0, 12.0]), sphere_around("mesh", [])
+    (6.5, None)
+    """
+    if shape == "box":
+        return float(np.linalg.norm(size)) / 2
+    if shape in ("cylinder", "capsule"):
+        radius, length = size
+        return float(np.hypot(radius, length / 2)) if shape == "cylinder" else radius + length / 2
+    return max(size) if shape in ("sphere", "ellipsoid") and size else None

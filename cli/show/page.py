@@ -1,0 +1,42 @@
+"""The columns of a table as a page that moves shows them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cli.read import options
+from cli.read.units import UNITS, to_si
+from cli.show.in_units import chosen_units, in_units
+from dalembert.page import Shown, fits
+
+if TYPE_CHECKING:
+    from cli.show.columns import Table
+
+# what a scene is drawn from: of these alone the page must know the unit
+DRAWN = ("length", "angle", "velocity", "acceleration", "speed", "force", "time")
+
+
+def refuse_long(count: int) -> None:
+    """Refuse --html of more poses than a page can hold."""
+    try:
+        fits(count)
+    except ValueError as error:
+        raise options.bad("--html", str(error)) from None
+
+
+def shown(table: Table, units: str | None) -> dict[str, Shown]:
+    """Return the columns of numbers under their SI headers, in the units of --units."""
+    chosen = {} if units is None else chosen_units(units)
+    pairs = zip(table.columns, in_units(table, chosen).columns, strict=True)
+    return {
+        column.header: Shown(np.array(other.values, dtype=float), other.header, _si(other.unit))
+        for column, other in pairs
+        if column.unit or not any(isinstance(value, str) for value in column.values)
+    }
+
+
+def _si(unit: str) -> float:
+    """Return what one of a unit is in SI; 1 where the page need not know."""
+    return next((float(to_si(1.0, d, unit)) for d in DRAWN if unit in UNITS[d]), 1.0)

@@ -1,0 +1,145 @@
+"""A page that moves: data, a style and a small script in one HTML file, which needs no network.
+
+A page shows *series* of poses: columns over one input or time, and what a scene needs to know to draw them. The first series
+is drawn in full, the others as ghosts. `plane.js` draws mechanisms, `space.js` a body that turns; what both share (play,
+slider, table, plots) is in `player.js`. Whoever fills a page passes plain data: nothing here knows mechanics.
+
+Names come from users. They stand in the page as data and reach it as text only; besides, the page's own policy runs no
+script but the one that is named there by its hash, and loads nothing.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+Json = Any
+
+MOST = 20_000
+"""Poses of a page: a browser draws as many without a halt."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A column as the page shows it: under a header of its own where it is in a unit of its own."""
+
+    values: ArrayLike
+    header: str
+    si: float = 1.0
+    """What one of its unit is in SI and radians."""
+
+
+def fits(count: int) -> None:
+    """Refuse more poses than a page can hold: ValueError."""
+    if count > MOST:
+        raise ValueError(f"a page that moves of {count} poses: expected at most {MOST}; take larger steps")
+
+
+def packed(values: ArrayLike, exact: bool = True) -> Json:
+    """Return a column of numbers as the page keeps it: one number where all are equal, else the numbers' bytes in base64.
+
+    Parameters
+    ----------
+    values : array (n,)
+        NaN where there is none.
+    exact : bool
+        Keep every digit: 8 bytes a number. Else 4 bytes and 7 digits, wherever the numbers' range allows.
+
+    >>> packed([2.5, 2.5]), packed([1.0, 2.0], exact=False)
+    ({'all': 2.5}, {'f4': 'AACAPwAAAEA='})
+    """
+    given = np.asarray(values, dtype=float)
+    if given.size and (given == given[0]).all():
+        return {"all": float(given[0])}
+    short = given.astype("<f4") if not exact and _in_range(given) else None
+    data, kind = (given.astype("<f8"), "f8") if short is None else (short, "f4")
+    return {kind: base64.b64encode(data.tobytes()).decode()}
+
+
+def _in_range(values: np.ndarray[Any, np.dtype[np.float64]]) -> bool:
+    size = np.abs(values[np.isfinite(values) & (values != 0)])
+    return bool(np.isfinite(values[~np.isnan(values)]).all() and (size < 1e38).all() and (size > 1e-37).all())
+
+
+def rounded(values: ArrayLike) -> list[float]:
+    """Return numbers with the seven digits that a drawing needs.
+
+    >>> rounded([1 / 3])
+    [0.3333333]
+    """
+    return [float(f"{x:.7g}") for x in np.asarray(values, dtype=float).ravel().tolist()]
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page that moves, as one text of HTML; a notebook shows it in a frame of its own."""
+
+    html: str
+    height: int = 640
+    """How high the frame in a notebook is, pixels."""
+
+    def save(self, path: str | Path) -> None:
+        """Write the page to a file; a browser opens it from the disk."""
+        Path(path).write_text(self.html, encoding="utf-8")
+
+    def __repr__(self) -> str:
+        return f"Page({len(self.html) / 1e3:.0f} kB of HTML; .save(FILE) writes it)"
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{escape(self.html)}" sandbox="allow-scripts" style="width:100%;'
+            f'height:{self.height}px;border:0" title="a moving picture"></iframe>'
+        )
+
+
+def page(
+    title: str, scene: Literal["plane", "space"], series: Sequence[Mapping[str, Json]], **rest: Json
+) -> Page:
+    """Return the page of some series of poses.
+
+    Parameters
+    ----------
+    title : str
+    scene : "plane" or "space"
+        Which script draws it.
+    series : sequence of mappings
+        Each holds `columns`, a list of {header, owner, and what `packed` gives}, `n`, the number of poses, and what its
+        scene reads.
+    rest
+        What else the script reads.
+    """
+    data = json.dumps({"series": series, **rest}, separators=(",", ":"), ensure_ascii=False)
+    # a name in the data cannot end the element that holds it
+    data = data.replace("<", "\\u003c")
+    script = f'"use strict";\n{_part("player.js")}\n{_part(f"{scene}.js")}\n'
+    hashed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    places = {
+        "{{title}}": escape(title or "dalembert"),
+        "{{hash}}": hashed,
+        "{{style}}": _part("page.css"),
+        "{{script}}": script,
+        "{{data}}": data,
+    }
+    html = _part("page.html")
+    head, *parts = html.split("{{")
+    filled = [head]
+    for part in parts:
+        name, after = part.split("}}", 1)
+        filled += [places["{{" + name + "}}"], after]
+    return Page("".join(filled))
+
+
+@cache
+def _part(name: str) -> str:
+    return (files("dalembert.page") / name).read_text(encoding="utf-8")

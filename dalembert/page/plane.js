@@ -1,0 +1,358 @@
+// A planar mechanism: its shapes carried along by its bodies, arrows, instant centres, the velocity polygon.
+// The drawing's own numbers are SI and radians; columns may be in other units (column.si).
+const view = $("view");
+const svg = svgIn(view);
+const at = (series, k, i) => (k === null || k === undefined ? NaN : series.columns[k].values[i] * (series.columns[k].si ?? 1));
+const classOf = (b) => (b ? `b${(b - 1) % 8}` : "ground");
+
+// where body b stands at pose i: [x, y, cos, sin]; the ground comes first and stands still
+function stand(series, b, i) {
+  const body = series.bodies[b];
+  if (!b) return [0, 0, 1, 0];
+  const point = series.points[body.point];
+  const angle = at(series, body.angle, i);
+  const [c, s] = [Math.cos(angle), Math.sin(angle)];
+  const [x, y] = body.at;
+  return [at(series, point.x, i) - (c * x - s * y), at(series, point.y, i) - (s * x + c * y), c, s];
+}
+function carried([x, y, c, s], u, v) {
+  return [x + c * u - s * v, y + s * u + c * v];
+}
+// whether a pose can be assembled
+const real = (stands) => stands.every((where) => where.every(Number.isFinite));
+// the points of a shape where its bodies stand
+function outline(shape, stands) {
+  const found = [];
+  const [p, ends] = [shape.p ?? shape.z, shape.ends];
+  for (let k = 0; k < p.length; k += 2) {
+    if (!ends) found.push(carried(stands[shape.b], p[k], p[k + 1]));
+    else {
+      // a spring: shares of its length, and sideways
+      const from = carried(stands[ends[0]], ends[1], ends[2]);
+      const to = carried(stands[ends[3]], ends[4], ends[5]);
+      const way = [to[0] - from[0], to[1] - from[1]];
+      const length = Math.hypot(...way) || 1;
+      found.push([from[0] + way[0] * p[k] - (way[1] / length) * p[k + 1], from[1] + way[1] * p[k] + (way[0] / length) * p[k + 1]]);
+    }
+  }
+  return found;
+}
+
+// --- the room that is needed over all poses ---------------------------------------------------------------------------
+function room() {
+  let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
+  for (const series of data.series) {
+    const step = Math.max(1, Math.floor(series.n / 90));
+    for (let i = 0; i < series.n; i += step) {
+      const stands = series.bodies.map((_, b) => stand(series, b, i));
+      if (!real(stands)) continue;
+      for (const shape of series.shapes) {
+        for (const [x, y] of outline(shape, stands)) {
+          const r = shape.s ?? 0;
+          [left, right, low, high] = [Math.min(left, x - r), Math.max(right, x + r), Math.min(low, y - r), Math.max(high, y + r)];
+        }
+      }
+    }
+  }
+  return left <= right ? [left, right, low, high] : [-1, 1, -1, 1];
+}
+const [left, right, low, high] = room();
+const LEAST = { pin: 3.5, tip: 2.5, mass: 3 }; // pixels
+let scale, px, py, width, height;
+
+// --- what is drawn ----------------------------------------------------------------------------------------------------
+const layers = { traces: put(svg, "g"), ghosts: put(svg, "g", { class: "ghost" }), main: put(svg, "g"), over: put(svg, "g") };
+const figures = data.series.map((series, s) => {
+  const group = put(s ? layers.ghosts : layers.main, "g");
+  const parts = series.shapes.map((shape) => {
+    const kind = shape.s === undefined ? (shape.c ? "closed" : "") : "disc";
+    return put(group, shape.s === undefined ? "path" : "circle", { class: `${shape.r} ${kind} ${classOf(shape.b)}` });
+  });
+  return { series, group, parts };
+});
+const words = texts(layers.over);
+const missing = put(layers.over, "text", { class: "missing" }, "cannot be assembled at this input");
+const bar = put(layers.over, "path", { class: "scale" });
+const drawn = { names: true, velocity: false, acceleration: false, forces: whole.forces.length > 0, centres: false, polygon: false };
+const traced = new Set(whole.points.filter((p) => p.trace).map((p) => p.name));
+
+function drawFigure({ series, group, parts }, i) {
+  const stands = series.bodies.map((_, b) => stand(series, b, i));
+  group.style.display = real(stands) ? "" : "none";
+  if (!real(stands)) return null;
+  for (const [k, shape] of series.shapes.entries()) {
+    const points = outline(shape, stands);
+    if (shape.s === undefined) parts[k].setAttribute("d", `M${points.map(([x, y]) => fixed(px(x), py(y))).join("L")}${shape.c ? "Z" : ""}`);
+    else {
+      parts[k].setAttribute("cx", px(points[0][0]).toFixed(2));
+      parts[k].setAttribute("cy", py(points[0][1]).toFixed(2));
+    }
+  }
+  return stands;
+}
+
+// --- arrows -----------------------------------------------------------------------------------------------------------
+// the places that move, each once, and the columns of their rates
+const movers = whole.points.filter((p) => p.moves);
+const longest = {};
+function arrows(kind, tails) {
+  const group = put(layers.over, "g");
+  const parts = tails.map((tail) => put(group, "path", { class: kind }));
+  const size = (i) => Math.max(0, ...tails.map(([, x, y]) => Math.hypot(at(whole, x, i), at(whole, y, i))).filter(Number.isFinite));
+  const sizes = Array.from({ length: n }, (_, i) => size(i));
+  longest[kind] = Math.max(0, ...sizes);
+  // one scale for all poses; a short peak may reach half across the picture
+  const usual = 2 * Math.sqrt(sizes.reduce((sum, x) => sum + x * x, 0) / n);
+  return (i, on) => {
+    const length = (0.2 * Math.min(width, height)) / (Math.max(usual, longest[kind] / 2.5) || 1);
+    for (const [k, [point, x, y]] of tails.entries()) {
+      const d = on ? arrow(px(at(whole, point.x, i)), py(at(whole, point.y, i)), length * at(whole, x, i), -length * at(whole, y, i)) : "";
+      parts[k].setAttribute("d", d);
+    }
+  };
+}
+const rates = (key) => movers.filter((p) => p[key]).map((p) => [p, ...p[key]]);
+const drawers = {
+  velocity: arrows("velocity", rates("v")),
+  acceleration: arrows("acceleration", rates("a")),
+  force: arrows("force", whole.forces.map((f) => [whole.points[f.point], f.x, f.y])),
+};
+
+// --- headers ----------------------------------------------------------------------------------------------------------
+const head = (k) => (k === null || k === undefined ? "" : data.series[0].columns[k].header);
+const suffix = (text, name) => (text.startsWith(`${name}_`) ? text.slice(name.length + 1) : text);
+const pointHeads = ["x", "y"].map((key) => suffix(head(whole.points[0]?.[key]), whole.points[0]?.name));
+const lengths = whole.columns[whole.points[0]?.x]?.si ?? 1; // what one of their unit is in m
+
+// --- instant centres: where two bodies have one velocity -------------------------------------------------------------
+const velocities = movers.length > 0 && movers.every((p) => p.v) && whole.bodies.slice(1).every((b) => b.omega !== null);
+const pinned = (a, b) => whole.pins.some((pin) => pin.includes(a) && pin.includes(b));
+const pairs = whole.bodies.flatMap((_, b) => whole.bodies.slice(0, b).map((__, a) => [a, b])).filter(([a, b]) => !pinned(a, b));
+// the velocity of a body's point that stands in the origin, and its angular velocity
+function field(b, i) {
+  if (!b) return [0, 0, 0];
+  const body = whole.bodies[b];
+  const p = whole.points[body.point];
+  const omega = at(whole, body.omega, i);
+  const [vx, vy] = p.v ? p.v.map((k) => at(whole, k, i)) : [0, 0];
+  return [vx + omega * at(whole, p.y, i), vy - omega * at(whole, p.x, i), omega];
+}
+function centre(a, b, i) {
+  const [f, g] = [field(a, i), field(b, i)];
+  const turn = g[2] - f[2];
+  return [-(g[1] - f[1]) / turn, (g[0] - f[0]) / turn];
+}
+const crosses = put(layers.over, "path", { class: "centre" });
+let centreCells;
+function drawCentres(i) {
+  let d = "";
+  for (const [k, [a, b]] of pairs.entries()) {
+    const [x, y] = drawn.centres ? centre(a, b, i) : [NaN, NaN];
+    const [u, v] = [px(x), py(y)];
+    const far = !(Math.hypot(x, y) < 1e6 * (right - left + high - low));
+    centreCells?.[k].forEach((cell, axis) => (cell.textContent = far ? "∞" : short([x, y][axis] / lengths)));
+    if (!(u > -20 && u < width + 20 && v > -20 && v < height + 20)) continue;
+    d += `M${fixed(u - 5, v - 5)}L${fixed(u + 5, v + 5)}M${fixed(u - 5, v + 5)}L${fixed(u + 5, v - 5)}`;
+    words.put(u, v - 11, `${whole.bodies[a].name} / ${whole.bodies[b].name}`, "centre");
+  }
+  crosses.setAttribute("d", d);
+}
+function centreTable(on) {
+  $("centres")?.remove();
+  centreCells = undefined;
+  if (!on) return;
+  const scroll = put($("values"), "div", { class: "scroll", id: "centres" });
+  const found = put(scroll, "table");
+  put(found, "caption", {}, "Instant centres");
+  const head = put(put(found, "thead"), "tr");
+  for (const text of ["", ...pointHeads]) put(head, "th", {}, text);
+  const body = put(found, "tbody");
+  centreCells = pairs.map(([a, b]) => {
+    const row = put(body, "tr");
+    put(row, "th", {}, `${whole.bodies[a].name} / ${whole.bodies[b].name}`);
+    return [put(row, "td"), put(row, "td")];
+  });
+}
+
+// --- the velocity polygon: velocities from one pole; of each link an image of itself ---------------------------------
+const polygon = { svg: null };
+function polygonOn(on) {
+  $("extra").replaceChildren();
+  polygon.svg = on ? svgIn($("extra")) : null;
+  if (!on) return;
+  polygon.lines = put(polygon.svg, "g");
+  polygon.words = texts(polygon.svg);
+}
+function drawPolygon(i) {
+  if (!polygon.svg) return;
+  const [w, h] = [$("extra").clientWidth, Math.min(320, $("extra").clientWidth)];
+  sized(polygon.svg, w, h);
+  const tips = new Map(whole.points.map((p) => [p, p.moves ? p.v.map((k) => at(whole, k, i)) : [0, 0]]));
+  const real = [...tips.values()].filter(([x, y]) => Number.isFinite(x + y));
+  const [xs, ys] = [range([0, ...real.map((v) => v[0])]), range([0, ...real.map((v) => v[1])])];
+  const k = Math.min((w - 70) / (xs[1] - xs[0] || 1e-300), (h - 60) / (ys[1] - ys[0] || 1e-300));
+  const X = (x) => w / 2 + k * (x - (xs[0] + xs[1]) / 2);
+  const Y = (y) => h / 2 - k * (y - (ys[0] + ys[1]) / 2);
+  polygon.lines.replaceChildren();
+  for (const [b, body] of whole.bodies.entries()) {
+    const image = body.points.map((p) => tips.get(whole.points[p])).filter(([x, y]) => Number.isFinite(x + y));
+    if (!b || image.length < 2) continue;
+    const d = `M${image.map(([x, y]) => fixed(X(x), Y(y))).join("L")}${image.length > 2 ? "Z" : ""}`;
+    put(polygon.lines, "path", { class: `image ${classOf(b)}`, d });
+  }
+  const at_ = new Map(); // points of one velocity share a label
+  for (const [p, [x, y]] of tips) {
+    if (!Number.isFinite(x + y)) continue;
+    if (p.moves) put(polygon.lines, "path", { class: "velocity", d: arrow(X(0), Y(0), X(x) - X(0), Y(y) - Y(0)) });
+    const key = fixed(X(x), Y(y));
+    at_.set(key, [...(at_.get(key) ?? []), p]);
+  }
+  const middle = [X((xs[0] + xs[1]) / 2), Y((ys[0] + ys[1]) / 2)];
+  for (const points of at_.values()) {
+    const [x, y] = tips.get(points[0]);
+    const [u, v] = [X(x) - middle[0], Y(y) - middle[1]];
+    const r = Math.hypot(u, v) || 1;
+    polygon.words.put(X(x) + (14 * u) / r, Y(y) + (14 * (v || 1)) / r, points.map((p) => p.name).join(", "), "point");
+  }
+  polygon.words.done();
+}
+
+// --- paths ------------------------------------------------------------------------------------------------------------
+function drawTraces() {
+  layers.traces.replaceChildren();
+  for (const [s, series] of data.series.entries()) {
+    for (const p of series.points) {
+      if (!traced.has(p.name)) continue;
+      const [xs, ys] = p.path ?? [p.x, p.y].map((k) => series.columns[k].values.map((x) => x * (series.columns[k].si ?? 1)));
+      let d = "";
+      let pen = false;
+      for (let i = 0; i < xs.length; i++) {
+        const real = Number.isFinite(xs[i]);
+        if (real) d += (pen ? "L" : "M") + fixed(px(xs[i]), py(ys[i]));
+        pen = real;
+      }
+      put(layers.traces, "path", { class: s ? "trace ghost" : "trace", d, "data-path": p.name });
+    }
+  }
+}
+for (const series of data.series) {
+  for (const p of series.points) p.path = p.path?.map((one) => unpack(one, series.fine));
+}
+
+// --- all of a pose ----------------------------------------------------------------------------------------------------
+// beside a point, on the side where none of its links leads away; a link's name in the middle of a plate or beside a bar,
+// where no other name stands
+const neighbours = whole.points.map((_, k) => [...new Set(whole.bodies.slice(1).filter((b) => b.points.includes(k)).flatMap((b) => b.points))].filter((other) => other !== k));
+const LETTER = [3.4, 8]; // half a letter's width; a line's height
+function labels(stands, i) {
+  if (!stands || !drawn.names) return;
+  const places = whole.points.map((p) => [px(at(whole, p.x, i)), py(at(whole, p.y, i))]);
+  const taken = places.map(([u, v]) => [u, v, 5, 5]);
+  const free = ([u, v, w, h]) => taken.every(([x, y, a, b]) => Math.abs(u - x) > w + a || Math.abs(v - y) > h + b);
+  const unit = ([du, dv]) => [du / (Math.hypot(du, dv) || 1), dv / (Math.hypot(du, dv) || 1)];
+  const set = (label, places, kind) => {
+    const [w, h] = [LETTER[0] * label.t.length, LETTER[1]];
+    const boxes = places.map(([u, v]) => [u, v, w, h]);
+    const box = boxes.find(free) ?? boxes[0];
+    taken.push(box);
+    words.put(box[0], box[1], label.t, kind);
+  };
+  // how far aside the middle of a name stands: a long one farther to the left or right
+  const aside = (label, [du, dv], gap) => [du * (gap + Math.max(0, LETTER[0] * (label.t.length - 2))), dv * gap];
+  const across = ([du, dv]) => (du > 0 ? [dv, -du] : [-dv, du]);
+  for (const label of whole.labels.filter((one) => one.of === "point")) {
+    const k = whole.points.findIndex((p) => p.name === label.t);
+    const [u, v] = places[k];
+    const towards = neighbours[k].map((p) => unit([places[p][0] - u, places[p][1] - v]));
+    // the foot of a fixed pivot
+    if (!label.b) towards.push([0, 1.4]);
+    let way = [0, 1].map((axis) => -towards.reduce((sum, one) => sum + one[axis], 0));
+    if (Math.hypot(...way) < 0.35) way = across(towards[0] ?? [-1, 0]);
+    const [du, dv] = aside(label, unit(way), 15);
+    set(label, [[u + du, v + dv]], "point");
+  }
+  for (const label of whole.labels.filter((one) => one.of === "link")) {
+    const [u, v] = carried(stands[label.b], ...label.z).map((x, axis) => [px, py][axis](x));
+    const ends = whole.bodies[label.b].points.map((p) => places[p]);
+    const along = ends.length > 1 ? [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]] : [0, 50];
+    const side = across(unit(along)).map((x) => -x);
+    const beside = [1, -1].flatMap((sign) => [0, 0.2, -0.2].map((share) => {
+      const [du, dv] = aside(label, side.map((x) => sign * x), 12);
+      return [u + du + share * along[0], v + dv + share * along[1]];
+    }));
+    set(label, ends.length > 2 ? [[u, v], ...beside] : beside, `body ${classOf(label.b)}`);
+  }
+}
+function legend() {
+  const said = [];
+  const [first, ...others] = data.series.map((series) => series.name);
+  if (others.length) said.push(`in full: ${first}; faint: ${others.slice(0, 4).join("; ")}${others.length > 4 ? ` and ${others.length - 4} more` : ""}`);
+  const of = (kind, unit) => longest[kind] && said.push(`longest arrow of ${kind}: ${short(longest[kind])} ${unit}`);
+  if (drawn.velocity) of("velocity", data.units.v);
+  if (drawn.acceleration) of("acceleration", data.units.a);
+  if (drawn.forces) of("force", data.units.f);
+  if (drawn.polygon) said.push(`velocity polygon: each point's velocity from one pole, ${data.units.v}; dashed: the links' images`);
+  $("legend").textContent = said.join("; ");
+}
+function drawAll(i) {
+  const [stands] = figures.map((figure) => drawFigure(figure, i));
+  missing.style.display = stands ? "none" : "";
+  labels(stands, i);
+  for (const [kind, draw] of Object.entries(drawers)) draw(i, drawn[kind === "force" ? "forces" : kind]);
+  drawCentres(i);
+  words.put(...barText, "note");
+  words.done();
+  drawPolygon(i);
+}
+let barText;
+function resize() {
+  width = Math.max(240, view.clientWidth);
+  const margin = 34;
+  const shape = (high - low || right - left || 1) / (right - left || high - low || 1);
+  height = Math.round(Math.max(0.4 * width, Math.min(shape * (width - 2 * margin) + 2 * margin, Math.max(300, 0.68 * innerHeight), 1.2 * width)));
+  sized(svg, width, height);
+  scale = Math.min((width - 2 * margin) / (right - left || 1e-300), (height - 2 * margin) / (high - low || 1e-300));
+  px = (x) => width / 2 + scale * (x - (left + right) / 2);
+  py = (y) => height / 2 - scale * (y - (low + high) / 2);
+  for (const { series, parts } of figures) {
+    for (const [k, shape] of series.shapes.entries()) if (shape.s !== undefined) parts[k].setAttribute("r", Math.max(shape.s * scale, LEAST[shape.r] ?? 0).toFixed(2));
+  }
+  missing.setAttribute("x", width / 2);
+  missing.setAttribute("y", 20);
+  // a length to measure by
+  const length = stepOf(0, width / scale, 5);
+  const [x, y] = [14, height - 14];
+  bar.setAttribute("d", `M${x} ${y - 4}V${y + 4}M${x} ${y}H${(x + length * scale).toFixed(1)}M${(x + length * scale).toFixed(1)} ${y - 4}V${y + 4}`);
+  barText = [x + (length * scale) / 2, y - 10, length < 1 ? `${short(1000 * length)} mm` : `${short(length)} m`];
+  drawTraces();
+}
+
+// --- values and controls ------------------------------------------------------------------------------------------------
+table("Points", [...pointHeads, "path"], whole.points.map((p) => [p.name, [p.x, p.y]]), () => true, (row, name) => {
+  const box = put(put(row, "td"), "input", { type: "checkbox", "aria-label": `path of ${name}` });
+  box.checked = traced.has(name);
+  box.addEventListener("change", () => {
+    traced[box.checked ? "add" : "delete"](name);
+    drawTraces();
+  });
+});
+const links = whole.bodies.slice(1);
+const turning = ["angle", "omega", "alpha"].filter((key) => links.some((b) => head(b[key])));
+table("Links", turning.map((key) => suffix(head(links[0][key]), links[0].name)), links.map((b) => [b.name, turning.map((key) => b[key])]), (k) => k === 0);
+if (whole.forces.length) {
+  table("Joint forces", [`x, ${data.units.f}`, `y, ${data.units.f}`], whole.forces.map((f) => [f.name, [f.x, f.y]]), () => false);
+}
+const flips = (name, then) => (on) => {
+  drawn[name] = on;
+  then?.(on);
+  legend();
+};
+toggle("n", "names", drawn.names, flips("names"));
+toggle("v", "velocities", false, flips("velocity"), longest.velocity > 0);
+toggle("a", "accelerations", false, flips("acceleration"), longest.acceleration > 0);
+if (whole.forces.length) toggle("f", "joint forces", drawn.forces, flips("forces"), longest.force > 0);
+toggle("i", "instant centres", false, flips("centres", centreTable), velocities && longest.velocity > 0);
+toggle("p", "velocity polygon", false, flips("polygon", polygonOn), velocities && longest.velocity > 0);
+legend();
+watchers.push(drawAll);
+start({ resize });

@@ -1,0 +1,380 @@
+// What every page shares: numbers, play and pause, slider, keys, table, plots. A scene (plane.js, space.js) draws.
+const data = JSON.parse(document.getElementById("data").textContent);
+const $ = (id) => document.getElementById(id);
+
+// --- elements: text is always text --------------------------------------------------------------------------------
+function make(name, attributes = {}, text) {
+  const svg = ["svg", "g", "path", "circle", "line", "text", "title"].includes(name);
+  const found = svg ? document.createElementNS("http://www.w3.org/2000/svg", name) : document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) found.setAttribute(key, value);
+  if (text !== undefined) found.textContent = text;
+  return found;
+}
+function put(parent, ...rest) {
+  return parent.appendChild(make(...rest));
+}
+function svgIn(host) {
+  return put(host, "svg", { role: "img" });
+}
+// one unit of a picture is one pixel of the screen: words keep their size on a phone
+function sized(svg, width, height) {
+  for (const [key, value] of Object.entries({ width, height, viewBox: `0 0 ${width} ${height}` })) svg.setAttribute(key, value);
+}
+// a picture of words made anew at every pose
+function texts(parent) {
+  const pool = [];
+  let used = 0;
+  return {
+    put(x, y, text, kind) {
+      const one = pool[used] ?? (pool[used] = put(parent, "text"));
+      used++;
+      one.setAttribute("x", x.toFixed(1));
+      one.setAttribute("y", y.toFixed(1));
+      one.setAttribute("class", kind);
+      one.textContent = text;
+    },
+    done() {
+      while (pool.length > used) pool.pop().remove();
+      used = 0;
+    },
+  };
+}
+function arrow(x, y, dx, dy) {
+  const length = Math.hypot(dx, dy);
+  if (!(length > 1.5)) return "";
+  const [u, v] = [dx / length, dy / length];
+  const head = Math.min(9, length / 2);
+  const end = [x + dx, y + dy];
+  const barb = (side) => [end[0] - head * (u - side * 0.42 * v), end[1] - head * (v + side * 0.42 * u)];
+  return `M${fixed(x, y)}L${fixed(...end)}M${fixed(...barb(1))}L${fixed(...end)}L${fixed(...barb(-1))}`;
+}
+function fixed(x, y) {
+  return `${x.toFixed(2)} ${y.toFixed(2)}`;
+}
+
+// --- numbers --------------------------------------------------------------------------------------------------------
+function unpack(column, n) {
+  if ("all" in column) return new Float64Array(n).fill(column.all);
+  const Kind = "f8" in column ? Float64Array : Float32Array;
+  const bytes = Uint8Array.from(atob(column.f8 ?? column.f4), (c) => c.charCodeAt(0));
+  // least significant byte first on every machine that shows pages
+  return new Kind(bytes.buffer);
+}
+for (const series of data.series) {
+  for (const column of series.columns) column.values = unpack(column, series.n);
+}
+// every digit, as the CSV has it
+function exact(x) {
+  if (!Number.isFinite(x)) return "–";
+  const [mantissa, power] = x.toExponential().split("e");
+  const e = Number(power);
+  if (x !== 0 && (e < -4 || e >= 16)) return `${mantissa}e${e < 0 ? "-" : "+"}${String(Math.abs(e)).padStart(2, "0")}`;
+  return Number.isInteger(x) ? `${x === 0 ? 0 : x}.0` : String(x);
+}
+// six digits, as a table on a terminal has them
+function short(x) {
+  return Number.isFinite(x) ? String(Number(x.toPrecision(6))) : "–";
+}
+// a cell with every digit, those beyond the sixth small
+function fill(cell, x) {
+  const text = exact(x);
+  const [, lead, rest, power] = /^(-?(?:0\.0*)?(?:\d\.?){1,6})(\d*\.?\d*)(e.*)?$/.exec(text) ?? [0, text, "", ""];
+  cell.replaceChildren(lead);
+  if (rest) put(cell, "small", {}, rest);
+  if (power) cell.append(power);
+}
+function range(values) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const x of values) {
+    if (x < low) low = x;
+    if (x > high) high = x;
+  }
+  return [low, high];
+}
+// the step at which at most so many ticks fit; degrees over much of a turn go by parts of it
+function stepOf(low, high, most, degrees = false) {
+  const rough = (high - low) / most;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const turned = degrees && rough > 10 ? [15, 30, 60, 90, 180, 360, 720, 3600].find((m) => m >= rough) : undefined;
+  return turned ?? power * [1, 2, 5, 10].find((m) => m * power >= rough * (1 - 1e-9));
+}
+function ticks(low, high, step) {
+  const found = [];
+  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) found.push(Number((i * step).toPrecision(12)));
+  return found;
+}
+
+// --- the pose shown, and time -----------------------------------------------------------------------------------------
+const whole = data.series[0];
+const n = whole.n;
+const watchers = []; // called with each new pose
+let shown = 0;
+function show(i) {
+  shown = Math.max(0, Math.min(n - 1, Math.round(i)));
+  $("slider").value = shown;
+  $("slider").setAttribute("aria-valuetext", said(shown));
+  $("pose").textContent = `${said(shown)}${n > 1 ? `  (pose ${shown + 1} of ${n})` : ""}`;
+  for (const watch of watchers) watch(shown);
+}
+function said(i) {
+  return whole.over.map((k) => `${whole.columns[k].header} ${short(whole.columns[k].values[i])}`).join(", ");
+}
+// seconds at speed 1 at which each pose is due: the poses' own time, or some seconds for a turn of the input
+const clock = data.clock === undefined ? Float64Array.from({ length: n }, (_, i) => (i * data.lasts) / Math.max(1, n - 1)) : whole.columns[data.clock].values.map((t) => t * (whole.columns[data.clock].si ?? 1));
+const begins = clock[0];
+const lasts = clock[n - 1] - clock[0];
+const speeds = Array.from({ length: 21 }, (_, i) => 2 ** (i - 10));
+let speed = 10;
+let playing = false;
+let place = 0; // seconds since the beginning
+let way = 1;
+let last;
+// a sweep that does not come back to its beginning is played back and forth
+const wraps = data.wraps ?? true;
+function play(on) {
+  playing = on && lasts > 0;
+  $("play").textContent = playing ? "❚❚" : "▶";
+  $("play").setAttribute("aria-label", playing ? "pause" : "play");
+  if (!playing) return;
+  place = clock[shown] - begins;
+  if (!wraps && shown === n - 1) way = -1;
+  if (!wraps && shown === 0) way = 1;
+  last = undefined;
+  requestAnimationFrame(frame);
+}
+function frame(now) {
+  if (!playing) return;
+  if (last !== undefined) place += (way * speeds[speed] * Math.min(now - last, 200)) / 1000;
+  last = now;
+  if (wraps) place = ((place % lasts) + lasts) % lasts;
+  else if (place > lasts) [place, way] = [Math.max(0, 2 * lasts - place), -1];
+  else if (place < 0) [place, way] = [Math.min(lasts, -place), 1];
+  let [low, high] = [0, n - 1];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (clock[middle] - begins <= place) low = middle;
+    else high = middle;
+  }
+  const near = place - (clock[low] - begins) < clock[high] - begins - place ? low : high;
+  if (near !== shown) show(near);
+  requestAnimationFrame(frame);
+}
+function jump(i) {
+  play(false);
+  show(i);
+}
+function faster(by) {
+  speed = Math.max(0, Math.min(speeds.length - 1, speed + by));
+  $("speed").selectedIndex = speed;
+}
+
+// --- controls ---------------------------------------------------------------------------------------------------------
+const keys = new Map(); // key -> [what it does, its words]
+function onKey(key, words, act) {
+  keys.set(key, act);
+  $("keys").append(`${key === " " ? "space" : key}: ${words}. `);
+}
+function controls() {
+  $("slider").max = n - 1;
+  for (const id of ["slider", "play", "first", "back", "ahead", "speed"]) $(id).disabled = n < 2;
+  $("slider").addEventListener("input", () => jump(Number($("slider").value)));
+  for (const [i, s] of speeds.entries()) put($("speed"), "option", { value: i }, s < 1 ? `1/${1 / s}` : `${s}`);
+  // what takes less than 3 s or more than 20 s is shown slower or faster at first
+  while (lasts > 0 && lasts / speeds[speed] < 3 && speed > 0) speed--;
+  while (lasts / speeds[speed] > 20 && speed < speeds.length - 1) speed++;
+  faster(0);
+  $("speed").addEventListener("change", () => (speed = $("speed").selectedIndex));
+  onKey(" ", "play, pause", () => play(!playing));
+  onKey("ArrowLeft", "one pose back, with shift ten", (e) => jump(shown - (e.shiftKey ? 10 : 1)));
+  onKey("ArrowRight", "one pose ahead, with shift ten", (e) => jump(shown + (e.shiftKey ? 10 : 1)));
+  onKey("Home", "first pose", () => jump(0));
+  onKey("End", "last pose", () => jump(n - 1));
+  onKey("-", "slower", () => faster(-1));
+  onKey("+", "faster", () => faster(1));
+  $("play").addEventListener("click", () => play(!playing));
+  $("first").addEventListener("click", () => jump(0));
+  $("back").addEventListener("click", () => jump(shown - 1));
+  $("ahead").addEventListener("click", () => jump(shown + 1));
+  document.addEventListener("keydown", (event) => {
+    const act = keys.get(event.key);
+    const here = event.target;
+    if (!act || event.ctrlKey || event.metaKey || event.altKey || here.tagName === "SELECT") return;
+    // a button that has the focus is pressed by space itself
+    if (event.key === " " && (here.tagName === "BUTTON" || here.tagName === "SUMMARY")) return;
+    event.preventDefault();
+    act(event);
+  });
+}
+function toggle(key, words, on, change, possible = true) {
+  const button = put($("toggles"), "button", { type: "button", "aria-pressed": on && possible, title: `${words} (${key})`, "data-toggle": words }, words);
+  button.disabled = !possible;
+  const flip = () => {
+    if (button.disabled) return;
+    const now = button.getAttribute("aria-pressed") !== "true";
+    button.setAttribute("aria-pressed", now);
+    change(now);
+    show(shown);
+  };
+  button.addEventListener("click", flip);
+  onKey(key, words, flip);
+}
+function theme() {
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  let own = null;
+  const set = () => (document.documentElement.dataset.theme = own ?? (dark.matches ? "dark" : "light"));
+  const flip = () => {
+    own = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
+    set();
+  };
+  dark.addEventListener("change", set);
+  $("theme").addEventListener("click", flip);
+  onKey("d", "dark or light", flip);
+  set();
+}
+
+// --- the table of a pose ----------------------------------------------------------------------------------------------
+// rows: [name, [column or null, ...]]; the columns marked exact show every digit
+function table(caption, heads, rows, exactly, more) {
+  const scroll = put($("values"), "div", { class: "scroll" });
+  const found = put(scroll, "table");
+  put(found, "caption", {}, caption);
+  const head = put(put(found, "thead"), "tr");
+  for (const text of ["", ...heads]) put(head, "th", { scope: "col" }, text);
+  const body = put(found, "tbody");
+  const cells = [];
+  for (const [name, columns] of rows) {
+    const row = put(body, "tr", { "data-name": name });
+    put(row, "th", { scope: "row" }, name);
+    for (const [k, column] of columns.entries()) cells.push([put(row, "td"), column, exactly(k)]);
+    if (more) more(row, name);
+  }
+  watchers.push((i) => {
+    for (const [cell, k, every] of cells) {
+      const x = k === null ? NaN : whole.columns[k].values[i];
+      if (every) fill(cell, x);
+      else cell.textContent = k === null ? "" : short(x);
+    }
+  });
+}
+
+// --- plots ------------------------------------------------------------------------------------------------------------
+const plots = [];
+function plot(column) {
+  const host = put($("plots"), "div", { class: "plot" });
+  const line = put(host, "div");
+  const choice = put(line, "select", { "aria-label": "column" });
+  const groups = new Map();
+  for (const [k, c] of whole.columns.entries()) {
+    if (!c.header) continue;
+    const group = groups.get(c.owner) ?? put(choice, "optgroup", { label: c.owner || "input" });
+    groups.set(c.owner, group);
+    put(group, "option", { value: k }, c.header);
+  }
+  choice.value = column;
+  const value = put(line, "output");
+  const away = put(line, "button", { type: "button", "aria-label": "remove this plot", title: "remove this plot" }, "×");
+  const svg = svgIn(host);
+  const x = data.x === undefined ? Float64Array.from({ length: n }, (_, i) => i + 1) : whole.columns[data.x].values;
+  const margin = { left: 58, right: 18, top: 8, bottom: 30 };
+  let cursor, dot, ghosts, px, py;
+  const chart = {
+    draw() {
+      const k = Number(choice.value);
+      const [width, height] = [Math.max(200, host.clientWidth), 150];
+      svg.replaceChildren();
+      sized(svg, width, height);
+      put(svg, "title", {}, whole.columns[k].header);
+      const lines = data.series.map((s) => s.columns[k]?.values ?? []);
+      let [low, high] = range(lines.flatMap((values) => range(values)).filter(Number.isFinite));
+      if (!(low <= high)) [low, high] = [0, 1];
+      const pad = (high - low) * 0.06 || Math.abs(high) * 0.1 || 1;
+      [low, high] = [low - pad, high + pad];
+      let [left, right] = range(x);
+      if (left === right) [left, right] = [left - 1, right + 1];
+      px = (v) => margin.left + ((v - left) / (right - left)) * (width - margin.left - margin.right);
+      py = (v) => height - margin.bottom - ((v - low) / (high - low)) * (height - margin.top - margin.bottom);
+      const under = data.x === undefined ? "pose" : whole.columns[data.x].header;
+      for (const t of ticks(left, right, stepOf(left, right, Math.max(2, width / 70), under.endsWith("_deg")))) {
+        put(svg, "line", { class: "grid", x1: px(t), x2: px(t), y1: margin.top, y2: height - margin.bottom });
+        put(svg, "text", { class: "tick", x: px(t), y: height - margin.bottom + 13, "text-anchor": "middle" }, short(t));
+      }
+      for (const t of ticks(low, high, stepOf(low, high, 4))) {
+        put(svg, "line", { class: "grid", x1: margin.left, x2: width - margin.right, y1: py(t), y2: py(t) });
+        put(svg, "text", { class: "tick", x: margin.left - 5, y: py(t) + 4, "text-anchor": "end" }, short(t));
+      }
+      put(svg, "text", { class: "tick", x: width - margin.right, y: height - 4, "text-anchor": "end" }, under);
+      const jumps = /deg$/.test(whole.columns[k].header) ? 180 : Infinity;
+      for (const [s, values] of [...lines.entries()].reverse()) {
+        let d = "";
+        let pen = false;
+        for (let i = 0; i < values.length; i++) {
+          const y = values[i];
+          if (!Number.isFinite(y)) pen = false;
+          else {
+            if (i && Math.abs(y - values[i - 1]) > jumps) pen = false;
+            d += (pen ? "L" : "M") + fixed(px(x[i] ?? i), py(y));
+            pen = true;
+          }
+        }
+        put(svg, "path", { class: s ? "curve ghost" : "curve", d });
+      }
+      cursor = put(svg, "line", { class: "cursor", y1: margin.top, y2: height - margin.bottom });
+      dot = put(svg, "circle", { class: "dot", r: 4.5 });
+      this.at(shown);
+    },
+    at(i) {
+      const y = whole.columns[Number(choice.value)].values[i];
+      for (const end of ["x1", "x2"]) cursor.setAttribute(end, px(x[i]));
+      dot.style.display = Number.isFinite(y) ? "" : "none";
+      if (Number.isFinite(y)) {
+        dot.setAttribute("cx", px(x[i]));
+        dot.setAttribute("cy", py(y));
+      }
+      value.textContent = short(y);
+    },
+  };
+  const seek = (event) => {
+    const at = event.clientX - svg.getBoundingClientRect().left;
+    let near = 0;
+    for (let i = 1; i < n; i++) if (Math.abs(px(x[i]) - at) < Math.abs(px(x[near]) - at)) near = i;
+    jump(near);
+  };
+  svg.addEventListener("pointerdown", (event) => {
+    svg.setPointerCapture(event.pointerId);
+    seek(event);
+  });
+  svg.addEventListener("pointermove", (event) => {
+    if (event.buttons) seek(event);
+  });
+  choice.addEventListener("change", () => chart.draw());
+  away.addEventListener("click", () => {
+    plots.splice(plots.indexOf(chart), 1);
+    host.remove();
+  });
+  plots.push(chart);
+  chart.draw();
+}
+
+// --- the beginning ------------------------------------------------------------------------------------------------------
+// scene: {resize()} lays out anew where the window has another size
+function start(scene) {
+  controls();
+  theme();
+  watchers.push((i) => plots.forEach((one) => one.at(i)));
+  const lay = () => {
+    scene.resize();
+    plots.forEach((one) => one.draw());
+    show(shown);
+  };
+  lay();
+  data.plots.forEach(plot);
+  $("more").addEventListener("click", () => plot(data.plots.at(-1)));
+  let width = innerWidth;
+  addEventListener("resize", () => {
+    if (innerWidth !== width) lay();
+    width = innerWidth;
+  });
+  // a sheet of paper has another width than the window
+  addEventListener("beforeprint", lay);
+  addEventListener("afterprint", lay);
+}

@@ -1,0 +1,158 @@
+"""Help in panels, choices as choices, an example that runs; colour and progress on a terminal alone."""
+
+from __future__ import annotations
+
+import io
+import os
+import pty
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from cli.app import COMMANDS
+from cli.show.progress import progress
+
+Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+COMMAND = Path(sys.executable).with_name("dalembert")
+SOLVING = ("balance", "field", "place", "mechanism", "work", "body", "spin")
+
+
+def on_a_terminal(folder: Path, *words: str, **environment: str) -> str:
+    """What a command shows on a terminal of 120 columns, standard error too."""
+    here, there = pty.openpty()
+    env = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "COLUMNS")}
+    process = subprocess.Popen(
+        [str(COMMAND), *words],
+        stdin=subprocess.DEVNULL,
+        stdout=there,
+        stderr=there,
+        cwd=folder,
+        env={**env, "TERM": "xterm", "COLUMNS": "120", **environment},
+    )
+    os.close(there)
+    shown = b""
+    while True:
+        try:
+            part = os.read(here, 65536)
+        except OSError:
+            break
+        if not part:
+            break
+        shown += part
+    process.wait(timeout=60)
+    os.close(here)
+    return shown.decode().replace("\r\n", "\n")
+
+
+@pytest.mark.parametrize("command", SOLVING)
+def test_options_stand_in_panels_of_at_most_ten(command: str, dalembert: Dalembert) -> None:
+    page = dalembert(command, "--help").stdout
+    panels = re.split(r"^(?=\S.*:$)", page, flags=re.MULTILINE)[1:]
+    titles = [panel.splitlines()[0] for panel in panels]
+    assert titles[0] == "Arguments:"
+    assert titles[1] == "What:"
+    assert "Output:" in titles
+    # every option has a panel
+    assert "Options:" not in titles
+    for panel in panels:
+        assert len(re.findall(r"^  -", panel, re.MULTILINE)) <= 10, panel
+    assert len(re.findall(r"^  (?:-., )?--", page, re.MULTILINE)) >= 17
+
+
+def test_help_is_as_wide_as_the_terminal(tmp_path: Path) -> None:
+    for columns in (80, 150):
+        page = on_a_terminal(tmp_path, "field", "--help", COLUMNS=str(columns))
+        widest = max(map(len, page.splitlines()))
+        assert columns - 22 < widest <= columns
+
+
+def test_choices_are_shown_as_choices(dalembert: Dalembert) -> None:
+    page = dalembert("field", "--help").stdout
+    for choices in ("<least-squares|minimax>", "<influence|four-run>", "<ccw|cw>"):
+        assert choices in page
+    assert "<position|velocity|acceleration|jerk>" in dalembert("mechanism", "--help").stdout
+    done = dalembert("field", "x.csv", "--objective", "minmax")
+    assert done.returncode == 2
+    assert "'least-squares', 'minimax'" in done.stderr
+
+
+@pytest.mark.parametrize("command", SOLVING)
+def test_the_example_of_the_help_runs(command: str, dalembert: Dalembert) -> None:
+    page = dalembert(command, "--help").stdout
+    title, line = page.rstrip().splitlines()[-2:]
+    found = re.match(r"Example \(dalembert (examples \S+) writes its files here\):$", title)
+    assert found is not None
+    assert dalembert(*shlex.split(found[1])).returncode == 0
+    program, *words = shlex.split(line)
+    assert program == "dalembert"
+    assert words[0] == command
+    done = dalembert(*words)
+    assert done.returncode == 0, done.stderr
+
+
+def test_every_command_has_help(dalembert: Dalembert) -> None:
+    for command in COMMANDS:
+        done = dalembert(command, "-h")
+        assert done.returncode == 0
+        assert done.stdout.startswith(f"Usage: dalembert {command} ")
+
+
+ROTOR = "mass_g,radius_mm,angle_deg\n5,20,30\n"
+JUDGED = ("balance", "r.csv", "--plane", "A:20mm", "--permissible", "50g_mm", "--round-mass", "5g")
+
+
+def test_colour_is_for_verdicts_warnings_and_marks_on_a_terminal(
+    dalembert: Dalembert, tmp_path: Path
+) -> None:
+    (tmp_path / "r.csv").write_text(ROTOR.replace("\n5,", ",x\n5,").replace("30\n", "30,1\n"))
+    shown = on_a_terminal(tmp_path, *JUDGED)
+    assert "(\033[1;31mbeyond\033[0m), residual 0 (\033[32mwithin\033[0m)" in shown
+    assert shown.count("\033[33mwarning:\033[0m") == 1
+    assert shown.count("\033[") == 6
+    # a warning is not carried out of sight by the table
+    assert shown.index("warning:") > shown.index("residual 0")
+    plain = re.sub(r"\033\[[\d;]*m", "", shown)
+    for quiet in (
+        on_a_terminal(tmp_path, *JUDGED, "--no-color"),
+        on_a_terminal(tmp_path, *JUDGED, NO_COLOR="1"),
+        on_a_terminal(tmp_path, *JUDGED, TERM="dumb"),
+    ):
+        assert quiet == plain
+    assert "\033" not in dalembert(*JUDGED, "--text").stdout
+
+
+def test_an_expectation_that_fails_is_red(tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text(ROTOR)
+    (tmp_path / "e.csv").write_text("mass_g,angle_deg\n5,30\n")
+    shown = on_a_terminal(tmp_path, "balance", "r.csv", "--plane", "A:20mm", "--expect", "e.csv")
+    assert "\033[32mok\033[0m" in shown
+    assert "\033[1;31mWRONG\033[0m" in shown
+
+
+def test_words_that_are_no_verdicts_stay_plain(tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text("rotor,mass_g,radius_mm,angle_deg\nwithin,5,20,30\nbeyond,5,20,30\n")
+    assert "\033" not in on_a_terminal(tmp_path, "balance", "r.csv", "--plane", "within:20mm")
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(("seconds", "shown"), [(0.1, False), (0.7, True)])
+def test_progress_is_for_work_of_more_than_two_seconds(
+    seconds: float, shown: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter(k * seconds for k in range(100))
+    monkeypatch.setattr("time.monotonic", lambda: next(clock))
+    for stream, speaks in ((Terminal(), shown), (io.StringIO(), False)):
+        monkeypatch.setattr(sys, "stderr", stream)
+        assert list(progress(range(8), 8, "rotors")) == list(range(8))
+        assert ("of 8 rotors" in stream.getvalue()) == speaks
+        # nothing of it stays on the line
+        assert stream.getvalue().rpartition("\r")[2] == ""

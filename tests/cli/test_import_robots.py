@@ -1,0 +1,302 @@
+"""`dalembert import` of planar robots: URDF, SDF and MJCF as others write them, and what is refused of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+
+import numpy as np
+import pytest
+
+from cli.errors import DataError
+from cli.imports.assembled import described
+from cli.imports.drawn import settle
+from cli.imports.told import read
+from virtualwork import Mechanism
+
+Run = Callable[..., "CompletedProcess[str]"]
+
+
+def taken(text: str, folder: Path | None = None) -> tuple[Mechanism, list[str]]:
+    """The only mechanism of a robot file, and everything that is said."""
+    _, (drawing,) = read("file", text.encode(), None, folder)
+    (part,) = settle(drawing)
+    made = described(part, "test")
+    return Mechanism.from_toml_text(made), drawing.notes + part.notes
+
+
+def refused(text: str, folder: Path | None = None) -> str:
+    with pytest.raises(DataError) as error:
+        taken(text, folder)
+    return str(error.value)
+
+
+# the four-bar of Gazebo's own tutorial: links in one plane, joints where they meet
+SDF = """<?xml version="1.0"?>
+<sdf version="1.6"><model name="four bar"><pose>0 0 0.5 0 0 0</pose>
+<link name="AB"><pose>0 0 0 0 0 0</pose><inertial><pose>0 0.1 0 0 0 0</pose><mass>2</mass>
+  <inertia><ixx>0.01</ixx><iyy>0.001</iyy><izz>0.011</izz></inertia></inertial></link>
+<link name="BC"><pose>0 0.2 0 0 0 0</pose></link>
+<link name="CD"><pose>0.3 0.2 0 0 0 0</pose></link>
+<frame name="P" attached_to="BC"><pose>0.1 0.05 0 0 0 0</pose></frame>
+<joint name="A" type="revolute"><parent>world</parent><child>AB</child><axis><xyz>0 0 1</xyz></axis></joint>
+<joint name="B" type="revolute"><parent>AB</parent><child>BC</child><axis><xyz>0 0 1</xyz></axis></joint>
+<joint name="C" type="revolute"><parent>BC</parent><child>CD</child><axis><xyz>0 0 1</xyz></axis></joint>
+<joint name="D" type="revolute"><parent>world</parent><child>CD</child><pose>0.02 -0.2 0 0 0 0</pose>
+  <axis><xyz>0 0 1</xyz></axis></joint>
+</model></sdf>"""
+
+URDF = """<robot name="four bar">
+<link name="base"/><link name="crank"/><link name="coupler"/><link name="rocker"/><link name="tip"/>
+<joint name="A" type="continuous"><parent link="base"/><child link="crank"/><axis xyz="0 -1 0"/>
+  <origin xyz="0 0 0.5"/></joint>
+<joint name="B" type="continuous"><parent link="crank"/><child link="coupler"/><axis xyz="0 1 0"/>
+  <origin xyz="0 0 0.2"/></joint>
+<joint name="D" type="continuous"><parent link="base"/><child link="rocker"/><axis xyz="0 1 0"/>
+  <origin xyz="0.32 0 0.5"/></joint>
+<joint name="P" type="fixed"><parent link="coupler"/><child link="tip"/><origin xyz="0.1 0 0.05"/></joint>
+{loop}
+<transmission name="t"><joint name="A"/></transmission>
+</robot>"""
+LOOPS = {
+    "gazebo": """<gazebo><joint name="C" type="revolute"><parent>coupler</parent><child>rocker</child>
+<pose>-0.02 0 0.2 0 0 0</pose><axis><xyz>0 1 0</xyz></axis></joint></gazebo>""",
+    "loop_joint": """<loop_joint name="C" type="continuous"><link1 link="coupler" xyz="0.3 0 0"/>
+<link2 link="rocker" xyz="-0.02 0 0.2"/><axis xyz="0 1 0"/></loop_joint>""",
+    "second parent": """<link name="end"/>
+<joint name="E" type="fixed"><parent link="rocker"/><child link="end"/><origin xyz="-0.02 0 0.2"/></joint>
+<joint name="C" type="continuous"><parent link="coupler"/><child link="end"/><axis xyz="0 1 0"/>
+  <origin xyz="0.3 0 0"/></joint>""",
+}
+
+PISTON = 0.1 + 0.3 * math.cos(math.radians(20)), 1 - 0.3 * math.sin(math.radians(20))
+MJCF = f"""<mujoco model="slider crank">
+<compiler angle="degree" inertiafromgeom="false"/>
+<default><joint axis="0 1 0"/><default class="rail"><joint type="slide" axis="1 0 0"/></default></default>
+<worldbody>
+ <body name="crank" pos="0 0 1"><joint name="hip" damping="1"/>
+  <inertial pos="0.05 0 0" mass="0.2" diaginertia="1e-4 2e-4 3e-4"/>
+  <body name="rod" pos="0.1 0 0" euler="0 20 0"><joint name="knee"/><site name="mid" pos="0.15 0 0"/></body></body>
+ <body name="piston" pos="{PISTON[0]!r} 0 {PISTON[1]!r}"><joint name="bore" class="rail"/></body>
+</worldbody>
+<equality><connect body1="rod" body2="piston" anchor="0.3 0 0"/></equality>
+<actuator><position name="m" joint="hip"/></actuator>
+<keyframe><key qpos="0 0 0" qvel="3 0 0"/></keyframe>
+</mujoco>"""
+
+
+def test_an_sdf_model_stands_where_its_poses_say() -> None:
+    m, notes = taken(SDF)
+    assert set(m.links) == {"AB", "BC", "CD"}
+    motion = m.motion()
+    places = {"A": (0, 0), "B": (0, 0.2), "C": (0.3, 0.2), "D": (0.32, 0), "P": (0.1, 0.25)}
+    for point, at in places.items():
+        assert motion.point(point).position[0] == pytest.approx(at, abs=1e-15)
+    assert m.rigid["AB"].mass == 2
+    assert m.rigid["AB"].inertia == 0.011
+    assert any("no actuator: A is taken as the input" in note for note in notes)
+    turned = m.motion(0.3).point("C").position[0]
+    assert math.dist(turned, (0.32, 0)) == pytest.approx(math.hypot(0.02, 0.2), rel=1e-14)
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_a_urdf_loop_is_closed_in_each_of_its_notations(loop: str) -> None:
+    m, notes = taken(URDF.format(loop=LOOPS[loop]))
+    motion = m.motion()
+    # the plane is x-z
+    for point, at in {"B": (0, 0.7), "C": (0.3, 0.7), "D": (0.32, 0.5), "tip": (0.1, 0.75)}.items():
+        assert motion.point(point).position[0] == pytest.approx(at, abs=1e-14), point
+    assert m.inputs[0].link == "crank"
+    assert not any("actuator" in note for note in notes)
+    turned = m.motion(0.2).point("C").position[0]
+    assert math.dist(turned, (0.32, 0.5)) == pytest.approx(math.hypot(0.02, 0.2), rel=1e-13)
+
+
+def test_an_mjcf_slider_crank_with_classes_and_degrees() -> None:
+    m, notes = taken(MJCF)
+    assert m.guides[0].is_slider
+    assert m.gravity == pytest.approx(-9.81j)
+    assert m.rigid["crank"].inertia == 2e-4
+    # a joint about +y turns clockwise in the plane x-z
+    assert m.inputs[0].speed == pytest.approx(-3.0)
+    motion = m.motion()
+    along = math.cos(math.radians(20))
+    assert motion.point("mid").position[0] == pytest.approx(
+        (0.1 + 0.15 * along, 1 - 0.15 * math.sin(math.radians(20)))
+    )
+    q = 0.4
+    x = 0.1 * math.cos(q) + math.sqrt(0.09 - (0.1 * math.sin(q) + 0.3 * math.sin(math.radians(20))) ** 2)
+    assert m.motion(q).link("rod").angle[0] < 0
+    piston = m.motion(q).point("connect 1").position[0]
+    assert piston == pytest.approx((x, 1 - 0.3 * math.sin(math.radians(20))), rel=1e-12)
+    assert any("damping of hip: left out" in note for note in notes)
+
+
+def test_mujoco_agrees_with_what_is_read_of_poses() -> None:
+    """Every way to write an orientation, nested frames and defaults, against MuJoCo's own reader."""
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
+    from cli.read.robots.reading import read as read_robot
+
+    text = """<mujoco><compiler angle="degree" eulerseq="zyX"/>
+<default><default class="s"><site pos="0 0 0.1"/></default></default><worldbody>
+<body name="a" pos="1 2 3" euler="10 20 30"><joint axis="1 2 3" pos=".1 .2 .3"/><geom size=".1"/>
+ <frame pos="0 1 0" axisangle="0 1 1 40"><body name="b" quat="1 2 3 4" childclass="s"><joint type="slide"/><geom size=".1"/>
+  <site name="p"/><frame zaxis="1 1 -1"><site name="q" pos="1 0 0"/></frame>
+  <body name="c" xyaxes="1 1 0 0 1 1"><geom size=".1"/><body name="d" zaxis="0 0 -1"><geom size=".1"/></body></body></body></frame>
+</body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    state = mujoco.MjData(model)
+    mujoco.mj_forward(model, state)
+    robot = read_robot("file", text.encode(), None)
+    for name in "abcd":
+        assert robot.links[name].pose[:3, 3] == pytest.approx(state.body(name).xpos, abs=1e-14)
+        assert robot.links[name].pose[:3, :3] == pytest.approx(state.body(name).xmat.reshape(3, 3), abs=1e-14)
+    for name, link in (("p", "b"), ("q", "b")):
+        at = robot.links[link].pose @ np.append(robot.links[link].points[name], 1)
+        assert at[:3] == pytest.approx(state.site(name).xpos, abs=1e-14)
+    first = next(iter(robot.joints.values()))
+    assert first.axis == pytest.approx(state.xaxis[0], abs=1e-14)
+    assert first.ends[1] == pytest.approx(state.xanchor[0], abs=1e-14)
+
+
+def test_poses_of_sdf_relative_to_frames_links_and_in_degrees() -> None:
+    text = SDF.replace(
+        '<link name="BC"><pose>0 0.2 0 0 0 0</pose></link>',
+        '<frame name="F"><pose degrees="true">0 0 0 0 0 90</pose></frame>'
+        '<link name="BC"><pose relative_to="F">0.2 0 0 0 0 -1.5707963267948966</pose></link>',
+    ).replace('version="1.6"', 'version="1.9"')
+    m, _ = taken(text)
+    assert m.motion().point("B").position[0] == pytest.approx((0, 0.2), abs=1e-15)
+    assert "relative to itself" in refused(
+        text.replace('<frame name="F"><pose degrees="true">', '<frame name="F"><pose relative_to="BC">')
+    )
+
+
+def test_a_robot_whose_loop_is_open_as_it_stands_is_assembled_and_said() -> None:
+    m, notes = taken(URDF.format(loop=LOOPS["loop_joint"].replace("-0.02 0 0.2", "0 0 0.25")))
+    assert any("joint C is 0.0539 m open as the file stands" in note for note in notes)
+    (at,) = m.motion().point("C").position
+    assert math.dist(at, (0.32, 0.5)) == pytest.approx(0.25, rel=1e-12)
+
+
+def test_mimicked_joints_are_gears() -> None:
+    text = """<robot name="g"><link name="base"/><link name="a"/><link name="b"/>
+<joint name="one" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/></joint>
+<joint name="two" type="continuous"><parent link="base"/><child link="b"/><origin xyz="1 0 0"/><axis xyz="0 0 -1"/>
+<mimic joint="one" multiplier="2.5"/></joint></robot>"""
+    m, _ = taken(text)
+    assert m.motion(0.1, speed=2.0).link("b").omega[0] == pytest.approx(-5.0)
+
+
+def test_axes_rounded_to_a_few_digits_are_planar_and_said() -> None:
+    m, notes = taken(URDF.format(loop=LOOPS["gazebo"]).replace(
+        '<axis xyz="0 1 0"/>\n  <origin xyz="0 0 0.2"/>', '<axis xyz="0 0 1"/>\n  <origin xyz="0 0 0.2" rpy="-1.5708 0 0"/>'
+    ).replace("</link>", "</link>"))  # fmt: skip
+    assert any("axes are off by up to 0.00021 deg" in note for note in notes)
+    assert m.links
+
+
+# --- what is refused -----------------------------------------------------------------------------------------------
+def test_a_spatial_robot_is_refused_with_its_joint_and_by_how_much() -> None:
+    tilted = URDF.format(loop=LOOPS["gazebo"]).replace(
+        '<child link="rocker"/><axis xyz="0 1 0"/>', '<child link="rocker"/><axis xyz="0 1 0.1"/>'
+    )
+    assert refused(tilted) == (
+        "file: no planar mechanism: joint 'D': its axis stands 5.711 deg off the normal of the plane of the others"
+    )
+    lifted = MJCF.replace('type="slide" axis="1 0 0"', 'type="slide" axis="1 0.02 0"')
+    assert "joint 'bore': its slide leaves the plane by 1.146 deg" in refused(lifted)
+    floating = SDF.replace('name="C" type="revolute"', 'name="C" type="universal"')
+    assert "joint 'C' is of the type 'universal'" in refused(floating)
+
+
+BOMB = """<?xml version="1.0"?>
+<!DOCTYPE lolz [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">]>
+<{root} name="&b;"><link name="x"/></{root}>"""
+OUTSIDE = '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><{root} name="&x;"/>'
+
+
+@pytest.mark.parametrize("root", ["robot", "sdf", "mujoco"])
+@pytest.mark.parametrize("text", [BOMB, OUTSIDE, "<!DOCTYPE {root} SYSTEM 'http://x/y.dtd'><{root}/>"])
+def test_bombs_and_entities_are_refused(text: str, root: str) -> None:
+    assert refused(text.format(root=root)) == "file: declarations and entities of XML are refused"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<robot name='r'><link name='a'>", "line 1, column 32: no valid XML (no element found); is the file cut off?"),
+        ("<robot>\n<link name='a'></robot>", "line 2, column 18: no valid XML (mismatched tag)"),
+        ("<robot/>", "<robot>: no link"),
+        ("<robot><link/></robot>", "a <link> has no 'name'"),
+        ("<robot><link name='a'/><link name='a'/></robot>", "two links are called 'a'"),
+        ("<robot><link name='a'/></robot>", "nothing in it moves"),
+        ("<robot><link name='a'/><joint name='j' type='revolute'><parent link='a'/></joint></robot>", "joint 'j': <child link=…> is missing"),
+        ("<robot><link name='a'/><joint name='j' type='revolute'><parent link='b'/><child link='a'/></joint></robot>", "joint 'j': no link is called 'b': expected one of a"),
+        (URDF.format(loop="").replace('xyz="0 0 0.2"', 'xyz="0 0 ${2*0.1}"'), "joint 'B', origin xyz: found '${2*0.1}', expected a finite number"),
+        (URDF.format(loop="").replace('xyz="0 0 0.2"', 'xyz="0 0 nan"'), "joint 'B', origin xyz: found 'nan', expected a finite number"),
+        (URDF.format(loop="").replace('xyz="0 0 0.2"', 'xyz="0 0.2"'), "joint 'B', origin xyz: found '0 0.2', expected 3 numbers"),
+        (URDF.format(loop="").replace('xyz="0 -1 0"', 'xyz="0 0 0"'), "joint 'A', axis: found 0 0 0, expected a direction"),
+        (URDF.format(loop='<joint name="X" type="fixed"><parent link="rocker"/><child link="base"/></joint>'), "every link is the child of a joint"),
+        ("<sdf version='1.9'/>", "<sdf>: no <model>"),
+        (SDF.replace("<parent>AB</parent>", ""), "joint 'B': <parent> is missing"),
+        (SDF.replace("<pose>0 0.2 0 0 0 0</pose>", "<pose>0 0.2 0</pose>"), "link 'BC', pose: found '0 0.2 0', expected 6 numbers"),
+        (SDF.replace("<mass>2</mass>", "<mass>-2</mass>"), "link 'AB', mass: found -2, expected one of zero or more"),
+        (MJCF.replace('class="rail"/></body>', 'class="none"/></body>'), "no default class is called 'none'"),
+        (MJCF.replace('body2="piston"', 'body2="none"'), "no link is called 'none'"),
+        (MJCF.replace('joint="hip"', 'joint="none"'), "no joint is called 'none'"),
+        (MJCF.replace('euler="0 20 0"', 'quat="0 0 0 0"'), "body 'rod': found 0 0 0 0, expected a quaternion"),
+        ("<mujoco>" + "<frame>" * 200 + "</frame>" * 200 + "</mujoco>", "nested more than 100 deep"),
+        ("<html/>", "of no known kind: expected pmks-text"),
+    ],
+)  # fmt: skip
+def test_damaged_robots_are_refused_with_their_place(text: str, said: str) -> None:
+    assert said in refused(text)
+
+
+@pytest.mark.parametrize("text", [SDF, URDF.format(loop=LOOPS["gazebo"]), MJCF], ids=["sdf", "urdf", "mjcf"])
+def test_a_robot_cut_off_anywhere_is_refused(text: str) -> None:
+    for end in range(20, len(text) - 8, 37):
+        assert "file" in refused(text[:end])
+
+
+def test_includes_are_followed_inside_the_folder_alone(tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    home.mkdir()
+    body, rest = MJCF.split("<worldbody>")
+    (home / "world.xml").write_text(
+        "<mujoco><worldbody>" + rest.partition("</worldbody>")[0] + "</worldbody></mujoco>"
+    )
+    (tmp_path / "secret.xml").write_text("<mujoco/>")
+    text = body + '<include file="{}"/>' + rest.partition("</worldbody>")[2]
+    m, _ = taken(text.format("world.xml"), home)
+    assert set(m.links) == {"crank", "rod", "piston"}
+    for path in ("../secret.xml", str(tmp_path / "secret.xml")):
+        assert "lies outside the file's folder: not read" in refused(text.format(path), home)
+    (home / "link.xml").symlink_to(tmp_path / "secret.xml")
+    assert "lies outside" in refused(text.format("link.xml"), home)
+    assert "No such file" in refused(text.format("none.xml"), home)
+    assert "standard input has no folder" in refused(text.format("world.xml"))
+    (home / "loop.xml").write_text('<mujoco><include file="loop.xml"/></mujoco>')
+    assert "more than 20 files are included" in refused(text.format("loop.xml"), home)
+
+
+def test_a_large_robot_is_refused(dalembert: Run, tmp_path: Path) -> None:
+    (tmp_path / "big.urdf").write_bytes(b"<robot>" + b" " * 10_000_001)
+    for arguments in (("import", "big.urdf"), ("body", "big.urdf", "--check-inertias")):
+        done = dalembert(*arguments)
+        assert done.returncode == 1
+        assert "expected at most 10000000 (10 MB)" in done.stderr
+
+
+def test_the_command_tells_the_format_or_takes_its_name(dalembert: Run, tmp_path: Path) -> None:
+    (tmp_path / "robot.txt").write_text(SDF)
+    done = dalembert("import", "robot.txt", "-o", "m.toml")
+    assert done.returncode == 0, done.stderr
+    assert Mechanism.from_toml(tmp_path / "m.toml").name == "four bar"
+    assert dalembert("import", "robot.txt", "--from", "sdf").returncode == 0
+    assert dalembert("import", "-", stdin=SDF).returncode == 0
+    done = dalembert("import", "robot.txt", "--from", "linkage")
+    assert done.returncode == 1

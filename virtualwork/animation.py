@@ -1,0 +1,311 @@
+"""A motion as a page that moves: its drawing, its columns, and which of them are whose place, angle, rate and force.
+
+The columns are the caller's, under the names of the CSV with SI units (`H_x_m`, `coupler_angle_deg`, `H_vx_m_s`, …), and stand
+in the page with every digit of a position. What the drawing needs beyond them is added here: places of points that the columns
+leave out, and where nothing has a speed the velocities for a unit of the input, from which instant centres follow.
+
+A page holds a list of series: the first is drawn in full, the others as ghosts over it (other assemblies, variants).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dalembert.page import Page, Shown, fits, packed, page, rounded
+from virtualwork.describe.description import Description
+from virtualwork.describe.parts import GROUND
+from virtualwork.drawing import Circle, Coil, Drawing, Line, Shape
+from virtualwork.forces import Forces
+from virtualwork.formulas.numbers import xy
+from virtualwork.formulas.poses import Poses
+from virtualwork.table import columns
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+TURN = 6.0
+"""A turn of the input takes so many seconds at speed 1."""
+FINE = 181
+"""A path is drawn through so many poses a turn at least."""
+# what keeps every digit, with inputs and times; of rates and forces the page keeps seven
+_PLACE = re.compile(r"_([xy]_m|position_m|deg|rad)\Z")
+_RATES = {"v": "v{}_m_s", "a": "a{}_m_s2"}
+
+
+@dataclass(frozen=True)
+class JointForce:
+    """A joint's force on a link: the joint's point, what it is called, and the column of its x; that of y is named alike."""
+
+    point: str
+    name: str
+    column: str
+
+
+@dataclass
+class Series:
+    """Poses of one mechanism with their columns.
+
+    Parameters
+    ----------
+    poses, drawing
+        What moves, and what it is drawn as.
+    columns : mapping
+        Of numbers, under their SI names; (n,) each.
+    over : sequence of str
+        The columns of the inputs, or of time.
+    """
+
+    poses: Poses
+    drawing: Drawing
+    columns: Mapping[str, Shown]
+    over: Sequence[str]
+    forces: Sequence[JointForce] = ()
+    name: str = ""
+    _packed: list[dict[str, Any]] = field(default_factory=list)
+    _index: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def mechanism(self) -> Description:
+        """What is drawn."""
+        return self.poses.mechanism
+
+    def document(self) -> dict[str, Any]:
+        """Return the series as the page reads it."""
+        m = self.mechanism
+        self._packed, self._index = [], {}
+        owners = sorted({*m.links, *(p for body in m.bodies.values() for p in body)}, key=len, reverse=True)
+        for name, shown in self.columns.items():
+            owner = next((o for o in owners if name.startswith(f"{o}_")), "")
+            exact = name in self.over or bool(_PLACE.search(name))
+            k = self._add(name, shown.values, shown.header, owner, exact)
+            if shown.si != 1:
+                self._packed[k]["si"] = shown.si
+        names = list(dict.fromkeys(p for body in m.bodies.values() for p in body))
+        timed = any(np.any(rate) for rate in self.poses.rates[0]) and all(
+            f"{name}_vx_m_s" in self._index for name in names if name not in m.ground
+        )
+        unit = not timed and len(m.inputs) == 1
+        points = [self._point(name, unit) for name in names]
+        paths = self._paths([name for name in names if name not in m.ground])
+        for point in points:
+            if point["name"] in paths:
+                point["path"] = paths[point["name"]]
+        order = list(m.bodies)
+        return {
+            "name": self.name,
+            "n": self.poses.n,
+            "columns": self._packed,
+            "over": [self._index[name] for name in self.over],
+            "points": points,
+            "bodies": [self._body(name, names, unit) for name in order],
+            "pins": [[order.index(body) for body in bodies] for bodies in m.pins.values()],
+            "shapes": [_shape(shape, order) for shape in self.drawing.shapes],
+            "labels": [
+                {"of": one.of, "b": order.index(one.body), "z": _pairs([one.at]), "t": one.text}
+                for one in self.drawing.labels
+            ],
+            "forces": [
+                {
+                    "name": f.name,
+                    "point": names.index(f.point),
+                    "x": self._index[f.column],
+                    "y": self._index[f.column.replace("_fx_", "_fy_")],
+                }
+                for f in self.forces
+            ],
+            "fine": len(self._fine) if paths else 0,
+            "timed": not unit,
+        }
+
+    def _add(
+        self, name: str, values: ArrayLike, header: str = "", owner: str = "", exact: bool = True
+    ) -> int:
+        """Add a column; without a header the page does not list it."""
+        self._index[name] = len(self._packed)
+        self._packed.append({"header": header, "owner": owner, **packed(values, exact)})
+        return self._index[name]
+
+    def _column(self, name: str, values: Callable[[], ArrayLike]) -> int:
+        """Return the place of a column of places or angles, added where the caller's have it not."""
+        return self._index[name] if name in self._index else self._add(name, values(), name)
+
+    def _point(self, name: str, unit: bool) -> dict[str, Any]:
+        m = self.mechanism
+        body = next(body for body, points in m.bodies.items() if name in points)
+        place = m.bodies[body][name]
+
+        def part(i: int) -> ArrayLike:
+            z = self.poses.point_derivative(body, place, 0, name)
+            return z.imag if i else z.real
+
+        found: dict[str, Any] = {
+            "name": name,
+            "moves": body != GROUND,
+            "trace": _draws(m, name),
+            "x": self._column(f"{name}_x_m", lambda: part(0)),
+            "y": self._column(f"{name}_y_m", lambda: part(1)),
+        }
+        for key, form in _RATES.items():
+            columns = [f"{name}_{form.format(axis)}" for axis in "xy"]
+            if all(column in self._index for column in columns):
+                found[key] = [self._index[column] for column in columns]
+        if unit and body != GROUND:
+            z = self.poses.point_coefficient(body, place, 0, name)
+            found["v"] = [
+                self._add(f"{name} {axis}", z_, exact=False) for axis, z_ in (("x", z.real), ("y", z.imag))
+            ]
+        return found
+
+    def _body(self, name: str, names: list[str], unit: bool) -> dict[str, Any]:
+        points = self.mechanism.bodies[name]
+        found: dict[str, Any] = {
+            "name": name,
+            "points": [names.index(p) for p in points],
+            "point": names.index(next(iter(points))) if points else None,
+            "at": _pairs([next(iter(points.values()), 0j)]),
+            "angle": None,
+            "omega": None,
+        }
+        if name != GROUND:
+            angles = (f"{name}_angle_deg", f"{name}_angle_rad")
+            known = next((a for a in angles if a in self._index), angles[1])
+            found["angle"] = self._column(known, lambda: self.poses.angle(name))
+            found["omega"] = self._index.get(f"{name}_omega_rad_s")
+            found["alpha"] = self._index.get(f"{name}_alpha_rad_s2")
+            if unit:
+                found["omega"] = self._add(f"{name} omega", self.poses.angle_coefficient(name), exact=False)
+        return found
+
+    def _paths(self, names: list[str]) -> dict[str, list[Any]]:
+        """Return the paths of points where the poses themselves are too few to draw them."""
+        m, q = self.mechanism, self.poses.inputs
+        self._fine = np.empty(0)
+        if len(m.inputs) != 1:
+            return {}
+        slide = m.inputs[0].is_slide
+        low, high = float(np.nanmin(q)), float(np.nanmax(q))
+        if low == high and not slide:
+            high = low + 2 * np.pi
+        turns = 1.0 if slide else (high - low) / (2 * np.pi)
+        count = int(np.clip(np.ceil(FINE * turns), FINE if slide else 2, 8 * FINE))
+        if low == high or len(q) >= count:
+            return {}
+        self._fine = np.linspace(low, high, count)
+        poses = self.poses.again(self._fine[:, None])
+        found = {}
+        for name in names:
+            body = next(body for body, points in m.bodies.items() if name in points)
+            z = poses.point_derivative(body, m.bodies[body][name], 0, name)
+            found[name] = [_bytes(z.real), _bytes(z.imag)]
+        return found
+
+
+def _bytes(values: ArrayLike) -> dict[str, Any]:
+    return dict(packed(values, exact=False))
+
+
+def _pairs(points: Sequence[complex]) -> list[float]:
+    z = np.asarray(points, dtype=complex)
+    return rounded(np.stack([z.real, z.imag], axis=-1))
+
+
+def _shape(shape: Shape, order: list[str]) -> dict[str, Any]:
+    found: dict[str, Any] = {"r": shape.role, "b": order.index(shape.body)}
+    if isinstance(shape, Line):
+        found |= {"p": _pairs(shape.points)} | ({"c": 1} if shape.closed else {})
+    elif isinstance(shape, Circle):
+        found |= {"z": _pairs([shape.centre]), "s": rounded([shape.radius])[0]}
+    elif isinstance(shape, Coil):
+        ends = [(order.index(body), *_pairs([z])) for body, z in shape.ends]
+        # along 0 -> 1: the real part is the share of its length, the imaginary part a distance sideways
+        found |= {"p": _pairs(shape.along(0, 1)), "ends": [x for end in ends for x in end]}
+    return found
+
+
+def moving_page(
+    title: str,
+    series: Sequence[Series],
+    time: str = "",
+    plots: Sequence[str] = (),
+) -> Page:
+    """Return the page of a mechanism's motion.
+
+    Parameters
+    ----------
+    series : sequence of Series
+        The first is drawn in full, the others as ghosts.
+    time : str
+        The column of the poses' own times, s; without it a turn of the input takes some seconds.
+    plots : sequence of str
+        The columns that are plotted at first.
+
+    Raises
+    ------
+    ValueError
+        More poses than a page can hold.
+    """
+    fits(series[0].poses.n)
+    documents = [one.document() for one in series]
+    first, m = series[0], series[0].mechanism
+    columns = [column["header"] for column in documents[0]["columns"]]
+    slide = m.inputs[0].is_slide
+    rate = "m/s" if documents[0]["timed"] else f"m for each {'m' if slide else 'rad'} of the input"
+    span = float(np.ptp(first.poses.inputs[:, 0])) if first.poses.n else 0.0
+    shown = [first.columns[name].header for name in plots] or _first_plots(first)
+    back = first.poses.n > 1 and all(_comes_back(first, name) for name in m.links)
+    rest: dict[str, Any] = {
+        "units": {"v": rate, "a": "m/s²", "f": "N"},
+        "lasts": TURN if slide or len(m.inputs) > 1 else TURN * max(span / (2 * np.pi), 0.25),
+        "wraps": bool(time) or back,
+        "plots": [columns.index(header) for header in shown],
+    }
+    if time:
+        rest["clock"] = documents[0]["over"][0]
+    if time or len(m.inputs) == 1:
+        rest["x"] = documents[0]["over"][0]
+    return page(title, "plane", documents, **rest)
+
+
+def _draws(m: Description, point: str) -> bool:
+    """Say whether a point draws its path from the first: one of a link alone, that no guide holds."""
+    return point not in (*m.ground, *m.pins, *(guide.point for guide in m.guides))
+
+
+def _first_plots(series: Series) -> list[str]:
+    """Return the columns to begin with: an effort where there is one, and the place of a point that draws a path."""
+    m = series.mechanism
+    free = [p for link in m.links.values() for p in link.points if p not in m.ground]
+    moving = dict.fromkeys([*(p for p in free if _draws(m, p)), *free])
+    efforts = [name for name in series.columns if "virtual_work" in name]
+    names = [*efforts[:1], *(f"{p}_{axis}_m" for p in moving for axis in "yx"), *series.columns]
+    return [series.columns[name].header for name in names if name in series.columns][:2]
+
+
+def _comes_back(series: Series, link: str) -> bool:
+    """Say whether a link stands at the end as it stood at the beginning."""
+    first = next(iter(series.mechanism.links[link].points.items()))
+    z = series.poses.point_derivative(link, first[1], 0, first[0])[[0, -1]]
+    turned = np.exp(1j * series.poses.angle(link)[[0, -1]])
+    gap = max(abs(z[1] - z[0]) / series.mechanism.size, abs(turned[1] - turned[0]))
+    return bool(gap < 1e-6)
+
+
+def of_motion(poses: Poses, drawing: Drawing, forces: Forces | None) -> Page:
+    """Return the page of one motion with the columns of its table, and of its joint forces."""
+    table = columns(poses)
+    over = list(table)[: poses.inputs.shape[1]]
+    del table["assembled"]
+    arrows = []
+    for joint, on, of in forces.reactions.order.pairs if forces is not None else ():
+        lead = f"{joint.name}_{of}_on_{on}"
+        assert forces is not None
+        parts = xy(forces.joint_force(joint, on))
+        table |= {f"{lead}_fx_N": parts[:, 0], f"{lead}_fy_N": parts[:, 1]}
+        arrows.append(JointForce(joint.name, f"{joint.name}: {of} on {on}", f"{lead}_fx_N"))
+    shown = {name: Shown(values, name) for name, values in table.items()}
+    return moving_page(poses.mechanism.name, [Series(poses, drawing, shown, over, arrows)])

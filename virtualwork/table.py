@@ -1,0 +1,36 @@
+"""A motion as columns, SI and radians: the inputs, which poses are assembled, angles and places with their rates."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from virtualwork.formulas.poses import Poses
+
+POINT = (("x_m", "y_m"), ("vx_m_s", "vy_m_s"), ("ax_m_s2", "ay_m_s2"))
+LINK = ("angle_rad", "omega_rad_s", "alpha_rad_s2")
+
+
+def columns(poses: Poses) -> dict[str, Any]:
+    """Return the columns by their headers; rates where the inputs have any."""
+    m = poses.mechanism
+    orders = 3 if any(np.any(rate) for of in poses.rates for rate in of) else 1
+    table: dict[str, Any] = {
+        f"{e.name}_{'m' if e.is_slide else 'rad'}": poses.inputs[:, j] for j, e in enumerate(m.inputs)
+    }
+    table["assembled"] = poses.assembled
+    for name in m.links:
+        for order, header in enumerate(LINK[:orders]):
+            values = poses.angle_derivative(name, order) if order else poses.angle(name)
+            table[f"{name}_{header}"] = values
+    seen = set(m.ground)
+    for body, points in m.bodies.items():
+        for name, place in points.items():
+            if name in seen:
+                continue
+            seen.add(name)
+            for order, (x, y) in enumerate(POINT[:orders]):
+                z = poses.point_derivative(body, place, order, name)
+                table[f"{name}_{x}"], table[f"{name}_{y}"] = z.real, z.imag
+    return table
