@@ -35,9 +35,9 @@ def _print_schema(asked: bool) -> None:
 
 EXAMPLE = "klann"
 PANELS = {
-    "What": "at sweep inputs only branch change vary variants",
+    "What": "at sweep inputs only branch change vary variants draws seed distribution",
     "How": "order newton",
-    "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states html schema",
+    "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights tolerance graph states html schema",
 }
 
 
@@ -153,7 +153,8 @@ def run(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of what is drawn.")] = 0,
     distribution: Annotated[
-        str, typer.Option(help="normal (a limit is three standard deviations) or uniform: of what is drawn.")
+        Literal["normal", "uniform"],
+        typer.Option(help="Of what is drawn: a limit is three standard deviations, or the end."),
     ] = "normal",
     schema: Annotated[
         bool,
@@ -217,6 +218,13 @@ def run(
             own[1],
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
         )
+    spreads = tolerance or draws is not None
+    if spreads:
+        from cli.mechanism.tolerance import Tolerances, checked, with_tolerances
+
+        others = {"--vary": vary, "--variants": variants, "--branch": branch, "--states": states}
+        others |= {"--graph": graph, "--html": html, **dict.fromkeys(own, True), "--forces": None}
+        checked(draws, tolerance, [flag for flag, given in others.items() if given])
     with _told(file):
         mechanism, bare, said, about = load(file)
         mechanism = assigned(mechanism, bare, change) if change else mechanism
@@ -230,7 +238,7 @@ def run(
             from cli.show.page import refuse_long
 
             refuse_long(q.n * (1 if several is None else several.count))
-        alone = several is None and html is None and own in ([], ["--forces"])
+        alone = several is None and html is None and not spreads and own in ([], ["--forces"])
         if alone and show.streams and analysis.is_long:
             return _long(analysis, forces, states)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
@@ -239,6 +247,9 @@ def run(
         analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces, times=times)
         if several is None:
             result = _result(analysis, request, states, explain, graph, about)
+            if spreads:
+                its = Tolerances(analysis, forces, draws or 0, seed, distribution)
+                return with_tolerances(result, its)
             return _with_page(result, html, lambda: [("", analysis)], forces, show.units)
 
         def analysis_of(variant: Mechanism) -> Analysis:

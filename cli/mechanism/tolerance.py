@@ -193,14 +193,17 @@ class Tolerances:
                     f"{linear[i]:.6g}, but {its.sd[i]:.6g} of the drawn mechanisms"
                 )
         if whole < 1:
-            lines.append(f"{(1 - whole) * 100:.3g} % of the drawn mechanisms cannot be assembled in every pose")
+            lines.append(
+                f"{(1 - whole) * 100:.3g} % of the drawn mechanisms cannot be assembled in every pose"
+            )
         return lines
 
     def document(self) -> dict[str, Any]:
         """As the JSON document has it."""
         found: dict[str, Any] = {
             "columns": {
-                header: {"worst": cells(its.worst), "sd": cells(its.sd)} for header, its in self.linear.items()
+                header: {"worst": cells(its.worst), "sd": cells(its.sd)}
+                for header, its in self.linear.items()
             },
             "shares": [
                 {"path": d.path, "column": header, "share": cells(its.shares[i])}
@@ -239,7 +242,8 @@ class Tolerances:
                 sample = self.drawn[0][column.header]
                 named = (("mean", sample.mean), ("sd", sample.sd), *zip(NAMES, sample.quantiles, strict=True))
                 found += [
-                    Column(f"{column.name}_drawn_{name}", column.unit, cells(values)) for name, values in named
+                    Column(f"{column.name}_drawn_{name}", column.unit, cells(values))
+                    for name, values in named
                 ]
         return Table(found, base.keys)
 
@@ -247,13 +251,19 @@ class Tolerances:
         """Which dimensions matter most, for the terminal."""
         lines = []
         for header, its in self.linear.items():
-            mean = np.nanmean(its.shares, axis=1) if np.isfinite(its.shares).any() else np.zeros(len(self.limits))
+            mean = (
+                np.nanmean(its.shares, axis=1)
+                if np.isfinite(its.shares).any()
+                else np.zeros(len(self.limits))
+            )
             order = np.argsort(-mean, kind="stable")[:3]
             ranked = zip(order, [list(self.limits)[i].path for i in order], strict=True)
             told = ", ".join(f"{path} {mean[i] * 100:.3g} %" for i, path in ranked if mean[i] > 0)
             if told:
                 lines.append(f"{header}: {told}")
-        return "shares of the variance, the largest, means over the poses:\n" + "\n".join(lines) if lines else ""
+        return (
+            "shares of the variance, the largest, means over the poses:\n" + "\n".join(lines) if lines else ""
+        )
 
 
 _FIELDS = ("mean", "sd", "quantiles", "errors")
@@ -285,4 +295,6 @@ def checked(draws: int | None, tolerance: bool, others: Sequence[str]) -> None:
     if draws is not None and draws < 2:
         raise options.bad("--draws", f"{draws}: expected two or more drawn mechanisms")
     if others:
-        raise options.bad(flag, f"expected poses or forces of one mechanism, and no {' or '.join(others)} beside it")
+        raise options.bad(
+            flag, f"expected poses or forces of one mechanism, and no {' or '.join(others)} beside it"
+        )

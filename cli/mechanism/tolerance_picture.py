@@ -27,7 +27,7 @@ def draw(found: Tolerances) -> Figure:
     left, right = figure.subplots(1, 2, width_ratios=(1.3, 1))
     if points:
         _paths(left, found, points)
-        _shares(right, found, [key for key in points], "variance of the position")
+        _shares(right, found, points, "variance of the position")
     else:
         header = found.numbers[0].header
         _over_input(left, found, header)
