@@ -45,7 +45,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("__init__",),
         ("mechanism",),
         ("motion",),
-        ("animation",),
+        ("animation", "parts_of_motion"),
         ("forces", "table"),
         ("family",),
         ("intime",),

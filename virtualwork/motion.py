@@ -24,10 +24,12 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.parts import Point, as_point
 from virtualwork.drawing import Drawing, draw
+from virtualwork.formulas.lanes import FORCES, Lanes, over_blocks
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import Key
 from virtualwork.formulas.sweep import EvenSweep
+from virtualwork.parts_of_motion import LinkMotion, PointMotion, SlideMotion
 from virtualwork.plan.steps import Step
 from virtualwork.table import columns
 
@@ -39,192 +41,6 @@ if TYPE_CHECKING:
     from virtualwork.family.sensitivity import Sensitivities
     from virtualwork.forces import Forces
     from virtualwork.study.cycle import Cycle
-
-
-class PointMotion:
-    """Motion of one point of a link.
-
-    Attributes
-    ----------
-    position, velocity, acceleration, jerk : array (n, 2)
-        m, m/s, m/s², m/s³, in ground axes; NaN where the pose cannot be assembled.
-    """
-
-    def __init__(self, motion: Motion, body: str, place: complex, node: str | None = None) -> None:
-        self.motion, self.body, self.place, self.node = motion, body, place, node
-
-    def __repr__(self) -> str:
-        return f"PointMotion({self.node or self.place!r} of {self.body}, {self.motion.n} poses)"
-
-    @property
-    def position(self) -> Reals:
-        """(n, 2) m."""
-        return xy(self.complex(0))
-
-    @property
-    def velocity(self) -> Reals:
-        """(n, 2) m/s (Ibrahim eq. 1.4.1)."""
-        return xy(self.complex(1))
-
-    @property
-    def acceleration(self) -> Reals:
-        """(n, 2) m/s² (Ibrahim eq. 1.5.1)."""
-        return xy(self.complex(2))
-
-    @property
-    def jerk(self) -> Reals:
-        """(n, 2) m/s³ (Ibrahim eq. 1.5.3)."""
-        return xy(self.complex(3))
-
-    def complex(self, order: int) -> Complexes:
-        """The order-th time derivative as x + iy, (n,)."""
-        return self.motion.poses.point_derivative(self.body, self.place, order, self.node)
-
-    def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the position (order 0), velocity (1), acceleration (2) or jerk.
-
-        It is the length of the error, in the unit of the quantity; the dimensions and the input are taken as exact.
-        Infinite where no digit is known, within rounding of a limit of the input. See `virtualwork.bounds`.
-
-        Examples
-        --------
-        A crank of length 1 at 60°: y = √3/2.
-
-        >>> from virtualwork import Input, Link, Mechanism
-        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
-        >>> point = crank.motion(np.pi / 3).point("P")
-        >>> bool(abs(point.position[0, 1] - np.sqrt(0.75)) <= point.error_estimate()[0] < 1e-15)
-        True
-        """
-        return self.motion.rounding.point(self.body, self.place, self.node, order)
-
-    def sensitivity(self, path: str, order: int = 0) -> Reals:
-        """Return the derivative (n, 2) of the position (order 0), velocity (1), ... to a number of the description.
-
-        Parameters
-        ----------
-        path : str
-            Of the number, such as "links.crank.B.x"; angles count in radians.
-        order : int
-
-        Raises
-        ------
-        DescriptionError
-            Where the path names no number.
-
-        Examples
-        --------
-        A crank's end moves along with its length:
-
-        >>> from virtualwork import Input, Link, Mechanism
-        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
-        >>> crank.motion(np.pi / 2).point("P").sensitivity("links.crank.P.x").round(15)
-        array([[0., 1.]])
-        """
-        return xy(self.motion.derivative(("point", self.body, self.place, self.node, order), path))
-
-    def coefficient(self, j: int = 0) -> Complexes:
-        """The velocity coefficient dP/dq_j as x + iy, (n,): the point's virtual displacement for a unit of input j."""
-        return self.motion.poses.point_coefficient(self.body, self.place, j, self.node)
-
-
-class LinkMotion:
-    """Motion of one link.
-
-    Attributes
-    ----------
-    angle : array (n,)
-        rad, of the link's own x-axis, in (−π, π].
-    omega, alpha, jerk : array (n,)
-        rad/s, rad/s², rad/s³.
-    """
-
-    def __init__(self, motion: Motion, body: str) -> None:
-        self.motion, self.body = motion, body
-
-    def __repr__(self) -> str:
-        return f"LinkMotion({self.body}, {self.motion.n} poses)"
-
-    @property
-    def angle(self) -> Reals:
-        """(n,) rad."""
-        return self.motion.poses.angle(self.body)
-
-    @property
-    def omega(self) -> Reals:
-        """(n,) rad/s (Ibrahim eq. 1.4.2)."""
-        return self.motion.poses.angle_derivative(self.body, 1)
-
-    @property
-    def alpha(self) -> Reals:
-        """(n,) rad/s² (Ibrahim eq. 1.5.2)."""
-        return self.motion.poses.angle_derivative(self.body, 2)
-
-    @property
-    def jerk(self) -> Reals:
-        """(n,) rad/s³ (Ibrahim eq. 1.5.3)."""
-        return self.motion.poses.angle_derivative(self.body, 3)
-
-    def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the angle (order 0, rad), ω (1), α (2) or the angular jerk (3).
-
-        The dimensions and the input are taken as exact. See `virtualwork.bounds`.
-        """
-        return self.motion.rounding.angle(self.body, order)
-
-    def sensitivity(self, path: str, order: int = 0) -> Reals:
-        """Return the derivative (n,) of the angle (order 0, rad), ω (1), α (2) to a number of the description.
-
-        `path` names the number, such as "links.crank.B.x".
-        """
-        found: Reals = self.motion.derivative(("angle", self.body, order), path)
-        return found
-
-    def coefficient(self, j: int = 0) -> Reals:
-        """The velocity coefficient dθ/dq_j, (n,): the link's virtual rotation for a unit of input j."""
-        return self.motion.poses.angle_coefficient(self.body, j)
-
-
-class SlideMotion:
-    """Motion along one guide: `position`, `speed`, `acceleration`, `jerk`, each (n,), m from the guide's `through`."""
-
-    def __init__(self, motion: Motion, guide: int) -> None:
-        self.motion, self.guide = motion, guide
-
-    def __repr__(self) -> str:
-        return f"SlideMotion({self.motion.mechanism.guides[self.guide].point}, {self.motion.n} poses)"
-
-    @property
-    def position(self) -> Reals:
-        """(n,) m."""
-        return self.motion.poses.slide_derivative(self.guide, 0)
-
-    @property
-    def speed(self) -> Reals:
-        """(n,) m/s."""
-        return self.motion.poses.slide_derivative(self.guide, 1)
-
-    @property
-    def acceleration(self) -> Reals:
-        """(n,) m/s²."""
-        return self.motion.poses.slide_derivative(self.guide, 2)
-
-    @property
-    def jerk(self) -> Reals:
-        """(n,) m/s³."""
-        return self.motion.poses.slide_derivative(self.guide, 3)
-
-    def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the slide (order 0, m), its speed (1), acceleration (2) or jerk (3).
-
-        The dimensions and the input are taken as exact. See `virtualwork.bounds`.
-        """
-        return self.motion.rounding.slide(self.guide, order)
-
-    def sensitivity(self, path: str, order: int = 0) -> Reals:
-        """Return the derivative (n,) of the slide (order 0, m), its speed (1), ... to a number of the description."""
-        found: Reals = self.motion.derivative(("slide", self.guide, order), path)
-        return found
 
 
 class Motion:
@@ -251,6 +67,7 @@ class Motion:
     ) -> None:
         self.assembly = assembly
         self.poses = Poses(assembly, angle, speed, acceleration, jerk, block_of)
+        self.lanes = Lanes(assembly, self.poses)
         self._units: dict[int, Motion] = {}
 
     def __repr__(self) -> str:
@@ -353,6 +170,12 @@ class Motion:
                 return SlideMotion(self, i)
         raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
 
+    def value(self, key: Key) -> Any:
+        """A quantity by its key (`Recording.value`), (n,): from the tape where that pays, else over blocks of poses."""
+        if self.lanes.pays((key,)):
+            return self.lanes.values((key,))[0].copy()
+        return over_blocks(self.poses, key, self.dynamics if key[0] in FORCES else None)
+
     @cached_property
     def rounding(self) -> MotionErrors:
         """Bounds of the rounding errors of this motion, each formed when first asked for."""
@@ -374,8 +197,12 @@ class Motion:
 
         Static where speed and acceleration are zero (Riul, unit II, eq. 3), else with inertia loads (eq. 5).
         """
-        found = self.dynamics.effort
-        return found[:, 0] if self.inputs.shape[1] == 1 else found
+        k = self.inputs.shape[1]
+        return (
+            self.value(("effort", 0))
+            if k == 1
+            else np.stack([self.value(("effort", j)) for j in range(k)], axis=1)
+        )
 
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2) N (Ibrahim §2.2).
@@ -418,39 +245,6 @@ class Motion:
         from virtualwork.study.counterweights import least_squares
 
         return least_squares(self, links)
-
-    # --- as a picture ---------------------------------------------------------------------------------------------
-    @cached_property
-    def drawing(self) -> Drawing:
-        """What the mechanism is drawn as, its guides as long as used; `at(shape.body, z)` carries its points along."""
-        slides = (self.poses.slide_derivative(i, 0) for i in range(len(self.mechanism.guides)))
-        return draw(self.mechanism, [(float(np.fmin.reduce(s)), float(np.fmax.reduce(s))) for s in slides])
-
-    def animate(self, forces: bool = False) -> Page:
-        """Return a page that moves: the mechanism over these poses with play, slider, curves and values.
-
-        A notebook shows it; `.save("motion.html")` writes it to a file that any browser opens.
-
-        Parameters
-        ----------
-        forces : bool
-            Draw the joint forces too.
-
-        Raises
-        ------
-        ValueError
-            More poses than a page can hold.
-
-        Examples
-        --------
-        >>> from virtualwork import Input, Link, Mechanism
-        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 2})}, inputs=Input(link="crank"))
-        >>> "P_vx_m_s" in crank.motion(np.linspace(0, 6, 37), speed=3.0).animate().html
-        True
-        """
-        from virtualwork.animation import of_motion
-
-        return of_motion(self.poses, self.drawing, self.dynamics if forces else None)
 
     # --- how it hangs on the dimensions ---------------------------------------------------------------------------
     @cached_property
@@ -499,6 +293,39 @@ class Motion:
         if what == "shaking moment":
             return np.asarray(self.derivative(("shaking moment",), path))
         raise ValueError(f"'{what}': expected effort, shaking force or shaking moment")
+
+    # --- as a picture ---------------------------------------------------------------------------------------------
+    @cached_property
+    def drawing(self) -> Drawing:
+        """What the mechanism is drawn as, its guides as long as used; `at(shape.body, z)` carries its points along."""
+        slides = (self.poses.slide_derivative(i, 0) for i in range(len(self.mechanism.guides)))
+        return draw(self.mechanism, [(float(np.fmin.reduce(s)), float(np.fmax.reduce(s))) for s in slides])
+
+    def animate(self, forces: bool = False) -> Page:
+        """Return a page that moves: the mechanism over these poses with play, slider, curves and values.
+
+        A notebook shows it; `.save("motion.html")` writes it to a file that any browser opens.
+
+        Parameters
+        ----------
+        forces : bool
+            Draw the joint forces too.
+
+        Raises
+        ------
+        ValueError
+            More poses than a page can hold.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 2})}, inputs=Input(link="crank"))
+        >>> "P_vx_m_s" in crank.motion(np.linspace(0, 6, 37), speed=3.0).animate().html
+        True
+        """
+        from virtualwork.animation import of_motion
+
+        return of_motion(self.poses, self.drawing, self.dynamics if forces else None)
 
     # --- as a table -------------------------------------------------------------------------------------------------
     def to_frame(self) -> DataFrame:

@@ -15,7 +15,7 @@ import numpy as np
 from cli.errors import DataError
 from virtualwork.describe.parts import GROUND
 from virtualwork.drawing import hull
-from virtualwork.motion import SlideMotion
+from virtualwork.parts_of_motion import SlideMotion
 
 if TYPE_CHECKING:
     from virtualwork import Mechanism

@@ -69,7 +69,7 @@ class Travel:
         """The least and the largest position along a guide, m."""
         if self.motion is None:
             return None
-        from virtualwork.motion import SlideMotion
+        from virtualwork.parts_of_motion import SlideMotion
 
         found = SlideMotion(self.motion, guide).position
         return (float(np.nanmin(found)), float(np.nanmax(found))) if np.isfinite(found).any() else None

@@ -319,6 +319,7 @@ def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | 
             **({} if found.request.places is None else {"split": lambda: columns.split(found)}),
             **({} if fits is None else {"residuals": residuals}),
         },
+        companions=["prediction"] if found.request.places is None else ["prediction", "split"],
         notes=lambda: (fit_words.notes(fits) if fits is not None else "") + words.notes(found),
         afterword=lambda: words.afterword(found) + (fit_words.afterword(fits) if fits is not None else ""),
         figure=figure,

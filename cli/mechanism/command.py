@@ -220,10 +220,11 @@ def run(
         )
     spreads = tolerance or draws is not None
     if spreads:
-        from cli.mechanism.tolerance import Tolerances, checked, with_tolerances
+        from cli.mechanism.tolerance import Tolerances
+        from cli.mechanism.tolerated import checked, with_tolerances
 
         others = {"--vary": vary, "--variants": variants, "--branch": branch, "--states": states}
-        others |= {"--graph": graph, "--html": html, **dict.fromkeys(own, True), "--forces": None}
+        others |= {"--graph": graph, "--html": html, **dict.fromkeys(own, "asked"), "--forces": None}
         checked(draws, tolerance, [flag for flag, given in others.items() if given])
     with _told(file):
         mechanism, bare, said, about = load(file)

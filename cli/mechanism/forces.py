@@ -24,7 +24,7 @@ def rows_of(analysis: Analysis, motion: Motion) -> list[tuple[Joint, str, str]]:
     return [
         (joint, on, of)
         for joint, on, of in motion.dynamics.reactions.order.pairs
-        if analysis.only is None or joint.name in analysis.only or on in analysis.only
+        if analysis.only is None or {joint.name, on, of} & set(analysis.only)
     ]
 
 

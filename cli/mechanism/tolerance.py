@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +20,6 @@ from virtualwork.formulas.recording import COMPLEX, Key
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from cli.show.columns import Result
 
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
 SURE, APART = 5.0, 0.02
@@ -267,34 +264,3 @@ class Tolerances:
 
 
 _FIELDS = ("mean", "sd", "quantiles", "errors")
-
-
-def with_tolerances(result: Result, found: Tolerances) -> Result:
-    """A result of poses with what the tolerances do to it."""
-    from cli.mechanism.tolerance_picture import draw
-
-    before = result.document
-    said = found.remarks()
-    _, *others = result.tables.items()
-    return replace(
-        result,
-        document=lambda: {**before(), "tolerance": found.document()},
-        tables={"poses": found.table, **dict(others)},
-        screen=None,
-        afterword=found.words,
-        figure=lambda: draw(found),
-        warnings=[*result.warnings, *said],
-    )
-
-
-def checked(draws: int | None, tolerance: bool, others: Sequence[str]) -> None:
-    """Refuse what does not go with it."""
-    from cli.read import options
-
-    flag = "--tolerance" if tolerance else "--draws"
-    if draws is not None and draws < 2:
-        raise options.bad("--draws", f"{draws}: expected two or more drawn mechanisms")
-    if others:
-        raise options.bad(
-            flag, f"expected poses or forces of one mechanism, and no {' or '.join(others)} beside it"
-        )

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
+from cli.place.corrections import Correction
 from cli.place.solve import Placing
 from cli.read.units import degrees, from_si
 from cli.show.columns import Column, Table
 
 if TYPE_CHECKING:
-    from cli.show.columns import Document
+    from cli.show.columns import Cell, Document
 
 
 def masses(found: Placing) -> Table:
@@ -39,6 +41,41 @@ def masses(found: Placing) -> Table:
         columns.append(Column("drill_depth", "mm", depths, partial(errors, 2, "length", "mm")))
         columns.append(Column("holes", "", [m.holes for m in found.masses]))
     return Table(columns, keys=("position",) if planes is None else ())
+
+
+def several(found: Sequence[tuple[Correction, Placing]]) -> Table:
+    """A row for each mass of each correction."""
+    tables = [masses(placing) for _, placing in found]
+    lengths = [len(table.columns[0].values) for table in tables]
+
+    def stacked(k: int) -> list[Cell]:
+        return [value for table in tables for value in table.columns[k].values]
+
+    def errors(k: int) -> list[float]:
+        return [
+            bound for table in tables if (error := table.columns[k].error) is not None for bound in error()
+        ]
+
+    names = [
+        Column(
+            what,
+            "",
+            [getattr(of, what) for (of, _), n in zip(found, lengths, strict=True) for _ in range(n)],
+        )
+        for what in ("rotor", "plane")
+    ]
+    columns = [
+        Column(c.name, c.unit, stacked(k), None if c.error is None else partial(errors, k))
+        for k, c in enumerate(tables[0].columns)
+    ]
+    return Table([*names, *columns], keys=("rotor", "plane", "position"))
+
+
+def documents(found: Sequence[tuple[Correction, Placing]]) -> Document:
+    """The JSON document of several corrections."""
+    return {
+        "placements": [{"rotor": of.rotor, "plane": of.plane, **document(placing)} for of, placing in found]
+    }
 
 
 def document(found: Placing) -> Document:

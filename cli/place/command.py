@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.place.read import Request, read_drill, read_planes, read_ratio, read_stock, read_vector
+from cli.place.corrections import Correction, read_corrections
+from cli.place.read import Request, read_drill, read_planes, read_ratio, read_stock
 from cli.read import options
-from cli.show.output import command
+from cli.show.output import ShowOptions, command
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from cli.show.columns import Result
+    from cli.show.columns import Result, Table
 
 
 EXAMPLE = "blades"
 PANELS = {
-    "What": "positions blades first stock pieces max_pieces max_mass",
+    "What": "rotor plane positions blades first stock pieces max_pieces max_mass",
     "How: elsewhere": "at_radius to_radius at_z to_z",
     "How: drilling": "drill density drill_point max_depth remove",
 }
@@ -28,8 +28,13 @@ PANELS = {
 def run(
     corrections: Annotated[
         list[str],
-        typer.Argument(metavar="MASS@ANGLE ...", help="Corrections to ADD, such as 83.5g@308.87deg."),
+        typer.Argument(
+            metavar="MASS@ANGLE ...",
+            help="Corrections to ADD, such as 83.5g@308.87deg; or a FILE that dalembert field wrote (CSV, JSON, workbook).",
+        ),
     ],
+    rotor: Annotated[str | None, typer.Option(metavar="NAME", help="The rotor, of a file.")] = None,
+    plane: Annotated[str | None, typer.Option(metavar="NAME", help="The plane, of a file.")] = None,
     positions: Annotated[
         str | None, typer.Option(metavar="ANGLES", help="Where masses can go, such as 292.5deg,315deg.")
     ] = None,
@@ -84,12 +89,15 @@ def run(
             "--remove", help="The vectors are material to REMOVE already: drill there, not opposite."
         ),
     ] = False,
+    *,
+    show: ShowOptions,
 ) -> Result:
     """Put a correction where masses can go: holes, blades, weights in stock, another radius, drilling.
 
-    Several corrections are combined first. Without --positions or --blades the result is the one mass.
+    Several corrections are combined first. Without --positions or --blades the result is the one mass. Of a file each
+    rotor's plane is placed by itself.
     """
-    vectors = [read_vector(spec) for spec in corrections]
+    read = read_corrections(corrections, rotor, plane)
     ratio = read_ratio(at_radius, to_radius)
     drilled = read_drill(drill, density, drill_point, max_depth)
     weights = read_stock(stock)
@@ -100,26 +108,48 @@ def run(
     if weights is not None and chosen is None:
         raise options.bad("--stock", "expected --positions or --blades for the weights to go to")
     limit = options.quantity("--max-mass", max_mass, "mass", positive=True)
-    from cli.place import columns, words
+    from cli.place import columns, picture, words
     from cli.place.solve import Placing
-    from cli.show.columns import Result
+    from cli.show.columns import Result, Section, Sheet
 
-    found = Placing(
-        Request(vectors, chosen, limit, weights, pieces, max_pieces, ratio, drilled, moved, remove)
-    )
+    found = [
+        (
+            of,
+            Placing(
+                Request(of.vectors, chosen, limit, weights, pieces, max_pieces, ratio, drilled, moved, remove)
+            ),
+        )
+        for of in read
+    ]
+    if len(found) > 1 and show.plot is not None:
+        raise options.bad("--plot", "draws one correction: expected --rotor and --plane too")
 
-    def figure() -> Figure:
-        from cli.place.picture import draw
+    def sheet(of: Correction, placing: Placing) -> Sheet:
+        parts: list[str | Table] = [words.notes(placing), columns.masses(placing), words.error(placing)]
+        return Sheet(
+            of.name if len(found) > 1 else "", [Section("Masses", parts)], lambda: picture.draw(placing)
+        )
 
-        return draw(found)
-
-    return Result(
-        document=lambda: columns.document(found),
-        tables={"masses": lambda: columns.masses(found)},
-        notes=lambda: words.notes(found),
-        afterword=lambda: words.error(found),
-        figure=figure,
+    (_, only), *others = found
+    warnings = [f"{of.name}: {text}" for of, placing in found for text in placing.warnings]
+    result = Result(
+        document=lambda: columns.documents(found),
+        tables={"masses": lambda: columns.several(found)},
+        notes=lambda: words.several(found),
+        afterword=lambda: "\n".join(f"{of.name}: {words.error(placing)}" for of, placing in found),
         method=words.METHOD,
+        sheets=lambda: [sheet(*each) for each in found],
         about={"title": "Placement of a correction"},
-        warnings=found.warnings,
+        warnings=warnings,
+    )
+    if others:
+        return result
+    return replace(
+        result,
+        document=lambda: columns.document(only),
+        tables={"masses": lambda: columns.masses(only)},
+        notes=lambda: words.notes(only),
+        afterword=lambda: words.error(only),
+        figure=lambda: picture.draw(only),
+        warnings=only.warnings,
     )

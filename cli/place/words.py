@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from cli.place.corrections import Correction
 from cli.place.solve import Placing
 from cli.read.units import degrees, from_si
 from cli.show.text import angle_text
@@ -23,6 +26,13 @@ def notes(found: Placing) -> str:
             z = from_si(share.z, "length", "mm")
             lines.append(f"in the plane z = {z:g} mm: {_vector(found, share.goal)}")
     return "\n".join([*lines, f"material to {'REMOVE' if found.request.removes else 'ADD'}:"])
+
+
+def several(found: Sequence[tuple[Correction, Placing]]) -> str:
+    """Say what is to be reached of each correction."""
+    lines = [f"{of.name}: {_vector(placing, placing.target)}" for of, placing in found]
+    action = "REMOVE" if found[0][1].request.removes else "ADD"
+    return "\n".join([*lines, f"angles counter-clockwise; material to {action}:"])
 
 
 def error(found: Placing) -> str:

@@ -77,6 +77,8 @@ class Result:
     """The JSON document, without its warnings."""
     tables: Mapping[str, Callable[[], Table]]
     """Name -> table; the first is the CSV."""
+    companions: Sequence[str] = ()
+    """Which further tables go beside a file that holds one table, as FILE-name.csv."""
     screen: Callable[[], Table] | None = None
     """The terminal's table, where another layout reads better than that of the CSV."""
     notes: Callable[[], str] = lambda: ""

@@ -232,7 +232,12 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         result, cut = _with_digits_that_hold(result, first)
         first = cache(lambda: cut)
     pages = _report_files(result, options, asked, files, checked)
-    refuse_inputs([path for path in (output, options.plot, *result.beside, *pages) if path is not None])
+    tables = _tables_beside(result, options)
+    refuse_inputs(
+        [path for path in (output, options.plot, *result.beside, *pages, *tables) if path is not None]
+    )
+    for path, table_of in tables.items():
+        write(path, _one_table(options.form, iter([table_of()])))
     for path, data in result.beside.items():
         write(path, data())
     for path, page in pages.items():
@@ -279,6 +284,17 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         _warn(result.warnings, options)
     if result.failed() or (checked is not None and not checked.passed):
         raise typer.Exit(1)
+
+
+def _tables_beside(result: Result, options: ShowOptions) -> dict[Path, Callable[[], Table]]:
+    """Return the tables that go beside a file of one table, each in a file of its own."""
+    output = options.output
+    if output is None or not options.holds_one:
+        return {}
+    return {
+        output.with_name(f"{output.stem}-{name}{output.suffix}"): result.tables[name]
+        for name in result.companions
+    }
 
 
 def _report_files(

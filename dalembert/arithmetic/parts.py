@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
+from multiprocessing import active_children, get_context
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -95,11 +96,10 @@ class Processes(Executor):
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
+        self._others = set(active_children())
         self._pool = self._new()
 
     def _new(self) -> ProcessPoolExecutor:
-        from multiprocessing import get_context
-
         # each starts afresh: a copy of this process would copy what its threads hold
         return ProcessPoolExecutor(self.workers, get_context("spawn"), initializer=_ignore_interrupts)
 
@@ -122,9 +122,8 @@ class Processes(Executor):
             self.shutdown()
             return None
         # whatever stopped the work, Ctrl-C too: nobody waits for what is not wanted any more
-        processes = list((self._pool._processes or {}).values())
         self.shutdown(wait=False, cancel_futures=True)
-        for process in processes:
+        for process in set(active_children()) - self._others:
             process.terminate()
         return None
 

@@ -36,8 +36,38 @@ def solved(
     >>> [round(x, 15) for x in solved([[0.0, 2.0], [1.0, 1.0]], [4.0, 5.0])]
     [3.0, 2.0]
     """
-    a = [[*row, b] for row, b in zip(matrix, right, strict=True)]
+    a = _reflected([[*row, b] for row, b in zip(matrix, right, strict=True)], kind)
     n = len(matrix[0])
+    x: list[Number] = [0.0] * n
+    for k in range(n - 1, -1, -1):
+        rest = a[k][n]
+        for j in range(k + 1, n):
+            rest = rest - (0.0 if _nothing(a[k][j]) or _nothing(x[j]) else a[k][j] * x[j])
+        x[k] = 0.0 if _nothing(rest) else rest / a[k][k]
+    if not least:
+        return x
+    enough = kind.select(regularity(matrix, kind) - least, 1.0, float("nan"))
+    return [value * enough for value in x]
+
+
+def regularity(matrix: list[list[Number]], kind: Kind = RECORDED) -> Number:
+    """The least diagonal entry of R over the largest, in size: about the least singular value over the largest.
+
+    >>> regularity([[2.0, 0.0], [0.0, 1e-3]])
+    0.0005
+    """
+    n = len(matrix[0])
+    a = _reflected([[*row, 0.0] for row in matrix], kind)
+    least = largest = abs(a[0][0])
+    for k in range(1, n):
+        size = abs(a[k][k])
+        least, largest = kind.select(least - size, size, least), kind.select(size - largest, size, largest)
+    return least / largest
+
+
+def _reflected(a: list[list[Number]], kind: Kind) -> list[list[Number]]:
+    """R and the right side, which is the last column."""
+    n = len(a[0]) - 1
     for k in range(n):
         rows = [i for i in range(k + 1, len(a)) if not _nothing(a[i][k])]
         if not rows:
@@ -58,18 +88,4 @@ def solved(
             along = along * factor
             for i, v in mirror.items():
                 a[i][j] = a[i][j] - v * along
-    x: list[Number] = [0.0] * n
-    for k in range(n - 1, -1, -1):
-        rest = a[k][n]
-        for j in range(k + 1, n):
-            rest = rest - (0.0 if _nothing(a[k][j]) or _nothing(x[j]) else a[k][j] * x[j])
-        x[k] = 0.0 if _nothing(rest) else rest / a[k][k]
-    if not least:
-        return x
-    largest = abs(a[0][0])
-    for k in range(1, n):
-        largest = kind.select(abs(a[k][k]) - largest, abs(a[k][k]), largest)
-    good: Number = 1.0
-    for k in range(n):
-        good = kind.select(abs(a[k][k]) - least * largest, good, float("nan"))
-    return [value * good for value in x]
+    return a

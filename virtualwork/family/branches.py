@@ -105,7 +105,7 @@ def _meets(
     """Where a dip of the radicand, which is followed down, goes to zero."""
     inner = depth[1:-1]
     dips = (inner <= depth[:-2]) & (inner <= depth[2:]) & (inner < DIP) & (inner > 0)
-    meets: Mask = (np.abs(depth[[0, -1]]) < MEETS).any(axis=0)
+    meets: Mask = np.asarray((np.abs(depth[[0, -1]]) < MEETS).any(axis=0))
     places, lanes = np.nonzero(dips)
     if not len(lanes):
         return meets

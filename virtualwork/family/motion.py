@@ -57,7 +57,7 @@ class PointOfFamily:
 
     def complex(self, order: int) -> Complexes:
         """The order-th time derivative as x + iy, (v, n)."""
-        return self.motion.values([("point", self.body, self.place, self.node, order)])[0]
+        return self.motion.values([("point", self.body, self.place, self.node, order)])[0]  # type: ignore[no-any-return]
 
 
 class LinkOfFamily:
@@ -70,7 +70,7 @@ class LinkOfFamily:
         return f"LinkOfFamily({self.body}, {len(self.motion)} variants)"
 
     def _of(self, order: int) -> Reals:
-        return self.motion.values([("angle", self.body, order)])[0]
+        return self.motion.values([("angle", self.body, order)])[0]  # type: ignore[no-any-return]
 
     @property
     def angle(self) -> Reals:
@@ -100,7 +100,7 @@ class SlideOfFamily:
         self.motion, self.guide = motion, guide
 
     def _of(self, order: int) -> Reals:
-        return self.motion.values([("slide", self.guide, order)])[0]
+        return self.motion.values([("slide", self.guide, order)])[0]  # type: ignore[no-any-return]
 
     @property
     def position(self) -> Reals:
@@ -177,7 +177,7 @@ class FamilyMotion:
     @cached_property
     def assembled(self) -> NDArray[np.bool_]:
         """(v, n) bool: which poses of which variants can be assembled."""
-        return np.isfinite(self.values([ASSEMBLED])[0])
+        return np.asarray(np.isfinite(self.values([ASSEMBLED])[0]))
 
     @property
     def failed(self) -> int:
@@ -243,7 +243,7 @@ class FamilyMotion:
         """The effort at the input by virtual work, (v, n) N·m (N at a slide); (v, n, k) for k inputs."""
         k = len(self.part.mechanism.inputs)
         found = self.values([("effort", j) for j in range(k)])
-        return found[0] if k == 1 else np.stack(found, axis=-1)  # type: ignore[no-any-return]
+        return found[0] if k == 1 else np.stack(found, axis=-1)
 
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (v, n, 2) N.

@@ -175,8 +175,8 @@ class Solver:
         for i in range(0, len(places), each):
             rows = places[i : i + each]
             alone[rows[self._on_tape(keys, rows, out)]] = True
-        for i in np.flatnonzero(alone):
-            self._one(int(i), keys, out)
+        for place in np.flatnonzero(alone):
+            self._one(int(place), keys, out)
         return out
 
     def _takes(self, keys: Sequence[Key]) -> bool:

@@ -69,7 +69,8 @@ def limits(m: Description, given: Mapping[str, float]) -> dict[Dimension, float]
     DescriptionError
         Where a path names no number.
     """
-    known, found = dimensions(m), {}
+    known = dimensions(m)
+    found: dict[Dimension, float] = {}
     for path, limit in given.items():
         found |= dict.fromkeys(named(m, path, known), limit)
     return found
@@ -137,9 +138,9 @@ def drawn(
     each = max(1, HELD // (len(family) * max(len(keys), 1)))
     for a in range(0, n, each):
         rows = slice(a, min(a + each, n))
-        part = [r[rows] if np.ndim(r) else r for r in rates]
+        speed, acceleration = (r[rows] if np.ndim(r) else r for r in rates)
         q = inputs[rows]
-        motion = family.motion(q[:, 0] if k == 1 else q, *part, executor=executor)
+        motion = family.motion(q[:, 0] if k == 1 else q, speed, acceleration, executor)
         yield rows, motion.values(list(keys)), motion.assembled
 
 

@@ -99,6 +99,19 @@ class Folded:
         return 0.0 * x
 
 
+def real_part(z: Number) -> Number:
+    """The real part of any number."""
+    return bare(z).real
+
+
+def imaginary_part(z: Number) -> Number:
+    """The imaginary part."""
+    return bare(z).imag
+
+
+PARTS = real_part, imaginary_part
+
+
 class Written:
     """Recorded numbers, and constants of the mechanism that vary: what is done with them is written down."""
 
@@ -134,22 +147,14 @@ class Written:
 
     def solve(self, cols: list[list[Number]], right: list[Number]) -> list[Number]:
         """Solve Σ column·x + right = 0."""
-        rows = [[part(c) for c in row] for row in cols for part in (_real, _imag)]
-        return solved(rows, [-part(w) for w in right for part in (_real, _imag)])
+        rows = [[part(c) for c in row] for row in cols for part in PARTS]
+        return solved(rows, [-part(w) for w in right for part in PARTS])
 
     def transposed(self, cols: list[list[Number]], loads: list[Number]) -> list[Number]:
         """Solve Σ_c λ_c·column_c + load = 0."""
-        rows = [[part(row[j]) for row in cols for part in (_real, _imag)] for j in range(len(loads))]
+        rows = [[part(row[j]) for row in cols for part in PARTS] for j in range(len(loads))]
         x = solved(rows, [0.0 if load is None else -bare(load) for load in loads], least=PARALLEL)
         return [self.join(x[2 * c], x[2 * c + 1]) for c in range(len(cols))]
-
-
-def _real(z: Number) -> Number:
-    return bare(z).real
-
-
-def _imag(z: Number) -> Number:
-    return bare(z).imag
 
 
 ONE, MANY, WRITTEN = One(), Many(), Written()

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.engines import FEW, compiled_code, run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.linear import SINGULAR
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Number, Reals
@@ -107,6 +108,7 @@ class Lanes:
 
     def takes(self, keys: Iterable[Key]) -> bool:
         """Whether the tape has these quantities: friction iterates, and redundant statics is a system of its own."""
+        recording = self.recording
         if self.branch.folded:
             return False
         if not any(key[0] in FORCES for key in keys):
@@ -115,7 +117,7 @@ class Lanes:
             return False
         return not (
             any(key[0] in ("newton-euler", "force", "moment") for key in keys)
-            and self.recording.forces[0].order.redundant
+            and recording.forces[0].order.redundant
         )
 
     def values(self, keys: Sequence[Key]) -> list[Any]:
@@ -135,18 +137,20 @@ class Lanes:
         forces = any(key[0] in FORCES for key in keys)
         groups = [g.name for g in self.branch.plan.groups if g.kind not in ("Newton", "PRP")]
         more: list[Key] = [("margin", name) for name in groups] if forces else []
+        if forces or any(key[0] != "turn" and key[-1] != 0 for key in keys):
+            larger = [g.name for g in self.branch.plan.groups if g.kind == "Newton"]
+            more += [("regularity", name) for name in larger]
         closed: dict[Key, Key] = {}
         if self.branch.may_open:
             closed = {key: ("closed", *self.recording.hangs_on(key)) for key in keys}
         tape = taped(self.branch, self.recording, (*keys, *more, *dict.fromkeys(closed.values())))
         out = run(tape, self.entering(tape.inputs))
         n = self.poses.n
-        careful = self.branch.close_to_change(self.poses.inputs[:, 0]) if self.branch.turning_over else None
-        for _, name in more:
-            near = np.abs(out[names(("margin", name))[0]]) < NEAR
+        careful: Any = self.branch.close_to_change(self.poses.inputs[:, 0])
+        for key in more:
+            near = np.abs(out[names(key)[0]]) < (NEAR if key[0] == "margin" else SINGULAR)
             if np.any(near):
-                near = np.broadcast_to(near, n)
-                careful = near if careful is None else careful | near
+                careful = careful | np.broadcast_to(near, n)
         nowhere = ~np.isfinite(self.poses.inputs).all(axis=1)
         for key in keys:
             where = names(key)
@@ -161,16 +165,16 @@ class Lanes:
             if key[0] in FORCES:
                 value += 0.0
             self.known[key] = value
-        if careful is not None and careful.any():
+        if careful.any():
             some = self.poses.some(careful)
             for key in keys:
                 self.known[key][careful] = over_blocks(some, key)
 
-    def entering(self, names: Iterable[str]) -> dict[str, Any]:
-        """The inputs of a tape."""
+    def entering(self, inputs: Iterable[str]) -> dict[str, Any]:
+        """The inputs of a tape, by their names."""
         poses, found = self.poses, {}
         one = poses.n == 1
-        for name in names:
+        for name in inputs:
             kind, _, of = name.partition(" ")
             if not of:
                 j = int(name[1:])
@@ -187,8 +191,7 @@ class Lanes:
             elif of.startswith("spring "):
                 found[name] = self._spring(int(of.removeprefix("spring ")))
             else:
-                self.poses.solve((f"angle:{of}",), 0)
-                found[name] = self.poses.over(lambda _, st, body=of: st.angle[body])
+                found[name] = self._angle(of)
         if one:
             found = {name: float(np.ravel(value)[0]) for name, value in found.items()}
         return found
@@ -201,6 +204,11 @@ class Lanes:
         if at < len(of.angles):
             return self.poses.over(lambda _, st: st.angle[of.angles[at]])  # type: ignore[no-any-return]
         return self.poses.over(lambda _, st: st.slide[of.slides[at - len(of.angles)]])  # type: ignore[no-any-return]
+
+    def _angle(self, body: str) -> Reals:
+        """A body's angle with its whole turns."""
+        self.poses.solve((f"angle:{body}",), 0)
+        return self.poses.over(lambda _, st: st.angle[body])  # type: ignore[no-any-return]
 
     def _spring(self, number: int) -> Reals:
         """A torsion spring's twist."""

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from dalembert.arithmetic.recorded import Number, Recorder, bare
-from dalembert.arithmetic.systems import solved
+from dalembert.arithmetic.systems import regularity, solved
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
 from virtualwork.describe.loads import TorsionSpring
@@ -28,7 +28,7 @@ from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block, Shared, Table
 from virtualwork.formulas.dynamics import resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
-from virtualwork.formulas.kinds import WRITTEN
+from virtualwork.formulas.kinds import PARTS, WRITTEN
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.loads import Tabled
@@ -223,6 +223,7 @@ class Recording:
         ("shaking",), ("shaking moment",)            complex; real
         ("closed", groups' names …)                  a finite number where these groups are assembled
         ("margin", group's name)                     the radicand of a closed form, relative
+        ("regularity", group's name)                 of a larger group: how far its Jacobian is from singular, of 1
         """
         if key not in self._values:
             found = getattr(self, f"_{key[0].replace('-', '_').replace(' ', '_')}")(*key[1:])
@@ -346,6 +347,12 @@ class Recording:
                 if group.kind == "PRP":
                     total = total + abs(self.st.slide[group.slides[0]])
         return total
+
+    def _regularity(self, group: str) -> Number:
+        of = next(g for g in self.plan.groups if g.name == group)
+        self.solve(self.plan.writes(of), 0)
+        cols = columns(of, self.st)
+        return regularity([[part(c) for c in row] for row in cols for part in PARTS])
 
     def _margin(self, group: str) -> Number:
         of = next(g for g in self.plan.groups if g.name == group)
