@@ -39,7 +39,7 @@ ROLES = {
 
 SYMBOL = 0.016
 """The radius of a pin, of the size of the mechanism."""
-UNKNOWN_TRAVEL = 0.3
+UNKNOWN_TRAVEL = 0.2
 """Where nobody says how far a guide is used: so much of the size of the mechanism either way."""
 
 
@@ -125,14 +125,12 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
     Parameters
     ----------
     travel : sequence of (least, largest)
-        Of each guide, m: over which slides it is drawn. Default, and where NaN: some way about its `through`.
+        Of each guide, m: over which slides it is drawn. Default, and where NaN: some way about its `through`; of a guide
+        that is hardly used some way about its block or pin.
     """
     s = SYMBOL * mechanism.size
     reach = UNKNOWN_TRAVEL * mechanism.size
-    spans = [
-        span if all(map(isfinite, span)) else (-reach, reach)
-        for span in (travel or [(-reach, reach)] * len(mechanism.guides))
-    ]
+    spans = [_long_enough(span, reach, s) for span in (travel or [(-reach, reach)] * len(mechanism.guides))]
     guides = list(zip(mechanism.guides, spans, strict=True))
     wheels = [circle for gear in mechanism.gears for circle in _wheels(mechanism, gear)]
     wheels = list(dict.fromkeys(wheels))
@@ -162,6 +160,13 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
         _points(mechanism, s),
     ]
     return Drawing(tuple(chain.from_iterable(layers)), tuple(_labels(mechanism)), s)
+
+
+def _long_enough(span: tuple[float, float], reach: float, s: float) -> tuple[float, float]:
+    """Return over what to draw a guide: some way about its block or pin where it is hardly used, as in a single pose."""
+    low, high = span if all(map(isfinite, span)) else (0.0, 0.0)
+    middle = (low + high) / 2
+    return (low, high) if high - low > 4 * s else (middle - reach, middle + reach)
 
 
 def _coil(mechanism: Description, spring: Spring, s: float) -> Coil:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from virtualwork.branch.assembly import Assembly, all_assemblies
 from virtualwork.describe.description import Description
+from virtualwork.describe.errors import MechanismError
 from virtualwork.describe.reader import read, read_text
 from virtualwork.motion import Motion
 
@@ -91,6 +92,16 @@ class Mechanism(Description):
     def assembly(self) -> Assembly:
         """The assembly that the guess chooses, ready to move."""
         return Assembly.from_guess(self)
+
+    def _repr_html_(self) -> str | None:
+        """Draw it in its own pose; None, which shows its `repr`, where it has none."""
+        from virtualwork.still import svg
+
+        try:
+            motion = self.motion()
+            return svg(motion.poses, motion.drawing)
+        except MechanismError:
+            return None
 
     def motion(
         self,

@@ -7,11 +7,13 @@ starts that are drawn at random.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from benchmarks.stress.pairs import Pairs
 from benchmarks.stress.topologies import END, Topology, evaluate, follow, generate, regularity
+from virtualwork import Guess
 from virtualwork.branch.assembly import Assembly
 from virtualwork.formulas.numbers import Reals
 from virtualwork.motion import Motion
@@ -19,6 +21,7 @@ from virtualwork.motion import Motion
 SCANNED = 1.5  # rad or m, to both sides of the guess
 FINEST = 1e-6
 STARTS = 60
+GRID = 360
 
 
 def one_input(seed: int) -> Topology | None:
@@ -43,6 +46,54 @@ def wrong_limits(t: Topology) -> list[str]:
                 f"no limit at {side * near:+.6g} from the guess: it goes on to {side * way.reached:+.6g}"
             )
     return wrong
+
+
+def wrong_dead_points(t: Topology) -> list[str]:
+    """Dead points that the scan meets and the program does not name, or the other way round, on every range of the branch.
+
+    A pose in the middle of each range that the program puts together is followed to its ends by itself.
+    """
+    m = t.mechanism
+    dead = np.array(m.check.dead_points)
+    period = None if m.inputs[0].is_slide else m.assembly.track.period
+    q = t.inputs[0] + np.linspace(-SCANNED, SCANNED, GRID)
+    low, end = -math.inf, math.inf
+    if period is not None:
+        # ends of other ranges are named in the turns in which the guess's own lies
+        low = max((m.check.input_limits or (-math.inf,))[0], t.inputs[0] - period)
+        q, end = low + period * (np.arange(GRID) + 0.5) / GRID, low + period
+        dead = low + (dead - low + 1e-6) % period - 1e-6
+    motion, wrong = m.motion(q), []
+    there = np.append(motion.assembled, False)
+    first = np.flatnonzero(there & ~np.roll(there, 1))
+    last = np.flatnonzero(there & ~np.roll(there, -1))
+    for middle in (first + last) // 2:
+        pose = placed(t, motion, int(middle))
+        start = pose.inputs[0]
+        for side in (-1.0, 1.0):
+            way = follow(pose, (side,), (SCANNED,), FINEST)
+            ahead = side * (dead - start)
+            near = float(ahead[ahead > 0].min(initial=math.inf))
+            if way.reached > (end - start if side > 0 else start - low) + 1e-3:
+                continue
+            if way.end == "limit" and abs(near - way.reached) > 1e-3:
+                wrong.append(
+                    f"a dead point {side * way.reached:+.6g} from {start:.6g}, said to be at {side * near:+.6g}"
+                )
+            if way.end != "limit" and near < way.reached - 1e-3:
+                wrong.append(
+                    f"no dead point {side * near:+.6g} from {start:.6g}: it goes on to {side * way.reached:+.6g}"
+                )
+    return wrong
+
+
+def placed(t: Topology, motion: Motion, i: int) -> Topology:
+    """The mechanism as it stands in pose i of a motion."""
+    links = t.mechanism.links
+    angles = {body: float(motion.link(body).angle[i]) for body in links}
+    origins = {body: complex(motion.at(body, 0j).complex(0)[i]) for body in links}
+    guess = Guess(at=float(motion.inputs[i, 0]), angles=angles)
+    return Topology(t.seed, replace(t.mechanism, guess=guess), origins, angles)
 
 
 def settled(t: Topology, x: Reals) -> Reals | None:
@@ -116,7 +167,16 @@ def _assemblies(rng: np.random.Generator) -> Pairs:
     return [(math.inf if wrong_assemblies(t, rng) else 0.0, 1.0)]
 
 
+def _dead_points(rng: np.random.Generator) -> Pairs:
+    t = one_input(int(rng.integers(1 << 31)))
+    return [] if t is None else [(math.inf if wrong_dead_points(t) else 0.0, 1.0)]
+
+
 CAMPAIGNS = {
     "limits of any topology": ("how far the input goes, against a scan of all constraints", _limits),
+    "dead points of any topology": (
+        "the ends of every range of a branch, against the same scan",
+        _dead_points,
+    ),
     "assemblies of any topology": ("every one listed, against Newton from random starts", _assemblies),
 }

@@ -93,6 +93,16 @@ def verdicts(found: Balancing) -> str:
                 f"initial {before:.6g} ({'within' if v.initial <= v.permissible else 'beyond'}), "
                 f"residual {after:.6g} ({'within' if v.residual <= v.permissible else 'beyond'})"
             )
+    names = found.rotors.names
+    if len(names) > SHOWN:
+        beyond = [
+            name for r, name in enumerate(names) if any(v.residual > v.permissible for v in found.verdicts(r))
+        ]
+        lines.append(
+            f"all {len(names)} rotors: residual (within)"
+            if not beyond
+            else f"{len(beyond)} of {len(names)} rotors: residual (beyond): {', '.join(beyond[:SHOWN])}{' …' * (len(beyond) > SHOWN)}"
+        )
     return "\n".join(lines)
 
 

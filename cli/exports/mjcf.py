@@ -48,6 +48,7 @@ def mjcf(s: Skeleton, travel: Travel, said: str) -> bytes:
     for k, g in enumerate(m.gears, 1):
         _fixed(tendon, f"gears {k}", s.terms(g.shares()))
         add(equality, "tendon", tendon1=f"gears {k}")
+    _springs(s, tendon, bodies)
     actuator = Element("actuator")
     for k, e in enumerate(m.inputs):
         joint = next((j for j in s.joints if j.input == k), None)
@@ -64,10 +65,30 @@ def mjcf(s: Skeleton, travel: Travel, said: str) -> bytes:
     return document(root, said)
 
 
-def _fixed(tendon: Element, name: str, terms: dict[str, float]) -> None:
+def _fixed(tendon: Element, name: str, terms: dict[str, float]) -> Element:
     made = add(tendon, "fixed", name=name)
     for joint, factor in terms.items():
         add(made, "joint", joint=joint, coef=factor)
+    return made
+
+
+def _springs(s: Skeleton, tendon: Element, bodies: dict[str, Element]) -> None:
+    """Add springs and dampers, between two places and between two links."""
+    m = s.m
+    for k, spring in enumerate(m.springs, 1):
+        made = add(tendon, "spatial", name=f"spring {k}", stiffness=spring.stiffness, damping=spring.damping)
+        made.set("springlength", digits(spring.free_length))
+        for side, (body, point) in zip("ab", spring.between, strict=True):
+            site = f"spring {k} {side}"
+            add(bodies[body], "site", name=site, pos=spatial(m.place(body, point)))
+            add(made, "site", site=site)
+    for k, turning in enumerate(m.torsion_springs, 1):
+        on, link = turning.links
+        terms = s.terms({link: 1.0, on: -1.0})
+        made = _fixed(tendon, f"torsion spring {k}", terms)
+        made.attrib |= {"stiffness": digits(turning.stiffness), "damping": digits(turning.damping)}
+        here = sum(c * next(j.value for j in s.joints if j.name == name) for name, c in terms.items())
+        made.set("springlength", digits(here - s.twist(turning)))
 
 
 def _body(s: Skeleton, b: Branching, inside: Element) -> Element:
@@ -101,7 +122,8 @@ def _inside(s: Skeleton, part: Part, body: Element) -> None:
             diaginertia=digits(*3 * (part.inertia,)),
         )
     for point, z in part.points.items():
-        if part.name != GROUND and point not in s.m.pins and not any(point == j.point for j in s.joints):
+        # a point of several links stands on the first
+        if next(name for name, other in s.parts.items() if point in other.points) == part.name:
             add(body, "site", name=point, pos=spatial(z))
     for a, b in part.strokes:
         add(body, "geom", type="capsule", size=THICK * s.m.size, fromto=f"{spatial(a)} {spatial(b)}")

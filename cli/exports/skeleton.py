@@ -13,12 +13,16 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cli.errors import DataError
+from virtualwork.describe.loads import TorsionSpring
 from virtualwork.describe.parts import GROUND
 from virtualwork.drawing import hull
 from virtualwork.parts_of_motion import SlideMotion
 
 if TYPE_CHECKING:
     from virtualwork import Mechanism
+
+# poses between the guess and the start
+FOLLOWED = 181
 
 
 @dataclass
@@ -224,6 +228,14 @@ class Skeleton:
             for name, sense in self.path[body].items():
                 found[name] = found.get(name, 0.0) + c * sense
         return {name: c for name, c in found.items() if abs(c) > 1e-12}
+
+    def twist(self, spring: TorsionSpring) -> float:
+        """Return how far a torsion spring is wound, rad: within half a turn at the guess, and followed from there."""
+        way = np.linspace(self.m.at, self.inputs, FOLLOWED)
+        motion = self.m.motion(way if len(self.inputs) > 1 else way[:, 0])
+        on, link = (motion.link(b).angle if b != GROUND else np.zeros(FOLLOWED) for b in spring.links)
+        wound = np.unwrap(link - on) - spring.free_angle
+        return float(wound[-1] - 2 * np.pi * np.round(wound[0] / (2 * np.pi)))
 
     def driven(self, k: int) -> Joint | None:
         """Return the joint whose coordinate is an input; where none is, the one on which its link hangs in the tree."""

@@ -89,6 +89,7 @@ class _Reader:
         self.pistons: dict[frozenset[str], Slide] = {}
         for k, e in enumerate(self.entries("cylinders"), 1):
             self._cylinder(f"cylinder {k}", self.known(f"cylinder {k}", listed(e, "joints", "jointIds")))
+            self._limits(f"cylinder {k}", e)
         for k, e in enumerate(self.entries("actuators"), 1):
             self._actuator(k, e)
         return d
@@ -134,8 +135,20 @@ class _Reader:
                 d.welds.append((name, held[0] if held and GROUND not in held else GROUND))
         return slide
 
+    def _limits(self, where: str, e: dict[str, Any]) -> None:
+        """Name the limits of a stroke or a turn; a whole turn is none."""
+        held = {key: e[key] for key in ("stroke", "min", "max") if e.get(key) is not None}
+        low, high = held.get("min"), held.get("max")
+        numbers = isinstance(low, int | float) and isinstance(high, int | float)
+        if numbers and e.get("type") == "rotary" and high - low >= 360:  # type: ignore[operator]
+            del held["min"], held["max"]
+        if held:
+            said = ", ".join(f"{key} {value}" for key, value in held.items())
+            self.d.notes.append(left_out(f"{said} of {where}", "an input has no limits of its own here"))
+
     def _actuator(self, k: int, e: dict[str, Any]) -> None:
         d, where = self.d, f"actuator {k}"
+        self._limits(where, e)
         at, start = self.known(where, [e.get("at"), e.get("from")])
         velocity = e.get("velocity")
         try:

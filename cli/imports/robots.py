@@ -13,10 +13,10 @@ from fractions import Fraction
 import numpy as np
 
 from cli.errors import DataError
-from cli.imports.drawn import GROUND, Body, Drawing, Drive, Mesh, Place, Slide, unused
+from cli.imports.drawn import GROUND, Body, Drawing, Drive, Load, Mesh, Place, Slide, unused
 from cli.imports.plane import plane_of
 from cli.imports.words import left_out
-from cli.read.robots.robot import Motor, Robot, RobotJoint, RobotLink
+from cli.read.robots.robot import Motor, Robot, RobotJoint, RobotLink, Spring
 
 # what the bodies are called that the export makes of slots
 BLOCK = "block "
@@ -82,10 +82,11 @@ class _Layer:
         self._named_points()
         self._couplings()
         self._drives(moving)
+        self._springs(moving)
         for what in dict.fromkeys(what for j in moving for what in j.more):
             names = ", ".join(j.name for j in moving if what in j.more)
             d.notes.append(
-                left_out(f"{what} of {names}", "`dalembert import` takes over what moves and what is heavy")
+                left_out(f"{what} of {names}", "it moves as far as its links let it, without friction")
             )
         if robot.gravity is not None:
             g = self.plane.direction(robot.gravity)
@@ -247,9 +248,11 @@ class _Layer:
             named = {p: link.pose @ np.append(at, 1.0) for p, at in link.points.items()}
             if self._top(name) != name and link.inertial is None:
                 named[name] = link.pose[:, 3]
+            held = d.bodies[group.name].points
             for point, at in named.items():
                 z = self._place(group.inside(self.plane.place(at[:3])))
-                d.bodies[group.name].points[d.fresh(point)] = z
+                if point not in held and z not in held.values():
+                    held[d.fresh(point)] = z
 
     # --- what ties and what drives ---------------------------------------------------------------------------
     def _shares(self, terms: list[tuple[str, float]], where: str) -> dict[str, float] | None:
@@ -287,6 +290,45 @@ class _Layer:
                 continue
             b, a = pair[:2]
             d.meshes.append(Mesh(a, b, -shares[a] / shares[b], arm))
+
+    def _springs(self, moving: list[RobotJoint]) -> None:
+        """Springs and dampers of joints and tendons; on a slide alone they have no like."""
+        robot, d = self.robot, self.d
+        found = [
+            Spring(f"spring of joint {j.name}", [], [(j.name, 1.0)], j.stiffness, j.damping, j.rest)
+            for j in moving
+            if j.stiffness or j.damping
+        ]
+        for s in found + robot.springs:
+            values: dict[str, object] = {
+                k: v for k, v in (("stiffness", s.stiffness), ("damping", s.damping)) if v
+            }
+            if s.ends:
+                ends = []
+                for link, at in s.ends:
+                    place = self.plane.place((robot.links[link].pose @ np.append(at, 1.0))[:3])
+                    ends.append((self.group(link), place))
+                length = abs(ends[0][1] - ends[1][1])
+                if s.stiffness:
+                    values["free_length"] = length if s.rest is None else s.rest
+                held: list[tuple[str, Place | None]] = [(g.name, self._place(g.inside(z))) for g, z in ends]
+                d.loads.append(Load("springs", held, values))
+                continue
+            shares = self._shares(s.terms, s.name)
+            pair = sorted(shares.items(), key=lambda e: e[1]) if shares else []
+            if len(pair) != 2:
+                d.notes.append(left_out(s.name, "it acts neither between two places nor between two links"))
+                continue
+            (on, _), (link, c) = pair
+            if s.stiffness:
+                # from the sum of the joints' coordinates to the angle between the links
+                here = sum(factor * robot.joints[name].value for name, factor in s.terms)
+                free = 0.0 if s.rest is None else (s.rest - here) / c
+                values["free_angle"] = d.bodies[link].turn - d.bodies[on].turn + free
+            for key in ("stiffness", "damping"):
+                if key in values:
+                    values[key] = float(values[key]) * c * c  # type: ignore[arg-type]
+            d.loads.append(Load("torsion_springs", [(on, None), (link, None)], values))
 
     def _drives(self, moving: list[RobotJoint]) -> None:
         d, robot = self.d, self.robot

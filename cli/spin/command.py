@@ -104,6 +104,7 @@ def run(
         document=lambda: columns.document(found),
         tables={"states": lambda: columns.states(found)},
         notes=lambda: words.notes(found),
+        afterword=lambda: words.afterword(found),
         figure=figure,
         beside={} if html is None else {html: page},
         method=words.METHOD,

@@ -38,12 +38,24 @@ def coarse(found: Rotation) -> list[str]:
     ]
 
 
+LONG = 24  # times: below a longer table stands what would have been carried out of sight above it
+
+
 def notes(found: Rotation) -> str:
-    """Say what is constant in the motion."""
-    lines = [
-        "omega in body axes, momentum in space axes, attitude [w, x, y, z] from body to space; "
-        + ("closed form" if found.exact else f"integrated by {found.integrator}")
-    ]
+    """Say above the table what its columns are, and what is constant in the motion."""
+    told = "omega in body axes, momentum in space axes, attitude [w, x, y, z] from body to space; " + (
+        "closed form" if found.exact else f"integrated by {found.integrator}"
+    )
+    return told if len(found.time) > LONG else "\n".join([told, *_constants(found)])
+
+
+def afterword(found: Rotation) -> str:
+    """Say it below a long table."""
+    return "\n".join(_constants(found)) if len(found.time) > LONG else ""
+
+
+def _constants(found: Rotation) -> list[str]:
+    lines = []
     drift = found.drift
     if drift["momentum"] is not None:
         lines.append(f"drift: momentum {drift['momentum']:.2g}, energy {drift['energy']:.2g} (relative)")
@@ -57,4 +69,4 @@ def notes(found: Rotation) -> str:
             lines.append(
                 ", ".join(f"{name}: {'none' if x is None else f'{x:.6g}'}" for name, x in rates.items())
             )
-    return "\n".join(lines)
+    return lines

@@ -9,6 +9,7 @@ import json
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import Any
@@ -23,7 +24,7 @@ from cli.imports.assembled import described
 from cli.imports.drawn import settle
 from cli.imports.pmksweb import number
 from cli.imports.told import read
-from virtualwork import Mechanism
+from virtualwork import Guess, Mechanism
 
 Run = Callable[..., "CompletedProcess[str]"]
 FORMATS = Path(__file__).parents[1] / "data" / "formats"
@@ -444,6 +445,45 @@ def test_coordinates_in_are_coordinates_out(places: list[tuple[float, float]]) -
     for k, z in enumerate(places, 1):
         assert at(m, f"J{k}") == pytest.approx(z, rel=1e-10, abs=1e-10)
     moves(m, 1e-3)
+
+
+def test_a_symmetric_double_butterfly_stands_as_drawn_and_a_guess_from_which_it_moves_is_said() -> None:
+    """Its drawn pose is a triple root: the links move as the cube root of the input, and no rate is determined."""
+    text = "\n".join(
+        [
+            "crank ground R 0 0",
+            *(
+                "crank up1 R 3 3",
+                "crank up2 R -3 3",
+                "up1 wing1 R 3 8",
+                "up2 wing2 R -3 8",
+                "wing1 wing2 R 0 10",
+            ),
+            *("wing1 leg1 R 5 10", "wing2 leg2 R -5 10", "leg2 ground R -5 -4", "leg1 ground R 5 -4"),
+        ]
+    )
+    (m,), notes = taken(text)
+    assert at(m, "J6") == (0, 10)
+    (said,) = (note for note in notes if "neither side" in note)
+    rows = dict(re.findall(r'(\w+) = "(\S+) rad"', said))
+    start = float(rows.pop("at"))
+    near = replace(m, guess=Guess(start, {name: float(value) for name, value in rows.items()}))
+    motion = near.motion(np.linspace(0.6, 1.2, 7) * start)
+    assert motion.assembled.all()
+    # the same linkage: its legs keep their length, and its wings meet
+    for point, foot in (("J7", 5), ("J8", -5)):
+        gap = motion.point(point).position - [foot, -4]
+        assert np.hypot(*gap.T) == pytest.approx(14, rel=1e-12)
+    assert np.ptp(motion.point("J6").position[:, 0]) > 0.1
+
+
+def test_limits_of_strokes_and_turns_are_named() -> None:
+    text = (FORMATS / "motiongen/cylinder_boom_invented.json").read_text()
+    assert any("stroke 0.8 of cylinder 1: left out" in note for note in taken(text)[1])
+    turning = (FORMATS / "motiongen/elliptical_crank.json").read_text()
+    assert not any("max" in note for note in taken(turning)[1])
+    said = taken(turning.replace('"max": 360', '"max": 90'))[1]
+    assert any("min 0, max 90 of actuator 1: left out" in note for note in said)
 
 
 # --- bad input ----------------------------------------------------------------------------------------------------

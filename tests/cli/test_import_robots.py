@@ -131,7 +131,26 @@ def test_an_mjcf_slider_crank_with_classes_and_degrees() -> None:
     assert m.motion(q).link("rod").angle[0] < 0
     piston = m.motion(q).point("connect 1").position[0]
     assert piston == pytest.approx((x, 1 - 0.3 * math.sin(math.radians(20))), rel=1e-12)
-    assert any("damping of hip: left out" in note for note in notes)
+    # the joint's damper, N·m·s/rad, holds against 3 rad/s
+    assert m.torsion_springs[0].damping == 1
+    assert not notes
+
+
+def test_springs_of_mjcf_ask_for_mujocos_effort() -> None:
+    """A joint's spring in degrees, a tendon between two sites, one on a joint: statics against MuJoCo's own forces."""
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
+    text = """<mujoco><option gravity="0 0 0"/><compiler angle="degree"/><worldbody><site name="s" pos="0.3 0.4 0"/>
+<body name="arm" euler="0 0 30"><joint name="hip" axis="0 0 -1" stiffness="2" springref="20"/><geom size=".1" mass="0"/>
+<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><site name="t" pos="0.2 0 0"/></body></worldbody>
+<tendon><spatial name="a" stiffness="30" springlength="0.1"><site site="s"/><site site="t"/></spatial>
+<fixed name="b" stiffness="3" springlength="0.2"><joint joint="hip" coef="2"/></fixed></tendon></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    state = mujoco.MjData(model)
+    m, _ = taken(text)
+    for q in (0.0, 0.4, -0.7):
+        state.qpos[0] = q
+        mujoco.mj_inverse(model, state)
+        assert m.motion(math.radians(30) - q).effort == pytest.approx([-state.qfrc_inverse[0]], rel=1e-12)
 
 
 def test_mujoco_agrees_with_what_is_read_of_poses() -> None:

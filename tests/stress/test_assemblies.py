@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.stress.assemblies import one_input, wrong_assemblies, wrong_limits
+from benchmarks.stress.assemblies import one_input, wrong_assemblies, wrong_dead_points, wrong_limits
+from virtualwork import Guess, Guide, Input, Link, Mechanism
 
 
 def _limits(seeds: range) -> int:
@@ -53,3 +54,56 @@ def test_limits_are_where_a_scan_can_go_no_further() -> None:
 
 def test_every_assembly_is_listed_and_closes() -> None:
     assert _assemblies(range(60)) > 2
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(100061, id="a gear of fractional ratio inside a group"),
+        pytest.param(100202, id="ends of ranges in other turns, where the wheels stand otherwise"),
+        pytest.param(100249, id="a slide's other range, behind a gap"),
+        pytest.param(100300, id="the same"),
+    ],
+)
+def test_dead_points_of_every_range(seed: int) -> None:
+    t = one_input(seed)
+    assert t is not None
+    assert wrong_dead_points(t) == []
+
+
+def test_dead_points_are_where_a_scan_can_go_no_further() -> None:
+    met = 0
+    for seed in range(40):
+        t = one_input(seed)
+        if t is not None:
+            assert wrong_dead_points(t) == [], f"seed {seed}"
+            met += len(t.mechanism.check.dead_points) > 0
+    assert met > 5
+
+
+def test_behind_a_limit_nothing_stands_where_a_gear_turns_by_halves() -> None:
+    """Seed 11: links of one group turn by half a turn of the input; a turn back it stands otherwise, not as before."""
+    t = one_input(11)
+    assert t is not None
+    m = t.mechanism
+    low, _ = m.check.input_limits or (0.0, 0.0)
+    assert m.assembly.track.turns == 2
+    assert m.motion(low + np.array([1e-6, 1.0, 6.0])).assembled.all()
+    assert not m.motion(low - np.array([1e-6, 1.0, 4.0, 2 * np.pi, 7.0])).assembled.any()
+
+
+def test_a_crank_driven_by_its_piston_has_four_dead_points() -> None:
+    """±(rod ± crank): a range that is met behind the gap, half of it within one size from the guess, has both of its ends."""
+    m = Mechanism(
+        {"O": (0, 0), "S": (0, 2)},
+        {
+            "crank": Link({"O": (0, 0), "C": (0.5, 0)}),
+            "rod": Link({"C": (0, 0), "B": (1, 0)}),
+            "block": Link({"B": (0, 0)}),
+        },
+        guides=[Guide("B", "block", "ground", 0j, 0.0, 0.0)],
+        inputs=Input(slider="B"),
+        guess=Guess(at=1.2, angles={"rod": 0.3, "crank": -0.5}),
+    )
+    assert m.check.dead_points == pytest.approx((-1.5, -0.5, 0.5, 1.5), abs=1e-12)
+    assert m.check.input_limits == pytest.approx((0.5, 1.5), abs=1e-12)

@@ -57,6 +57,15 @@ def test_a_guide_is_as_long_as_it_is_used() -> None:
     assert np.ptp(ends.real) == pytest.approx(2 * beyond)
 
 
+def test_a_guide_of_a_single_pose_is_drawn_some_way_about_its_pin() -> None:
+    motion = example("scotch-yoke", "yoke").motion([1.2])
+    (slot,) = (s for s in motion.drawing.shapes if s.role == "slot")
+    assert isinstance(slot, Line)
+    ends = np.array(slot.points)
+    assert ends.mean().imag == pytest.approx(0.05 * np.sin(1.2), rel=1e-6)
+    assert np.ptp(ends.imag) > 0.04
+
+
 def test_a_block_lies_along_its_guide_whichever_way_its_link_is_turned() -> None:
     engine = example("engine", "engine")
     motion = engine.motion([0.3])

@@ -17,7 +17,7 @@ from virtualwork.formulas.positions import Case, State, run
 from virtualwork.formulas.rates import Passage
 from virtualwork.formulas.winding import principal
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Plan, Step, Turn
+from virtualwork.plan.steps import Group, Plan, Step, turns
 
 
 @record
@@ -63,9 +63,8 @@ class Choice(Record):
     def geared(self) -> set[str]:
         """Bodies of which a gear of fractional ratio needs the angle itself, with its whole turns, at first or second hand."""
         found: set[str] = set()
-        for step in reversed(self.plan.steps):
-            for turn in (step,) if isinstance(step, Turn) else step.ties if isinstance(step, Group) else ():
-                found |= {b for b, r in turn.angle.bases if turn.body in found or not float(r).is_integer()}
+        for turn in reversed(list(turns(self.plan.steps))):
+            found |= {b for b, r in turn.angle.bases if turn.body in found or not float(r).is_integer()}
         return found
 
     @cached_property

@@ -26,7 +26,7 @@ from virtualwork.branch.winding import Winding, wind_along_lines
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.numbers import Complexes, Number, Reals
 from virtualwork.formulas.positions import State, run
-from virtualwork.plan.steps import Group, Step, Turn
+from virtualwork.plan.steps import Group, Step, turns
 
 # of one turn, or of one mechanism's size of slide
 SAMPLES = 720
@@ -36,8 +36,10 @@ DIP = 0.05
 SAME = 1e-6
 # turns of the input within which a branch is looked for to come back to itself
 TURNS = 32
+# within which the ends of its range are looked for
+TURNED = (1, 2, 4, 8, 16, TURNS)
 # sizes of the mechanism within which the limits of a slide are looked for
-SLIDES = 4.0
+SLIDES = (1, 2, 4)
 # poses of a turn that are compared for it
 COMPARED = 60
 
@@ -61,20 +63,16 @@ class Track:
         self.active = len(m.inputs) == 1
         self.start = m.at[0]
         self.low = self.high = self.start
-        slide = m.inputs[0].is_slide
-        self.length = m.size if slide else 2 * np.pi
+        self._slides = m.inputs[0].is_slide
+        self.length = m.size if self._slides else 2 * np.pi
         self.flips: dict[str, Reals] = {}
         self.changes: dict[str, list[ChangePoint]] = {}
         self._brackets: list[tuple[str, float, float]] = []
         self._continuations: dict[str, Continuation] = {}
         self._winding = Winding(self)
         # one turn says it all where every turn of a body is a whole number of turns of the input
-        whole = all(
-            float(k).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, k in s.angle.inputs
-        ) and all(
-            float(r).is_integer() for s in self.plan.steps if isinstance(s, Turn) for _, r in s.angle.bases
-        )
-        self.whole = whole and not slide
+        factors = [k for t in turns(self.plan.steps) for _, k in (*t.angle.inputs, *t.angle.bases)]
+        self.whole = not self._slides and all(float(k).is_integer() for k in factors)
         self._repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
         # no change point anywhere, however far the input turns
         self.settled = False
@@ -335,19 +333,30 @@ class Track:
     # --- the branch's own scale -----------------------------------------------------------------------------------
     @cached_property
     def turns(self) -> int | None:
-        """How many turns of the input bring every group back to where it stood: the period of the branch.
+        """How many turns of the input tell the poses of the branch apart: its period.
 
-        A branch that passes an odd number of change points in a turn needs two; a fractional gear its own number. A
-        branch between two limits needs what tells its own inputs apart. None with a slide or several inputs, and where
-        no number of turns up to `TURNS` does it.
+        A branch between two limits needs what tells its own inputs apart; any other as many as bring every group back
+        to where it stood. None with a slide or several inputs, and where no number of turns up to `TURNS` does it.
         """
-        if not self.active or self.assembly.mechanism.inputs[0].is_slide:
+        n = self._repetition
+        if n == 1 or self._slides or not self.has_limits:
+            return n
+        low, high = self.range
+        return max(1, int(np.ceil((high - low) / self.length))) if np.isfinite(high - low) else n
+
+    @cached_property
+    def _repetition(self) -> int | None:
+        """How many turns of the input bring every group back to where it stood, as far as poses can be compared.
+
+        A branch that passes an odd number of change points in a turn needs two; a fractional gear its own number.
+        """
+        if not self.active or self._slides:
             return None
         self.cover(self.start, self.start + self.length)
         if self.settled or self._period is not None or not self.plan.groups:
             return 1
         steps = self.assembly.needed([key for g in self.plan.groups for key in self.plan.writes(g)])
-        factors = [k for s in steps if isinstance(s, Turn) for _, k in s.angle.inputs]
+        factors = [k for t in turns(steps) for _, k in t.angle.inputs]
         ratios = [Fraction(k).limit_denominator(TURNS) for k in factors]
         if any(abs(float(r) - k) > 1e-12 * abs(k) for r, k in zip(ratios, factors, strict=True)):
             return None
@@ -358,20 +367,8 @@ class Track:
             self.cover(self.start - n * self.length, self.start + self.length)
             # beyond a limit there is nothing to compare: what is not assembled contradicts nothing
             if not (np.abs(self._stands(q - n * self.length) - here) > SAME).any():
-                return self._between_limits(n)
-        return self._between_limits(None)
-
-    def _between_limits(self, n: int | None) -> int | None:
-        """The turns of a range between two limits; n where there is none."""
-        if n == 1 or not self.has_limits:
-            return n
-        shifts = (0.0,) if n is None else (0.0, n * self.length)
-        every = [(limit.input + shift, limit.side) for limit in self._ends() for shift in shifts]
-        above = [q for q, side in every if q > self.start and side < 0]
-        below = [q for q, side in every if q < self.start and side > 0]
-        if not above or not below:
-            return n
-        return max(1, int(np.ceil((min(above) - max(below)) / self.length)))
+                return n
+        return None
 
     def _stands(self, q: Reals) -> Complexes:
         """Rotations and slides (over the size) of all groups at inputs q; NaN where not assembled."""
@@ -393,16 +390,48 @@ class Track:
         return d if self.period is None else d - self.period * np.round(d / self.period)
 
     # --- limits ---------------------------------------------------------------------------------------------------
-    def limits(self) -> list[Limit]:
-        """Where the input can go no further, over one period of the branch or what was covered, to full precision."""
-        back = self.length if not self._repeats else 0.0
-        self.cover(self.start - back, self.start + (self.period or self.length))
-        for reach in (1.0, 2.0, SLIDES) if self.assembly.mechanism.inputs[0].is_slide else ():
-            self.cover(self.start - reach * self.length, self.start + reach * self.length)
-            # on, until there is an end on either side of the guess
-            if len({v.side for v in self._ends() if (v.input - self.start) * v.side < 0}) == 2:
+    @cached_property
+    def range(self) -> tuple[float, float]:
+        """The ends of the input's range around the guess, rad or m; infinite where none was met."""
+        low, high = -np.inf, np.inf
+        within = [n for n in TURNED if n <= (self._repetition or TURNS)]
+        for reach in SLIDES if self._slides else within[-1:] if self._repeats else within:
+            back = 0 if self._repeats else reach
+            self.cover(self.start - back * self.length, self.start + reach * self.length)
+            ends = self._around()
+            low = max((v.input for v in ends if v.side > 0 and v.input < self.start), default=-np.inf)
+            high = min((v.input for v in ends if v.side < 0 and v.input > self.start), default=np.inf)
+            # a slide: on, until every range that was met has both of its ends
+            if np.isfinite(high - low) and not (self._slides and (ends[0].side < 0 or ends[-1].side > 0)):
                 break
-        return self._ends()
+        return low, high
+
+    def limits(self) -> list[Limit]:
+        """Where the input can go no further, over one period of the branch or what was covered, to full precision.
+
+        The poses of a branch between two limits are told apart over less than brings them back: ends of other ranges
+        are those of the turns in which its own lies.
+        """
+        back = 0.0 if self._repeats else self.length
+        self.cover(self.start - back, self.start + (self.period or self.length))
+        # a slide is looked along farther
+        if not self._slides and not self.has_limits:
+            return []
+        low, high = self.range
+        apart = not self._repeats or self.turns != self._repetition
+        if self.period is None or not np.isfinite(high - low) or not apart:
+            return self._ends()
+        self.cover(low, low + self.period)
+        near = SAME * self.length
+        return [v for v in self._around() if -near < v.input - low < self.period - near]
+
+    def _around(self) -> list[Limit]:
+        """The limits in what was covered; of a branch that repeats itself, before and after it too."""
+        ends = self._ends()
+        if not self._repeats:
+            return ends
+        again = (self._repetition or 1) * self.length
+        return [replace(v, input=v.input + n * again) for n in (-1, 0, 1) for v in ends]
 
     def _ends(self) -> list[Limit]:
         """The limits in what was covered."""

@@ -13,7 +13,7 @@ perhaps times a slide. That is all that derivatives, virtual displacements and r
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -127,6 +127,15 @@ class Group:
 
 
 Step = Turn | Slide | Place | Group
+
+
+def turns(steps: Iterable[Step]) -> Iterator[Turn]:
+    """Every angle that follows from others, by itself or tied inside a group."""
+    for step in steps:
+        if isinstance(step, Turn):
+            yield step
+        elif isinstance(step, Group):
+            yield from step.ties
 
 
 @dataclass(frozen=True)

@@ -125,18 +125,11 @@ class Check:
         track = self.assembly.track
         if not track.active:
             return None
-        limits = track.limits()
-        if not limits:
+        if not track.limits():
             return None
-        period = track.period
-        turns = (0.0,) if period is None else (-period, 0.0, period)
-        every = sorted((limit.input + t, limit.side) for limit in limits for t in turns)
-        above = [q for q, side in every if q > track.start and side < 0]
-        below = [q for q, side in every if q < track.start and side > 0]
-        if not above and not below:
-            return None
+        low, high = track.range
         # on the other side it goes on as far as it was looked for
-        return (below[-1] if below else -math.inf, above[0] if above else math.inf)
+        return None if math.isinf(low) and math.isinf(high) else (low, high)
 
     @cached_property
     def dead_points(self) -> tuple[float, ...]:

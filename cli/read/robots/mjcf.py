@@ -20,6 +20,7 @@ from cli.read.robots.robot import (
     Robot,
     RobotJoint,
     RobotLink,
+    Spring,
     about,
     half_unit,
     pose,
@@ -210,15 +211,18 @@ class _Reader:
         at = here @ pose(numbers(file, f"{where}, pos", values.get("pos"), 3, (0.0, 0.0, 0.0)))
         axis = numbers(file, f"{where}, axis", values.get("axis"), 3, (0.0, 0.0, 1.0))
         direction = here[:3, :3] @ unit(file, f"{where}, axis", axis)
-        keys = ("range", "damping", "stiffness", "frictionloss", "armature")
+        keys = ("range", "frictionloss", "armature")
         more = tuple("limits" if k == "range" else k for k in keys if values.get(k, "0").strip("0. "))
         value = number(file, f"{where}, ref", values.get("ref", "0"))
         value = self.angle(value) if kind == "turn" else value
-        self.robot.join(
-            RobotJoint(
-                name, kind, parent, below, (at[:3, 3], at[:3, 3]), np.asarray(direction), value, type_, more
-            )
+        made = RobotJoint(name, kind, parent, below, (at[:3, 3], at[:3, 3]), np.asarray(direction), value)
+        made.type, made.more = type_, more
+        made.stiffness, made.damping, rest = (
+            number(file, f"{where}, {key}", values.get(key, "0").split()[0])
+            for key in ("stiffness", "damping", "springref")
         )
+        made.rest = self.angle(rest) if kind == "turn" else rest
+        self.robot.join(made)
 
     def _inertial(self, where: str, e: Element | None) -> Inertial | None:
         if e is None:
@@ -302,13 +306,41 @@ class _Reader:
 
     def _tendons(self) -> None:
         for element in children(self.root, "tendon"):
-            for e in children(element, "spatial"):
-                self.robot.notes.append(f"tendon '{e.get('name', '')}': left out: springs are not taken over")
+            for k, e in enumerate(children(element, "spatial", "fixed"), 1):
+                self._spring(e, f"tendon '{e.get('name') or k}'")
         points: dict[str, dict[str, Array]] = {}
         for name, (link, at) in self.sites.items():
             points.setdefault(link, {})[name] = at
         for link, held in points.items():
             self.robot.links[link].points = held
+
+    def _spring(self, e: Element, where: str) -> None:
+        """A tendon that pulls: between two sites, or on joints."""
+        values = self.classes[e.get("class", "main")].get("tendon", {}) | e.attrib
+        stiffness, damping = (
+            number(self.file, f"{where}, {key}", values.get(key, "0").split()[0])
+            for key in ("stiffness", "damping")
+        )
+        if not (stiffness or damping):
+            return
+        rest = [
+            float(w) for w in words(self.file, f"{where}, springlength", values.get("springlength", "-1"))
+        ]
+        ends, terms = [], []
+        if e.tag == "fixed":
+            terms = self._fixed(named(self.file, e), where)
+        else:
+            sites = [s.get("site", "") for s in e]
+            if len(sites) != 2 or not all(s in self.sites for s in sites):
+                self.robot.notes.append(f"{where}: left out: it does not run straight between two sites")
+                return
+            ends = [self.sites[s] for s in sites]
+        if len(rest) > 1 and rest[0] != rest[-1]:
+            self.robot.notes.append(
+                f"{where}: it is slack from {rest[0]:g} to {rest[-1]:g}: the first is taken"
+            )
+        open_ = "springlength" not in values or (rest[0] == -1.0 and not terms)
+        self.robot.springs.append(Spring(where, ends, terms, stiffness, damping, None if open_ else rest[0]))
 
     def _actuators(self) -> None:
         robot = self.robot

@@ -46,7 +46,7 @@ class RobotLink:
 class RobotJoint:
     """A joint; `ends` are where it stands as each of its two links has it, `axis` its axis, all in the world.
 
-    `value` is its coordinate in the file's own configuration. A `ball` is pinned in every plane; `type` is what the file
+    `value` is its coordinate in the file's own configuration, `rest` that where its spring is at rest. A `ball` is pinned in every plane; `type` is what the file
     calls it, `more` what else it says of it: limits, damping.
     """
 
@@ -57,6 +57,9 @@ class RobotJoint:
     ends: tuple[Array, Array]
     axis: Array
     value: float = 0.0
+    stiffness: float = 0.0
+    rest: float = 0.0
+    damping: float = 0.0
     type: str = ""
     more: tuple[str, ...] = ()
 
@@ -71,6 +74,21 @@ class Motor:
 
 
 @dataclass
+class Spring:
+    """A spring and damper: between two places, each (link, place in its axes), or on a sum of joint coordinates.
+
+    `rest` is the length, or the sum, without force; None where that is as the file stands.
+    """
+
+    name: str
+    ends: list[tuple[str, Array]]
+    terms: list[tuple[str, float]]
+    stiffness: float
+    damping: float
+    rest: float | None
+
+
+@dataclass
 class Robot:
     """All that a file says; `gears` are (a, b, ratio, arm), `couplings` sums of joint coordinates that stay as they are."""
 
@@ -82,6 +100,7 @@ class Robot:
     couplings: list[tuple[str, list[tuple[str, float]]]] = field(default_factory=list)
     gears: list[tuple[str, str, float, str]] = field(default_factory=list)
     motors: list[Motor] = field(default_factory=list)
+    springs: list[Spring] = field(default_factory=list)
     ground: str = WORLD
     gravity: Array | None = None
     notes: list[str] = field(default_factory=list)

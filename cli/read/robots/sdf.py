@@ -236,6 +236,13 @@ def joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     at = frame[:3, 3]
     robot.join(RobotJoint(name, kind, parent, below, (at, at), direction, type=type_))
     robot.joints[name].more = _more(axis)
+    dynamics = None if axis is None else child(axis, "dynamics")
+    if dynamics is not None:
+        made = robot.joints[name]
+        tags = ("damping", "spring_stiffness", "spring_reference")
+        made.damping, made.stiffness, made.rest = (
+            number(file, f"{where}, {tag}", (_text(child(dynamics, tag)) or "0").strip()) for tag in tags
+        )
     mimic = None if axis is None else child(axis, "mimic")
     if mimic is not None:
         factor = number(file, f"{where}, mimic multiplier", _text(child(mimic, "multiplier")) or "1")
@@ -245,10 +252,9 @@ def joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
 def _more(axis: Element | None) -> tuple[str, ...]:
     """Name what is said of a joint beyond its place."""
     limit, dynamics = (None if axis is None else child(axis, tag) for tag in ("limit", "dynamics"))
-    found: list[tuple[str, Element | None, tuple[str, ...]]] = [("limits", limit, ("lower", "upper"))]
-    found += [(key, dynamics, (key,)) for key in ("damping", "friction", "spring_stiffness")]
+    found = (("limits", limit, ("lower", "upper")), ("friction", dynamics, ("friction",)))
     return tuple(
-        what.replace("_", " ")
+        what
         for what, element, tags in found
         if element is not None and any((_text(child(element, tag)) or "").strip("0. \n") for tag in tags)
     )

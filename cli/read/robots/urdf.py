@@ -149,15 +149,18 @@ def _joint(robot: Robot, row: tuple[Element, str, Kind, str, str], frame: Array)
     ends = (frame[:3, 3], robot.links[link].pose[:3, 3])
     made = RobotJoint(named(robot.file, e), kind, parent, link, ends, direction, type=e.get("type", ""))
     made.more = _more(e)
+    dynamics = child(e, "dynamics")
+    if dynamics is not None:
+        made.damping = number(robot.file, f"{where}, damping", dynamics.get("damping", "0"))
     robot.join(made)
 
 
 def _more(e: Element) -> tuple[str, ...]:
     """Name what is said of a joint beyond its place."""
-    found: list[tuple[str, Element | None, tuple[str, ...]]] = [
-        ("limits", child(e, "limit"), ("lower", "upper"))
-    ]
-    found += [(key, child(e, "dynamics"), (key,)) for key in ("damping", "friction")]
+    found = (
+        ("limits", child(e, "limit"), ("lower", "upper")),
+        ("friction", child(e, "dynamics"), ("friction",)),
+    )
     return tuple(
         what
         for what, element, keys in found

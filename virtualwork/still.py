@@ -1,0 +1,104 @@
+"""A pose as a small picture in SVG, as a notebook shows a mechanism."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from virtualwork.describe.parts import GROUND
+from virtualwork.drawing import Circle, Coil, Drawing, Label, Line, Shape
+from virtualwork.formulas.numbers import Complexes
+from virtualwork.formulas.poses import Poses
+
+WIDTH, HEIGHT, EDGE = 520.0, 360.0, 26.0
+"""Pixels at most, and around the drawing."""
+# as visible on white as on black
+COLORS = ("#3b82f6", "#e0662a", "#2fa15a", "#a259e6", "#e0484f", "#1ba3b3", "#b98a16", "#dd4f93")
+INK = "currentColor"
+# role -> width of the stroke, and how it is filled: with its own colour so far, or with that of the paper
+LOOK = {
+    "link": (4.5, 0.16),
+    "wheel": (1.6, 0.07),
+    "block": (1.6, 0.3),
+    "hatch": (0.7, 0.0),
+    "mass": (0.9, 0.0),
+    "tip": (1.0, 1.0),
+}
+
+
+def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
+    """Return the picture of one pose; None where it cannot be assembled.
+
+    Colours are those of a page in the dark as in the light: what is no link has the colour of the text around.
+
+    >>> from virtualwork import Input, Link, Mechanism
+    >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank", value=0.5))
+    >>> motion = crank.motion()
+    >>> str(svg(motion.poses, motion.drawing))[:4]
+    '<svg'
+    """
+    order = list(poses.mechanism.bodies)
+
+    def at(body: str, z: complex) -> complex:
+        return complex(poses.point_derivative(body, z, 0)[i])
+
+    def places(shape: Shape) -> Complexes:
+        if isinstance(shape, Circle):
+            return np.array([at(shape.body, shape.centre)])
+        if isinstance(shape, Coil):
+            return np.array(shape.along(*(at(*end) for end in shape.ends)))
+        return np.array([at(shape.body, z) for z in shape.points])
+
+    drawn = [(shape, places(shape)) for shape in drawing.shapes]
+    if not all(np.isfinite(z).all() for _, z in drawn):
+        return None
+    reach = [
+        z + r
+        for s, z in drawn
+        for r in ((s.radius * np.array([1 + 1j, -1 - 1j])) if isinstance(s, Circle) else [0])
+    ]
+    every = np.concatenate(reach)
+    low = complex(every.real.min(), every.imag.min())
+    wide, high = np.ptp(every.real), np.ptp(every.imag)
+    scale = min((WIDTH - 2 * EDGE) / (wide or 1e-300), (HEIGHT - 2 * EDGE) / (high or 1e-300))
+    width, height = scale * wide + 2 * EDGE, scale * high + 2 * EDGE
+
+    def xy(z: complex) -> tuple[float, float]:
+        on = (z - low) * scale
+        return round(on.real + EDGE, 2), round(height - on.imag - EDGE, 2)
+
+    title = escape(poses.mechanism.name or "mechanism")
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.2f} {height:.2f}" '
+        f'role="img" style="max-width:100%" font-family="sans-serif" font-size="12"><title>{title}</title>'
+    ]
+    for shape, z in drawn:
+        color = (
+            INK if shape.body == GROUND or shape.role in ("pin", "tip", "mass") else _color(order, shape.body)
+        )
+        stroke, filled = LOOK.get(shape.role, (1.3, 0.0))
+        fill, filled = ("white", 1) if shape.role == "pin" else (color, filled if shape.body != GROUND else 0)
+        closed = isinstance(shape, Circle) or (isinstance(shape, Line) and shape.closed)
+        look = f'stroke="{color}" stroke-width="{stroke}" stroke-linejoin="round" stroke-linecap="round" '
+        look += f'fill="{fill}" fill-opacity="{filled}"' if closed else 'fill="none"'
+        if isinstance(shape, Circle):
+            x, y = xy(complex(z[0]))
+            parts.append(f'<circle cx="{x}" cy="{y}" r="{max(shape.radius * scale, 2.5):.2f}" {look}/>')
+            continue
+        points = " ".join(f"{x},{y}" for x, y in map(xy, z.tolist()))
+        parts.append(f'<{"polygon" if closed else "polyline"} points="{points}" {look}/>')
+    for label in drawing.labels:
+        x, y = xy(at(label.body, label.at))
+        parts.append(_name(label, x, y, _color(order, label.body)))
+    return "".join([*parts, "</svg>"])
+
+
+def _color(order: list[str], body: str) -> str:
+    return INK if body == GROUND else COLORS[(order.index(body) - 1) % len(COLORS)]
+
+
+def _name(label: Label, x: float, y: float, color: str) -> str:
+    if label.of == "point":
+        return f'<text x="{x - 7}" y="{y - 8}" text-anchor="end" fill="{INK}">{escape(label.text)}</text>'
+    return f'<text x="{x + 8}" y="{y + 13}" font-size="11" fill="{color}">{escape(label.text)}</text>'
