@@ -45,7 +45,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("__init__",),
         ("mechanism",),
         ("motion",),
-        ("animation", "parts_of_motion", "still"),
+        ("animation", "evaluator", "parts_of_motion", "still"),
         ("forces", "table"),
         ("family",),
         ("intime",),

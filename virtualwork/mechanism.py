@@ -16,6 +16,7 @@ from virtualwork.describe.reader import read, read_text
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
+    from virtualwork.evaluator import Evaluator
     from virtualwork.family.family import Family
     from virtualwork.study.check import Check
     from virtualwork.study.equilibrium import Equilibria
@@ -135,6 +136,32 @@ class Mechanism(Description):
         if angle is None:
             return Motion(self.assembly)
         return Motion(self.assembly, angle, speed, acceleration, jerk)
+
+    def evaluator(self, *wanted: str) -> Evaluator:
+        """Named quantities of the assembly that the guess chooses, made ready once to be asked for again and again.
+
+        Parameters
+        ----------
+        wanted : str
+            Called as in the JSON output: `points.H`, `points.H.velocity`, `links.coupler.omega`, `slides.S.speed`,
+            `effort`, `reactions.B.coupler` (the force on that link), `shaking.force`, `shaking.moment`.
+
+        Raises
+        ------
+        DescriptionError
+            Where a name is not known.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link
+        >>> m = Mechanism({"O": 0j}, {"arm": Link({"O": 0j}, mass=2, center=0.5)}, inputs=Input(link="arm"),
+        ...               gravity=-9.81j)
+        >>> m.evaluator("effort")(0.0)
+        {'effort': 9.81}
+        """
+        from virtualwork.evaluator import Evaluator
+
+        return Evaluator(self.assembly, *wanted)
 
     def vary(self, numbers: Mapping[str, ArrayLike]) -> Family:
         """Variants of this mechanism: other numbers at the paths of some dimensions.

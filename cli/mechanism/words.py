@@ -9,6 +9,7 @@ from cli.mechanism.solve import ORDERS, Analysis
 from cli.mechanism.studies import Document, Studies
 from cli.show.columns import Section, Table
 from cli.show.text import heading, table_text
+from virtualwork.formulas.recording import Key
 from virtualwork.plan.steps import Group, Place, Slide, Turn
 
 METHOD = (
@@ -121,7 +122,21 @@ def explain_text(analysis: Analysis) -> str:
             else "skipped: nothing asked for hangs on it"
         )
         lines.append(f"{i:4d}  {text}  [{done}]")
-    return "\n".join(lines)
+    return "\n".join([*lines, _operations(analysis)])
+
+
+def _operations(analysis: Analysis) -> str:
+    """What all points and links of a pose cost, with rates where the input has any."""
+    motion = analysis.motions[0]
+    m = motion.mechanism
+    moves = any(not isinstance(rate, float) or rate for rates in motion.poses.rates for rate in rates)
+    keys: list[Key] = []
+    told = []
+    for order, what in enumerate(("", " with velocities", " with accelerations")[: 3 if moves else 1]):
+        keys += [("point", body, z, p, order) for body in m.links for p, z in m.bodies[body].items()]
+        keys += [("angle", body, order) for body in m.links]
+        told.append(f"{motion.lanes.operations(keys)}{what}")
+    return f"operations a pose of all points and links: {', '.join(told)}"
 
 
 def _angle_text(analysis: Analysis, step: Turn) -> str:
@@ -191,6 +206,10 @@ def explain_forces(analysis: Analysis) -> str:
 
     motion = analysis.motions[0]
     lines = ["forces:"]
+    keys: list[Key] = [("force", joint.key, joint.bodies[-1]) for joint in motion.dynamics.reactions.joints]
+    keys += [("effort", j) for j in range(len(analysis.mechanism.inputs))]
+    if motion.lanes.takes(keys):
+        lines.append(f"  operations a pose: {motion.lanes.operations(keys)}")
     for j, entry in enumerate(analysis.mechanism.inputs):
         works, workless, absent = ledger(motion.dynamics.scene, j)
         lines.append(f"  virtual work at input {entry.name}: {', '.join(works) or 'no load does any'}")

@@ -71,6 +71,13 @@ class Assembly(Choice):
         return frozenset(name for name in flips if len(flips[name]) and name not in self.folded)
 
     @property
+    def settled(self) -> bool:
+        """Whether no change point lies anywhere, however far the input turns."""
+        at = self.mechanism.at
+        self.cover(at[0], at[0])
+        return self.track.settled
+
+    @property
     def folded(self) -> set[str]:
         """The groups that are singular in every pose."""
         return self.track.folded

@@ -7,7 +7,7 @@ poses. Poses close to a change point, where two branches meet, are left to `Pose
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from threading import Lock
 from typing import Any, Protocol
@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.engines import FEW, compiled_code, run
+from dalembert.arithmetic.engines import FEW, compiled_code, floats, run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.linear import SINGULAR
@@ -40,6 +40,10 @@ MANY_POSES = 1_000_000
 _writing = Lock()
 
 
+# a function of floats, the places of its arguments among the input and its rates, and whether each result is a vector
+Ready = tuple[Callable[..., tuple[float, ...]], tuple[int, ...], tuple[bool, ...]]
+
+
 class Turning(Branch, Protocol):
     """A branch whose closed forms may change their sign along the input."""
 
@@ -62,6 +66,10 @@ class Turning(Branch, Protocol):
     @property
     def may_open(self) -> bool:
         """Whether it cannot be assembled somewhere in what was covered, as far as is known."""
+
+    @property
+    def settled(self) -> bool:
+        """Whether no change point lies anywhere, however far the input turns."""
 
     @property
     def folded(self) -> set[str]:
@@ -120,18 +128,40 @@ class Lanes:
             and recording.forces[0].order.redundant
         )
 
+    def operations(self, keys: Iterable[Key]) -> int:
+        """What quantities of a pose cost, in operations on real numbers, with all that they hang on."""
+        return taped(self.branch, self.recording, tuple(keys)).cost
+
     def values(self, keys: Sequence[Key]) -> list[Any]:
         """The quantities, each (n,), real or complex.
 
         What `takes` does not take, and poses close to a change point, are worked out over blocks.
         """
         new = [key for key in keys if key not in self.known]
+        if new and self.poses.n == 1 and self._one(tuple(new)):
+            return [self.known[key] for key in keys]
         if new and not self.takes(new):
             for key in new:
                 self.known[key] = over_blocks(self.poses, key)
         elif new:
             self._run(new)
         return [self.known[key] for key in keys]
+
+    def _one(self, keys: tuple[Key, ...]) -> bool:
+        """One pose that hangs on nothing but its input, by a function of floats."""
+        given = [self.poses.inputs, *(rates[0] for rates in self.poses.rates)]
+        values = [x if isinstance(x, float) else float(np.ravel(x)[0]) for x in given]
+        made = ready(self.branch, tuple(x != 0.0 for x in values[1:]), keys)
+        if made is None:
+            return False
+        function, places, vectors = made
+        try:
+            found = iter(function(*[values[i] for i in places]))
+        except (ZeroDivisionError, ValueError, OverflowError):
+            return False
+        for key, vector in zip(keys, vectors, strict=True):
+            self.known[key] = np.array([complex(next(found), next(found)) if vector else next(found) + 0.0])
+        return True
 
     def _run(self, keys: list[Key]) -> None:
         forces = any(key[0] in FORCES for key in keys)
@@ -243,6 +273,35 @@ def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
             branch.recordings[key] = recording.tape(keys)
     found: Tape = branch.recordings[key]
     return found
+
+
+def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:
+    """Quantities of one pose as a function of floats; None where they hang on more than the input and its rates.
+
+    Such a mechanism has one input that turns, no change point, no limit, and a closed form for every group.
+    """
+    known = branch.recordings
+    name = "ready", moves, keys
+    if name not in known:
+        known[name] = _made(branch, moves, keys)
+    found: Ready | None = known[name]
+    return found
+
+
+def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:
+    poses = Poses(branch)
+    if (
+        poses.inputs.shape[1] > 1
+        or not (branch.settled and Lanes(branch, poses).takes(keys))
+        or branch.may_open
+    ):
+        return None
+    tape = taped(branch, recorded(branch, moves), keys)
+    arguments = [f"{name}0" for name in NAMES]
+    if not floats.takes(tape) or not set(tape.inputs) <= set(arguments):
+        return None
+    places = tuple(arguments.index(name) for name in tape.inputs)
+    return floats.compiled(tape), places, tuple(len(names(key)) == 2 for key in keys)
 
 
 def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:

@@ -1,0 +1,156 @@
+"""Quantities from the tape beside those over blocks of poses: worked examples, change points, ends, threads, names."""
+
+from __future__ import annotations
+
+import threading
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from virtualwork import Mechanism
+from virtualwork.describe.errors import DescriptionError
+from virtualwork.formulas.lanes import Lanes, over_blocks
+
+EXAMPLES = {
+    f"{path.parent.name}/{path.name}": path
+    for path in sorted(Path(str(files("cli"))).glob("examples/*/*.toml"))
+    if "[links" in path.read_text(encoding="utf-8")
+}
+
+
+def sweep(m, n=61):
+    """Poses all around the guess, with a speed and accelerations."""
+    rng = np.random.default_rng(3)
+    if len(m.inputs) > 1:
+        q = np.array(m.at) + rng.uniform(-0.3, 0.3, (n, len(m.inputs)))
+        return q, rng.normal(size=q.shape), rng.normal(size=q.shape)
+    width = 0.2 * m.size if m.inputs[0].is_slide else 2 * np.pi
+    return m.at[0] + np.linspace(-width / 2, width / 2, n), 3.0, rng.normal(size=n)
+
+
+def every_key(m, motion):
+    """Every quantity that the command can show."""
+    keys = [
+        ("point", body, z, p, order)
+        for body, points in m.bodies.items()
+        if body != "ground"
+        for p, z in points.items()
+        for order in range(3)
+    ]
+    keys += [("angle", body, order) for body in m.links for order in range(3)]
+    keys += [("slide", i, order) for i in range(len(m.guides)) for order in range(3)]
+    keys += [(kind, j) for kind in ("effort", "newton-euler") for j in range(len(m.inputs))]
+    keys += [("force", joint.key, b) for joint in motion.dynamics.reactions.joints for b in joint.bodies]
+    return [*keys, ("shaking",), ("shaking moment",)]
+
+
+def compare(m, monkeypatch, engine) -> None:
+    """All quantities both ways, within the bounds of their rounding errors; poses that have none are the same."""
+    q, speed, acceleration = sweep(m)
+    motion = m.motion(q, speed, acceleration)
+    keys = every_key(m, motion)
+    monkeypatch.setenv("DALEMBERT_ENGINE", engine)
+    found = Lanes(m.assembly, m.motion(q, speed, acceleration).poses).values(keys)
+    monkeypatch.delenv("DALEMBERT_ENGINE")
+    # what is zero but for rounding is measured by the largest of its kind
+    largest = {}
+    truths = [over_blocks(motion.poses, key, motion.dynamics) for key in keys]
+    for key, true in zip(keys, truths, strict=True):
+        kind = key[0], key[-1] if key[0] in ("point", "angle", "slide") else 0
+        largest[kind] = max(largest.get(kind, 0.0), float(np.nanmax(np.abs(true), initial=0.0)))
+    force = max(value for kind, value in largest.items() if kind[0] in ("force", "shaking"))
+    for kind in ("shaking moment", "effort", "newton-euler"):
+        largest[kind, 0] = max(largest[kind, 0], force * m.size)
+    largest["shaking", 0] = force
+    # a condition κ makes κ^(order + 1) of a rounding
+    condition = np.where(np.isfinite(motion.condition), motion.condition, 1.0)
+    for key, value, true in zip(keys, found, truths, strict=True):
+        assert (np.isnan(value) == np.isnan(true)).all(), key
+        kind = key[0], key[-1] if key[0] in ("point", "angle", "slide") else 0
+        close = np.abs(value - true) <= 4e-15 * np.maximum(condition, 1.0) ** 3 * largest[kind]
+        assert (close | np.isnan(true)).all(), key
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_every_quantity_of_the_worked_examples_on_numpy(name, monkeypatch) -> None:
+    compare(Mechanism.from_toml(EXAMPLES[name]), monkeypatch, "numpy")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["python", "llvm"])
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_every_quantity_of_the_worked_examples_on_the_other_engines(name, engine, monkeypatch) -> None:
+    compare(Mechanism.from_toml(EXAMPLES[name]), monkeypatch, engine)
+
+
+def test_an_evaluator_gives_what_the_motion_gives() -> None:
+    m = Mechanism.from_toml(EXAMPLES["klann/klann.toml"])
+    at = m.evaluator("points.C", "points.C.velocity", "links.leg.alpha", "effort")
+    motion = m.motion(1.0, 2.0, 0.5)
+    for found in (at(1.0, 2.0, 0.5), at(1, 2, 0.5)):
+        assert found["points.C"] == pytest.approx(motion.point("C").position[0], rel=1e-14)
+        assert found["points.C.velocity"] == pytest.approx(motion.point("C").velocity[0], rel=1e-13)
+        assert found["links.leg.alpha"] == pytest.approx(motion.link("leg").alpha[0], rel=1e-12)
+        assert found["effort"] == pytest.approx(motion.effort[0], rel=1e-13)
+    many = at([1.0, 2.0], 2.0, 0.5)
+    assert many["points.C"].shape == (2, 2)
+    assert many["points.C"][0] == pytest.approx(motion.point("C").position[0], rel=1e-14)
+
+
+def test_an_evaluator_knows_where_nothing_stands_and_which_names_there_are(rocker) -> None:
+    at = rocker.evaluator("links.coupler.angle", "points.B")
+    found = at(np.pi)
+    assert np.isnan(found["links.coupler.angle"])
+    # the crank itself stands anywhere
+    assert np.isfinite(found["points.B"]).all()
+    with pytest.raises(DescriptionError, match=r"no point is named 'Bb'; did you mean 'B'\?"):
+        rocker.evaluator("points.Bb")
+    with pytest.raises(DescriptionError, match="no derivative is named 'speed'"):
+        rocker.evaluator("points.B.speed")
+    with pytest.raises(DescriptionError, match=r"'torque': expected points\.NAME\.velocity"):
+        rocker.evaluator("torque")
+
+
+def test_two_threads_that_ask_one_motion_get_the_right_numbers(monkeypatch) -> None:
+    monkeypatch.setenv("DALEMBERT_ENGINE", "numpy")
+    m = Mechanism.from_toml(EXAMPLES["klann/klann.toml"])
+    q = np.linspace(0, 6, 5000)
+    alone = m.motion(q, 2.0)
+    expected = {name: (alone.link(name).angle, alone.link(name).omega) for name in m.links}
+    fresh = Mechanism.from_toml(EXAMPLES["klann/klann.toml"]).motion(q, 2.0)
+    wrong: list[str] = []
+
+    def ask(names) -> None:
+        for name in names:
+            angle, omega = expected[name]
+            if not (
+                np.array_equal(fresh.link(name).angle, angle)
+                and np.array_equal(fresh.link(name).omega, omega)
+            ):
+                wrong.append(name)
+
+    threads = [threading.Thread(target=ask, args=(list(m.links)[:: 1 - 2 * (i % 2)],)) for i in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+@pytest.fixture
+def rocker():
+    """A double rocker: its input goes no further than some 100°."""
+    from virtualwork import Guess, Input, Link
+
+    return Mechanism(
+        {"A": (0, 0), "D": (4, 0)},
+        {
+            "crank": Link({"A": (0, 0), "B": (3, 0)}),
+            "coupler": Link({"B": (0, 0), "C": (2, 0)}),
+            "rocker": Link({"D": (0, 0), "C": (2.5, 0)}),
+        },
+        inputs=Input(link="crank"),
+        guess=Guess(0.5, {"coupler": 0.3, "rocker": 1.0}),
+    )

@@ -1,0 +1,142 @@
+"""A few named quantities of one mechanism, asked for again and again: for loops, optimisers, controllers.
+
+What is asked for is written down and made ready once; a call with numbers is then little more than its arithmetic, and
+one with arrays is one pass of the engine for all quantities together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe.errors import DescriptionError, hint
+from virtualwork.formulas.lanes import Lanes, Ready, ready, recorded, taped
+from virtualwork.formulas.numbers import xy
+from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.recording import COMPLEX, Key
+
+POINT = ("position", "velocity", "acceleration", "jerk")
+LINK = ("angle", "omega", "alpha", "jerk")
+SLIDE = ("position", "speed", "acceleration", "jerk")
+
+
+class Evaluator:
+    """Named quantities of an assembly over its inputs; `Mechanism.evaluator` makes one.
+
+    Examples
+    --------
+    >>> from virtualwork import Input, Link, Mechanism
+    >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": 2})}, inputs=Input(link="arm"))
+    >>> at = arm.evaluator("points.P", "links.arm.omega")
+    >>> at(0.0, speed=3.0)
+    {'points.P': (2.0, 0.0), 'links.arm.omega': 3.0}
+    >>> at([0.0, np.pi], speed=3.0)["links.arm.omega"]
+    array([3., 3.])
+    """
+
+    def __init__(self, assembly: Assembly, *wanted: str) -> None:
+        self.assembly, self.wanted = assembly, wanted
+        self.keys = tuple(key_of(assembly, name) for name in wanted)
+        self._ready: dict[tuple[bool, ...], Ready | None] = {}
+
+    def __repr__(self) -> str:
+        return f"Evaluator({self.assembly.mechanism.name!r}: {', '.join(self.wanted)})"
+
+    def __call__(
+        self, angle: ArrayLike, speed: ArrayLike = 0.0, acceleration: ArrayLike = 0.0, jerk: ArrayLike = 0.0
+    ) -> dict[str, Any]:
+        """The quantities, by the names they were asked for with.
+
+        Parameters
+        ----------
+        angle : float, or array (n,); (n, k) for k inputs
+            The input: rad for a turning input, m for a slide.
+        speed, acceleration, jerk : scalar or of the same shape
+            Its derivatives in time.
+
+        Returns
+        -------
+        dict of name to float or (x, y); to array (n,) or (n, 2)
+            NaN where the pose cannot be assembled.
+        """
+        if isinstance(angle, float):
+            given = angle, speed, acceleration, jerk
+            moves = speed != 0.0, acceleration != 0.0, jerk != 0.0
+            if moves not in self._ready:
+                self._ready[moves] = ready(self.assembly, moves, self.keys)
+            made = self._ready[moves]
+            if made is not None:
+                function, places, vectors = made
+                try:
+                    values = iter(function(*[given[i] for i in places]))
+                except (ZeroDivisionError, ValueError, OverflowError):
+                    pass
+                else:
+                    return {
+                        name: (next(values), next(values)) if vector else next(values)
+                        for name, vector in zip(self.wanted, vectors, strict=True)
+                    }
+        poses = Poses(self.assembly, angle, speed, acceleration, jerk)
+        found = Lanes(self.assembly, poses).values(self.keys)
+        shown = {
+            name: xy(value) if key[0] in COMPLEX else value
+            for name, key, value in zip(self.wanted, self.keys, found, strict=True)
+        }
+        if np.ndim(angle):
+            return shown
+        return {
+            name: tuple(map(float, np.ravel(v))) if v.ndim > 1 else float(v[0]) for name, v in shown.items()
+        }
+
+    def operations(self, *, speed: bool = True, acceleration: bool = True) -> int:
+        """How many operations a pose costs: what is not asked for, and what a zero rate makes vanish, is not counted."""
+        return taped(self.assembly, recorded(self.assembly, (speed, acceleration, False)), self.keys).cost
+
+
+def key_of(assembly: Assembly, name: str) -> Key:
+    """The key of a quantity called as in the JSON output: `points.H.velocity`, `reactions.B.coupler`.
+
+    Raises
+    ------
+    DescriptionError
+        With what is known in place of what is not.
+    """
+    m = assembly.mechanism
+    kind, *of = name.split(".")
+
+    def known(word: str, words: Mapping[str, Any] | tuple[str, ...], what: str) -> str:
+        if word not in words:
+            raise DescriptionError(f"'{name}': no {what} is named '{word}'{hint(word, words)}")
+        return word
+
+    def order(words: tuple[str, ...]) -> int:
+        return words.index(known(of[1], words, "derivative")) if len(of) > 1 else 0
+
+    if kind == "points" and of:
+        where = {point: body for body, points in m.bodies.items() for point in points}
+        body = where[known(of[0], where, "point")]
+        return "point", body, m.bodies[body][of[0]], of[0], order(POINT)
+    if kind == "links" and of:
+        return "angle", known(of[0], m.links, "link"), order(LINK)
+    if kind == "slides" and of:
+        guides = {guide.point: i for i, guide in enumerate(m.guides)}
+        return "slide", guides[known(of[0], guides, "slot or slider")], order(SLIDE)
+    if kind == "effort":
+        inputs = {entry.name: j for j, entry in enumerate(m.inputs)}
+        return "effort", inputs[known(of[0], inputs, "input")] if of else 0
+    if kind == "reactions" and len(of) == 2:
+        forces = recorded(assembly, (True, True, False)).forces[1]
+        there = {joint.name: joint for joint in forces.joints if of[1] in joint.bodies}
+        return "force", there[known(of[0], there, f"joint of {of[1]}")].key, of[1]
+    if name == "shaking.force":
+        return ("shaking",)
+    if name == "shaking.moment":
+        return ("shaking moment",)
+    raise DescriptionError(
+        f"'{name}': expected points.NAME.velocity, links.NAME.omega, slides.NAME.speed, effort, reactions.JOINT.LINK, "
+        "shaking.force or shaking.moment"
+    )
