@@ -6,6 +6,7 @@ component, with limits on masses and residuals where asked for.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -22,6 +23,7 @@ from dalembert.arithmetic.records import numbers, record, table
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import FigureBase
 
     from balancing.rounding import Bounds, Solved
 
@@ -66,6 +68,39 @@ class Balance:
         else:
             raise ValueError(f"'{of}': expected corrections or residual")
         return table({names[0]: np.abs(values), names[1]: np.degrees(angle_of(values))}, ("rotor", axis))
+
+    def plot(
+        self,
+        sensors: Sequence[str] = (),
+        planes: Sequence[str] = (),
+        amplitude: str = "",
+        figure: FigureBase | None = None,
+    ) -> NDArray[np.object_]:
+        """Draw the vibration before and after, and the corrections to add.
+
+        Parameters
+        ----------
+        sensors, planes
+            Their names.
+        amplitude
+            The unit of the vibration.
+        figure
+            Where to draw; None: a new figure of pyplot's.
+
+        Returns
+        -------
+        array of matplotlib's polar axes: vibration, corrections; of several rotors a row for each of the first four
+
+        Raises
+        ------
+        ImportError
+            matplotlib (the extra `plot`) is missing.
+        """
+        from balancing.picture import before_and_after
+
+        return before_and_after(
+            self.initial, self.residual, self.corrections, amplitude, sensors, planes, figure=figure
+        )
 
     @cached_property
     def residual(self) -> Complex:

@@ -16,6 +16,7 @@ which for two planes is the line above. Only differences of given positions stan
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -30,6 +31,7 @@ from dalembert.arithmetic.records import numbers, record, table
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import FigureBase
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -141,6 +143,46 @@ class Correction:
         z = np.where(np.isfinite(z), z, self.planes[..., :1])
         weights = np.einsum("...pq,...kq->...kp", apart, z[..., :, None] - self.planes[..., None, :])
         return np.asarray((np.abs(weights) / square[..., None, None]).sum(axis=-1).max(axis=-1))
+
+    def plot(
+        self, names: Sequence[str] = (), planes: Sequence[str] = (), figure: FigureBase | None = None
+    ) -> NDArray[np.object_]:
+        """Draw the unbalances' shares in each plane, their resultant and the correction to add.
+
+        Parameters
+        ----------
+        names, planes
+            Of the unbalances (k,) and of the planes (p,).
+        figure
+            Where to draw; None: a new figure of pyplot's.
+
+        Returns
+        -------
+        array of matplotlib's polar axes, (planes,); of several rotors the first four, (rotors, planes)
+
+        Raises
+        ------
+        ImportError
+            matplotlib (the extra `plot`) is missing.
+        """
+        from balancing.picture import MOST, KnownMasses, known_masses
+
+        alone = Correction(self.moment[..., None], self.z[..., None], self.planes[..., None, :])
+        shares, made = -alone.unbalance, self.unbalance
+        (k, p), many = shares.shape[-2:], made.ndim > 1
+        flat = zip(shares.reshape(-1, k, p)[:MOST], made.reshape(-1, p)[:MOST], strict=True)
+        rotors = [
+            KnownMasses(
+                str(i + 1) if many else "",
+                names or [str(j + 1) for j in range(k)],
+                planes or [f"{j + 1}" for j in range(p)],
+                1e6 * mine,
+                1e6 * w,
+            )
+            for i, (mine, w) in enumerate(flat)
+        ]
+        dials = known_masses(rotors, "g·mm", figure=figure)
+        return dials if many else dials[0]
 
     @cached_property
     def residual(self) -> Unbalances:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from balancing.propagation import components, response
 from balancing.run_log import Errors, JointFit
 from dalembert.arithmetic.records import numbers, record
+
+if TYPE_CHECKING:
+    from matplotlib.figure import FigureBase
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -82,6 +85,42 @@ class LogBalance:
         errors = Errors(e.unit[i], e.along[i], e.across[i], e.degrees_of_freedom[i])
         weights, along = (None if part is None else part[i] for part in (self.weights, self.along))
         return LogBalance(self.fit.machine(i), self.corrections[i], errors, weights, along, self.ridge)
+
+    def plot(
+        self,
+        sensors: Sequence[str] = (),
+        planes: Sequence[str] = (),
+        amplitude: str = "",
+        figure: FigureBase | None = None,
+    ) -> NDArray[np.object_]:
+        """Draw the vibration before and after, and the corrections to add.
+
+        Parameters
+        ----------
+        sensors, planes
+            Their names.
+        amplitude
+            The unit of the vibration.
+        figure
+            Where to draw; None: a new figure of pyplot's.
+
+        Returns
+        -------
+        array of matplotlib's polar axes: vibration, corrections; one machine's (see `machine`)
+
+        Raises
+        ------
+        ImportError
+            matplotlib (the extra `plot`) is missing.
+        """
+        from balancing.picture import before_and_after
+
+        fit = self.fit
+        here = fit.present
+        history = fit.readings[here], (fit.readings - fit.residuals)[here]
+        return before_and_after(
+            fit.initial, self.residual, self.corrections, amplitude, sensors, planes, history, figure
+        )
 
     @cached_property
     def residual(self) -> Complex:

@@ -14,6 +14,8 @@ from dalembert.arithmetic.records import record, table
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import FigureBase
+    from matplotlib.projections.polar import PolarAxes
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -38,6 +40,19 @@ class Placement:
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row per position: angle_deg, mass_kg."""
         return table({"angle_deg": np.degrees(self.angles), "mass_kg": self.masses}, ("position",))
+
+    def plot(self, figure: FigureBase | None = None) -> PolarAxes:
+        """Draw the positions with their masses on the rim, target and total as vectors; return matplotlib's polar axes.
+
+        Without a figure it is a new one of pyplot's; without matplotlib (the extra `plot`) an ImportError.
+        """
+        from balancing.picture import Places, places
+
+        mine = Places(
+            "", self.angles.tolist(), (1e3 * self.masses).tolist(), 1e3 * self.target, 1e3 * self.total
+        )
+        axes: PolarAxes = places([mine], "g", figure=figure)[0]
+        return axes
 
     @property
     def total(self) -> complex:

@@ -11,8 +11,10 @@ circular, E|ε|² = σ²/weight, of one σ for all channels of a machine.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +23,10 @@ from balancing.dependence import roundings, threshold
 from balancing.qr import factors
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
+
+if TYPE_CHECKING:
+    from matplotlib.figure import FigureBase
+    from matplotlib.projections.polar import PolarAxes
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -130,6 +136,20 @@ class JointFit:
         size = np.abs(_rows(self.masses)) @ np.swapaxes(np.abs(self.unknowns), -1, -2)
         noise = 16 * EPS * (np.abs(self.readings) + size)
         return np.asarray(np.where(np.abs(left) <= noise, 0.0, left))
+
+    def plot(
+        self, sensors: Sequence[str] = (), amplitude: str = "", figure: FigureBase | None = None
+    ) -> PolarAxes:
+        """Draw one machine's readings, each joined to what was fitted to it, and the vibration without masses.
+
+        Returns matplotlib's polar axes. Without a figure it is a new one of pyplot's; without matplotlib (the extra
+        `plot`) an ImportError.
+        """
+        from balancing.picture import readings
+
+        here, names = self.present, sensors or [str(k + 1) for k in range(self.initial.shape[-1])]
+        pairs = self.readings[here], (self.readings - self.residuals)[here]
+        return readings(names, self.initial, *pairs, amplitude, figure=figure)
 
     def fitted(self, masses: ArrayLike) -> Complex:
         """Return the vibration with these masses on, (..., k, p) -> (..., k, s)."""

@@ -5,7 +5,7 @@ The tensor is stored at the centre of mass, so that moving a body changes no dig
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import components, numbers, record, table
-from rigidbody3d import rounding
+from rigidbody3d import rounding, solids
 from rigidbody3d.inertia import Principal, principal, products, shift, turn
 from rigidbody3d.rounding import BodyError, Numbers
 from rigidbody3d.shapes import inertia_of
+from rigidbody3d.solids import Solid, Whole
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import FigureBase
 
 Array = NDArray[np.float64]
 
@@ -30,7 +32,8 @@ Array = NDArray[np.float64]
 class Body:
     """Mass (...), centre of mass (..., 3) and inertia tensor at it (..., 3, 3), kg, m, kg·m²; leading axes are bodies.
 
-    `rounding` bounds the errors of a body that was worked out (moved, turned, put together); see `error_estimate`.
+    `rounding` bounds the errors of a body that was worked out (moved, turned, put together); see `error_estimate`. `form`
+    has the shapes it was made of, for its picture.
 
     Examples
     --------
@@ -43,6 +46,7 @@ class Body:
     center: Array
     inertia: Array
     rounding: Callable[[], BodyError] | None = field(default=None, repr=False, compare=False)
+    form: Callable[[], list[Solid]] | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         mass, center, inertia = (np.asarray(x, dtype=float) for x in (self.mass, self.center, self.inertia))
@@ -70,13 +74,18 @@ class Body:
         """Return a body of a shape (see `shapes.SHAPES`) along its own axes."""
         m, c = np.asarray(mass, dtype=float), np.asarray(center, dtype=float)
         return cls(
-            m, c, inertia_of(shape, mass, **dimensions), partial(rounding.of_shape, shape, m, c, dimensions)
+            m,
+            c,
+            inertia_of(shape, mass, **dimensions),
+            partial(rounding.of_shape, shape, m, c, dimensions),
+            partial(solids.of_shape, shape, m, c, dimensions),
         )
 
     def moved(self, offset: ArrayLike) -> Body:
         """Return the body moved by an offset (..., 3), m: its tensor stays as it is, digit for digit."""
         by = np.asarray(offset, dtype=float)
-        return Body(self.mass, self.center + by, self.inertia, partial(rounding.moved, self.numbers, by))
+        error, form = partial(rounding.moved, self.numbers, by), partial(solids.moved, self.solids, by)
+        return Body(self.mass, self.center + by, self.inertia, error, form)
 
     def turned(self, rotation: ArrayLike, about: ArrayLike | None = None) -> Body:
         """Return the body turned by a rotation matrix (..., 3, 3) about a point (default: its centre of mass)."""
@@ -84,9 +93,11 @@ class Body:
         center, point = self.center, None if about is None else np.asarray(about, dtype=float)
         if point is not None:
             center = point + np.einsum("...ij,...j->...i", R, center - point)
-        return Body(
-            self.mass, center, turn(self.inertia, R), partial(rounding.turned, self.numbers, R, point)
+        error, form = (
+            partial(rounding.turned, self.numbers, R, point),
+            partial(solids.turned, self.solids, R, point),
         )
+        return Body(self.mass, center, turn(self.inertia, R), error, form)
 
     def about(self, point: ArrayLike) -> Array:
         """Return the tensor about a point (..., 3): the parallel axis theorem, (..., 3, 3), kg·m²."""
@@ -104,6 +115,54 @@ class Body:
     def principal(self) -> Principal:
         """The central principal moments and axes."""
         return principal(self.inertia)
+
+    def solids(self) -> list[Solid]:
+        """Return the shapes that the body was made of, in their places; of a tensor alone the ellipsoid that has it."""
+        if self.form is not None:
+            return self.form()
+        return solids.of_tensor(self.mass, self.center, self.inertia)
+
+    def plot(
+        self,
+        names: Sequence[str] = (),
+        vectors: Mapping[str, ArrayLike] | None = None,
+        figure: FigureBase | None = None,
+    ) -> NDArray[np.object_]:
+        """Draw the body in the two views that show most of it, its parts as their shapes to scale, and principal axes.
+
+        Parameters
+        ----------
+        names
+            Of the parts.
+        vectors
+            By name, (3,): ω, H …, drawn by their direction.
+        figure
+            Where to draw; None: a new figure of pyplot's.
+
+        Returns
+        -------
+        array (2,) of matplotlib axes
+
+        Raises
+        ------
+        ValueError
+            Several bodies: put them together (`compose`), or take one.
+        ImportError
+            matplotlib (the extra `plot`) is missing.
+        """
+        from rigidbody3d.picture import views
+
+        arrows = {name: np.asarray(v, dtype=float) for name, v in (vectors or {}).items()}
+        return views.body(self.solids(), names, self.whole(), arrows, figure)
+
+    def whole(self) -> Whole:
+        """Return where a body's centre of mass and principal axes lie, and the principal radii of gyration."""
+        if self.mass.ndim:
+            raise ValueError(
+                f"a picture shows one body, found {self.mass.size}: compose() puts parts together"
+            )
+        moments, axes = self.principal
+        return Whole(self.center, np.sqrt(np.clip(moments, 0, None) / self.mass), axes)
 
     def numbers(self) -> Numbers:
         """Return mass, centre of mass and tensor with the errors of how the body was made."""
@@ -168,4 +227,6 @@ def compose(parts: Body, axis: int = -1) -> Body:
     offset = center - middle
     slip = (mass[..., None] * offset).sum(axis=0) / total[..., None]
     whole = inertia.sum(axis=0) + shift(mass, offset).sum(axis=0) - shift(total, slip)
-    return Body(total, middle + slip, whole, partial(rounding.composed, parts.numbers, at, middle))
+    return Body(
+        total, middle + slip, whole, partial(rounding.composed, parts.numbers, at, middle), parts.solids
+    )

@@ -15,10 +15,11 @@ from rigidbody3d import attitude as quaternion
 from rigidbody3d.free_rotation import FreeRotation
 from rigidbody3d.inertia import principal
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require, tensors_off
-from rigidbody3d.states import frame_of, in_blocks
+from rigidbody3d.states import frame_of, in_blocks, plot_of
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import FigureBase
 
 Array = NDArray[np.float64]
 
@@ -173,6 +174,14 @@ class FreeState:
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row per state: t_s, ω in body axes, attitude, momentum in space axes, energy."""
         return frame_of(self, self.time)
+
+    def plot(self, figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw ω over time, the polhode, the trace of the body's axis on the sphere of space; return matplotlib's axes (3,).
+
+        One body at several times, else a ValueError. Without a figure it is a new one of pyplot's; without matplotlib
+        (the extra `plot`) an ImportError.
+        """
+        return plot_of(self, self.time, self.body.inertia, free=True, top=False, figure=figure)
 
     def error_estimate(self, of: str = "attitude", tensor: ArrayLike = 0.0) -> Array:
         """Return a bound of the rounding error of a quantity, the given data as exact.

@@ -22,10 +22,11 @@ from dalembert.arithmetic.records import record
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.inertia import principal
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require, tensors_off
-from rigidbody3d.states import frame_of
+from rigidbody3d.states import frame_of, plot_of
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import FigureBase
 
 Array = NDArray[np.float64]
 Torque = Callable[[float, Array, Array], ArrayLike]
@@ -76,6 +77,14 @@ class Trajectory:
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row per state: t_s, ω in body axes, attitude, momentum in space axes, energy."""
         return frame_of(self, self.time)
+
+    def plot(self, figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw ω over time, ω in body axes, the trace of the body's axis on the sphere of space; return matplotlib's axes (3,).
+
+        One body at several times, else a ValueError. Without a figure it is a new one of pyplot's; without matplotlib
+        (the extra `plot`) an ImportError.
+        """
+        return plot_of(self, self.time, self.tensor, free=False, top=self.mgl != 0, figure=figure)
 
     def error_estimate(self, of: str = "attitude", tensor: ArrayLike = 0.0) -> Array:
         """Return an estimate of the error, of the method and of rounding together.

@@ -11,6 +11,7 @@ the moment about the other bearing over the span: no reaction is the difference 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -25,6 +26,7 @@ from rigidbody3d.body import Body
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import FigureBase
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -104,6 +106,17 @@ class Shaft:
             "angle_deg": np.degrees(np.angle(self.unbalance)) % 360,
         }
         return table(columns, ("shaft", "bearing"))
+
+    def plot(self, names: Sequence[str] = (), figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw the shaft from two sides, and below each view the bearing forces in its plane; return the axes (2, 2).
+
+        `names` are those of the parts. One shaft, else a ValueError. Without a figure it is a new one of pyplot's;
+        without matplotlib (the extra `plot`) an ImportError.
+        """
+        from rigidbody3d.picture import views
+
+        forces = ({"static": self.static} if self.gravity.any() else {}) | {"dynamic": self.dynamic}
+        return views.shaft(self.body.solids(), names, self.body.whole(), self.bearings, forces, figure=figure)
 
     @property
     def _turning(self) -> Complex:

@@ -6,13 +6,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import components, table
 from rigidbody3d.rounding_in_time import State
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import FigureBase
 
 Array = NDArray[np.float64]
 
@@ -39,3 +40,16 @@ def frame_of(state: State, time: Array) -> pd.DataFrame:
     columns |= components("momentum_*_kg_m2_s", state.momentum)
     columns |= {"energy_J": state.energy}
     return table(columns, ("body", "state") if time.ndim else ("body",))
+
+
+def plot_of(
+    state: State, time: Array, inertia: ArrayLike, *, free: bool, top: bool, figure: FigureBase | None
+) -> NDArray[np.object_]:
+    """Draw one body's states over time: ω, its path in body axes (the polhode), the trace of an axis in space."""
+    from rigidbody3d.picture.rotation import rotation
+
+    if np.shape(state.omega) != (np.size(time), 3) or np.size(time) < 2:
+        raise ValueError(
+            f"a picture shows one body at several times, found ω of the shape {np.shape(state.omega)}"
+        )
+    return rotation(time, state.omega, state.attitude, inertia, free=free, top=top, figure=figure)

@@ -29,11 +29,12 @@ from dalembert.arithmetic.records import record
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require
-from rigidbody3d.states import frame_of, in_blocks
+from rigidbody3d.states import frame_of, in_blocks, plot_of
 from rigidbody3d.top_roots import constants
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import FigureBase
 
 Array = NDArray[np.float64]
 
@@ -173,6 +174,14 @@ class TopState:
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row per state: t_s, ω in body axes, attitude, momentum in space axes, energy."""
         return frame_of(self, self.time)
+
+    def plot(self, figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw ω over time, ω in body axes, the trace of the body's axis on the sphere of space; return matplotlib's axes (3,).
+
+        One body at several times, else a ValueError. Without a figure it is a new one of pyplot's; without matplotlib
+        (the extra `plot`) an ImportError.
+        """
+        return plot_of(self, self.time, self.top.inertia, free=False, top=True, figure=figure)
 
     def error_estimate(self, of: str = "attitude", moments: ArrayLike = 0.0) -> Array:
         """Return a bound of the rounding error of a quantity, the given data as exact.

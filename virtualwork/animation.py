@@ -19,7 +19,7 @@ import numpy as np
 from dalembert.page import Page, Shown, fits, packed, page, rounded
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.drawing import Circle, Coil, Drawing, Line, Shape
+from virtualwork.drawing import Circle, Coil, Drawing, Line, Shape, tracers
 from virtualwork.forces import Forces
 from virtualwork.formulas.numbers import xy
 from virtualwork.formulas.poses import Poses
@@ -146,7 +146,7 @@ class Series:
         found: dict[str, Any] = {
             "name": name,
             "moves": body != GROUND,
-            "trace": _draws(m, name),
+            "trace": name in tracers(m),
             "x": self._column(f"{name}_x_m", lambda: part(0)),
             "y": self._column(f"{name}_y_m", lambda: part(1)),
         }
@@ -271,16 +271,11 @@ def moving_page(
     return page(title, "plane", documents, **rest)
 
 
-def _draws(m: Description, point: str) -> bool:
-    """Say whether a point draws its path from the first: one of a link alone, that no guide holds."""
-    return point not in (*m.ground, *m.pins, *(guide.point for guide in m.guides))
-
-
 def _first_plots(series: Series) -> list[str]:
     """Return the columns to begin with: an effort where there is one, and the place of a point that draws a path."""
     m = series.mechanism
     free = [p for link in m.links.values() for p in link.points if p not in m.ground]
-    moving = dict.fromkeys([*(p for p in free if _draws(m, p)), *free])
+    moving = dict.fromkeys([*tracers(m), *free])
     efforts = [name for name in series.columns if "virtual_work" in name]
     names = [*efforts[:1], *(f"{p}_{axis}_m" for p in moving for axis in "yx"), *series.columns]
     return [series.columns[name].header for name in names if name in series.columns][:2]

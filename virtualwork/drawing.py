@@ -162,6 +162,15 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
     return Drawing(tuple(chain.from_iterable(layers)), tuple(_labels(mechanism)), s)
 
 
+def tracers(mechanism: Description) -> list[str]:
+    """Return the points whose paths are of interest: those of a link alone, that no joint holds.
+
+    A fixed pin in a moving slot is the ground's; the point of any other guide runs along a line that is drawn.
+    """
+    held = {*mechanism.ground, *mechanism.pins, *(guide.point for guide in mechanism.guides)}
+    return list(dict.fromkeys(p for link in mechanism.links.values() for p in link.points if p not in held))
+
+
 def _long_enough(span: tuple[float, float], reach: float, s: float) -> tuple[float, float]:
     """Return over what to draw a guide: some way about its block or pin where it is hardly used, as in a single pose."""
     low, high = span if all(map(isfinite, span)) else (0.0, 0.0)

@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from virtualwork.bounds.forces import ForceErrors
 from virtualwork.formulas.dynamics import Dynamics
+
+if TYPE_CHECKING:
+    from matplotlib.figure import FigureBase
 
 
 class Forces(Dynamics):
@@ -33,6 +40,16 @@ class Forces(Dynamics):
         True
         """
         return self._errors
+
+    def plot(self, figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw effort and joint forces against the input, and what shakes the ground; return matplotlib's axes.
+
+        They are those of effort, joint forces and, where something moves, shaking force and moment. Without a figure
+        it is a new one of pyplot's; without matplotlib (the extra `plot`) an ImportError.
+        """
+        from virtualwork.picture.over_input import forces
+
+        return forces(self, figure=figure)
 
     def __repr__(self) -> str:
         return f"Forces({self.poses.n} poses, {len(self.scene.loads)} loads)"

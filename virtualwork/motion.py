@@ -23,7 +23,6 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.drawing import Drawing, draw
 from virtualwork.formulas.lanes import FORCES, Lanes, over_blocks
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.poses import Poses
@@ -34,10 +33,13 @@ from virtualwork.plan.steps import Step
 from virtualwork.table import columns
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
     from pandas import DataFrame
 
     from dalembert.page import Page
     from virtualwork.bounds.motion import MotionErrors
+    from virtualwork.drawing import Drawing
     from virtualwork.family.sensitivity import Sensitivities
     from virtualwork.forces import Forces
     from virtualwork.study.cycle import Cycle
@@ -238,10 +240,7 @@ class Motion:
         return Cycle(self)
 
     def counterweights(self, links: Sequence[str]) -> tuple[dict[str, complex], Complexes, Complexes]:
-        """The counterweights on links with a fixed pivot that leave the least RMS shaking force.
-
-        See `virtualwork.study.counterweights.least_squares`.
-        """
+        """Counterweights of the least RMS shaking force: see `virtualwork.study.counterweights.least_squares`."""
         from virtualwork.study.counterweights import least_squares
 
         return least_squares(self, links)
@@ -294,12 +293,28 @@ class Motion:
             return np.asarray(self.derivative(("shaking moment",), path))
         raise ValueError(f"'{what}': expected effort, shaking force or shaking moment")
 
-    # --- as a picture ---------------------------------------------------------------------------------------------
+    # --- as a picture -----------------------------------------------------------------------------------------------
     @cached_property
     def drawing(self) -> Drawing:
-        """What the mechanism is drawn as, its guides as long as used; `at(shape.body, z)` carries its points along."""
-        slides = (self.poses.slide_derivative(i, 0) for i in range(len(self.mechanism.guides)))
-        return draw(self.mechanism, [(float(np.fmin.reduce(s)), float(np.fmax.reduce(s))) for s in slides])
+        """What the mechanism is drawn as, its guides as long as they are used; `at(shape.body, z)` carries shapes along."""
+        from virtualwork.picture.shapes import shapes_of
+
+        return shapes_of(self.poses)
+
+    def plot(self, points: Sequence[str] | None = None, figure: FigureBase | None = None) -> Axes:
+        """Draw the mechanism to scale and the paths of points (default: of all that are no joint); return the axes.
+
+        Without a figure it is a new one of pyplot's; without matplotlib (the extra `plot`) an ImportError.
+        """
+        from virtualwork.picture.paper import on_paper
+
+        return on_paper(self.poses, points, figure)
+
+    def plot_curves(self, *names: str, figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw `H.x`, `coupler.omega` … against the input, a panel for each unit; return their axes."""
+        from virtualwork.picture.over_input import curves
+
+        return curves(self.poses, names, figure)
 
     def animate(self, forces: bool = False) -> Page:
         """Return a page that moves: the mechanism over these poses with play, slider, curves and values.

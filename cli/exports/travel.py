@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from virtualwork.describe.parts import GROUND
+from virtualwork.drawing import tracers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -61,9 +61,8 @@ class Travel:
     def traced(self) -> list[str]:
         """The points whose curves are drawn: those that no joint holds; where there are none, all that move."""
         m = self.m
-        guided = {g.point for g in m.guides if g.link != GROUND}
-        moving = list(dict.fromkeys(p for link in m.links.values() for p in link.points if p not in m.ground))
-        return [p for p in moving if p not in m.pins and p not in guided] or moving
+        moving = dict.fromkeys(p for link in m.links.values() for p in link.points if p not in m.ground)
+        return tracers(m) or list(moving)
 
     def way(self, guide: int) -> tuple[float, float] | None:
         """The least and the largest position along a guide, m."""

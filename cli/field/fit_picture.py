@@ -13,7 +13,10 @@ from cli.field.fit import Fitted, LogFits
 from cli.field.runs import Complex, Real
 from cli.field.solve import Solved
 from cli.field.words import amplitude_unit
-from cli.show.picture import arrow, free_direction
+from cli.show.picture import blank
+from dalembert.drawing.labels import Label, place
+from dalembert.drawing.polar import Look, arrow, free_direction
+from dalembert.drawing.sheet import plain, sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,44 +33,50 @@ BEFORE, AFTER, READ, FITTED, NEXT = "0.45", "tab:red", "tab:blue", "tab:orange",
 
 def draw(fits: LogFits, rotors: Sequence[int]) -> Figure:
     """Draw the history of each rotor, its corrections with their 95 % regions, and its residuals."""
-    from matplotlib.figure import Figure
-
     blocks = []
     for rotor in rotors:
         k, i = fits.found.place[rotor]
         blocks.append((rotor, fits.found.solved[k], i))
     rows = [-(-(min(len(solved.group.channels), CIRCLES) + 3) // ACROSS) for _, solved, _ in blocks]
-    figure = Figure(figsize=(11.4, 3.9 * sum(rows) + 0.5), layout="constrained")
+    figure = blank()
+    sheet(11.4, 3.9 * sum(rows) + 0.5, figure)
     parts = figure.subfigures(len(blocks), 1, height_ratios=rows, squeeze=False)[:, 0]
+    labels = []
     for part, count, (rotor, solved, i) in zip(parts, rows, blocks, strict=True):
         if fits.found.several:
             part.suptitle(f"rotor {fits.found.runs.rotors[rotor]}")
-        _block(part, count, fits, solved, i)
+        labels += _block(part, count, fits, solved, i)
     figure.get_layout_engine().set(rect=(0, 0, 1, 0.985), h_pad=0.07, w_pad=0.06)  # type: ignore[union-attr, call-arg]
     figure.legend(handles=_handles(fits), loc="outside lower center", ncols=4, fontsize=9, frameon=False)
+    place(labels)
     return figure
 
 
-def _block(part: SubFigure, rows: int, fits: LogFits, solved: Solved, i: int) -> None:
+def _block(
+    part: SubFigure, rows: int, fits: LogFits, solved: Solved, i: int
+) -> list[tuple[Axes, list[Label]]]:
     grid = part.add_gridspec(rows, ACROSS)
     cells = [grid[k // ACROSS, k % ACROSS] for k in range(rows * ACROSS)]
     shown = min(len(solved.group.channels), CIRCLES)
     fitted = list(Fitted(solved.group).rows(i))
+    labels: list[tuple[Axes, list[Label]]] = []
     for s, channel in enumerate(solved.group.channels[:shown]):
         axes: PolarAxes = part.add_subplot(cells[s], projection="polar")  # type: ignore[assignment]
-        _circle(axes, fits, solved, i, s)
+        labels.append((axes, _circle(axes, fits, solved, i, s)))
         for row in fitted:
             if row.channel == channel and row.outlier:
                 at = [np.angle(row.value)], [abs(row.value)]
                 axes.plot(*at, "o", mfc="none", mec=AFTER, ms=9, mew=1.2)
         axes.set_title(f"sensor {channel}, {amplitude_unit(fits.found)}", pad=12, fontsize=10)
-    _corrections(part.add_subplot(cells[shown], projection="polar"), fits, solved, i)  # type: ignore[arg-type]
+    dial: PolarAxes = part.add_subplot(cells[shown], projection="polar")  # type: ignore[assignment]
+    labels.append((dial, _corrections(dial, fits, solved, i)))
     _regions(part.add_subplot(cells[shown + 1]), fits, solved, i)
     last = shown + 2
     _residuals(part.add_subplot(grid[last // ACROSS, last % ACROSS :]), fits, solved, i, shown)
+    return labels
 
 
-def _circle(axes: PolarAxes, fits: LogFits, solved: Solved, i: int, s: int) -> None:
+def _circle(axes: PolarAxes, fits: LogFits, solved: Solved, i: int, s: int) -> list[Label]:
     """Draw the runs of one sensor and state, what was fitted to them, and what is to be expected."""
     assert solved.balance is not None
     balance = solved.balance
@@ -90,8 +99,10 @@ def _circle(axes: PolarAxes, fits: LogFits, solved: Solved, i: int, s: int) -> N
     for outline, (_, _, color) in zip(outlines, regions, strict=True):
         axes.fill(np.angle(outline), np.abs(outline), color=color, alpha=0.18, lw=0)
         axes.plot(np.angle(outline), np.abs(outline), color=color, lw=0.8)
-    arrow(axes, before, scale, BEFORE, 1.3, "--", "")
-    arrow(axes, after, scale, AFTER, 1.8, "-", "")
+    arrow(axes, before, scale, Look(BEFORE, 1.3, "--"))
+    arrow(axes, after, scale, Look(AFTER, 1.8))
+    if abs(after) < 0.03 * scale:  # too short for an arrow
+        axes.plot([np.angle(after)], [abs(after)], "o", color=AFTER, ms=5)
     for v, w in zip(read, fitted, strict=True):
         axes.plot(np.angle([w, v]), np.abs([w, v]), "-", color=FITTED, lw=1.1)
     axes.plot(np.angle(fitted), np.abs(fitted), "o", mfc="none", mec=FITTED, ms=4.5, mew=1.0)
@@ -102,18 +113,10 @@ def _circle(axes: PolarAxes, fits: LogFits, solved: Solved, i: int, s: int) -> N
     axes.set_rlabel_position(free_direction([*read, before, after]))
     _quiet(axes)
     names = list(_names(read, [group.logs[i].rows[j][0] for j in here], 0.06 * scale))
-    for at, name in names if len(names) <= NAMED else ():
-        out = at / abs(at) if at else 1.0
-        axes.annotate(
-            name,
-            xy=(float(np.angle(at)), abs(at)),
-            xytext=(8 * out.real, 8 * out.imag),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize=7.5,
-            color=READ,
-        )
+    return [
+        Label(name, (float(np.angle(at)), abs(at)), READ, 7.5, float(np.degrees(np.angle(at))))
+        for at, name in (names if len(names) <= NAMED else ())
+    ]
 
 
 def _names(values: Complex, runs: list[str], near: float) -> Iterator[tuple[complex, str]]:
@@ -140,7 +143,7 @@ def _ellipse(center: complex, covariance: Real, k: float) -> Complex:
     return np.asarray(center + unit * (along + 1j * across))
 
 
-def _corrections(axes: PolarAxes, fits: LogFits, solved: Solved, i: int) -> None:
+def _corrections(axes: PolarAxes, fits: LogFits, solved: Solved, i: int) -> list[Label]:
     """Draw the corrections and their 95 % regions; where one is asked for, the next run's masses."""
     found = fits.found
     masses = found.amount(solved.corrections[i])
@@ -152,8 +155,8 @@ def _corrections(axes: PolarAxes, fits: LogFits, solved: Solved, i: int) -> None
     for outline in outlines:
         axes.fill(np.angle(outline), np.abs(outline), color=AFTER, alpha=0.18, lw=0)
         axes.plot(np.angle(outline), np.abs(outline), color=AFTER, lw=0.8)
-    for plane, w in zip(solved.planes, masses, strict=True):
-        arrow(axes, w, scale, AFTER, 2.2, "-", plane)
+    for w in masses:
+        arrow(axes, w, scale, Look(AFTER, 2.2))
     run = fits.suggested(solved, i) if fits.asked.suggest else None
     if run is not None:
         at = found.amount(run.masses)
@@ -163,6 +166,11 @@ def _corrections(axes: PolarAxes, fits: LogFits, solved: Solved, i: int) -> None
     axes.set_rlim(0, 1.15 * scale)
     axes.set_rlabel_position(free_direction(list(masses)))
     _quiet(axes)
+    tips = [(float(np.angle(w)), float(abs(w))) for w in masses]
+    return [
+        Label(plane, tip, AFTER, 8.0, float(np.degrees(tip[0])))
+        for plane, tip in zip(solved.planes, tips, strict=True)
+    ]
 
 
 def _spread(fits: LogFits, solved: Solved, i: int) -> list[tuple[Real, float]]:
@@ -191,7 +199,7 @@ def _regions(axes: Axes, fits: LogFits, solved: Solved, i: int) -> None:
     axes.set_xlabel(f"along the correction, {fits.found.unit}", fontsize=9)
     axes.set_ylabel(f"across, {fits.found.unit}", fontsize=9)
     axes.tick_params(labelsize=8, colors="0.3")
-    axes.grid(color="0.88")
+    plain(axes)
     told = bool(known) and bool(np.isfinite([np.sum(covariance) * k for covariance, k in known]).all())
     title = (
         "95 % region of each correction, enlarged" if told else "nothing tells how sure the corrections are"

@@ -302,7 +302,7 @@ def _result(
     graph: str | None,
     about: dict[str, str],
 ) -> Result:
-    from cli.mechanism import columns, graphs, poses, remarks, words
+    from cli.mechanism import columns, picture, poses, remarks, words
     from cli.mechanism import forces as of_forces
     from cli.mechanism.states import table as link_states
     from cli.mechanism.studies import Studies
@@ -311,7 +311,7 @@ def _result(
     studies = Studies(analysis, request)
     found = studies.document
     if graph:
-        graphs.quantities(analysis, graph)  # a bad name is an error before anything is written
+        picture.check_names(analysis, graph)  # a bad name is an error before anything is written
 
     def of_poses() -> Table:
         if request.forces:
@@ -325,12 +325,10 @@ def _result(
         return {"name": analysis.mechanism.name, "poses": listed, **found}
 
     def figure() -> Figure:
-        from cli.mechanism import force_picture, picture
-
         several = len(analysis.inputs.shown) > 2 and analysis.motions[0].assembled.any()
         if graph:
-            return picture.graphs(analysis, graph)
-        return force_picture.draw(analysis) if request.forces and several else picture.draw(analysis)
+            return picture.draw_curves(analysis, graph)
+        return picture.draw_forces(analysis) if request.forces and several else picture.draw(analysis)
 
     def beside() -> Iterable[bytes]:
         # every link, whatever --only names

@@ -21,6 +21,7 @@ from rigidbody3d.shapes import SHAPES
 
 if TYPE_CHECKING:
     from rigidbody3d.rounding import BodyError
+    from rigidbody3d.solids import Solid
 
 Array = NDArray[np.float64]
 
@@ -75,6 +76,7 @@ def read_parts(path: str) -> Parts:
     warnings = list(table.warnings)
     rows: list[dict[str, float]] = []
     meshes: dict[int, Callable[[], tuple[float, float]]] = {}
+    faces: dict[int, Array] = {}
     columns = {
         key: column.tolist() for key, column in values.items()
     }  # row by row Python's numbers are faster
@@ -82,7 +84,7 @@ def read_parts(path: str) -> Parts:
         row = {key: value for key, column in columns.items() if (value := column[index]) == value}
         rows.append(row)
         if shape.lower() == MESH:
-            mass[index], own, inertia[index], meshes[index] = _mesh(table, index, row, folder)
+            mass[index], own, inertia[index], meshes[index], faces[index] = _mesh(table, index, row, folder)
             if not row.keys() & {"x", "y", "z"}:  # it stays where the file has it
                 center[index] = own
         else:
@@ -94,10 +96,17 @@ def read_parts(path: str) -> Parts:
     place = {index: at for at, index in enumerate(kept.tolist())}
     name, rows = [name[i] for i in kept], [rows[i] for i in kept]
     meshes = {place[i]: rough for i, rough in meshes.items()}
+    faces = {place[i]: triangles for i, triangles in faces.items()}
     rotation = (turns @ _along(table, values))[kept]
     shapes = [table.texts["shape"][i].lower() for i in kept]
     mass, center, inertia = mass[kept], center[kept], inertia[kept]
-    drawn = Body(mass, center, inertia, partial(_reading, shapes, rows, meshes, mass, center, inertia))
+    drawn = Body(
+        mass,
+        center,
+        inertia,
+        partial(_reading, shapes, rows, meshes, mass, center, inertia),
+        partial(_solids, shapes, rows, faces, mass, center, inertia),
+    )
     turned = drawn.turned(rotation)
     each = replace(turned, rounding=partial(_turning, drawn, rotation, table, kept))
     total = mass.sum()
@@ -191,8 +200,8 @@ def _last_digit(table: Table, index: int) -> float:
 
 def _mesh(
     table: Table, index: int, row: dict[str, float], folder: Path
-) -> tuple[float, Array, Array, Callable[[], tuple[float, float]]]:
-    """Return mass, centre of mass and tensor of a closed mesh from a file, and what bounds their rounding."""
+) -> tuple[float, Array, Array, Callable[[], tuple[float, float]], Array]:
+    """Return mass, centre and tensor of a closed mesh from a file, what bounds their rounding, its triangles about the centre."""
     cell = table.texts.get("file", [""] * table.rows)[index]
     unit = table.texts.get("file_unit", [""] * table.rows)[index]
     if not cell:
@@ -215,7 +224,7 @@ def _mesh(
         raise table.error(index, "file", cell, f"a closed mesh: {error}") from None
     density = row["density"] if "density" in row else row["mass"] / float(volume)
     rough = partial(_rough, vertices, faces, float(volume))
-    return density * float(volume), center, density * inertia, rough
+    return density * float(volume), center, density * inertia, rough, vertices[faces] - center
 
 
 def _rough(vertices: Array, faces: NDArray[np.int64], volume: float) -> tuple[float, float]:
@@ -282,6 +291,28 @@ def _reading(
             m = m * known.measure(**given)
         masses[i], tensors[i] = m.error, shaped(shape, m, given).error
     return BodyError(masses, centers, tensors)
+
+
+def _solids(
+    shapes: list[str],
+    rows: list[dict[str, float]],
+    faces: dict[int, Array],
+    mass: Array,
+    center: Array,
+    inertia: Array,
+) -> list[Solid]:
+    """Return what the parts look like before they are turned."""
+    from rigidbody3d.solids import MESH, Solid, of_tensor
+
+    found = []
+    for i, (shape, row) in enumerate(zip(shapes, rows, strict=True)):
+        if shape == TENSOR:
+            found += of_tensor(mass[i : i + 1], center[i : i + 1], inertia[i : i + 1])
+        elif i in faces:
+            found.append(Solid(MESH, {}, float(mass[i]), center[i], np.eye(3), faces[i]))
+        else:
+            found.append(Solid(shape, row, float(mass[i]), center[i], np.eye(3)))
+    return found
 
 
 def _turning(drawn: Body, rotation: Array, table: Table, kept: NDArray[np.intp]) -> BodyError:

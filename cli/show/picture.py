@@ -1,18 +1,22 @@
-"""A figure as the bytes of a file; what polar pictures share."""
+"""A figure as the bytes of a file."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from cli.errors import DataError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from matplotlib.projections.polar import PolarAxes
+
+
+def blank() -> Figure:
+    """Return an empty figure, which takes the size that its picture needs."""
+    from matplotlib.figure import Figure
+
+    return Figure()
 
 
 def drawn(draw: Callable[[], Figure], suffix: str) -> bytes:
@@ -29,44 +33,3 @@ def drawn(draw: Callable[[], Figure], suffix: str) -> bytes:
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix)
     draw().savefig(stream, format=suffix, dpi=150, metadata=metadata)
     return stream.getvalue()
-
-
-def arrow(
-    axes: PolarAxes, value: complex, scale: float, color: str, width: float, style: str, label: str
-) -> None:
-    if not abs(value) > 1e-9 * scale:
-        return
-    angle, size = float(np.angle(value)), abs(value)
-    axes.annotate(
-        "",
-        xy=(angle, size),
-        xytext=(0, 0),
-        arrowprops={
-            "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
-            "color": color,
-            "lw": width,
-            "ls": style,
-            "shrinkA": 0,
-            "shrinkB": 0,
-        },
-    )
-    if label:
-        axes.annotate(
-            label,
-            xy=(angle, size),
-            xytext=(7 * np.cos(angle), 7 * np.sin(angle)),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize=8,
-        )
-
-
-def free_direction(vectors: Sequence[complex]) -> float:
-    """Return the direction, in degrees, in the middle of the widest gap between vectors: room for the scale."""
-    angles = np.sort(np.degrees(np.angle([v for v in vectors if v])) % 360)
-    if not len(angles):
-        return 22.5
-    gaps = np.diff(np.append(angles, angles[0] + 360))
-    widest = int(np.argmax(gaps))
-    return float((angles[widest] + gaps[widest] / 2) % 360)

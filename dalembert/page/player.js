@@ -177,7 +177,7 @@ function onKey(key, words, act) {
 function controls() {
   $("slider").max = n - 1;
   for (const id of ["slider", "play", "first", "back", "ahead", "speed"]) $(id).disabled = n < 2;
-  $("slider").addEventListener("input", () => jump(Number($("slider").value)));
+  for (const kind of ["input", "change"]) $("slider").addEventListener(kind, () => jump(Number($("slider").value)));
   for (const [i, s] of speeds.entries()) put($("speed"), "option", { value: i }, s < 1 ? `1/${1 / s}` : `${s}`);
   // what takes less than 3 s or more than 20 s is shown slower or faster at first
   while (lasts > 0 && lasts / speeds[speed] < 3 && speed > 0) speed--;
@@ -298,7 +298,7 @@ function plot(column) {
         put(svg, "line", { class: "grid", x1: px(t), x2: px(t), y1: margin.top, y2: height - margin.bottom });
         put(svg, "text", { class: "tick", x: px(t), y: height - margin.bottom + 13, "text-anchor": "middle" }, short(t));
       }
-      for (const t of ticks(low, high, stepOf(low, high, 4))) {
+      for (const t of ticks(low, high, stepOf(low, high, 5))) {
         put(svg, "line", { class: "grid", x1: margin.left, x2: width - margin.right, y1: py(t), y2: py(t) });
         put(svg, "text", { class: "tick", x: margin.left - 5, y: py(t) + 4, "text-anchor": "end" }, short(t));
       }

@@ -13,8 +13,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from dalembert.page import MOST, Page, packed
+from dalembert.page import MOST, Page, Shown, packed
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
+from virtualwork.animation import Series, moving_page
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -102,6 +103,19 @@ def test_few_poses_have_fine_paths() -> None:
     np.testing.assert_allclose(np.hypot(x, y), 0.04, rtol=1e-6)
     (series,) = data(four_bar().motion(np.linspace(0, 2 * np.pi, 361)).animate())["series"]
     assert not any("path" in p for p in series["points"])
+
+
+def test_a_page_over_time_plays_by_its_own_clock() -> None:
+    motion = four_bar().motion(np.linspace(0, 6, 50) ** 2 / 6, speed=1.0)
+    time = np.linspace(2.0, 5.0, 50)
+    shown = {"t_s": Shown(time, "t_s"), "crank_rad": Shown(motion.inputs[:, 0], "crank_rad")}
+    series = Series(motion.poses, motion.drawing, shown, ["t_s", "crank_rad"])
+    held = data(moving_page("run", [series, series], time="t_s"))
+    columns = held["series"][0]["columns"]
+    assert (unpacked(columns[held["clock"]], 50) == time).all()
+    assert held["x"] == held["clock"]
+    assert held["wraps"] is True
+    assert len(held["series"]) == 2
 
 
 def test_a_notebook_draws_a_mechanism() -> None:

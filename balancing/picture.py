@@ -1,0 +1,359 @@
+"""Polar pictures of balancing: known masses and their correction, vibration before and after, masses on their places.
+
+Angles are counter-clockwise as seen against +z. All takes plain arrays, in the unit that is named; the prefix is chosen here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dalembert.drawing.amounts import prefixed
+from dalembert.drawing.labels import Label, place
+from dalembert.drawing.polar import FOUND, GIVEN, SHARE, SUM, Look, Vector, dial, handle
+from dalembert.drawing.sheet import sheet
+
+if TYPE_CHECKING:
+    from matplotlib.figure import FigureBase
+    from matplotlib.lines import Line2D
+    from matplotlib.projections.polar import PolarAxes
+
+Complex = NDArray[np.complex128]
+Dials = NDArray[np.object_]
+"""The polar axes of a picture: a row for each rotor."""
+
+MOST = 4
+"""So many rotors of a batch are drawn."""
+NAMED = 16
+"""So many vectors of a dial are named."""
+SENSE = "angles counter-clockwise as seen against +z"
+WHOLE = Look("0.55", 4.0)
+TOGETHER = Look("tab:red", 1.8)
+READ = Look("tab:blue", 1.0)
+
+
+NONE = np.zeros(0, dtype=complex)
+
+
+class KnownMasses(NamedTuple):
+    """A rotor with known unbalances."""
+
+    name: str
+    masses: Sequence[str]
+    planes: Sequence[str]
+    shares: Complex
+    """Of each mass in each plane, (k, p)."""
+    made: Complex
+    """The correction in each plane, as it is given out, (p,)."""
+
+
+class Vibration(NamedTuple):
+    """A rotor with measured vibration."""
+
+    name: str
+    sensors: Sequence[str]
+    before: Complex
+    after: Complex
+    """(s,) each."""
+    planes: Sequence[str]
+    corrections: Complex
+    standing: Complex
+    """What of the trial masses stays on, (p,)."""
+    places: Sequence[float] = ()
+    """Where masses can go, rad."""
+    split: Sequence[Sequence[float]] = ()
+    """The masses on these places, of each plane."""
+    read: Complex = NONE
+    fitted: Complex = NONE
+    """Readings of runs, and what was fitted to each, (n,)."""
+
+
+class Places(NamedTuple):
+    """Places on a rotor, the masses on them, what these are to be together and what they are."""
+
+    title: str
+    angles: Sequence[float]
+    masses: Sequence[float]
+    target: complex
+    total: complex
+
+
+def known_masses(
+    rotors: Sequence[KnownMasses], unit: str, *, remove: bool = False, figure: FigureBase | None = None
+) -> Dials:
+    """Draw of each rotor its planes side by side: shares of the masses, resultant, correction; (rotors, planes)."""
+    rotors = rotors[:MOST]
+    every = [np.abs([*rotor.shares.ravel(), *rotor.made]).max(initial=0.0) for rotor in rotors]
+    factor, unit = prefixed(float(max(every, default=0.0)), unit)
+    columns = max((len(rotor.planes) for rotor in rotors), default=1)
+    figure = sheet(max(4.3 * columns, 5.2), 4.5 * len(rotors) + 0.8, figure)
+    dials = _dials(figure, len(rotors), columns)
+    labels = []
+    for row, (name, masses, planes, shares, made) in zip(dials, rotors, strict=True):
+        for k, axes in enumerate(row):
+            if k >= len(planes):
+                axes.set_visible(False)
+                continue
+            named = masses if len(masses) <= NAMED else [""] * len(masses)
+            mine = shares[:, k] * factor
+            vectors = [Vector(v, SHARE, text) for v, text in zip(mine, named, strict=True)]
+            vectors += [Vector(mine.sum(), SUM), Vector((-1 if remove else 1) * made[k] * factor, FOUND)]
+            title = f"rotor {name}, plane {planes[k]}" if name else f"plane {planes[k]}"
+            labels.append((axes, dial(axes, title, vectors)))
+    handles = [
+        handle(SHARE, "masses, their share in the plane"),
+        handle(SUM, "resultant"),
+        handle(FOUND, f"correction to {'remove' if remove else 'add'}"),
+    ]
+    _key(figure, handles, f"unbalance, {unit}; {SENSE}", min(3, 2 * columns - 1))
+    place(labels)
+    return dials
+
+
+def before_and_after(
+    before: Complex,
+    after: Complex,
+    corrections: Complex,
+    amplitude: str,
+    sensors: Sequence[str] = (),
+    planes: Sequence[str] = (),
+    history: tuple[Complex, Complex] | None = None,
+    figure: FigureBase | None = None,
+) -> Dials:
+    """Draw what a balance found, in SI: vibrations (..., s) and corrections (..., p); of a batch the first four.
+
+    `history` has the readings of one rotor's runs and what was fitted to each.
+    """
+    s, p = before.shape[-1], corrections.shape[-1]
+    many = corrections.ndim > 1
+    rows = [part.reshape(-1, part.shape[-1])[:MOST] for part in np.broadcast_arrays(before, after)]
+    read, fitted = history or (NONE, NONE)
+    masses = np.broadcast_to(
+        corrections, (*np.broadcast_shapes(before.shape[:-1], corrections.shape[:-1]), p)
+    )
+    found = [
+        Vibration(
+            str(i + 1) if many else "",
+            sensors or [str(k + 1) for k in range(s)],
+            v,
+            r,
+            planes or [str(k + 1) for k in range(p)],
+            w * 1e3,
+            np.zeros(p, dtype=complex),
+            read=read,
+            fitted=fitted,
+        )
+        for i, (v, r, w) in enumerate(zip(*rows, masses.reshape(-1, p)[:MOST], strict=True))
+    ]
+    dials = vibration(found, amplitude, "g", figure=figure)
+    return dials if many else dials[0]
+
+
+def vibration(
+    rotors: Sequence[Vibration], amplitude: str, amount: str, *, figure: FigureBase | None = None
+) -> Dials:
+    """Draw of each rotor the vibration before and after, and the corrections; (rotors, dials).
+
+    Where masses go onto places, each plane has a dial of its own, with the places and their masses.
+    """
+    apart = any(len(rotor.places) for rotor in rotors)
+    columns = 1 + (max(len(rotor.planes) for rotor in rotors) if apart else 1)
+    scale, amplitude = prefixed(
+        _largest(*(part for r in rotors for part in (r.before, r.after, r.read))), amplitude
+    )
+    factor, amount = prefixed(
+        _largest(*(part for r in rotors for part in (r.corrections, r.standing))), amount
+    )
+    figure = sheet(5.2 * columns, 5.0 * len(rotors) + 0.7, figure)
+    dials = _dials(figure, len(rotors), columns)
+    labels = []
+    for row, rotor in zip(dials, rotors, strict=True):
+        begin = f"rotor {rotor.name}: " if rotor.name else ""
+        labels.append(
+            (
+                row[0],
+                _measured(row[0], ", ".join(filter(None, (f"{begin}vibration", amplitude))), rotor, scale),
+            )
+        )
+        title = f"{begin}correction to ADD, {amount}"
+        pairs = list(zip(rotor.planes, rotor.standing * factor, rotor.corrections * factor, strict=True))
+        for k, axes in enumerate(row[1:]):
+            if apart and k >= len(pairs):
+                axes.set_visible(False)
+                continue
+            mine = pairs[k : k + 1] if apart else pairs
+            vectors = [Vector(on, GIVEN) for _, on, _ in mine if on]
+            vectors += [Vector(w, FOUND, "" if apart else plane) for plane, _, w in mine]
+            if not apart:
+                labels.append((axes, dial(axes, title, vectors)))
+                continue
+            named = f"plane {mine[0][0]}: " if len(pairs) > 1 else ""
+            masses = [mass * factor for mass in rotor.split[k]]
+            found = dial(axes, f"{named}{title}", vectors, 1.95)
+            labels.append((axes, found + _rim(axes, rotor.places, masses, amount, abs(mine[0][2]))))
+    handles = [
+        handle(
+            GIVEN,
+            "vibration before" + ("; trial masses left on" if any(r.standing.any() for r in rotors) else ""),
+        ),
+        handle(FOUND, "predicted vibration (dot: next to none); correction, by its plane"),
+    ]
+    if any(len(rotor.read) for rotor in rotors):
+        handles.append(_reading())
+    _key(figure, handles, SENSE, len(handles))
+    place(labels)
+    return dials
+
+
+def readings(
+    sensors: Sequence[str],
+    initial: Complex,
+    read: Complex,
+    fitted: Complex,
+    amplitude: str,
+    *,
+    figure: FigureBase | None = None,
+) -> PolarAxes:
+    """Draw the readings of runs (n,), each joined to what was fitted to it, and the fitted vibration without masses (s,)."""
+    scale, amplitude = prefixed(_largest(initial, read), amplitude)
+    figure = sheet(5.6, 5.6, figure)
+    axes: PolarAxes = _dials(figure, 1, 1)[0, 0]
+    vectors = [Vector(v, GIVEN, name) for v, name in zip(initial * scale, sensors, strict=True)]
+    title = ", ".join(filter(None, ("readings, and what was fitted", amplitude)))
+    labels = dial(axes, title, vectors)
+    _history(axes, read * scale, fitted * scale)
+    axes.set_rlim(0, 1.12 * (_largest(initial * scale, read * scale, fitted * scale) or 1.0))
+    _key(figure, [handle(GIVEN, "vibration without masses, fitted"), _reading()], SENSE, 2)
+    place([(axes, labels)])
+    return axes
+
+
+def places(
+    panels: Sequence[Places], unit: str, *, remove: bool = False, figure: FigureBase | None = None
+) -> NDArray[np.object_]:
+    """Draw for each plane its places with their masses on the rim, target and total as vectors; (planes,)."""
+    from matplotlib.lines import Line2D
+
+    factor, unit = prefixed(_largest(*((p.target, p.total, *p.masses) for p in panels)), unit)
+    figure = sheet(5.6 * len(panels), 6.2, figure)
+    dials: Dials = _dials(figure, 1, len(panels))[0]
+    labels = []
+    for axes, (title, angles, masses, target, total) in zip(dials, panels, strict=True):
+        vectors = [Vector(target * factor, WHOLE), Vector(total * factor, TOGETHER)]
+        scale = _largest(target * factor, total * factor)
+        title = f"{title}material to {'remove' if remove else 'add'}, {unit}"
+        found = dial(axes, title, vectors, 1.95)
+        labels.append(
+            (axes, found + _rim(axes, angles, [m * factor for m in masses], unit, scale, remove=remove))
+        )
+    filled = "white" if remove else "tab:red"
+    what = "drilled or taken off" if remove else "mass"
+    handles = [
+        handle(WHOLE, "correction"),
+        handle(TOGETHER, "what the masses are together"),
+        Line2D([], [], color="tab:red", marker="o", ls="", mfc=filled, label=what),
+        Line2D([], [], color="0.6", marker="o", ls="", mfc="white", label="place without"),
+    ]
+    _key(figure, handles, SENSE, 2)
+    place(labels)
+    return dials
+
+
+def _largest(*parts: ArrayLike) -> float:
+    values = np.concatenate([np.abs(np.asarray(part, dtype=complex)).ravel() for part in parts])
+    return float(values[np.isfinite(values)].max(initial=0.0))
+
+
+def _dials(figure: FigureBase, rows: int, columns: int) -> Dials:
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    engine = figure.get_figure(root=True).get_layout_engine()
+    if isinstance(engine, ConstrainedLayoutEngine):
+        # a dial's title stands above its degrees, which the layout learns too late
+        engine.set(h_pad=0.14)
+    found: Dials = figure.subplots(rows, columns, subplot_kw={"projection": "polar"}, squeeze=False)
+    return found
+
+
+def _key(figure: FigureBase, handles: Sequence[object], title: str, columns: int) -> None:
+    key = figure.legend(
+        handles=handles, loc="outside lower center", ncols=columns, fontsize=9, frameon=False, title=title
+    )
+    key.get_title().set_fontsize(9)
+
+
+def _measured(axes: PolarAxes, title: str, rotor: Vibration, scale: float) -> list[Label]:
+    few = len(rotor.before) <= NAMED
+    names = [str(sensor) if few else "" for sensor in rotor.sensors]
+    before, after = rotor.before * scale, rotor.after * scale
+    size = _largest(before, after)
+    # a name at the tip of what is left too, where there are several to tell apart and room for it
+    left = [
+        name if len(names) > 1 and abs(r) > 0.15 * size else "" for name, r in zip(names, after, strict=True)
+    ]
+    vectors = [Vector(v, GIVEN, name) for v, name in zip(before, names, strict=True)]
+    vectors += [Vector(r, FOUND, name) for r, name in zip(after, left, strict=True)]
+    _history(axes, rotor.read * scale, rotor.fitted * scale)
+    found = dial(axes, title, vectors)
+    axes.set_rlim(0, 1.12 * (_largest(before, after, rotor.read * scale, rotor.fitted * scale) or 1.0))
+    return found
+
+
+DOT: dict[str, Any] = {
+    "color": "tab:orange",
+    "lw": 1.0,
+    "marker": "o",
+    "ms": 3.5,
+    "mfc": "tab:blue",
+    "mec": "tab:blue",
+}
+
+
+def _history(axes: PolarAxes, read: Complex, fitted: Complex) -> None:
+    for v, w in zip(read, fitted, strict=True):
+        axes.plot(np.angle([v, w]), np.abs([v, w]), **DOT, markevery=[0])
+
+
+def _reading() -> Line2D:
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], **DOT, label="reading of a run; to what was fitted to it")
+
+
+def _rim(
+    axes: PolarAxes,
+    angles: ArrayLike,
+    masses: Sequence[float],
+    unit: str,
+    scale: float,
+    *,
+    remove: bool = False,
+) -> list[Label]:
+    """Draw the places as spokes about the vectors, and the masses on them; return the labels of the masses."""
+    scale = scale or 1.0
+    rim = 1.35 * scale
+    largest = max(masses, default=0.0) or 1.0
+    labels = []
+    for k, (angle, mass) in enumerate(zip(np.asarray(angles, dtype=float).tolist(), masses, strict=True)):
+        used = mass > 0
+        axes.plot([angle, angle], [1.12 * scale, rim], color="0.6", lw=3.0 if used else 2.0, zorder=2)
+        axes.plot(
+            [angle],
+            [rim],
+            "o",
+            ms=4 + 12 * np.sqrt(mass / largest) if used else 5,
+            mfc="tab:red" if used and not remove else "white",
+            mec="tab:red" if used else "0.6",
+            mew=1.5,
+            zorder=3,
+        )
+        if used:
+            labels.append(
+                Label(f"{k + 1}: {mass:.4g} {unit}", (angle, 1.05 * rim), toward=float(np.degrees(angle)))
+            )
+        elif len(masses) <= 36:
+            labels.append(Label(f"{k + 1}", (angle, 1.04 * rim), "0.4", 7.0, float(np.degrees(angle))))
+    return labels

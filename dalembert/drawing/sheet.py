@@ -1,0 +1,55 @@
+"""The sheet that a picture is drawn on, and axes that print their numbers plainly."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
+
+
+def sheet(width: float, height: float, figure: FigureBase | None = None) -> FigureBase:
+    """Return the figure to draw into.
+
+    Parameters
+    ----------
+    width, height
+        What the picture needs, inches.
+    figure
+        A figure or subfigure of the caller's; an empty figure is made as large as the picture needs. None: a new
+        figure of pyplot's, which a notebook shows and `pyplot.savefig` stores.
+
+    Raises
+    ------
+    ImportError
+        matplotlib is missing; the message names the extra that brings it.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise ImportError(
+            "a picture needs matplotlib: install dalembert with its extra, dalembert[plot]"
+        ) from None
+    if figure is None:
+        from matplotlib import pyplot
+
+        figure = pyplot.figure(figsize=(width, height))
+    elif isinstance(figure, Figure) and not (figure.axes or figure.subfigs):
+        figure.set_size_inches(width, height)
+    if isinstance(figure, Figure) and figure.get_layout_engine() is None:
+        figure.set_layout_engine("constrained")
+    return figure
+
+
+def plain(axes: Axes, which: str = "both") -> None:
+    """Let axes print their numbers whole: no power of ten and no offset beside them, a faint grid behind."""
+    from matplotlib.ticker import ScalarFormatter
+
+    for name, axis in (("x", axes.xaxis), ("y", axes.yaxis)):
+        if which in (name, "both"):
+            formatter = ScalarFormatter(useOffset=False)
+            formatter.set_scientific(False)
+            axis.set_major_formatter(formatter)
+    axes.grid(color="0.9", lw=0.6)
+    axes.set_axisbelow(True)

@@ -1,0 +1,90 @@
+"""The picture of every worked example, as the command draws it: no words that collide or are cut, no offsets."""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib
+import pytest
+from faults import faults
+from matplotlib.figure import Figure
+
+import cli.show.picture
+from cli.app import main
+from cli.examples.command import ABOUT, EXAMPLES, describe, names
+
+Draw = Callable[..., Figure]
+FURTHER = {
+    "engine": [
+        "--at 150deg",
+        "--sweep 90deg:450deg:30deg",
+        "--sweep 0deg:720deg:5deg --graph B.y,B.vy,B.ay,rod.omega",
+    ],
+    "klann": ["--sweep 0deg:360deg:10deg", "--sweep 0deg:360deg:10deg --forces"],
+    "parallelogram": ["--sweep 0deg:720deg:5deg --graph coupler.omega,rocker.omega,coupler.alpha"],
+    "peaucellier": ["--sweep=-90deg:90deg:1deg --graph B.x,B.y"],
+    "planetary-gear": ["--at 60deg"],
+    "scissors-lift": ["--sweep 0.4m:1.15m:0.05m"],
+    "quick-return": ["--sweep 0deg:360deg:10deg"],
+    "fan-one-plane": ["--blades 12"],
+    "pump-trials-left-on": ["--blades 12"],
+    "turbine-train": [""],
+    "blades": ["--max-mass 9g", "--drill 10mm --density 7850kg_m3"],
+    "crankshaft": [""],
+    "riul-rod": ["--shaft=-500mm:500mm --speed 10rad_s --correct A:-200mm:50mm --correct B:200mm:50mm"],
+    "tennis-racket": ["--at 5"],
+}
+"""Further calls of an example's file: the command, the file, then these words in place of its own options."""
+CALLS = [(name, None) for name in names()] + [
+    (name, words) for name, more in FURTHER.items() for words in more
+]
+
+
+@pytest.fixture
+def draw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Draw:
+    """Return what draws the picture of an example's call, in this process."""
+
+    def drawn(name: str, words: str | None) -> Figure:
+        for file in EXAMPLES.joinpath(name).iterdir():
+            if file.name != ABOUT:
+                (tmp_path / file.name).write_bytes(file.read_bytes())
+        call = shlex.split(describe(name)["command"])
+        if "--plot" in call:
+            del call[call.index("--plot") : call.index("--plot") + 2]
+        if words is not None:
+            call = [
+                *(
+                    call
+                    if call[1] == "place" or name in ("fan-one-plane", "pump-trials-left-on", "turbine-train")
+                    else call[:3]
+                ),
+                *shlex.split(words),
+            ]
+        figures: list[Figure] = []
+
+        def keep(picture: Callable[[], Figure], _: str) -> bytes:
+            matplotlib.use("Agg")
+            figures.append(picture())
+            return b""
+
+        monkeypatch.setattr(cli.show.picture, "drawn", keep)
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr("sys.argv", [*call, "--plot", "picture.png"])
+        with contextlib.suppress(SystemExit):
+            main()
+        (figure,) = figures
+        return figure
+
+    return drawn
+
+
+@pytest.mark.parametrize(("name", "words"), CALLS)
+def test_a_picture_can_be_handed_on(
+    name: str, words: str | None, draw: Draw, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert faults(draw(name, words)) == []
+    # matplotlib's own remarks would stand on the user's terminal
+    assert [record.message for record in caplog.records] == []

@@ -1,0 +1,162 @@
+"""Curves over the input: any quantities, and forces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dalembert.drawing.amounts import prefixed, quiet
+from dalembert.drawing.curves import Curve, Ends, panel, spread
+from dalembert.drawing.sheet import plain, sheet
+from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.poses import Poses
+from virtualwork.picture.quantities import quantities
+from virtualwork.plan.joints import Joint
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
+
+Panels = NDArray[np.object_]
+Row = tuple[Joint, str, str]
+"""A joint, the body that its force acts on, and what it comes from."""
+
+
+def curves(poses: Poses, names: Sequence[str], figure: FigureBase | None = None) -> Panels:
+    """Draw quantities against the input, a panel for each unit; return their axes."""
+    found = quantities(poses, names)
+    units = list(dict.fromkeys(q.unit for q in found))
+    figure = sheet(7.6, 1.0 + 2.3 * len(units), figure)
+    rows: Panels = figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0]
+    x, label = _input(poses)
+    ends = []
+    for axes, unit in zip(rows, units, strict=True):
+        mine = [q for q in found if q.unit == unit]
+        scale = max(q.scale for q in mine)
+        ends.append(panel(axes, x, [Curve(q.name, q.values) for q in mine], "", unit, scale))
+    _name_input(rows[-1], x, label)
+    if poses.mechanism.name:
+        figure.suptitle(poses.mechanism.name, fontsize=10)
+    spread(ends)
+    return rows
+
+
+def forces(d: Dynamics, rows: Sequence[Row] | None = None, figure: FigureBase | None = None) -> Panels:
+    """Draw the effort and the sizes of the joint forces against the input, and what shakes the ground.
+
+    Parameters
+    ----------
+    d
+        The forces of a motion.
+    rows
+        Which joint forces; None for all.
+    figure
+        See `dalembert.drawing.sheet`.
+
+    Returns
+    -------
+    array of axes
+        Effort, joint forces; where something moves also the hodograph of the shaking force, the shaking moment.
+    """
+    m, shakes = (
+        d.poses.mechanism,
+        d.scene.moves,
+    )  # at rest the ground carries a constant load, which is no picture
+    x, label = _input(d.poses)
+    shown = [
+        (row, size)
+        for row in (d.reactions.order.pairs if rows is None else rows)
+        if np.isfinite(size := np.abs(d.joint_force(row[0], row[1]))).any()
+    ]
+    tall = max(2.9, 0.17 * len(shown) + 0.8)
+    figure = sheet(12 if shakes else 7.6, 2.6 + 0.8 + tall, figure)
+    halves: Any = figure.subfigures(1, 2, width_ratios=(1.6, 1)) if shakes else (figure, None)
+    left, right = halves
+    top, bottom = left.subplots(2, 1, sharex=True, height_ratios=(2.6, tall))
+    shaking, moment = d.shaking if shakes else (np.zeros((1, 2)), np.zeros(1))
+    everything = [size for _, size in shown] + [shaking.ravel(), moment / m.size]
+    everything += [d.effort[:, j] / (1 if e.is_slide else m.size) for j, e in enumerate(m.inputs)]
+    largest = max((float(np.abs(v[np.isfinite(v)]).max(initial=0.0)) for v in everything), default=0.0)
+    ends = [_effort(top, d, x, largest), _joint_forces(bottom, x, shown, largest)]
+    _name_input(bottom, x, label)
+    bottom.set_ylim(bottom=0)
+    found = [top, bottom]
+    if shakes:
+        hodograph, curve = right.subplots(2, 1, height_ratios=(2.6, tall))
+        _hodograph(hodograph, shaking, largest)
+        ends.append(
+            panel(curve, x, [Curve("", moment)], "shaking moment about the origin", "N·m", largest * m.size)
+        )
+        _name_input(curve, x, label)
+        found += [hodograph, curve]
+    spread(ends)
+    return np.array(found, dtype=object)
+
+
+def _input(poses: Poses) -> tuple[Reals, str]:
+    m = poses.mechanism
+    if len(m.inputs) != 1:
+        return np.arange(1.0, poses.n + 1), "step"
+    entry = m.inputs[0]
+    if entry.is_slide:
+        factor, unit = prefixed(float(np.abs(poses.inputs).max(initial=0.0)), "m")
+        return poses.inputs[:, 0] * factor, f"position of {entry.name}, {unit}"
+    return np.degrees(poses.inputs[:, 0]), f"angle of {entry.name}, deg"
+
+
+def _name_input(axes: Axes, x: Reals, label: str) -> None:
+    from matplotlib.ticker import MultipleLocator
+
+    axes.set_xlabel(label)
+    across = float(np.ptp(x)) if len(x) else 0.0
+    if label.endswith("deg") and across >= 90:
+        axes.xaxis.set_major_locator(
+            MultipleLocator(next((s for s in (30, 60, 90, 180, 360) if across / s <= 8), 720))
+        )
+
+
+def _effort(axes: Axes, d: Dynamics, x: Reals, largest: float) -> Ends:
+    m = d.poses.mechanism
+    slides = [entry.is_slide for entry in m.inputs]
+    unit = "N" if all(slides) else "N·m" if not any(slides) else "N, N·m"
+    lines = [Curve(e.name if len(m.inputs) > 1 else "", d.effort[:, j]) for j, e in enumerate(m.inputs)]
+    if len(m.inputs) == 1 and len(x) > 1:
+        mean = float(np.trapezoid(d.effort[:, 0], x) / (x[-1] - x[0]))
+        if np.isfinite(mean):
+            lines.append(Curve("mean", np.full(len(x), mean)))
+    what = f"{'force' if slides[0] else 'torque'} at the input"
+    ends = panel(axes, x, lines, what, unit, largest * (1.0 if any(slides) else m.size))
+    axes.axhline(0, color="0.6", lw=0.8, zorder=1)
+    return ends
+
+
+def _joint_forces(axes: Axes, x: Reals, shown: Sequence[tuple[Row, Reals]], largest: float) -> Ends:
+    names = [joint.name for (joint, _, _), _ in shown]
+    lines = [
+        Curve(joint.name if names.count(joint.name) == 1 else f"{joint.name} ({of} on {on})", size)
+        for (joint, on, of), size in shown
+    ]
+    return panel(axes, x, lines, "joint force", "N", largest)
+
+
+def _hodograph(axes: Axes, shaking: Reals, largest: float) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    clean = quiet(shaking, largest)
+    size = float(np.abs(clean[np.isfinite(clean)]).max(initial=0.0))
+    factor, unit = prefixed(size, "N")
+    axes.plot(*(clean * factor).T, color="black", lw=1.4)
+    first = clean[np.isfinite(clean).all(axis=1)][:1] * factor
+    axes.plot(*first.T, marker="o", color="black", ms=5)
+    axes.plot(0, 0, marker="+", color="0.3", ms=9)
+    plain(axes)
+    axes.set_aspect("equal", adjustable="datalim")
+    if not size:
+        axes.set_xlim(-1, 1)
+    axes.xaxis.set_major_locator(MaxNLocator(4))
+    axes.set_xlabel(f"shaking force, x, {unit} (dot: first pose)")
+    axes.set_ylabel(f"y, {unit}")

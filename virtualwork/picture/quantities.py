@@ -1,0 +1,89 @@
+"""Quantities of a motion by name: `H.x`, `coupler.omega`, `B.slide`; and how large one of a kind is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import NamedTuple
+
+import numpy as np
+
+from virtualwork.describe.errors import DescriptionError
+from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.poses import Poses
+
+POINTS = {f"{rate}{part}": (order, part) for order, rate in enumerate(("", "v", "a", "j")) for part in "xy"}
+LINKS = {"angle": 0, "omega": 1, "alpha": 2, "jerk": 3}
+SLIDES = {"slide": 0, "speed": 1, "acceleration": 2}
+LENGTHS = ("m", "m/s", "m/s²", "m/s³")
+ANGLES = ("deg", "rad/s", "rad/s²", "rad/s³")
+
+
+class Quantity(NamedTuple):
+    """A quantity over the poses: its name, its unit, its values (n,), and how large one of its kind is."""
+
+    name: str
+    unit: str
+    values: Reals
+    scale: float
+
+
+def quantities(poses: Poses, names: Iterable[str]) -> list[Quantity]:
+    """Return the quantities of these names.
+
+    Raises
+    ------
+    DescriptionError
+        No link or point of that name, or it has no such quantity; the names that there are are told.
+    """
+    return [_quantity(poses, name) for name in names]
+
+
+def _quantity(poses: Poses, word: str) -> Quantity:
+    m = poses.mechanism
+    name, _, what = word.rpartition(".")
+    homes = {p: (body, z) for body, points in m.bodies.items() for p, z in points.items()}
+    guides = {g.point: i for i, g in enumerate(m.guides)}
+    known = {*homes, *m.links}
+    if name not in known:
+        close = get_close_matches(name, known, n=1)
+        hint = f"; did you mean '{close[0]}'?" if close else ""
+        raise DescriptionError(f"'{word}': no link or point is named '{name}'{hint}")
+    if name in homes and what in POINTS:
+        order, part = POINTS[what]
+        body, place = homes[name]
+        z = poses.point_derivative(body, place, order, name)
+        return Quantity(
+            word, LENGTHS[order], z.real if part == "x" else z.imag, m.size * pace(poses) ** order
+        )
+    if name in m.links and what in LINKS:
+        order = LINKS[what]
+        if order:
+            return Quantity(word, ANGLES[order], poses.angle_derivative(name, order), pace(poses) ** order)
+        return Quantity(word, "deg", unwrapped(poses.angle(name)), 180.0)
+    if name in guides and what in SLIDES:
+        order = SLIDES[what]
+        values = poses.slide_derivative(guides[name], order)
+        return Quantity(word, LENGTHS[order], values, m.size * pace(poses) ** order)
+    kinds = ((POINTS, homes), (LINKS, m.links), (SLIDES, guides))
+    choices = [choice for of, holders in kinds if name in holders for choice in of]
+    raise DescriptionError(f"'{word}': expected {name}. with one of {', '.join(choices)}")
+
+
+def pace(poses: Poses) -> float:
+    """Return how fast the inputs go, 1/s: the largest of ω, √α and ∛jerk, a slide in the mechanism's sizes."""
+    m = poses.mechanism
+    found = 0.0
+    for j, entry in enumerate(m.inputs):
+        for order in (1, 2, 3):
+            rate = np.abs(poses.rate(j, order)).max(initial=0.0) / (m.size if entry.is_slide else 1.0)
+            found = max(found, float(rate) ** (1 / order))
+    return found
+
+
+def unwrapped(angle: Reals) -> Reals:
+    """Return angles (n,), rad, as degrees without jumps, across gaps too."""
+    out = np.degrees(angle)
+    good = np.isfinite(angle)
+    out[good] = np.degrees(np.unwrap(angle[good]))
+    return out
