@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from typer.core import TyperCommand
 
@@ -16,7 +17,8 @@ class Command(TyperCommand):
     """Heading -> the names of its options; those of no panel stand first."""
     example = ""
 
-    def format_options(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
+    def panels_of(self, ctx: Any) -> dict[str, list[tuple[str, str]]]:
+        """Return the rows of help below their headings."""
         rows: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}
         place: dict[str, str] = {}
         for panels in (self.panels, PANELS):
@@ -28,10 +30,12 @@ class Command(TyperCommand):
             if record is not None:
                 heading = "Arguments" if param.param_type_name == "argument" else "Options"
                 rows[place.get(param.name or "", heading)].append(record)
-        for heading, records in rows.items():
-            if records:
-                with formatter.section(heading):
-                    formatter.write_dl(records)
+        return {heading: records for heading, records in rows.items() if records}
+
+    def format_options(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
+        for heading, records in self.panels_of(ctx).items():
+            with formatter.section(heading):
+                formatter.write_dl(records)
 
     def format_epilog(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
         if not self.example:

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.page import Page, Shown, fits, packed, page, rounded
 from rigidbody3d.inertia import principal
+from rigidbody3d.traced import pole as pole_of
+from rigidbody3d.traced import traced_axis
 
 Array = NDArray[np.float64]
 
-LIKE = 1e-9
-"""Moments as near as this, relatively, are those of a body of revolution."""
 SIDES = 24
 THIN = 0.04
 """No side of a drawn body is thinner, of its largest."""
@@ -57,7 +57,7 @@ def turning_page(
         ],
     }
     corners, faces = _top() if top else _body(inertia)
-    axis, called = _traced(inertia, np.asarray(omega, dtype=float), top)
+    axis, called = traced_axis(inertia, omega, top)
     return page(
         title,
         "space",
@@ -76,30 +76,6 @@ def turning_page(
     )
 
 
-def _traced(inertia: ArrayLike, omega: Array, top: bool) -> tuple[Array, str]:
-    """Return the axis whose path is drawn, and its name: that of revolution, else the one that turns fastest."""
-    moments, axes = principal(inertia)
-    pole = _pole(moments)
-    if top:
-        axis = np.array([0.0, 0.0, 1.0])
-    elif pole is not None:
-        axis = axes[pole]
-    else:
-        axis = axes[int(np.argmax(np.abs(axes @ omega)))]
-    name = next((a for a, e in zip("xyz", np.eye(3), strict=True) if np.allclose(np.abs(axis), e)), None)
-    return axis, f"body {name}" if name else "a principal axis"
-
-
-def _pole(moments: Array) -> int | None:
-    """Return the axis of revolution of a body with these principal moments (ascending)."""
-    low, middle, high = moments.tolist()
-    if high - low <= LIKE * high:
-        return None
-    if middle - low <= LIKE * high:
-        return 2
-    return 0 if high - middle <= LIKE * high else None
-
-
 Solid = tuple[Array, list[dict[str, Any]]]
 
 
@@ -109,7 +85,7 @@ def _body(inertia: ArrayLike) -> Solid:
     Of a box with the sides a, b, c: I_x ∝ b² + c², so a² ∝ I_y + I_z − I_x; of a bar I = m r²/2 and m (3r² + h²)/12.
     """
     moments, axes = principal(inertia)
-    pole = _pole(moments)
+    pole = pole_of(moments)
     if pole is None:
         squares = moments.sum() - 2 * moments
         half = np.sqrt(np.maximum(squares, 0.0))

@@ -63,7 +63,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("animation", "freebody", "gyroscope", "integration", "momentum", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("picture",),
-        ("rounding_in_time", "solids"),
+        ("rounding_in_time", "solids", "traced"),
         ("inertia",),
         ("rounding",),
         ("attitude", "elliptic", "shapes", "top_roots"),
@@ -92,7 +92,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "dalembert": (("__init__",), ("arithmetic", "drawing", "page")),
     "benchmarks": (
-        ("__main__", "same_outputs", "trace_passes"),
+        ("__main__", "commands_page", "same_outputs", "trace_passes"),
         ("fuzz", "page", "peers"),
         ("speed", "stress"),
         ("scenes",),

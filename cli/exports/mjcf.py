@@ -99,8 +99,9 @@ def _body(s: Skeleton, b: Branching, inside: Element) -> Element:
     if turned:
         body.set("euler", digits(0.0, 0.0, turned))
     made = add(body, "joint", name=j.name, type="hinge" if j.kind == "turn" else "slide")
+    # of a slide the place means nothing to MuJoCo, but it is the point's
+    made.set("pos", spatial(j.ends[1] if b.child == j.link else j.ends[0]))
     if j.kind == "turn":
-        made.set("pos", spatial(j.ends[1] if b.child == j.link else j.ends[0]))
         made.set("axis", digits(0.0, 0.0, b.sense))
     else:
         made.set("axis", spatial(b.sense * cmath.rect(1.0, j.direction - part.turn)))

@@ -156,6 +156,9 @@ def _keyed_text(source: Source) -> str | None:
             else:
                 lines.append(f"{first.rstrip(':=')}: [{', '.join(cells)}]")
         text = "\n".join(lines)
+        # the header of a table of runs is no key with a list
+        if "@" not in text:
+            return None
     return text if _keyed(text) else None
 
 

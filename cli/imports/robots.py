@@ -78,6 +78,8 @@ class _Layer:
         for j in moving:
             if j.kind == "slide":
                 self._slide(j)
+        self.joined = [(s.link, s.on) for s in self.slides.values()]
+        self.alike = self._turning_alike()
         self._slots()
         self._named_points()
         self._couplings()
@@ -255,9 +257,24 @@ class _Layer:
                     held[d.fresh(point)] = z
 
     # --- what ties and what drives ---------------------------------------------------------------------------
-    def _shares(self, terms: list[tuple[str, float]], where: str) -> dict[str, float] | None:
-        """Return Σ factor·(joint's coordinate) as a sum of the bodies' angles; None where it holds a slide."""
+    def _turning_alike(self) -> dict[str, str]:
+        """Return one body for each: those that slides join turn alike. The ground stands for its own, blocks for none."""
+        found = {name: name for name in [GROUND, *(g.name for g in self.groups.values())]}
+        for s in self.joined:
+            a, b = found[s[0]], found[s[1]]
+            keep = min(a, b, key=lambda name: (name != GROUND, name.startswith(BLOCK)))
+            found = {name: keep if top in (a, b) else top for name, top in found.items()}
+        return found
+
+    def _shares(
+        self, terms: list[tuple[str, float]], where: str, wanted: str = ""
+    ) -> dict[str, float] | None:
+        """Return Σ factor·(joint's coordinate) as a sum of the bodies' angles; None where it holds a slide.
+
+        Of bodies that turn alike the `wanted` one is named, or one that the joints name.
+        """
         found: dict[str, float] = {}
+        names: dict[str, str] = {}
         for name, factor in terms:
             j = self.robot.joints.get(name)
             if j is None:
@@ -267,9 +284,16 @@ class _Layer:
             sense = factor * self.plane.sense(j.axis)
             for link, c in ((j.child, sense), (j.parent, -sense)):
                 body = self.group(link).name
-                found[body] = found.get(body, 0.0) + c
+                top = self.alike[body]
+                found[top] = found.get(top, 0.0) + c
+                if body == wanted or (top not in names and body in self.d.bodies):
+                    names[top] = body
         scale = max(map(abs, found.values()), default=0.0)
-        return {body: c for body, c in found.items() if abs(c) > 1e-12 * scale}
+        return {
+            GROUND if top == GROUND else names.get(top, top): c
+            for top, c in found.items()
+            if abs(c) > 1e-12 * scale
+        }
 
     def _couplings(self) -> None:
         d = self.d
@@ -281,13 +305,14 @@ class _Layer:
                 d.notes.append(left_out(f"coupling {name}", "it is no gear of two bodies on an arm"))
                 continue
             first = self.robot.joints[terms[0][0]]
-            arm = GROUND if GROUND in shares else self.group(first.parent).name
-            if len(shares) == 2 and arm not in shares:
-                arm = GROUND
+            top = self.alike[self.group(first.parent).name]
+            carriers = [body for body in shares if self.alike[body] == top]
+            # any of the three may be called the arm
+            arm = GROUND if GROUND in shares else (carriers or list(shares))[0]
+            if len(shares) == 2:
+                # two that turn alike: whatever carries them
+                arm = next((body for body in d.bodies if body not in shares), GROUND)
             pair = [body for body in shares if body != arm]
-            if len(pair) == 1:
-                d.notes.append(left_out(f"coupling {name}", "it holds one body alone"))
-                continue
             b, a = pair[:2]
             d.meshes.append(Mesh(a, b, -shares[a] / shares[b], arm))
 
@@ -354,7 +379,7 @@ class _Layer:
             if not any(e.slide is s for e in d.drives):
                 d.drives.append(Drive(slide=s, at=j.value, speed=speed))
             return
-        shares = self._shares(m.terms, where)
+        shares = self._shares(m.terms, where, m.name)
         if shares is None or len(shares) != 2:
             d.notes.append(left_out(where, "it drives neither one slide nor the angle between two links"))
             return

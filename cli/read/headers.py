@@ -11,7 +11,7 @@ import typer
 
 from cli.errors import DataError
 from cli.read.synonyms import quantity_meant
-from cli.read.units import UNITS, dimensions, find_unit, nearest_unit, unit_name
+from cli.read.units import AMPLITUDES, UNITS, dimensions, find_unit, nearest_unit, unit_name
 
 # compiled where a header is so written
 _BRACKETS = r"(?s)(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\Z"
@@ -131,7 +131,13 @@ def _suffixes(name: str) -> list[str]:
 
 def spellings(quantity: str, dimension: str) -> str:
     """List the names a quantity's column may have: `mass_kg, mass_g or mass_lb`."""
-    names = [f"{quantity}_{unit}" if unit else quantity for unit in UNITS[dimension]][:4]
+    # of amplitudes the first unit of everything that instruments measure
+    units = (
+        [next(iter(of)) for of in AMPLITUDES.values()]
+        if dimension == "amplitude"
+        else [*UNITS[dimension]][:4]
+    )
+    names = [f"{quantity}_{unit}" if unit else quantity for unit in units]
     return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from cli.errors import nearest
-from cli.read.units import UNITS, Scaled, find_unit, from_si, to_si, unit_name
+from cli.read.units import UNITS, Scaled, dimensions, find_unit, from_si, to_si, unit_name
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,8 +36,13 @@ def chosen_units(text: str) -> dict[str, str]:
         found = {d: unit for d in _DIMENSIONS if (unit := find_unit(d, word))}
         if not word or not found:
             known = sorted({unit for d in _DIMENSIONS for unit in UNITS[d]})
+            hint = (
+                f"; '{word}' is a unit of amplitude, and amplitudes keep the file's"
+                if dimensions(word)
+                else nearest(word, known)
+            )
             raise typer.BadParameter(
-                f"'{part.strip()}' is no unit of a column: expected such as mm,g,deg,N_mm,rpm{nearest(word, known)}",
+                f"'{part.strip()}' is no unit of a column: expected such as mm,g,deg,N_mm,rpm{hint}",
                 param_hint="--units",
             )
         for dimension, unit in found.items():

@@ -11,6 +11,7 @@ from dalembert.drawing.curves import Curve, panel, spread
 from dalembert.drawing.sheet import sheet
 from rigidbody3d.attitude import rotate
 from rigidbody3d.inertia import principal
+from rigidbody3d.traced import traced_axis
 
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
@@ -121,21 +122,11 @@ def _curve(axes: Axes3D, omega: Array) -> None:
 
 def _trace(axes: Axes3D, inertia: ArrayLike, omega: Array, attitude: Array, *, top: bool) -> None:
     """The path on the unit sphere of space of the body's axis: of a body of revolution its own, else the most moved one."""
-    moments, directions = principal(inertia)
-    if top:
-        axis = np.array([0.0, 0.0, 1.0])
-    elif moments[2] - moments[1] < moments[1] - moments[0]:
-        axis = directions[0]
-    else:
-        axis = directions[2]
-    if not top and len(set(np.round(moments / moments[2], 9))) == 3:
-        axis = directions[int(np.argmax(np.abs(directions @ omega[0])))]
+    axis, label = traced_axis(inertia, omega[0], top)
     path = rotate(attitude, axis)
     axes.plot_wireframe(*_sphere(np.ones(3), np.eye(3)), color="0.85", lw=0.4, rstride=4, cstride=6)
     axes.plot(*path.T, color="black", lw=1.3)
     axes.scatter(*path[0], color="black", s=18)
-    name = next((n for n, e in zip("xyz", np.eye(3), strict=True) if np.allclose(np.abs(axis), e)), None)
-    label = f"body {name}" if name else "a principal axis"
     axes.set_title(f"trace of {label} on the unit sphere of space (dot: start)", fontsize=10)
     for letter in "xyz":
         getattr(axes, f"set_{letter}label")(letter, labelpad=-4)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import random
+import re
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from subprocess import CompletedProcess
 
@@ -178,6 +181,69 @@ def test_mujoco_agrees_with_what_is_read_of_poses() -> None:
     first = next(iter(robot.joints.values()))
     assert first.axis == pytest.approx(state.xaxis[0], abs=1e-14)
     assert first.ends[1] == pytest.approx(state.xanchor[0], abs=1e-14)
+
+
+def test_masses_that_follow_from_shapes_are_mujocos() -> None:
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads its own format: pip install mujoco")
+    from cli.read.robots.reading import read as read_robot
+
+    shapes = [
+        '<geom size=".1"/>',
+        '<geom type="capsule" size=".02" fromto="0 0 0 .1 .2 .3"/>',
+        '<geom type="capsule" size=".02 .3" pos="1 0 0" euler="10 20 30"/>',
+        '<geom type="cylinder" size=".05 .2" mass="3"/>',
+        '<geom type="box" size=".1 .2 .3" density="10" quat="1 2 3 4"/>',
+        '<geom type="box" size=".1 .2" fromto="0 0 0 1 1 0"/><geom class="heavy" pos="0 1 0"/>',
+        '<geom type="ellipsoid" size=".1 .2 .3"/>',
+        '<geom type="ellipsoid" size=".1" fromto="0 0 0 0 .1 .4"/>',
+    ]
+    bodies = "".join(f'<body name="b{k}"><joint/>{s}</body>' for k, s in enumerate(shapes))
+    text = f"""<mujoco><compiler angle="degree"/><default><default class="heavy"><geom size=".2" density="5000"/></default>
+</default><worldbody>{bodies}</worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    robot = read_robot("file", text.encode(), None)
+    for k in range(len(shapes)):
+        held, theirs = robot.links[f"b{k}"].inertial, model.body(f"b{k}")
+        assert held is not None
+        assert held.mass == pytest.approx(float(theirs.mass[0]), rel=1e-12)
+        assert held.pose[:3, 3] == pytest.approx(theirs.ipos, abs=1e-14)
+        assert np.linalg.eigvalsh(held.tensor) == pytest.approx(np.sort(theirs.inertia), rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_damage_anywhere_is_a_message_or_a_mechanism(seed: int) -> None:
+    """Words of a file exchanged, taken out or doubled: never anything but a DataError."""
+    draw = random.Random(seed)
+    words = [
+        "0",
+        "-1",
+        "1e300",
+        "nan",
+        "inf",
+        "",
+        "1 2",
+        "world",
+        "fixed",
+        "ball",
+        "slide",
+        "<",
+        "crank",
+        "A",
+    ]
+    for _ in range(60):
+        text = draw.choice([SDF, MJCF, *(URDF.format(loop=loop) for loop in LOOPS.values())])
+        for _ in range(draw.randint(1, 3)):
+            pattern = draw.choice([r'"[^"]*"', r">[^<>]+<", r"-?\d+\.?\d*", r" \w+=\"[^\"]*\"", r"<[^<>]*/>"])
+            spans = [found.span() for found in re.finditer(pattern, text)]
+            if spans:
+                a, b = draw.choice(spans)
+                inside = 1 if pattern[0] in '">' else 0
+                word = draw.choice([*words, text[a + inside : b - inside] * 2])
+                text = text[: a + inside] + word + text[b - inside :]
+        with suppress(DataError):
+            for d in read("file", text.encode(), None)[1]:
+                for part in settle(d):
+                    described(part, "test")
 
 
 def test_poses_of_sdf_relative_to_frames_links_and_in_degrees() -> None:

@@ -156,3 +156,24 @@ free_length = 500
     assert done.returncode == 0, done.stderr
     # along the ramp m·g·sin 30° against 100 N/m: 49.05 mm below the free length
     assert "A 0.45095 m: stable" in done.stdout
+
+
+def test_an_unknown_amplitude_names_what_instruments_measure(dalembert: Dalembert) -> None:
+    done = dalembert("field", "-", stdin=fan("amplitude_furlong"))
+    assert done.returncode == 1
+    assert (
+        "expected amplitude_um, amplitude_mm_s, amplitude_mm_s2, amplitude_V or amplitude_counts"
+        in done.stderr
+    )
+
+
+def test_a_unit_of_amplitude_is_no_misspelt_minute(dalembert: Dalembert) -> None:
+    done = dalembert("field", "-", "--units", "mil", stdin=fan("amplitude_um"))
+    assert done.returncode == 2
+    assert "'mil' is a unit of amplitude" in " ".join(done.stderr.split())
+    assert "did you mean" not in done.stderr
+
+
+def test_a_length_of_a_mechanism_is_no_angle(dalembert: Dalembert) -> None:
+    done = dalembert("mechanism", "-", stdin='units = { length = "parsec" }\n')
+    assert "expected a unit of length such as 'mm'\\n" in done.stderr.replace("\n", "\\n")

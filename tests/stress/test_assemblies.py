@@ -63,6 +63,7 @@ def test_every_assembly_is_listed_and_closes() -> None:
         pytest.param(100202, id="ends of ranges in other turns, where the wheels stand otherwise"),
         pytest.param(100249, id="a slide's other range, behind a gap"),
         pytest.param(100300, id="the same"),
+        pytest.param(500227, id="a group whose own range is longer than a turn"),
     ],
 )
 def test_dead_points_of_every_range(seed: int) -> None:

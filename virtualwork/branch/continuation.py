@@ -197,12 +197,21 @@ class Continuation:
         # where the determinant runs to a pole instead (a slide that runs away) there is nothing to extrapolate
         return float(near + total) if 0 <= side * total <= 16 * self.step[side] else float(near)
 
+    def end(self, side: int) -> float:
+        """How far the branch goes to one side, as far as is known."""
+        node = self.q[-1] if side > 0 else self.q[0]
+        return next((q for q, inside in self.ends if inside == -side), node)
+
     def _turned_back(self, q: Reals) -> Reals:
-        """Beyond a limit the branch is remembered: a whole turn later or earlier the mechanism stands as before."""
-        if not any(self.stopped.values()) or not self.track.whole or any(map(len, self.track.flips.values())):
+        """Beyond a limit the branch is remembered: a whole turn later or earlier the mechanism stands as before.
+
+        A branch of more than a turn between its limits stands in two ways at some inputs: there it is not.
+        """
+        if not all(self.stopped.values()) or not self.track.whole or any(map(len, self.track.flips.values())):
             return q
-        low = min([self.q[0], *(q for q, side in self.ends if side > 0)])
-        high = max([self.q[-1], *(q for q, side in self.ends if side < 0)])
+        low, high = self.end(-1), self.end(1)
+        if high - low > 2 * np.pi:
+            return q
         outside = (q < low) | (q > high)
         turned = low + np.mod(q - low, 2 * np.pi)
         return np.where(outside & (turned <= high), turned, q)

@@ -133,6 +133,27 @@ class Track:
                 if first and self._seen_all():
                     return
                 first = False
+            self._look_back(low, high)
+
+    def _look_back(self, low: float, high: float) -> None:
+        """Beyond an end of a group without a closed form it may stand as a turn before: then its other end matters too."""
+        for way in list(self._continuations.values()) if self.whole else ():
+            while (
+                way.stopped[1]
+                and not way.stopped[-1]
+                and way.end(1) < high
+                and self.low > way.end(1) - self.length
+            ):
+                self.low -= self.length
+                self._turn(self.low)
+            while (
+                way.stopped[-1]
+                and not way.stopped[1]
+                and way.end(-1) > low
+                and self.high < way.end(-1) + self.length
+            ):
+                self._turn(self.high)
+                self.high += self.length
 
     def _seen_all(self) -> bool:
         """Whether the one turn looked through says it all, or that it repeats."""

@@ -176,7 +176,11 @@ class Units:
         for kind, text in given.items():
             found = unit(str(text))
             if found is None or found[1] != EXPECTED[kind][1]:
-                raise wrong(f"[units] {kind}", text, f"a unit of {kind} such as 'mm' or 'deg'")
+                raise wrong(
+                    f"[units] {kind}",
+                    text,
+                    f"a unit of {kind} such as '{'deg' if kind == 'angle' else 'mm'}'",
+                )
             self.factors[kind] = found[0]
 
     def number(self, value: Any, kind: str, where: str) -> float:

@@ -154,9 +154,10 @@ def _hodograph(axes: Axes, shaking: Reals, largest: float) -> None:
     axes.plot(*first.T, marker="o", color="black", ms=5)
     axes.plot(0, 0, marker="+", color="0.3", ms=9)
     plain(axes)
-    axes.set_aspect("equal", adjustable="datalim")
-    if not size:
-        axes.set_xlim(-1, 1)
+    if size:
+        axes.set_aspect("equal", adjustable="datalim")
+    else:
+        axes.set(xlim=(-1, 1), ylim=(-1, 1))
     axes.xaxis.set_major_locator(MaxNLocator(4))
     axes.set_xlabel(f"shaking force, x, {unit} (dot: first pose)")
     axes.set_ylabel(f"y, {unit}")

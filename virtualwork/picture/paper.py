@@ -11,7 +11,7 @@ from dalembert.drawing.amounts import prefixed
 from dalembert.drawing.labels import Label, place
 from dalembert.drawing.sheet import plain, sheet
 from virtualwork.describe.parts import GROUND
-from virtualwork.drawing import Circle, Coil, Shape
+from virtualwork.drawing import Circle, Coil, Shape, tracers
 from virtualwork.formulas.numbers import Complexes
 from virtualwork.formulas.poses import Poses
 from virtualwork.picture.shapes import shapes_of
@@ -161,29 +161,20 @@ class _Paper:
             at, point = complex(self._at(label.body, label.at, i)[0]), label.of == "point"
             color, size = ("black", 9.0) if point else (self.colors[label.body], 8.0)
             found.append(Label(label.text, (at.real, at.imag), color, size))
-        for name, link in self.m.links.items():
-            if len(link.points) == 1:
-                at = complex(self._at(name, next(iter(link.points.values())), i)[0])
-                found.append(Label(name, (at.real, at.imag), self.colors[name], 8.0))
         return found
 
     def _paths(self, points: Sequence[str] | None) -> list[Label]:
         """Draw the paths of points over the whole travel, and return their names."""
         m = self.m
-        guided = {g.point for g in m.guides}
         labels = []
-        for body, link in m.links.items() if self.travel.n > 1 else ():
-            for name, own in link.points.items():
-                if points is None:
-                    mine = name not in m.pins and name not in guided
-                else:
-                    mine = name in points and next(b for b in m.bodies if name in m.bodies[b]) == body
-                if not mine:
-                    continue
-                z = self.travel.point_derivative(body, own, 0, name) * self.scale
-                self.axes.plot(z.real, z.imag, color="0.15", lw=0.9, zorder=2)
-                at = z[np.isfinite(z)]
-                if len(at):
-                    top = complex(at[np.argmax(at.imag)])
-                    labels.append(Label(f"path of {name}", (top.real, top.imag), "0.25", 8.0))
+        body_of = {name: body for body in reversed([*m.bodies]) for name in m.bodies[body]}
+        wanted = tracers(m) if points is None else [p for p in points if body_of.get(p, GROUND) != GROUND]
+        for name in dict.fromkeys(wanted) if self.travel.n > 1 else ():
+            own = m.bodies[body_of[name]][name]
+            z = self.travel.point_derivative(body_of[name], own, 0, name) * self.scale
+            self.axes.plot(z.real, z.imag, color="0.15", lw=0.9, zorder=2)
+            at = z[np.isfinite(z)]
+            if len(at):
+                top = complex(at[np.argmax(at.imag)])
+                labels.append(Label(f"path of {name}", (top.real, top.imag), "0.25", 8.0))
         return labels

@@ -28,6 +28,7 @@ from cli.read.robots.robot import (
     symmetric,
     unit,
 )
+from cli.read.robots.shapes import DENSITY, SIZES, together, unit_mass
 
 KINDS: dict[str, Kind] = {"hinge": "turn", "slide": "slide", "ball": "ball"}
 FULL = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
@@ -39,18 +40,18 @@ class _Compiler(NamedTuple):
 
     degrees: bool
     sequence: str
-    shapes: bool
+    shapes: str
 
 
 def read(file: str, root: Element, folder: Path | None) -> Robot:
     """Read a `<mujoco>`; files that it includes are followed inside its folder alone."""
     _include(file, root, folder, [0])
     robot = Robot(file, "MJCF", root.get("model", ""))
-    degrees, sequence, shapes = True, "xyz", True
+    degrees, sequence, shapes = True, "xyz", "auto"
     for e in children(root, "compiler"):
         degrees = e.get("angle", "degree" if degrees else "radian") != "radian"
         sequence = e.get("eulerseq", sequence)
-        shapes = e.get("inertiafromgeom", "auto") != "false"
+        shapes = e.get("inertiafromgeom", shapes)
     if len(sequence) != 3 or not set(sequence.lower()) <= set("xyz"):
         raise DataError(f"{file}: compiler: found eulerseq '{sequence}', expected three of x, y, z")
     robot.gravity = np.array([0.0, 0.0, -9.81])
@@ -185,9 +186,11 @@ class _Reader:
         if child(e, "freejoint") is not None or any(self.whole(j, of).get("type") == "free" for j in joints):
             robot.notes.append(f"{where}: its free joint is left out: it is taken as fixed")
             joints = []
-        robot.add(RobotLink(name, here, self._inertial(where, child(e, "inertial"))))
-        if self.compiler.shapes and child(e, "inertial") is None and child(e, "geom") is not None:
-            robot.notes.append(f"{where}: a mass that follows from its shapes is not taken over")
+        given = child(e, "inertial")
+        held = self._inertial(where, given)
+        if self.compiler.shapes == "true" or (self.compiler.shapes == "auto" and given is None):
+            held = self._of_shapes(where, e, of)
+        robot.add(RobotLink(name, here, held))
         above = parent
         if not joints:
             robot.join(
@@ -218,8 +221,7 @@ class _Reader:
         made = RobotJoint(name, kind, parent, below, (at[:3, 3], at[:3, 3]), np.asarray(direction), value)
         made.type, made.more = type_, more
         made.stiffness, made.damping, rest = (
-            number(file, f"{where}, {key}", values.get(key, "0").split()[0])
-            for key in ("stiffness", "damping", "springref")
+            self._leading(where, key, values) for key in ("stiffness", "damping", "springref")
         )
         made.rest = self.angle(rest) if kind == "turn" else rest
         self.robot.join(made)
@@ -245,6 +247,35 @@ class _Reader:
             symmetric({key: float(text) for key, text in texts.items()}),
             symmetric({key: half_unit(text) for key, text in texts.items()}),
         )
+
+    def _of_shapes(self, where: str, body: Element, of: str) -> Inertial | None:
+        """Return the inertia of a body's shapes."""
+        file, parts = self.file, []
+        for e in children(body, "geom"):
+            values = self.whole(e, of)
+            shape = values.get("type", "sphere")
+            if shape not in SIZES or "mesh" in values:
+                self.robot.notes.append(
+                    f"{where}: the mass of a {values.get('mesh', shape)} is not taken over"
+                )
+                continue
+            here = self.frame(f"{where}, geom", values)
+            size = [float(w) for w in words(file, f"{where}, geom size", values.get("size", "0"))]
+            if "fromto" in values:
+                ends = np.array(numbers(file, f"{where}, geom fromto", values["fromto"], 6)).reshape(2, 3)
+                way = ends[1] - ends[0]
+                here = pose(ends.mean(axis=0), _onto(unit(file, f"{where}, geom fromto", list(way))))
+                # across it has one size, whatever its shape
+                size = size[:1] * (SIZES[shape] - 1) + [float(np.linalg.norm(way)) / 2]
+            if len(size) < SIZES[shape] or min(size[: SIZES[shape]]) <= 0:
+                raise DataError(
+                    f"{file}: {where}, geom size: found {len(size)}, expected {SIZES[shape]} above zero"
+                )
+            volume, moments = unit_mass(shape, size[: SIZES[shape]])
+            density = number(file, f"{where}, geom density", values.get("density", str(DENSITY)))
+            mass = number(file, f"{where}, geom mass", values.get("mass", repr(density * volume)))
+            parts.append((mass, here, mass * moments))
+        return together(parts)
 
     # --- what closes loops ----------------------------------------------------------------------------------
     def _equalities(self, element: Element) -> None:
@@ -314,13 +345,14 @@ class _Reader:
         for link, held in points.items():
             self.robot.links[link].points = held
 
+    def _leading(self, where: str, key: str, values: dict[str, str]) -> float:
+        """Return the first of one number or several, such as a stiffness with its polynomial's."""
+        return float((words(self.file, f"{where}, {key}", values.get(key)) or ["0"])[0])
+
     def _spring(self, e: Element, where: str) -> None:
         """A tendon that pulls: between two sites, or on joints."""
         values = self.classes[e.get("class", "main")].get("tendon", {}) | e.attrib
-        stiffness, damping = (
-            number(self.file, f"{where}, {key}", values.get(key, "0").split()[0])
-            for key in ("stiffness", "damping")
-        )
+        stiffness, damping = (self._leading(where, key, values) for key in ("stiffness", "damping"))
         if not (stiffness or damping):
             return
         rest = [

@@ -1,0 +1,63 @@
+"""Write docs/commands.md from the commands' own help: `python -m benchmarks.commands_page > docs/commands.md`."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+
+import typer
+from typer.core import TyperGroup
+
+from cli.app import COMMANDS, build
+from cli.examples.command import describe
+from cli.help import Command
+from cli.show.output import PANELS
+
+_HEAD = """# Commands and options
+
+Every command with its arguments and options, as `dalembert COMMAND --help` has them. Method and sources: [balancing](balancing.md),
+[balancing in the field](field-balancing.md), [mechanisms](mechanisms.md), [virtual work](virtual-work.md), [rigid bodies](rigid-body.md).
+What tables and quantities may look like, and what is written: [tables](tables.md). This page is written by
+`python -m benchmarks.commands_page`.
+"""
+
+
+def page() -> Iterator[str]:
+    """Yield the lines of the page."""
+    yield from _HEAD.splitlines()
+    shared: dict[str, list[tuple[str, str]]] = {}
+    for name, (_, line) in COMMANDS.items():
+        group = typer.main.get_command(build(name))
+        assert isinstance(group, TyperGroup)
+        command = group.commands[name]
+        assert isinstance(command, Command)
+        context = typer.Context(command, info_name=name, parent=typer.Context(group, info_name="dalembert"))
+        yield from ("", f"## dalembert {name}", "", line)
+        yield from ("", *inspect.cleandoc(command.help or "").replace("*", r"\*").splitlines())
+        panels = command.panels_of(context)
+        solves = "Head of the report" in panels
+        shared |= {heading: records for heading, records in panels.items() if solves and heading in PANELS}
+        for heading, records in panels.items():
+            if solves and heading in PANELS and heading != "What":
+                continue
+            yield from _table(heading, records)
+        if command.example:
+            described = describe(command.example)
+            yield from ("", "```sh", f"dalembert examples {command.example}", described["command"], "```")
+    yield from ("", "## What every command that solves takes too")
+    for heading, records in shared.items():
+        if heading != "What":
+            yield from _table(heading, records)
+
+
+def _table(heading: str, records: list[tuple[str, str]]) -> Iterator[str]:
+    yield from ("", f"| {heading} | |", "|---|---|")
+    yield from (f"| `{_cell(option)}` | {_cell(told)} |" for option, told in records)
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.replace("|", r"\|").split())
+
+
+if __name__ == "__main__":
+    print("\n".join(page()))
