@@ -35,9 +35,10 @@ def _print_schema(asked: bool) -> None:
 
 EXAMPLE = "klann"
 PANELS = {
-    "What": "at sweep inputs only branch change vary variants draws seed distribution",
+    "What": "at sweep inputs only branch",
+    "Variants": "change vary variants tolerance draws seed distribution workers",
     "How": "order newton",
-    "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights tolerance graph states html schema",
+    "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states html schema",
 }
 
 
@@ -156,6 +157,9 @@ def run(
         Literal["normal", "uniform"],
         typer.Option(help="Of what is drawn: a limit is three standard deviations, or the end."),
     ] = "normal",
+    workers: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Processes that solve what is drawn.")
+    ] = None,
     schema: Annotated[
         bool,
         typer.Option(
@@ -219,6 +223,8 @@ def run(
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
         )
     spreads = tolerance or draws is not None
+    if workers is not None and draws is None:
+        raise options.bad("--workers", "expected --draws too: other work is done in one process")
     if spreads:
         from cli.mechanism.tolerance import Tolerances
         from cli.mechanism.tolerated import checked, with_tolerances
@@ -249,7 +255,7 @@ def run(
         if several is None:
             result = _result(analysis, request, states, explain, graph, about)
             if spreads:
-                its = Tolerances(analysis, forces, draws or 0, seed, distribution)
+                its = Tolerances(analysis, forces, draws or 0, seed, distribution, workers or 1)
                 return with_tolerances(result, its)
             return _with_page(result, html, lambda: [("", analysis)], forces, show.units)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from cli.mechanism.forces import effort_name, rows_of
 from cli.mechanism.poses import LINK, POINT, SLIDE, cells
 from cli.mechanism.solve import Analysis
 from cli.show.columns import Column, Table
+from dalembert.arithmetic.parts import Processes
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, spread, summary
 from virtualwork.formulas.recording import COMPLEX, Key
@@ -105,6 +107,7 @@ class Tolerances:
     draws: int = 0
     seed: int = 0
     distribution: str = "normal"
+    workers: int = 1
     said: list[str] = field(default_factory=list)
 
     @cached_property
@@ -155,12 +158,14 @@ class Tolerances:
         nominal = dict(zip(self.keys, motion.sensitivities.values(self.keys), strict=True))
         parts: dict[str, list[Drawn]] = {number.header: [] for number in self.numbers}
         whole = np.ones(self.draws, dtype=bool)
-        for rows, values, assembled in drawn(m, numbers, motion.inputs, (q.speed, q.acceleration), self.keys):
-            whole &= assembled.all(axis=1)
-            found = dict(zip(self.keys, values, strict=True))
-            for number in self.numbers:
-                its, mean = number.of(found[number.key]), number.of(nominal[number.key][rows])
-                parts[number.header].append(summary(its, mean, number.turn))
+        rates = q.speed, q.acceleration
+        with Processes(self.workers) if self.workers > 1 else nullcontext() as pool:
+            for rows, values, assembled in drawn(m, numbers, motion.inputs, rates, self.keys, pool):
+                whole &= assembled.all(axis=1)
+                found = dict(zip(self.keys, values, strict=True))
+                for number in self.numbers:
+                    its, mean = number.of(found[number.key]), number.of(nominal[number.key][rows])
+                    parts[number.header].append(summary(its, mean, number.turn))
         joined = {
             header: Drawn(*(np.concatenate([getattr(p, name) for p in some], axis=-1) for name in _FIELDS))
             for header, some in parts.items()

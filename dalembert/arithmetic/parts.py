@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
-from multiprocessing import active_children, get_context
+from multiprocessing import get_context
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -96,7 +96,6 @@ class Processes(Executor):
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
-        self._others = set(active_children())
         self._pool = self._new()
 
     def _new(self) -> ProcessPoolExecutor:
@@ -121,10 +120,9 @@ class Processes(Executor):
         if kind is None:
             self.shutdown()
             return None
-        # whatever stopped the work, Ctrl-C too: nobody waits for what is not wanted any more
-        self.shutdown(wait=False, cancel_futures=True)
-        for process in set(active_children()) - self._others:
-            process.terminate()
+        # whatever stopped the work, Ctrl-C too: what is begun is let finish, for a worker that is killed while it is sent
+        # something leaves its sender waiting, and nothing else is begun
+        self.shutdown(cancel_futures=True)
         return None
 
 
