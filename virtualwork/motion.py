@@ -23,10 +23,9 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.formulas.lanes import FORCES, Lanes, over_blocks
+from virtualwork.formulas.asked import FORCES, Key, over_blocks, pays
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.recording import Key
 from virtualwork.formulas.sweep import EvenSweep
 from virtualwork.parts_of_motion import LinkMotion, PointMotion, SlideMotion
 from virtualwork.plan.steps import Step
@@ -42,6 +41,7 @@ if TYPE_CHECKING:
     from virtualwork.drawing import Drawing
     from virtualwork.family.sensitivity import Sensitivities
     from virtualwork.forces import Forces
+    from virtualwork.formulas.lanes import Lanes
     from virtualwork.study.cycle import Cycle
 
 
@@ -69,7 +69,6 @@ class Motion:
     ) -> None:
         self.assembly = assembly
         self.poses = Poses(assembly, angle, speed, acceleration, jerk, block_of)
-        self.lanes = Lanes(assembly, self.poses)
         self._units: dict[int, Motion] = {}
 
     def __repr__(self) -> str:
@@ -172,9 +171,16 @@ class Motion:
                 return SlideMotion(self, i)
         raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
 
+    @cached_property
+    def lanes(self) -> Lanes:
+        """The quantities from the tape."""
+        from virtualwork.formulas.lanes import Lanes
+
+        return Lanes(self.assembly, self.poses)
+
     def value(self, key: Key) -> Any:
         """A quantity by its key (`Recording.value`), (n,): from the tape where that pays, else over blocks of poses."""
-        if self.lanes.pays((key,)):
+        if pays(self.assembly.recordings.setdefault("asked", {}), self.n, (key,)):
             return self.lanes.values((key,))[0].copy()
         return over_blocks(self.poses, key, self.dynamics if key[0] in FORCES else None)
 

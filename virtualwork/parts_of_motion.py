@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Protocol
 
 from virtualwork.describe.description import Description
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Complexes, Reals, xy
-from virtualwork.formulas.recording import Key
 
 if TYPE_CHECKING:
     from virtualwork.bounds.motion import MotionErrors

@@ -7,6 +7,7 @@ extended precision or rational arithmetic (`benchmarks.truth`); never against th
 # domain -> (module with a function `measure`, what it measures)
 DOMAINS = {
     "mechanisms": ("benchmarks.speed.mechanisms", "mechanisms in motion, their torque and joint forces"),
+    "evaluators": ("benchmarks.speed.evaluators", "the tape: evaluators on each engine, beside C"),
     "skipping": ("benchmarks.speed.skipping", "what is saved where less is asked for"),
     "rotors": ("benchmarks.speed.rotors", "corrections of rotors with known masses"),
     "field": ("benchmarks.speed.field", "corrections from measured vibration"),

@@ -32,7 +32,7 @@ def run(
     """Read a mechanism of another program: PMKS text and links, PMKS+ links, MotionGen, Linkage, linkage_sim, planar robots (URDF, SDF, MJCF).
 
     What is written is a file for `dalembert mechanism`. The links' axes are parallel to the ground's in the drawn pose,
-    which is that of input 0. All that is not taken over is named on standard error. Several mechanisms in one file
+    which is that of input 0; a robot's keep their own. All that is not taken over is named on standard error. Several mechanisms in one file
     become FILE-1.toml, FILE-2.toml and so on.
     """
     from cli.imports.assembled import described

@@ -178,11 +178,9 @@ def run(
     for each pose and link (what `dalembert work` reads); with --only or --forces a row for each pose. In a pipe
     --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
     """
-    from cli.mechanism.many import Many
     from cli.mechanism.read import wanted
     from cli.mechanism.solve import ORDERS, Analysis, load
     from cli.mechanism.studies import Request
-    from cli.mechanism.variants import asked, assigned
     from cli.mechanism.words import METHOD
 
     if branch is not None and branch != "all" and options.whole(branch) < 1:
@@ -234,8 +232,12 @@ def run(
         checked(draws, tolerance, [flag for flag, given in others.items() if given])
     with _told(file):
         mechanism, bare, said, about = load(file)
-        mechanism = assigned(mechanism, bare, change) if change else mechanism
-        several = asked(mechanism, bare, vary, variants, said)
+        several = None
+        if change or vary or variants is not None:
+            from cli.mechanism.variants import asked, assigned
+
+            mechanism = assigned(mechanism, bare, change) if change else mechanism
+            several = asked(mechanism, bare, vary, variants, said)
         q = wanted(mechanism, at, sweep, inputs, bare)
         rates = None if order is None else ORDERS.index(order)
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)
@@ -263,6 +265,8 @@ def run(
             home = at is None and sweep is None and inputs is None
             its = wanted(variant, at, sweep, inputs, bare) if home and several.moves_inputs else q
             return Analysis.of(file, variant, its, rates, names, branch)
+
+        from cli.mechanism.many import Many
 
         found = Many(
             mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
@@ -308,7 +312,7 @@ def _result(
     graph: str | None,
     about: dict[str, str],
 ) -> Result:
-    from cli.mechanism import columns, picture, poses, remarks, words
+    from cli.mechanism import columns, poses, remarks, words
     from cli.mechanism import forces as of_forces
     from cli.mechanism.states import table as link_states
     from cli.mechanism.studies import Studies
@@ -317,6 +321,8 @@ def _result(
     studies = Studies(analysis, request)
     found = studies.document
     if graph:
+        from cli.mechanism import picture
+
         picture.check_names(analysis, graph)  # a bad name is an error before anything is written
 
     def of_poses() -> Table:
@@ -331,6 +337,8 @@ def _result(
         return {"name": analysis.mechanism.name, "poses": listed, **found}
 
     def figure() -> Figure:
+        from cli.mechanism import picture
+
         several = len(analysis.inputs.shown) > 2 and analysis.motions[0].assembled.any()
         if graph:
             return picture.draw_curves(analysis, graph)

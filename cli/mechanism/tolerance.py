@@ -18,7 +18,8 @@ from cli.show.columns import Column, Table
 from dalembert.arithmetic.parts import Processes
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, spread, summary
-from virtualwork.formulas.recording import COMPLEX, Key
+from virtualwork.formulas.asked import Key
+from virtualwork.formulas.recording import COMPLEX
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -9,7 +9,7 @@ from cli.mechanism.solve import ORDERS, Analysis
 from cli.mechanism.studies import Document, Studies
 from cli.show.columns import Section, Table
 from cli.show.text import heading, table_text
-from virtualwork.formulas.recording import Key
+from virtualwork.formulas.asked import Key
 from virtualwork.plan.steps import Group, Place, Slide, Turn
 
 METHOD = (

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from shlex import quote
 
 import typer
 
@@ -201,6 +200,8 @@ def likeness(headings: Iterable[Heading], known: Mapping[str, str], texts: Seque
 
 def offers(headings: Iterable[Heading], known: Mapping[str, str], texts: Sequence[str]) -> list[str]:
     """Return for columns that are not known but may be meant the option that takes them: `--column mass_g=Masse`."""
+    from shlex import quote
+
     out = []
     for each in headings:
         base, unit = each.base, each.unit

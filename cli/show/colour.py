@@ -8,10 +8,9 @@ from typing import TextIO
 
 _GREEN, _RED, _YELLOW, _PLAIN = "\033[32m", "\033[1;31m", "\033[33m", "\033[0m"
 # verdicts stand in brackets, behind a colon or at the end of a line: elsewhere these are words like others
-_WORDS = re.compile(
+_WORDS = (
     r"(?<=\()(?:within|beyond)\b|(?<=: )(?:stable|unstable)\b|\b(?:ok|WRONG|outlier)(?=\s*$)"
-    r"|^warning:|\b(?:dead|change) points?: (?!none)|\binput limits: (?!none)",
-    re.MULTILINE,
+    r"|^warning:|\b(?:dead|change) points?: (?!none)|\binput limits: (?!none)"
 )
 _COLOURS = {
     **dict.fromkeys(("within", "stable", "ok"), _GREEN),
@@ -23,4 +22,8 @@ def coloured(text: str, stream: TextIO, wanted: bool = True) -> str:
     """Return a text as this stream shows it: with colours on a terminal, unless NO_COLOR or the user says no."""
     if not wanted or not stream.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
         return text
-    return _WORDS.sub(lambda found: f"{_COLOURS.get(found[0], _YELLOW)}{found[0]}{_PLAIN}", text)
+
+    def painted(found: re.Match[str]) -> str:
+        return f"{_COLOURS.get(found[0], _YELLOW)}{found[0]}{_PLAIN}"
+
+    return re.sub(_WORDS, painted, text, flags=re.MULTILINE)

@@ -52,7 +52,7 @@ class Table:
         return {column.header: column.values for column in self.columns}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, repr=False)
 class Section:
     """A part of a report below a heading of its own: paragraphs and tables."""
 
@@ -60,7 +60,7 @@ class Section:
     parts: Sequence[str | Table]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, repr=False)
 class Sheet:
     """What begins a page of a report."""
 
@@ -69,7 +69,7 @@ class Sheet:
     figure: Callable[[], Figure] | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, repr=False)
 class Result:
     """What a command has found, in every form it can be shown in; each is formed when it is asked for."""
 

@@ -42,7 +42,8 @@ def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
     return check
 
 
-@dataclass(frozen=True, eq=False)
+# each method that dataclass makes costs a tenth of a millisecond at every start
+@dataclass(eq=False, repr=False)
 class ShowOptions:
     """The options that every command shares, in the order in which its help lists them."""
 
@@ -121,9 +122,8 @@ class ShowOptions:
     @property
     def head(self) -> dict[str, str]:
         """What the options say for the head of the report."""
-        from cli.read.about import HEAD
-
-        return {name: text for name in HEAD if (text := getattr(self, name)) is not None}
+        names = PANELS["Head of the report"].split()
+        return {name: text for name in names if (text := getattr(self, name)) is not None}
 
     @property
     def form(self) -> str:

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from hashlib import sha256
 from typing import Any, Protocol
 
 Operation = tuple[str, *tuple[Any, ...]]
@@ -99,6 +98,8 @@ class Tape:
     @cached_property
     def key(self) -> str:
         """A name for caches on disk: the same for the same operations in every process."""
+        from hashlib import sha256
+
         return sha256(repr((self.operations, self.outputs)).encode()).hexdigest()
 
     @cached_property

@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.stress.topologies import generate
 from virtualwork import Mechanism
-from virtualwork.describe.errors import DescriptionError
-from virtualwork.formulas.lanes import Lanes, over_blocks
+from virtualwork.describe.errors import DescriptionError, MechanismError
+from virtualwork.formulas.asked import over_blocks
+from virtualwork.formulas.lanes import Lanes
 
 EXAMPLES = {
     f"{path.parent.name}/{path.name}": path
@@ -20,14 +22,14 @@ EXAMPLES = {
 }
 
 
-def sweep(m, n=61):
+def sweep(m, share=1.0, n=61):
     """Poses all around the guess, with a speed and accelerations."""
     rng = np.random.default_rng(3)
     if len(m.inputs) > 1:
-        q = np.array(m.at) + rng.uniform(-0.3, 0.3, (n, len(m.inputs)))
+        q = np.array(m.at) + share * rng.uniform(-0.3, 0.3, (n, len(m.inputs)))
         return q, rng.normal(size=q.shape), rng.normal(size=q.shape)
     width = 0.2 * m.size if m.inputs[0].is_slide else 2 * np.pi
-    return m.at[0] + np.linspace(-width / 2, width / 2, n), 3.0, rng.normal(size=n)
+    return m.at[0] + share * np.linspace(-width / 2, width / 2, n), 3.0, rng.normal(size=n)
 
 
 def every_key(m, motion):
@@ -46,30 +48,32 @@ def every_key(m, motion):
     return [*keys, ("shaking",), ("shaking moment",)]
 
 
-def compare(m, monkeypatch, engine) -> None:
+def compare(m, monkeypatch, engine, share=1.0) -> None:
     """All quantities both ways, within the bounds of their rounding errors; poses that have none are the same."""
-    q, speed, acceleration = sweep(m)
+    q, speed, acceleration = sweep(m, share)
     motion = m.motion(q, speed, acceleration)
     keys = every_key(m, motion)
     monkeypatch.setenv("DALEMBERT_ENGINE", engine)
     found = Lanes(m.assembly, m.motion(q, speed, acceleration).poses).values(keys)
     monkeypatch.delenv("DALEMBERT_ENGINE")
-    # what is zero but for rounding is measured by the largest of its kind
+
+    # what is zero but for rounding is measured by the largest of its dimension
+    def dimension(key):
+        kind = {"point": "length", "slide": "length", "shaking": "force"}.get(key[0], key[0])
+        return kind, key[-1] if key[0] in ("point", "angle", "slide") else 0
+
     largest = {}
     truths = [over_blocks(motion.poses, key, motion.dynamics) for key in keys]
     for key, true in zip(keys, truths, strict=True):
-        kind = key[0], key[-1] if key[0] in ("point", "angle", "slide") else 0
-        largest[kind] = max(largest.get(kind, 0.0), float(np.nanmax(np.abs(true), initial=0.0)))
-    force = max(value for kind, value in largest.items() if kind[0] in ("force", "shaking"))
+        size = float(np.nanmax(np.abs(true), initial=0.0))
+        largest[dimension(key)] = max(largest.get(dimension(key), 0.0), size)
     for kind in ("shaking moment", "effort", "newton-euler"):
-        largest[kind, 0] = max(largest[kind, 0], force * m.size)
-    largest["shaking", 0] = force
+        largest[kind, 0] = max(largest.get((kind, 0), 0.0), largest["force", 0] * m.size)
     # a condition κ makes κ^(order + 1) of a rounding
     condition = np.where(np.isfinite(motion.condition), motion.condition, 1.0)
     for key, value, true in zip(keys, found, truths, strict=True):
         assert (np.isnan(value) == np.isnan(true)).all(), key
-        kind = key[0], key[-1] if key[0] in ("point", "angle", "slide") else 0
-        close = np.abs(value - true) <= 4e-15 * np.maximum(condition, 1.0) ** 3 * largest[kind]
+        close = np.abs(value - true) <= 4e-15 * np.maximum(condition, 1.0) ** 3 * largest[dimension(key)]
         assert (close | np.isnan(true)).all(), key
 
 
@@ -83,6 +87,21 @@ def test_every_quantity_of_the_worked_examples_on_numpy(name, monkeypatch) -> No
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_every_quantity_of_the_worked_examples_on_the_other_engines(name, engine, monkeypatch) -> None:
     compare(Mechanism.from_toml(EXAMPLES[name]), monkeypatch, engine)
+
+
+@pytest.mark.slow
+def test_every_quantity_of_mechanisms_of_any_topology(monkeypatch) -> None:
+    """Drawn at random at a pose: two to six links, slots, prisms and gears on moving links, one or two inputs."""
+    compared = 0
+    for seed in range(250):
+        try:
+            m = generate(seed).mechanism
+            _ = m.assembly
+        except MechanismError:
+            continue
+        compare(m, monkeypatch, "numpy", 0.02)
+        compared += 1
+    assert compared > 200
 
 
 def test_an_evaluator_gives_what_the_motion_gives() -> None:

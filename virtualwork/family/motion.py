@@ -18,8 +18,8 @@ from virtualwork.describe.errors import DescriptionError, MechanismError
 from virtualwork.describe.parts import Point, as_point
 from virtualwork.family.branches import LANES
 from virtualwork.family.part import ASSEMBLED, Part, answer, forget
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Complexes, Reals
-from virtualwork.formulas.recording import Key
 from virtualwork.plan.joints import joints
 
 if TYPE_CHECKING:

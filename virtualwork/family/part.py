@@ -21,10 +21,10 @@ from virtualwork.describe.dimensions import Dimension, changed
 from virtualwork.describe.errors import MechanismError
 from virtualwork.family.branches import LANES, meet_on_the_way, signs
 from virtualwork.family.written import Written
-from virtualwork.formulas.lanes import FORCES, over_blocks
+from virtualwork.formulas.asked import FORCES, Key, over_blocks
 from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.recording import COMPLEX, NAMES, Key, names
+from virtualwork.formulas.recording import COMPLEX, NAMES, names
 
 Mask = NDArray[np.bool_]
 # sin² of a transmission angle below which a force may have no digit left

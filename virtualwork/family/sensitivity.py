@@ -19,10 +19,11 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.dimensions import Dimension, named, value
 from virtualwork.describe.errors import DescriptionError, MechanismError
 from virtualwork.family.written import Written
-from virtualwork.formulas.lanes import FORCES, Lanes
+from virtualwork.formulas.asked import FORCES, Key
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.recording import COMPLEX, NAMES, Key, names
+from virtualwork.formulas.recording import COMPLEX, NAMES, names
 
 # what an input's own numbers are called on the tape
 ENTERS = {"value": "q", "speed": "v", "acceleration": "a", "jerk": "j"}

@@ -19,8 +19,8 @@ import numpy as np
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, dimensions, named, value
 from virtualwork.family.family import Family
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.recording import Key
 
 # draws of one stream of random numbers
 STREAM = 4096

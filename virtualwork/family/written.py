@@ -10,7 +10,8 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import distance
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, value
-from virtualwork.formulas.recording import Key, Recording
+from virtualwork.formulas.asked import Key
+from virtualwork.formulas.recording import Recording
 from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Step, Turn

@@ -6,7 +6,6 @@ poses. Poses close to a change point, where two branches meet, are left to `Pose
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from threading import Lock
@@ -15,26 +14,20 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.engines import FEW, compiled_code, floats, run
+from dalembert.arithmetic.engines import floats, run
 from dalembert.arithmetic.tape import Tape
-from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.asked import FORCES, Key, over_blocks
 from virtualwork.formulas.linear import SINGULAR
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.poses import Branch, Poses
-from virtualwork.formulas.recording import COMPLEX, NAMES, Key, Recording, names
+from virtualwork.formulas.recording import COMPLEX, NAMES, Recording, names
 from virtualwork.formulas.scene import Scene
 
-# what the loads have a part in; a pose that is not assembled has none of it
-FORCES = {"effort", "newton-euler", "force", "moment", "shaking", "shaking moment"}
 # sin² of a transmission angle below which a force may have no digit left
 NEAR = 1e-18
 
-
-# times that a few poses are asked for, and poses, from which on the tape pays
-OFTEN = 50
-MANY_POSES = 1_000_000
 
 # two threads that ask one assembly at once
 _writing = Lock()
@@ -97,22 +90,6 @@ class Lanes:
             self.branch.cover(float(np.nanmin(inputs)), float(np.nanmax(inputs)))
         moves = tuple(any(np.any(rate) for rate in rates) for rates in self.poses.rates)
         return recorded(self.branch, moves)
-
-    def pays(self, keys: Sequence[Key]) -> bool:
-        """Whether these quantities are asked for so often, or of so many poses, that writing them down pays.
-
-        A few poses: some milliseconds to write down against some ten microseconds each time. Many: where compiled code
-        may run, and what it takes to make it is less than what it saves.
-        """
-        if os.environ.get("DALEMBERT_ENGINE"):
-            return True
-        asked = self.branch.recordings.setdefault("asked", {})
-        few = self.poses.n <= FEW
-        key = few, *keys
-        asked[key] = asked.get(key, 0) + (1 if few else self.poses.n)
-        if few:
-            return bool(asked[key] > OFTEN)
-        return bool(asked[key] > MANY_POSES and compiled_code())
 
     def takes(self, keys: Iterable[Key]) -> bool:
         """Whether the tape has these quantities: friction iterates, and redundant statics is a system of its own."""
@@ -302,34 +279,3 @@ def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Re
         return None
     places = tuple(arguments.index(name) for name in tape.inputs)
     return floats.compiled(tape), places, tuple(len(names(key)) == 2 for key in keys)
-
-
-def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:
-    """A quantity worked out over blocks of poses, (n,)."""
-    kind, *of = key
-    if kind in FORCES:
-        forces = forces or Dynamics(poses)
-        if kind == "effort":
-            return forces.effort[:, of[0]]
-        if kind == "newton-euler":
-            return forces.newton_euler[:, of[0]]
-        if kind.startswith("shaking"):
-            force, moment = forces.shaking
-            return moment if kind == "shaking moment" else force[:, 0] + 1j * force[:, 1]
-        joint = forces.reactions.by_key[of[0]]
-        return forces.joint_force(joint, of[1]) if kind == "force" else forces.joint_moment(joint, of[1])
-    match kind:
-        case "point":
-            body, z, node, order = of
-            return poses.point_derivative(body, z, order, node)
-        case "angle":
-            body, order = of
-            return poses.angle_derivative(body, order) if order else poses.angle(body)
-        case "slide":
-            return poses.slide_derivative(*of)
-        case "dpoint":
-            body, z, node, j, order = of
-            return poses.point_coefficient(body, z, j, node, order)
-        case "dangle":
-            return poses.angle_coefficient(*of)
-    raise KeyError(key)

@@ -25,6 +25,7 @@ from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
 from virtualwork.describe.loads import TorsionSpring
 from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.block import Block, Shared, Table
 from virtualwork.formulas.dynamics import resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
@@ -39,8 +40,6 @@ from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import JointForces
 from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
 
-# (kind, of what …): see `Recording.value`
-Key = tuple[Any, ...]
 NAMES = ("q", "v", "a", "j")
 
 

@@ -1,0 +1,72 @@
+"""What can be asked of poses, each quantity by its key; and whether it is asked for so often that the tape pays."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.poses import Poses
+
+# (kind, of what …): see `recording.Recording.value`
+Key = tuple[Any, ...]
+# what the loads have a part in; a pose that is not assembled has none of it
+FORCES = {"effort", "newton-euler", "force", "moment", "shaking", "shaking moment"}
+# poses that are few: Python's floats are faster than arrays
+FEW = 4
+# times that a few poses are asked for, and poses, from which on the tape pays
+OFTEN = 50
+MANY_POSES = 1_000_000
+
+
+def pays(asked: dict[Any, int], n: int, keys: Sequence[Key]) -> bool:
+    """Whether quantities are asked for so often, or of so many poses, that writing them down pays.
+
+    A few poses: some milliseconds to write down against some ten microseconds each time. Many: where compiled code may
+    run, and what it takes to make it is less than what it saves. `asked` counts for an assembly.
+    """
+    if os.environ.get("DALEMBERT_ENGINE"):
+        return True
+    key = n <= FEW, *keys
+    asked[key] = asked.get(key, 0) + (1 if n <= FEW else n)
+    if n <= FEW:
+        return asked[key] > OFTEN
+    return asked[key] > MANY_POSES and _compiled_code()
+
+
+def _compiled_code() -> bool:
+    from dalembert.arithmetic.engines import compiled_code
+
+    return compiled_code()
+
+
+def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:
+    """A quantity worked out over blocks of poses, (n,)."""
+    kind, *of = key
+    if kind in FORCES:
+        forces = forces or Dynamics(poses)
+        if kind == "effort":
+            return forces.effort[:, of[0]]
+        if kind == "newton-euler":
+            return forces.newton_euler[:, of[0]]
+        if kind.startswith("shaking"):
+            force, moment = forces.shaking
+            return moment if kind == "shaking moment" else force[:, 0] + 1j * force[:, 1]
+        joint = forces.reactions.by_key[of[0]]
+        return forces.joint_force(joint, of[1]) if kind == "force" else forces.joint_moment(joint, of[1])
+    match kind:
+        case "point":
+            body, z, node, order = of
+            return poses.point_derivative(body, z, order, node)
+        case "angle":
+            body, order = of
+            return poses.angle_derivative(body, order) if order else poses.angle(body)
+        case "slide":
+            return poses.slide_derivative(*of)
+        case "dpoint":
+            body, z, node, j, order = of
+            return poses.point_coefficient(body, z, j, node, order)
+        case "dangle":
+            return poses.angle_coefficient(*of)
+    raise KeyError(key)
