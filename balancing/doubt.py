@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.run_log import JointFit, joint_fit
+from balancing.run_log import Errors, JointFit, joint_fit
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
 
@@ -63,11 +63,12 @@ class Repeat(NamedTuple):
     """NaN where nothing is left over to compare with."""
 
 
-def repeats(fit: JointFit) -> Iterator[Repeat]:
+def repeats(fit: JointFit, errors: Errors | None = None) -> Iterator[Repeat]:
     """Yield the repeated readings of one machine, (r, s).
 
     The difference of two readings with equal masses is a direction of the residuals, and has the test of
-    `outlier_probability`.
+    `outlier_probability`. With errors that are known it is held against these: so large a |difference|² of two circular errors
+    has the probability exp(-|difference|²/(E|ε₁|² + E|ε₂|²)), times the number of pairs.
 
     >>> found = repeats(joint_fit([[1], [1.1], [3], [3.1], [2]], [[0], [0], [1], [1], [0.5]]))
     >>> [(one.runs, round(one.probability, 2)) for one in found]
@@ -86,6 +87,9 @@ def repeats(fit: JointFit) -> Iterator[Repeat]:
         of_both = 1 / weights[one, s] + 1 / weights[other, s]
         share = apart**2 / (of_both * float(fit.sum_of_squares)) if apart else 0.0
         chance = float(_chance(np.asarray(share), np.asarray(nu), int(both.sum()))) if nu >= 2 else np.nan
+        if errors is not None and np.isinf(errors.degrees_of_freedom):
+            variance = sum(errors.along[j, s] ** 2 + errors.across[j, s] ** 2 for j in (one, other))
+            chance = min(int(both.sum()) * float(np.exp(-(apart**2) / variance)), 1.0) if variance else np.nan
         yield Repeat((one, other), s, apart, chance)
 
 
@@ -167,7 +171,7 @@ def phase_sense(fit: JointFit) -> tuple[Real, Real, Real]:
     """
     from scipy.special import fdtri
 
-    turned = joint_fit(fit.readings.conj(), fit.masses, fit.weights)
+    turned = fit.again(fit.readings.conj())
     nu = np.asarray(fit.degrees_of_freedom, dtype=float)
     square = np.square(np.abs(np.where(fit.present, fit.readings, 0.0)))
     weighed = square if fit.weights is None else fit.weights * square

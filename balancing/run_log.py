@@ -137,6 +137,11 @@ class JointFit:
         noise = 16 * EPS * (np.abs(self.readings) + size)
         return np.asarray(np.where(np.abs(left) <= noise, 0.0, left))
 
+    def again(self, readings: Complex) -> JointFit:
+        """Return the fit of other readings of the same channels in the same runs, (..., r, s)."""
+        y = np.swapaxes(np.where(self.present, readings, 0.0), -1, -2)
+        return replace(self, readings=readings, unknowns=np.matvec(self.gain, y))
+
     def plot(
         self, sensors: Sequence[str] = (), amplitude: str = "", figure: FigureBase | None = None
     ) -> PolarAxes:
@@ -339,6 +344,13 @@ def _rows(masses: Complex) -> Complex:
 
 
 def _seen(r: Complex, rows: int) -> NDArray[np.bool_]:
+    n = r.shape[-1]
+    # σ_min ≥ |det R|/‖R‖ⁿ⁻¹: where that is enough no singular values are needed
+    size = np.sqrt(np.square(np.abs(r)).sum(axis=(-2, -1)))
+    product = np.abs(np.diagonal(r, axis1=-2, axis2=-1)).prod(axis=-1)
+    sure = np.asarray(product > threshold(rows, n) * size**n)
+    if sure.all():
+        return sure
     sigma = np.linalg.svd(r, compute_uv=False)
     return np.asarray(sigma[..., -1] > threshold(rows, r.shape[-1]) * sigma[..., 0])
 

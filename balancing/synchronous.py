@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -70,7 +71,9 @@ def _even(at: Real, step: float) -> Real:
     return np.asarray(late.min() + slope * k)
 
 
-def once_per_turn(t: ArrayLike, signal: ArrayLike, mark: ArrayLike) -> OncePerTurn:
+def once_per_turn(
+    t: ArrayLike, signal: ArrayLike, mark: ArrayLike, pulses: int = 1, tacho: ArrayLike | None = None
+) -> OncePerTurn:
     """Find the once-per-turn vectors of signals, turn by turn between marks, and their mean.
 
     Parameters
@@ -80,16 +83,23 @@ def once_per_turn(t: ArrayLike, signal: ArrayLike, mark: ArrayLike) -> OncePerTu
     signal
         Vibration, (n, s).
     mark
-        Once per turn, any unit, (n,).
+        Any unit, (n,): it rises `pulses` times in a turn.
+    pulses
+        With several pulses in a turn, evenly spaced, t = 0 is the first one of the recording: which it is of the shaft's
+        nobody can tell.
+    tacho
+        A second signal with several pulses in a turn, (n,), beside a mark that comes once: it tells the angle, and the mark
+        where it is zero.
 
     Raises
     ------
     ValueError
-        Times that do not rise, not finite, fewer than two marks, or fewer than four samples in a turn.
+        Times that do not rise, not finite, fewer pulses than one turn has, turns with other numbers of pulses, or fewer than
+        four samples in a turn.
 
     Notes
     -----
-    The angle grows evenly from mark to mark. In each turn the signal is fitted by a constant and up to three orders of
+    The angle grows evenly from pulse to pulse. In each turn the signal is fitted by a constant and up to three orders of
     cos and sin of that angle (least squares), so that neither the sampling nor other orders leak into the first;
     the mean over turns is the synchronous average of the first order.
 
@@ -108,11 +118,22 @@ def once_per_turn(t: ArrayLike, signal: ArrayLike, mark: ArrayLike) -> OncePerTu
         raise ValueError("times, signal and mark must be finite")
     if not (np.diff(time) > 0).all():
         raise ValueError("the times must rise from row to row")
-    at = marks(time, level)
-    if len(at) < 2:
-        raise ValueError(f"the mark rises {len(at)} times: expected two at least, a turn apart")
+    if pulses < 1:
+        raise ValueError(f"{pulses} pulses in a turn: expected one at least")
+    knots = marks(time, level)
+    if len(knots) < pulses + 1:
+        expected = (
+            "two at least, a turn apart" if pulses == 1 else f"{pulses + 1} at least, a turn of {pulses}"
+        )
+        raise ValueError(f"the mark rises {len(knots)} times: expected {expected}")
+    at = knots[::pulses]
+    if tacho is not None:
+        if pulses != 1:
+            raise ValueError("the pulses of a turn are counted from mark to mark, beside a tacho")
+        knots, at, pulses = _counted(time, np.asarray(tacho, dtype=float), at)
+    angle = np.asarray(2 * np.pi / pulses * np.arange(len(knots)), dtype=float)
     each = np.diff(at)
-    vectors = np.array([_turn(time, x, start, length) for start, length in zip(at[:-1], each, strict=True)])
+    vectors = np.array([_turn(time, x, start, end, knots, angle) for start, end in pairwise(at.tolist())])
     turns = len(each)
     mean = vectors.mean(axis=0)
     deviation, of_speed = np.full(mean.shape, np.nan), np.nan
@@ -123,13 +144,36 @@ def once_per_turn(t: ArrayLike, signal: ArrayLike, mark: ArrayLike) -> OncePerTu
     return OncePerTurn(mean, deviation, float(2 * np.pi * turns / (at[-1] - at[0])), of_speed, turns)
 
 
-def _turn(t: Real, x: Real, start: float, length: float) -> Complex:
-    """Return the first order of one turn, (s,)."""
-    first, last = np.searchsorted(t, [start, start + length])
+def _counted(time: Real, tacho: Real, at: Real) -> tuple[Real, Real, int]:
+    """Return the times of a tacho's pulses, the marks between the first and the last of them, and how many a turn has."""
+    if tacho.shape != time.shape or not np.isfinite(tacho).all():
+        raise ValueError("the tacho must be finite, a value for each time")
+    knots = marks(time, tacho)
+    if len(knots) < 2:
+        raise ValueError(f"the tacho rises {len(knots)} times: expected several pulses in each turn")
+    at = at[(at >= knots[0]) & (at <= knots[-1])]
+    if len(at) < 2:
+        raise ValueError("the tacho has no whole turn from mark to mark")
+    # pulses and marks may coincide: between marks their whole number is told by the mean
+    passed = np.interp(at, knots, np.arange(len(knots)))
+    pulses = round(float(passed[-1] - passed[0]) / (len(at) - 1))
+    odd = np.flatnonzero(np.abs(np.diff(passed) - pulses) > 0.5)
+    if pulses < 1 or len(odd):
+        k = int(odd[0]) if len(odd) else 0
+        found = float(passed[k + 1] - passed[k])
+        raise ValueError(
+            f"the turn at {at[k]:g} s has {found:.3g} pulses of the tacho: expected {max(pulses, 1)}, as others"
+        )
+    return knots, at, pulses
+
+
+def _turn(t: Real, x: Real, start: float, end: float, knots: Real, angles: Real) -> Complex:
+    """Return the first order of one turn, (s,), the angles known at some times."""
+    first, last = np.searchsorted(t, [start, end])
     samples = int(last - first)
     if samples < 4:
         raise ValueError(f"the turn at {start:g} s has {samples} samples: expected four at least")
-    angle = 2 * np.pi * (t[first:last] - start) / length
+    angle = np.interp(t[first:last], knots, angles) - np.interp(start, knots, angles)
     orders = np.arange(1, min(HARMONICS, (samples - 1) // 2) + 1)
     grown = angle[:, None] * orders
     rows = np.concatenate([np.ones((samples, 1)), np.cos(grown), np.sin(grown)], axis=1)

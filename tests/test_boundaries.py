@@ -44,11 +44,11 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "virtualwork": (
         ("__init__",),
         ("mechanism",),
+        ("family",),
+        ("intime",),
         ("motion",),
         ("animation", "evaluator", "parts_of_motion", "still"),
         ("forces", "table"),
-        ("family",),
-        ("intime",),
         ("picture",),
         ("study",),
         ("textbook",),

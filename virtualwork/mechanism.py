@@ -18,6 +18,7 @@ from virtualwork.motion import Motion
 if TYPE_CHECKING:
     from virtualwork.evaluator import Evaluator
     from virtualwork.family.family import Family
+    from virtualwork.intime.run import Run
     from virtualwork.study.check import Check
     from virtualwork.study.equilibrium import Equilibria
     from virtualwork.study.newton_table import AllAtOnce
@@ -136,6 +137,54 @@ class Mechanism(Description):
         if angle is None:
             return Motion(self.assembly)
         return Motion(self.assembly, angle, speed, acceleration, jerk)
+
+    def simulate(
+        self,
+        times: ArrayLike,
+        angle: ArrayLike | None = None,
+        speed: ArrayLike | None = None,
+        accuracy: float = 1e-9,
+        until: Mapping[str, float] | None = None,
+    ) -> Run:
+        """Let go of the inputs: the motion under gravity, forces, torques, springs, dampers and friction.
+
+        Virtual work with d'Alembert's forces is the equation of motion of the inputs; see `virtualwork.intime`.
+
+        Parameters
+        ----------
+        times : array (n,)
+            Rising, s; the motion starts at the first.
+        angle, speed : float or array (k,), optional
+            The inputs at the first time, rad or m, and their speeds. Default: the description's own.
+        accuracy : float
+            The wanted error of the inputs at every time, relative to one radian or the mechanism's size.
+        until : mapping of input name to its value, optional
+            The motion ends where an input reaches its value; the last time is that of the event.
+
+        Returns
+        -------
+        Run
+
+        Raises
+        ------
+        MechanismError
+            Where the motion is not determined: no mass moves with an input, the start cannot be assembled.
+        ValueError
+            Times that do not rise, an accuracy that is none, an unknown input.
+
+        Examples
+        --------
+        A pendulum let go at rest from the side, after 1 s:
+
+        >>> from virtualwork import Input, Link
+        >>> pendulum = Mechanism({"O": 0j}, {"bob": Link({"O": 0j}, mass=1, center=1)}, inputs=Input(link="bob"),
+        ...                      gravity=-9.81j)
+        >>> pendulum.simulate([0, 1], angle=0.0).angle[-1].round(6)
+        array([-2.975824])
+        """
+        from virtualwork.intime.run import simulate
+
+        return simulate(self.assembly, times, angle, speed, accuracy, until)
 
     def evaluator(self, *wanted: str) -> Evaluator:
         """Named quantities of the assembly that the guess chooses, made ready once to be asked for again and again.

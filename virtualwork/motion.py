@@ -87,7 +87,8 @@ class Motion:
     __hash__ = object.__hash__
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _again, (self.assembly, self.inputs, self.poses.rates, self.input_error, self.poses.block_of)
+        poses = self.poses
+        return _again, (self.assembly, self.inputs, poses.rates, self.input_error, poses.block_of, poses.time)
 
     # --- over what ------------------------------------------------------------------------------------------------
     @property
@@ -375,8 +376,9 @@ def _again(
     rates: list[list[Number]],
     input_error: ArrayLike,
     block_of: EvenSweep | None,
+    time: Reals | None = None,
 ) -> Motion:
     """Make a motion again, as pickles and copies do; what it had solved is solved anew when asked for."""
     motion = Motion(assembly, inputs, block_of=block_of)
-    motion.poses.rates, motion.input_error = rates, input_error
+    motion.poses.rates, motion.poses.time, motion.input_error = rates, time, input_error
     return motion

@@ -56,7 +56,9 @@ def wrong_dead_points(t: Topology) -> list[str]:
     m = t.mechanism
     dead = np.array(m.check.dead_points)
     period = None if m.inputs[0].is_slide else m.assembly.track.period
-    q = t.inputs[0] + np.linspace(-SCANNED, SCANNED, GRID)
+    track = m.assembly.track
+    # of a slide, as far as the program has looked for them
+    q = np.linspace(max(t.inputs[0] - SCANNED, track.low), min(t.inputs[0] + SCANNED, track.high), GRID)
     low, end = -math.inf, math.inf
     if period is not None:
         # ends of other ranges are named in the turns in which the guess's own lies

@@ -157,6 +157,9 @@ def run(
             metavar="FILE.csv", help="Once-per-turn vectors of a recording: t_s, mark, A_um …; no RUNS."
         ),
     ] = None,
+    pulses: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Pulses of the mark in a turn, for --signal.")
+    ] = 1,
 ) -> Result:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
@@ -196,7 +199,9 @@ def run(
             raise options.bad("--signal", "reads a recording: expected no RUNS")
         from cli.field.signal import signal as recorded
 
-        return recorded(signal)
+        return recorded(signal, pulses)
+    if pulses != 1:
+        raise options.bad("--pulses", "goes with --signal")
     if runs is None:
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
 
@@ -205,6 +210,7 @@ def run(
     from cli.field.fit import Asked, LogFits, masses_at
     from cli.field.layouts import alpha_of, is_log
     from cli.field.log import read_log
+    from cli.field.log_groups import fit_groups
     from cli.field.read import NotOneInitialRun, read_runs
     from cli.field.sisters import Sisters
     from cli.field.solve import FieldBalancing
@@ -247,11 +253,11 @@ def run(
         else:
             unknowns_beaten = any(len(group.trials) > len(group.planes) for group in measured.groups)
             fit = unknowns_beaten and stored is None and not four_run
-    if fit or measured is None:
-        said = phase_lag or rotation is not None
+    lagging = against if phase_lag or rotation is not None else None
+    if measured is None or (fit and not fit_groups(measured, lagging)):
         measured = read_log(
             runs,
-            lagging=against if said else None,
+            lagging=lagging,
             exclude=exclude or [],
             sisters=Sisters(files) if files else None,
             reading_error=error,

@@ -192,10 +192,11 @@ def remarks(found: FieldBalancing) -> Iterator[str]:
 def _repeats(found: FieldBalancing, solved: Solved, i: int) -> Iterator[str]:
     """Repeats with the same masses that contradict each other: by the test, or by 30 % of the vibration."""
     assert solved.balance is not None
-    group, fit = solved.group, solved.balance.fit.machine(i)
+    group, one = solved.group, solved.balance.machine(i)
+    fit = one.fit
     largest = np.abs(np.where(fit.present, fit.readings, 0.0)).max(axis=0)
     said = 0
-    for pair in repeats(fit):
+    for pair in repeats(fit, one.errors):
         far = pair.difference > 0.3 * largest[pair.channel]
         if (pair.probability < LEVEL or far) and said < SHOWN:
             said += 1

@@ -45,7 +45,7 @@ def summary(fits: LogFits, solved: Solved, i: int) -> str:
         else "nothing is left over to show their scatter"
     )
     sense = (
-        "the runs cannot tell the sense of the phase"
+        "the runs cannot tell the sense of the phase: a further run with a mass off the line of the others would"
         if log.sense is None
         else f"the runs say that the phase {log.sense}s"
     )

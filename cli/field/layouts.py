@@ -26,6 +26,7 @@ NAMES = {
     "unbalance": "trial_unbalance_kg_m",
     "mass_angle_deg": "trial_angle_deg",
 }
+KEYS = ("A", "B", "U", "ALPHA", "A0", "keep_trial", "weight_const")
 WITH = re.compile(
     r"without\b.*|with\s+(?P<mass>[\d.,]+)\s*(?P<unit>[a-z]+)(?:\s*(?:@|at)\s*(?P<angle>[-+\d.,]+)\s*(?:°|deg)?)?"
 )
@@ -143,23 +144,25 @@ def _states_are_masses(table: Table, states: list[re.Match[str]]) -> None:
 
 
 def _keyed_text(source: Source) -> str | None:
-    """Return the text of a file of vectors, or of a sheet with a key in the first cell of a row; None of any other."""
-    text = source.text
-    if source.sheet is not None:
-        lines = []
-        for row in source.sheet.rows:
-            first, *rest = [cell.strip() for cell in row] or [""]
-            cells = [cell for cell in rest if cell]
-            if not cells or not first:
-                # a cell that holds a line as the file would, or the row of a further sensor
-                lines.append(first or (f"  - [{', '.join(cells)}]" if cells else ""))
-            else:
-                lines.append(f"{first.rstrip(':=')}: [{', '.join(cells)}]")
-        text = "\n".join(lines)
-        # the header of a table of runs is no key with a list
-        if "@" not in text:
-            return None
+    """Return the text of a file of vectors; of a sheet with its lines, or with a key before the cells of a row; or None."""
+    text = source.text if source.sheet is None else _sheet_text(source.sheet.rows)
     return text if _keyed(text) else None
+
+
+def _sheet_text(rows: list[list[str]]) -> str:
+    """Write the rows of a sheet as a file of vectors has them; a row without a key is a further sensor's."""
+    lines: list[str] = []
+    for row in rows:
+        first, *cells = (cell.strip() for cell in row) if row else [""]
+        cells = [cell for cell in cells if cell]
+        key = first.rstrip(" :=")
+        if key in KEYS and cells:
+            lines.append(f"{key}: [[{', '.join(cells)}]]")
+        elif not first and cells and lines and lines[-1].endswith("]]"):
+            lines[-1] = f"{lines[-1][:-1]}, [{', '.join(cells)}]]"
+        elif first or cells:
+            lines.append(" ".join([first, *cells]))
+    return "\n".join(lines)
 
 
 def _keyed(text: str) -> bool:
@@ -197,7 +200,7 @@ def _vectors(file: str, text: str) -> Layout:
         )
     if slow and len(slow) != len(first):
         raise DataError(f"{file}: A0 has {len(slow)} vectors: expected one for each of {len(first)} sensors")
-    kept = "yes" if str(given.get("keep_trial", "")).strip().lower() in ("true", "yes", "1") else "no"
+    kept = "yes" if "".join(_flat(given.get("keep_trial", ""))).lower() in ("true", "yes", "1") else "no"
     runs = [(0, s, first[s]) for s in range(len(first))]
     runs += [(j + 1, s, row[j]) for j in range(len(masses)) for s, row in enumerate(trials)]
     on = [masses[j - 1] if j else ("", "") for j, _, _ in runs]
@@ -285,8 +288,9 @@ def _nested(file: str, key: str, text: str) -> list[object]:
             stack[-1].append(token.strip().strip("'\""))
     if len(stack) != 1:
         raise DataError(f"{file}: {key}: a bracket is not closed")
-    (whole,) = stack[0] or [[]]
-    return _listed(whole)
+    if len(stack[0]) > 1:
+        raise DataError(f"{file}: {key}: found {len(stack[0])} lists, expected one")
+    return _listed(stack[0][0]) if stack[0] else []
 
 
 def _listed(value: object) -> list[object]:

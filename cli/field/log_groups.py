@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from balancing import JointFit, determined, fit_with_prior, joint_fit, phase_sense
+from balancing import JointFit, Undetermined, determined, fit_with_prior, joint_fit, phase_sense
 from cli.errors import DataError
 from cli.field.read import NO, SHOWN, YES
 from cli.field.runs import Channel, Complex, Group, Log, Real, Rows, Runs
@@ -54,6 +55,86 @@ class _Rotor(NamedTuple):
     """(s,)."""
     years: list[float] | None
     """When each row of readings was read, (r,)."""
+
+
+def fit_groups(runs: Runs, lagging: bool | None) -> bool:
+    """Fit the rotors of a table of runs that is read already; False where a run's rows are not told by it one by one.
+
+    That is where a sensor was read several times in a run, or where speeds or dates count.
+    """
+    header = {name.lower() for name in runs.table.header}
+    if "speed" in runs.table.numbers or "date" in header:
+        return False
+    if any((group.counts > 1).any() for group in runs.groups):
+        return False
+    try:
+        runs.groups = [_whole(runs, group, lagging) for group in runs.groups]
+    except Undetermined:
+        # which run would tell is known to those that read them one by one
+        return False
+    return True
+
+
+def _whole(runs: Runs, group: Group, lagging: bool | None) -> Group:
+    """Return a group with its initial and trial runs fitted together."""
+    readings = np.concatenate([group.initial[:, None], group.runs], axis=1)
+    masses = np.concatenate([np.zeros_like(group.on[:, :1]), group.on], axis=1)
+    errors = group.errors
+
+    def of_fit() -> tuple[Real, Real, Real]:
+        of_initial, of_runs, of_masses = errors()
+        return (
+            np.zeros(group.initial.shape),
+            np.concatenate([of_initial[:, None], of_runs], axis=1),
+            np.concatenate([np.zeros_like(of_masses[:, :1]), of_masses], axis=1),
+        )
+
+    fit = joint_fit(readings, masses)
+    fit, senses = _sense(runs, group.rotors, fit, lagging, lambda turned: joint_fit(turned, masses))
+    rows = [(run, 0) for run in (group.first, *(trial.run for trial in group.trials))]
+    logs = {sense: Log(rows, sense) for sense in set(senses)}
+    return replace(
+        group,
+        trials=[],
+        initial=fit.initial,
+        runs=group.runs[:, :0],
+        on=group.on[:, :0],
+        added=group.added[:, :0],
+        base=[],
+        counts=group.counts[:1],
+        scatter=group.scatter[:, :1],
+        errors=of_fit,
+        fit=fit,
+        logs=[logs[sense] for sense in senses],
+    )
+
+
+def _sense(
+    runs: Runs, rotors: Rows, fit: JointFit, lagging: bool | None, again: Callable[[Complex], JointFit]
+) -> tuple[JointFit, list[str | None]]:
+    """Tell the sense of the phase, and fit again where the runs tell another than was taken and no option says it."""
+    told, taken, other = phase_sense(fit.alone)
+    turn = -1 if lagging else 1
+    against = np.flatnonzero(told < 0)
+    nu = np.maximum(fit.degrees_of_freedom, 1)
+    for i in against[:SHOWN].tolist():
+        of = f"rotor {runs.rotors[rotors[i]]}: " if len(runs.rotors) > 1 else ""
+        sds = [float(np.sqrt(square[i] / nu[i])) for square in (taken, other)]
+        word = "lags" if turn > 0 else "leads"
+        said = (
+            f"{of}the runs say that the instrument's phase {word}: residuals of {sds[1]:.4g} {runs.amplitude_unit} (standard "
+            f"deviation), in the other sense {sds[0]:.4g}"
+        )
+        runs.warnings.append(
+            f"{said}: it was turned round"
+            if lagging is None
+            else f"{said}; the option says otherwise, and was obeyed"
+        )
+    if lagging is None and len(against):
+        fit = again(np.where((told < 0)[:, None, None], fit.readings.conj(), fit.readings))
+        runs.lags = True
+    words = {1: "lead", -1: "lag", 0: None}
+    return fit, [words[int(turn * sense)] for sense in told.tolist()]
 
 
 class Logs:
@@ -112,7 +193,11 @@ class Logs:
         if self.sisters is not None:
             known = self.sisters.known(self.rows.rotors[mine[0].rotor], channels, self.runs)
         fit = self._fitted(readings, masses, known)
-        fit, senses = self._sense(rotors, fit, known)
+        senses: list[str | None] = [None] * len(mine)
+        if known is None or determined(masses, np.isfinite(readings)).all():
+            fit, senses = _sense(
+                self.runs, rotors, fit, self.lagging, lambda turned: self._fitted(turned, masses, known)
+            )
         g, s, p = len(mine), len(channels), len(planes)
         none = np.zeros((g, 0, p), dtype=complex)
         self.runs.groups.append(
@@ -166,34 +251,6 @@ class Logs:
             sd = np.where(fit.degrees_of_freedom > 0, fit.residual_sd, known.before.reading[0])
             fit = fit_with_prior(readings, masses, known.prior, sd[:, None, None])
         return fit
-
-    def _sense(self, rotors: Rows, fit: JointFit, known: Known | None) -> tuple[JointFit, list[str | None]]:
-        """Tell the sense of the phase, and fit again where the runs tell another than was taken and no option says it."""
-        if known is not None and not determined(fit.masses, fit.present).all():
-            return fit, [None] * len(rotors)
-        told, taken, other = phase_sense(fit.alone)
-        turn = -1 if self.lagging else 1
-        against = np.flatnonzero(told < 0)
-        nu = np.maximum(fit.degrees_of_freedom, 1)
-        for i in against[:SHOWN].tolist():
-            of = f"rotor {self.rows.rotors[rotors[i]]}: " if self.several else ""
-            sds = [float(np.sqrt(square[i] / nu[i])) for square in (taken, other)]
-            word = "lags" if turn > 0 else "leads"
-            said = (
-                f"{of}the runs say that the instrument's phase {word}: residuals of {sds[1]:.4g} {self.runs.amplitude_unit} (standard "
-                f"deviation), in the other sense {sds[0]:.4g}"
-            )
-            self.runs.warnings.append(
-                f"{said}: it was turned round"
-                if self.lagging is None
-                else f"{said}; the option says otherwise, and was obeyed"
-            )
-        if self.lagging is None and len(against):
-            turned = np.where((told < 0)[:, None, None], fit.readings.conj(), fit.readings)
-            fit = self._fitted(turned, fit.masses, known)
-            self.runs.lags = True
-        words = {1: "lead", -1: "lag", 0: None}
-        return fit, [words[int(turn * sense)] for sense in told.tolist()]
 
     def _rotor(self, r: int, members: list[int]) -> _Rotor:
         rows = self.rows

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from cli.errors import DataError, quote
-from cli.field.runs import Channel, Complex, Group, Real, Rows, Runs, Trial, apart
-from cli.read.tables import Cells, Table, number_names, read
+from cli.field.runs import Channel, Complex, Group, Real, Rows, Runs, Trial, alike, apart
+from cli.read.tables import Cells, number_names, read
 from cli.read.units import SMALLEST, UNITS, phasor, to_si
 
 YES = ("yes", "y", "true", "1", "kept", "on")
@@ -58,40 +58,10 @@ def read_runs(path: str, *, lagging: bool, phaseless: bool, stored_unit: str | N
         table.numbers["speed"].unit if "speed" in table.numbers else "rpm",
     )
     reader = _Reader(runs, vibration, None if stored_unit else size)
-    for rotors, rows in _layouts(table, rotor):
+    for rotors, rows in alike(table, rotor):
         runs.groups.append(reader.group(rotors, rows))
     runs.warnings = [*table.warnings, *reader.warnings]
     return runs
-
-
-def _layouts(table: Table, rotor: Rows) -> Iterator[tuple[Rows, Rows]]:
-    """Yield rotors whose rows name the same runs, sensors, speeds and planes: their numbers, and rows (g, n)."""
-    order = np.argsort(rotor, kind="stable")
-    count = np.bincount(rotor)
-    start = np.cumsum(count) - count
-    if len(count) == 1:
-        yield np.zeros(1, dtype=np.intp), order[None]
-        return
-    codes = [
-        number_names(table.texts[name])[1] if name in table.texts else np.zeros(table.rows, dtype=np.intp)
-        for name in ("run", "sensor", "trial_plane", "trial_kept")
-    ]
-    speed = table.numbers.get("speed")
-    codes.append(
-        np.unique(np.nan_to_num(speed.values, nan=-1.0), return_inverse=True)[1].astype(np.intp)
-        if speed is not None
-        else np.zeros(table.rows, dtype=np.intp)
-    )
-    signature = np.stack(codes, axis=1)
-    for size in np.unique(count):
-        rotors = np.flatnonzero(count == size)
-        rows = order[start[rotors, None] + np.arange(size)]
-        flat = np.ascontiguousarray(signature[rows].reshape(len(rotors), -1))
-        as_bytes = flat.view(np.dtype((np.void, flat.dtype.itemsize * flat.shape[1]))).ravel()
-        _, first, inverse = np.unique(as_bytes, return_index=True, return_inverse=True)
-        for label in np.argsort(first):
-            same = inverse == label
-            yield rotors[same], rows[same]
 
 
 class NotOneInitialRun(DataError):
@@ -245,6 +215,7 @@ class _Reader:
             np.array([[len(members) for members in cells] for cells in (places, *matches)]),
             scatter,
             errors,
+            initial,
         )
         self._contradictions(group, rows, (places, *matches))
         return group
@@ -372,11 +343,15 @@ class _Reader:
         return np.asarray(to_si(size, self.runs.per, self.size.unit)), turn, angle.unit
 
     def _numbers(self, cells: Cells, rows: Rows, place: int, expected: str) -> Real:
+        texts = [cells.values[row] for row in rows.tolist()]
+        # planes are named alike in all these rows
+        names = self.plane[rows[0]].count(";") + 1
+        whole = cells.numbers(texts) if names == 1 else None
+        if whole is not None:
+            return whole
         values = np.empty(len(rows))
-        for i, row in enumerate(rows.tolist()):
-            text = cells.values[row]
+        for i, (row, text) in enumerate(zip(rows.tolist(), texts, strict=True)):
             parts = text.split(";") if ";" in text or place else [text]
-            names = self.plane[row].count(";") + 1
             try:
                 if len(parts) != names:
                     raise ValueError

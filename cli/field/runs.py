@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import JointFit
-from cli.read.tables import Table
+from cli.read.tables import Table, number_names
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -106,6 +106,8 @@ class Group:
     """Σ|reading - mean|² of the repeats, (g, 1 + r, s)."""
     errors: Callable[[], tuple[Real, Real, Real]]
     """Bounds of the errors of `initial`, `runs` and `on` against the decimals of the table; worked out when asked for."""
+    first: str = ""
+    """The initial run."""
     fit: JointFit | None = None
     """Where all runs were fitted at once: `initial` is fitted then, and there are no trial runs."""
     logs: list[Log] = field(default_factory=list)
@@ -177,3 +179,33 @@ def apart(one: float | None, other: float) -> float:
     if one is None or other != other or one == other:
         return 0.0
     return abs(one - other) / max(abs(one), abs(other))
+
+
+def alike(table: Table, rotor: Rows) -> Iterator[tuple[Rows, Rows]]:
+    """Yield rotors whose rows name the same runs, sensors, speeds and planes: their numbers, and rows (g, n)."""
+    order = np.argsort(rotor, kind="stable")
+    count = np.bincount(rotor)
+    start = np.cumsum(count) - count
+    if len(count) == 1:
+        yield np.zeros(1, dtype=np.intp), order[None]
+        return
+    codes = [
+        number_names(table.texts[name])[1] if name in table.texts else np.zeros(table.rows, dtype=np.intp)
+        for name in ("run", "sensor", "trial_plane", "trial_kept")
+    ]
+    speed = table.numbers.get("speed")
+    codes.append(
+        np.unique(np.nan_to_num(speed.values, nan=-1.0), return_inverse=True)[1].astype(np.intp)
+        if speed is not None
+        else np.zeros(table.rows, dtype=np.intp)
+    )
+    signature = np.stack(codes, axis=1)
+    for size in np.unique(count):
+        rotors = np.flatnonzero(count == size)
+        rows = order[start[rotors, None] + np.arange(size)]
+        flat = np.ascontiguousarray(signature[rows].reshape(len(rotors), -1))
+        as_bytes = flat.view(np.dtype((np.void, flat.dtype.itemsize * flat.shape[1]))).ravel()
+        _, first, inverse = np.unique(as_bytes, return_index=True, return_inverse=True)
+        for label in np.argsort(first):
+            same = inverse == label
+            yield rotors[same], rows[same]

@@ -171,13 +171,7 @@ class FieldBalancing:
         """Return the corrections, for minimax the proven bounds, and the condition numbers."""
         request, weights = self.request, group.weights
         ceiling = request.max_residual
-        if limit is None and not request.ridge:
-            # the coefficients are differences of readings: what lies in their rounding is no information
-            beyond = np.flatnonzero(~(condition_number(alpha, weights) < SINGULAR))
-            if len(beyond):
-                i = int(beyond[0])
-                unseen_one = unseen(alpha[i], None if weights is None else weights[i])[0]
-                raise DataError(self.of(group, i) + planes_say(planes, unseen_one))
+        fix = None
         if request.objective == "least-squares" and limit is None and ceiling is None:
             try:
                 fix = least_squares(alpha, here, weights, ridge=request.ridge)
@@ -185,7 +179,16 @@ class FieldBalancing:
                 raise DataError(
                     self.of(group, *error.case[:1]) + planes_say(planes, error.combination)
                 ) from None
-            return fix.corrections, None, fix.condition_number
+        condition = condition_number(alpha, weights) if fix is None else fix.condition_number
+        if limit is None and not request.ridge:
+            # the coefficients are differences of readings: what lies in their rounding is no information
+            beyond = np.flatnonzero(~(condition < SINGULAR))
+            if len(beyond):
+                i = int(beyond[0])
+                unseen_one = unseen(alpha[i], None if weights is None else weights[i])[0]
+                raise DataError(self.of(group, i) + planes_say(planes, unseen_one))
+        if fix is not None:
+            return fix.corrections, None, condition
         if request.objective == "minimax":
             proven = [
                 self._one(group, planes, i, lambda i=i: self._minimax(alpha[i], here[i], limit, weights, i))  # type: ignore[misc]
@@ -218,7 +221,7 @@ class FieldBalancing:
                 i,
                 lambda i=i, w=w: least_squares(alpha[i], here[i], w, max_mass=limit, max_residual=ceiling),  # type: ignore[misc]
             ).corrections
-        return corrections, None, condition_number(alpha, weights)
+        return corrections, None, condition
 
     def _minimax(
         self, alpha: Complex, here: Complex, limit: Real | None, weights: Real | None, i: int

@@ -37,7 +37,7 @@ EXAMPLE = "klann"
 PANELS = {
     "What": "at sweep inputs only branch",
     "Variants": "change vary variants tolerance draws seed distribution workers",
-    "How": "order newton",
+    "How": "order newton time accuracy until",
     "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states html schema",
 }
 
@@ -105,6 +105,21 @@ def run(
             metavar="NAME.QUANTITY,...",
             help="--plot draws these against the input, such as H.x,coupler.omega.",
         ),
+    ] = None,
+    time: Annotated[
+        str | None,
+        typer.Option(
+            metavar="START:STOP:STEP",
+            help="Let go of the inputs: the motion under the loads, such as 0:10:0.01 (seconds).",
+        ),
+    ] = None,
+    accuracy: Annotated[
+        str | None,
+        typer.Option(metavar="NUMBER", help="With --time: the wanted error of the inputs (default 1e-9)."),
+    ] = None,
+    until: Annotated[
+        str | None,
+        typer.Option(metavar="INPUT=VALUE", help="With --time: end where an input has a value, crank=90deg."),
     ] = None,
     states: Annotated[
         Path | None,
@@ -230,6 +245,16 @@ def run(
         others = {"--vary": vary, "--variants": variants, "--branch": branch, "--states": states}
         others |= {"--graph": graph, "--html": html, **dict.fromkeys(own, "asked"), "--forces": None}
         checked(draws, tolerance, [flag for flag, given in others.items() if given])
+    if time is not None:
+        beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
+        beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}
+        beside |= {"--branch all": branch == "all"}
+        beside |= {"--vary": vary, "--variants": variants, "--html": html, "--tolerance": spreads}
+        clash = [flag for flag, value in beside.items() if value and flag != "--forces"]
+        if clash:
+            raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
+    elif accuracy is not None or until is not None:
+        raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
     with _told(file):
         mechanism, bare, said, about = load(file)
         several = None
@@ -238,6 +263,14 @@ def run(
 
             mechanism = assigned(mechanism, bare, change) if change else mechanism
             several = asked(mechanism, bare, vary, variants, said)
+        if time is not None:
+            from cli.mechanism.in_time import InTime, times_and_accuracy
+
+            home = Analysis.of(file, mechanism, wanted(mechanism, None, None, None, bare), 2, names, branch)
+            home.warnings += said
+            home.check_names()
+            motion = InTime(home, *times_and_accuracy(time, accuracy), until, bare, forces)
+            return replace(motion.result(about), within=lambda: _told(file))
         q = wanted(mechanism, at, sweep, inputs, bare)
         rates = None if order is None else ORDERS.index(order)
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)

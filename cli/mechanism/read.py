@@ -191,6 +191,15 @@ def _named(m: Mechanism, text: str, flag: str) -> dict[int, str]:
     return found
 
 
+def until_inputs(m: Mechanism, text: str, bare: Mapping[str, str]) -> dict[str, float]:
+    """The inputs' values that `--until` names, in SI."""
+    found = {}
+    for j, value in _named(m, text, "--until").items():
+        shown = _quantity(m, j, value, "--until", bare)
+        found[m.inputs[j].name] = shown if m.inputs[j].is_slide else math.radians(shown)
+    return found
+
+
 def _at(m: Mechanism, text: str, bare: Mapping[str, str]) -> list[float]:
     given = _named(m, text, "--at")
     home = _home(m)

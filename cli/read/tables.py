@@ -48,6 +48,17 @@ class Cells:
         """Read a number out of a cell; ValueError where it is none, or has not the decimal mark of the file."""
         return parse_number(_pointed(text) if self.decimal_comma else text)
 
+    def numbers(self, texts: list[str]) -> NDArray[np.float64] | None:
+        """Read numbers out of many cells at once; None where one is none, or has to be looked at by itself."""
+        together = "".join(texts)
+        if self.decimal_comma or not together.isascii() or "_" in together:
+            return None
+        try:
+            values = np.fromiter(map(float, texts), float, len(texts))
+        except ValueError:
+            return None
+        return values if (np.abs(values) <= LARGEST).all() else None
+
 
 @dataclass(eq=False)
 class Table:

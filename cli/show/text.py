@@ -26,10 +26,12 @@ def csv_text(columns: Mapping[str, Values], header: bool = True) -> str:
 
 
 def _plain_column(column: Values) -> Sequence[object]:
-    """Return a column's cells as CSV writes them, a numpy array of finite numbers in one step."""
-    if not isinstance(column, Sequence) and column.dtype.kind == "f" and (column == column).all():
+    """Return a column's cells as CSV writes them: a numpy array of numbers, or names alone, in one step."""
+    if not isinstance(column, Sequence) and column.dtype.kind == "f":
         numbers: list[float] = column.tolist()
-        return numbers
+        return numbers if (column == column).all() else ["" if x != x else x for x in numbers]
+    if isinstance(column, list) and set(map(type, column)) == {str}:
+        return column
     return [plain(value) for value in column]
 
 

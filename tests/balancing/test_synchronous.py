@@ -54,3 +54,42 @@ def test_the_uncertainty_of_the_mean_is_that_of_many_recordings() -> None:
 def test_what_is_no_recording(t: list[float], mark: list[float], says: str) -> None:
     with pytest.raises(ValueError, match=says):
         once_per_turn(t, np.ones((4, 1)), mark)
+
+
+def test_several_pulses_in_a_turn_tell_a_speed_that_varies_within_it() -> None:
+    t = np.arange(40_000) / 20_000
+    angle = 2 * np.pi * 11.3 * t + 0.4 * np.sin(2 * np.pi * 11.3 * t) + 0.5
+    x = 3 * np.cos(angle + 0.7)[:, None]
+    # once in a turn, and twenty times: each rises through half its height where the angle is a multiple of 2π and of π/10
+    mark, tacho = np.sin(angle), np.sin(20 * angle)
+    both = once_per_turn(t, x, mark, tacho=tacho)
+    error = abs(both.vector[0] - 3 * np.exp(0.7j))
+    assert error < 5e-3
+    assert both.turns in (21, 22)
+    # linear between pulses: twice as many, a quarter of the error
+    finer = once_per_turn(t, x, mark, tacho=np.sin(40 * angle))
+    assert abs(finer.vector[0] - 3 * np.exp(0.7j)) < error / 3
+    # the mark alone does not know how the shaft runs ahead and lags within the turn
+    assert abs(once_per_turn(t, x, mark).vector[0] - 3 * np.exp(0.7j)) > 0.1
+    # without a mark the first pulse is where the angle counts from: after 0.5 rad that of 2π/20·2
+    alone = once_per_turn(t, x, tacho, pulses=20)
+    first = 2 * np.pi / 20 * np.ceil(0.5 / (2 * np.pi / 20))
+    assert abs(alone.vector[0] - 3 * np.exp(1j * (0.7 + first))) < 5e-3
+    assert alone.speed == pytest.approx(2 * np.pi * 11.3, rel=2e-3)
+
+
+def test_pulses_that_cannot_be_counted_are_said() -> None:
+    t = np.arange(4000) / 4000
+    angle = 2 * np.pi * 10 * t + 0.3
+    x, mark, tacho = np.cos(angle)[:, None], np.sin(angle), np.sin(6 * angle)
+    missing = np.where((angle > 20) & (angle < 21.5), -1.0, tacho)
+    with pytest.raises(ValueError, match=r"5 pulses of the tacho: expected 6, as others"):
+        once_per_turn(t, x, mark, tacho=missing)
+    with pytest.raises(ValueError, match="from mark to mark"):
+        once_per_turn(t, x, mark, pulses=6, tacho=tacho)
+    with pytest.raises(ValueError, match="expected 101 at least, a turn of 100"):
+        once_per_turn(t, x, mark, pulses=100)
+    with pytest.raises(ValueError, match="one at least"):
+        once_per_turn(t, x, mark, pulses=0)
+    with pytest.raises(ValueError, match="rises 0 times"):
+        once_per_turn(t, x, mark, tacho=0 * tacho)

@@ -312,6 +312,7 @@ def test_repeats_that_contradict_each_other_are_named(dalembert: Dalembert) -> N
         (log([(0, 0)]), ["no mass ever changed"]),
         ("A: [80@40]\nU: [1@2]\n", ["no B", "trial runs"]),
         ("A: [80@40]\nB: [[1@2, 3@4]]\nU: [1@2]\n", ["B has 1 rows of 2", "1 trial runs"]),
+        ("A: [80@40] [60@55]\nB: [[1@2]]\nU: [1@2]\n", ["A: found 2 lists, expected one"]),
         ("A: [80-40]\nB: [[1@2]]\nU: [1@2]\n", ["A: found '80-40'", "amplitude@phase"]),
         (log(THREE).replace("30;-60", "30;x", 1), ["found 'x'", "angle of the mass"]),
         (log(THREE).replace("30;-60", "-30;-60", 1), ["found '-30'", "a mass that is not negative"]),

@@ -96,3 +96,62 @@ def test_the_largest_residual_to_be_expected(options: tuple[str, ...], dalembert
     assert exact["residual_max_95"] == pytest.approx(exact["residual_max"], rel=1e-12)
     said = dalembert("field", "-", "--text", *options, stdin=log(0)).stdout
     assert f"stays below {largest:.4g} µm in 95 % of cases" in said
+
+
+TWICE = """run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg
+0,1,80,40,,,
+1,1,90,41,A,5,0
+1,1,97,43,A,5,0
+"""
+LINE = """ ;DoubleA;phase;mass;phase
+n;80;40;0;0
+n;99;44;10;20
+n;120;46;20;20
+n;61;33;10;200
+"""
+
+
+def test_two_readings_that_differ_by_more_than_their_stated_error(dalembert: Dalembert) -> None:
+    """8 % and 2° apart: too far for errors of 1 % and 1°, not for those of 5 % and 3°."""
+    told = [
+        found(dalembert("field", "-", "--json", "--fit", "--reading-error", error, stdin=TWICE))[1]
+        for error in ("1%,1deg", "5%,3deg")
+    ]
+    (said,) = [warning for warning in told[0] if "contradict" in warning]
+    for word in ("run 1, sensor 1", "with the same masses on", "90 at 41°", "97 at 43°"):
+        assert word in said
+    assert not any("contradict" in warning for warning in told[1])
+
+
+def test_masses_on_one_line_cannot_tell_the_sense_of_the_phase(dalembert: Dalembert) -> None:
+    for options in ((), ("--phase-lag",)):
+        rotor, _ = found(dalembert("field", "-", "--json", *options, stdin=LINE))
+        assert rotor["fit"]["phase_sense"] is None
+        said = dalembert("field", "-", "--text", *options, stdin=LINE).stdout
+        assert (
+            "cannot tell the sense of the phase: a further run with a mass off the line of the others would"
+            in said
+        )
+
+
+def test_a_state_read_once_is_left_out_and_what_is_known_of_it_is_said(dalembert: Dalembert) -> None:
+    head = " ;DoubleA;phase;mass;phase\nn;80;40;0;0\nn;99;44;10;20\n"
+    for once, words in (
+        ("u;60;30;0;0\n", "its vibration without masses is known, what a mass in plane 1 does is not"),
+        ("u;60;30;10;20\n", "what it does is not told from the vibration without it; a run without"),
+    ):
+        rotor, warnings = found(dalembert("field", "-", "--json", stdin=head + once))
+        assert [one["state"] for one in rotor["residual"]] == ["n"]
+        (said,) = [warning for warning in warnings if "was read once" in warning]
+        assert words in said
+        assert "it takes no part in the fit" in said
+
+
+def test_planes_that_no_run_tells_apart(dalembert: Dalembert) -> None:
+    text = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n"
+    for run, size in enumerate((0, 5, 10, 7)):
+        on = f"A;B,{size};{size},0;90" if size else ",,"
+        text += f"{run},1,{80 + size},40,{on}\n{run},2,{70 - size},30,{on}\n"
+    done = dalembert("field", "-", "--fit", stdin=text)
+    assert done.returncode == 1
+    assert "do not tell the planes apart; a run with one plane's mass alone changed would" in done.stderr

@@ -39,3 +39,27 @@ def test_the_command_gives_the_rows_of_a_log(dalembert: Dalembert, tmp_path: Pat
     assert bad.returncode == 1
     assert "no column mark" in bad.stderr
     assert dalembert("field", "s.csv", "--signal", "s.csv").returncode == 2
+
+
+def test_a_tacho_with_several_pulses(dalembert: Dalembert, tmp_path: Path) -> None:
+    t = np.arange(4000) / 4000
+    angle = 2 * np.pi * 10 * t + 0.3
+    rows = np.stack([t, np.sin(angle), np.sin(6 * angle), 4 * np.cos(angle + 1)], axis=1)
+    for name, header, columns in (
+        ("both.csv", "t_s,mark,tacho,A_um", [0, 1, 2, 3]),
+        ("tacho.csv", "t_s,tacho,A_um", [0, 2, 3]),
+    ):
+        lines = [",".join(f"{value:.12g}" for value in row) for row in rows[:, columns]]
+        (tmp_path / name).write_text("\n".join([header, *lines]) + "\n")
+    both = dalembert("field", "--signal", "both.csv", "--json")
+    (one,) = json.loads(both.stdout)["signal"]
+    assert one["amplitude"] == pytest.approx(4, rel=1e-4)
+    assert one["phase_deg"] == pytest.approx(np.degrees(1), abs=0.01)
+    alone = dalembert("field", "--signal", "tacho.csv", "--pulses", "6", "--json")
+    found = json.loads(alone.stdout)
+    # the first pulse after 0.3 rad is at a sixth of a turn
+    assert found["signal"][0]["phase_deg"] == pytest.approx(np.degrees(1) + 60, abs=0.01)
+    assert found["signal"][0]["speed_rad_s"] == pytest.approx(20 * np.pi, rel=1e-5)
+    assert any("the first of 6 pulses" in warning for warning in found["warnings"])
+    assert dalembert("field", "--signal", "both.csv", "--pulses", "6").returncode == 2
+    assert dalembert("field", "both.csv", "--pulses", "6").returncode == 2

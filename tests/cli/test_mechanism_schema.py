@@ -53,9 +53,9 @@ def test_shipped_examples_are_valid(path: Path) -> None:
 @pytest.mark.parametrize("text", SHOWN)
 def test_examples_of_the_page_are_valid_and_read(text: str, tmp_path: Path) -> None:
     VALID.validate(tomllib.loads(text))
-    table = re.search(r"```csv\n(.*?)```", PAGE, re.DOTALL)
-    assert table
-    (tmp_path / "push.csv").write_text(table[1])
+    push, motor = re.findall(r"```csv\n(.*?)```", PAGE, re.DOTALL)
+    (tmp_path / "push.csv").write_text(push)
+    (tmp_path / "motor.csv").write_text(motor)
     (tmp_path / "shown.toml").write_text(text)
     mechanism = Mechanism.from_toml(tmp_path / "shown.toml")
     assert mechanism.motion(list(mechanism.at)).assembled.all()

@@ -40,6 +40,7 @@ FAULTS = {
     12837: "two inputs: in steps of one length over to another branch",
     13522: "two inputs: a gear of fractional ratio where its base's angle wraps",
     15007: "two inputs: over to a branch 0.6° away",
+    109309: "a gear that turns a link 576 times as fast: 5 s",
     61272: "a turn too much counted at a guess beside a limit",
 }
 

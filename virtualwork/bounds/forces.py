@@ -78,7 +78,11 @@ class ForceErrors:
             at = np.array([row[0] for row in load.table])
             force = np.array([row[1] for row in load.table])
             steep = float(np.max(np.abs(np.diff(force) / np.diff(at)), initial=0.0))
-            q = np.abs(self.poses.inputs[:, 0])
+            q = np.abs(self.poses.inputs[:, 0]) if load.axis == "input" else np.abs(at).max()
+            if load.axis == "angle":
+                own = own + steep * r.rotation(load.body)
+            elif load.axis == "speed":
+                own = own + steep * r.angle(load.body, 1)
             read = 2 * EPS * float(np.abs(force).max()) + EPS * steep * (q + np.abs(at).max())
             turning = size * r.rotation(load.body) if load.link_axes else 0.0
             return np.asarray(own + read + turning)

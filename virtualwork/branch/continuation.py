@@ -102,7 +102,9 @@ class Continuation:
                 # the cubic's own defect: what the two rates say of the step, against what it was
                 defect = np.abs((found[0] - x - side * step * 0.5 * (rate + new)) / far).max()
                 change = np.abs((found[0] - x) / far).max()
-                if np.isfinite(new).all() and defect <= 0.05 * max(change, 1e-6) and change < 0.5:
+                # gears alone may turn a link many times in a step, but evenly
+                even = (np.abs(found[0] - guess) <= 1e-9 * far).all()
+                if np.isfinite(new).all() and defect <= 0.05 * max(change, 1e-6) and (change < 0.5 or even):
                     if np.sign(det) != np.sign(self.det[end]):
                         crossed.append((min(q, to), max(q, to)))
                     place = len(self.q) if side > 0 else 0

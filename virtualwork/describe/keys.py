@@ -81,7 +81,11 @@ FORCE: Keys = {
 
 TORQUE: Keys = {
     "link": Key("text", "the link it acts on", needed=True),
-    "torque": Key("torque", "counter-clockwise, N m", needed=True),
+    "torque": Key(
+        "torque or table",
+        "counter-clockwise, N m; or a table beside the file: torque_N_m over t_s, angle_deg or speed_rad_s of the link",
+        needed=True,
+    ),
 }
 
 SPRING: Keys = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from typing import Any
 
 from virtualwork.describe.entries import Entries, need, proper
@@ -11,6 +12,16 @@ from virtualwork.describe.errors import DescriptionError, hint
 from virtualwork.describe.keys import FORCE, FRICTION, MOTOR, SPRING, TORQUE, TORSION_SPRING
 from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.describe.units import LARGEST, wrong
+
+# the columns that a table of torque may be over
+AXES = {
+    "t_s": ("time", 1.0),
+    "time_s": ("time", 1.0),
+    "angle_rad": ("angle", 1.0),
+    "angle_deg": ("angle", math.pi / 180),
+    "speed_rad_s": ("speed", 1.0),
+    "speed_rpm": ("speed", math.pi / 30),
+}
 
 
 class LoadEntries(Entries):
@@ -73,13 +84,31 @@ class LoadEntries(Entries):
         return tuple(found), not slide and abs(turns - round(turns)) < 1e-9 and round(turns) > 0
 
     def torque(self, entry: dict[str, Any], i: int) -> Torque:
-        """A torque."""
+        """A torque, constant or by a table."""
         where = f"[[torques]] {i}"
         proper(entry, TORQUE, where)
-        return Torque(
-            self.body(entry["link"], f"{where} link", ground=False),
-            self.number(entry["torque"], "torque", f"{where} torque"),
-        )
+        link, value = self.body(entry["link"], f"{where} link", ground=False), entry["torque"]
+        if isinstance(value, str) and re.match(r"\s*[-+]?(\d|\.\d)", value) is None:
+            return Torque(link, 0.0, *self.torque_table(value, f"{where} torque"))
+        return Torque(link, self.number(value, "torque", f"{where} torque"))
+
+    def torque_table(self, name: str, where: str) -> tuple[tuple[tuple[float, float], ...], Any, bool]:
+        """A torque over the time, or over the angle or speed of its link: a CSV with torque_N_m."""
+        rows = self.csv(name, where)
+        column = next((c for c in AXES if rows and c in rows[0]), None)
+        if column is None or "torque_N_m" not in rows[0]:
+            raise wrong(where, name, f"columns torque_N_m and one of {', '.join(AXES)}")
+        axis, factor = AXES[column]
+        try:
+            found = [(float(r[column]) * factor, float(r["torque_N_m"])) for r in rows]
+        except (TypeError, ValueError):
+            raise wrong(where, name, "numbers in every row") from None
+        if not all(math.hypot(at, torque) <= LARGEST for at, torque in found):
+            raise wrong(where, name, "finite numbers in every row")
+        if len(found) < 2 or any(not b[0] > a[0] for a, b in itertools.pairwise(found)):
+            raise wrong(where, name, f"at least two rows with rising {column}")
+        turns = (found[-1][0] - found[0][0]) / (2 * math.pi)
+        return tuple(found), axis, axis == "angle" and abs(turns - round(turns)) < 1e-9 and round(turns) > 0
 
     def spring(self, entry: dict[str, Any], i: int) -> Spring:
         """A spring and damper."""

@@ -25,10 +25,17 @@ class Force:
 
 @dataclass(frozen=True)
 class Torque:
-    """A torque on a link, N·m, counter-clockwise."""
+    """A torque on a link, N·m, counter-clockwise.
+
+    `history` is a table (x, torque) in place of a constant, linear between its rows, `over` the time (s), the link's
+    angle (rad) or its speed (rad/s); over an angle with a span of whole turns it is `periodic`.
+    """
 
     link: str
-    torque: float
+    torque: float = 0.0
+    history: tuple[tuple[float, float], ...] | None = None
+    over: Literal["time", "angle", "speed"] = "time"
+    periodic: bool = False
 
 
 @dataclass(frozen=True)

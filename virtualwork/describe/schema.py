@@ -86,6 +86,7 @@ _FORMS: dict[str, Schema] = {
     "text": _TEXT,
     "texts": {"type": "object", "additionalProperties": _TEXT},
     "name": {"type": ["string", "number"]},
+    "torque or table": {"anyOf": [_A_QUANTITY, _TEXT]},
     "two texts": {"type": "array", "items": _TEXT, "minItems": 2, "maxItems": 2},
     "frame": {"enum": ["ground", "link"]},
     "point": {"anyOf": [_TEXT, _A_PAIR]},

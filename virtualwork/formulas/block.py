@@ -44,6 +44,10 @@ class Shared:
         """q̇ and q̈ of the one input over a block, None where zero."""
         raise NotImplementedError
 
+    def time(self, rows: slice, many: bool) -> Number:
+        """The time over a block; None where the poses have none."""
+        return None
+
     def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
         """A torsion spring's twist with its whole turns, from what lies within half a turn of free."""
         raise NotImplementedError
@@ -82,6 +86,11 @@ class Setting(Shared):
         speed, acceleration, _ = self.poses.rates
         return part(speed[0], rows, many), part(acceleration[0], rows, many)
 
+    def time(self, rows: slice, many: bool) -> Number:
+        """The time over a block; None where the poses have none."""
+        time = self.poses.time
+        return None if time is None else time[rows] if many else float(time[0])
+
     def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
         """A torsion spring's twist with its whole turns, from what lies within half a turn of free."""
         found = whole(self._counted(spring), st.inputs[0], within)
@@ -119,10 +128,13 @@ class Formed(Protocol):
 
 
 class Table(Protocol):
-    """A force given over the input."""
+    """A load given by a table."""
+
+    def place_in(self, block: Block) -> Number:
+        """What the table is over, at the poses of a block."""
 
     def over(self, q: Number, many: bool) -> Number:
-        """The force at inputs."""
+        """What the table gives there."""
 
 
 class Block:
@@ -152,8 +164,13 @@ class Block:
         return torque[self.rows] if self.st.many else float(torque[0])
 
     def table(self, load: Table) -> Number:
-        """The force of a load that is given over the input."""
-        return load.over(self.st.inputs[0], self.st.many)
+        """What a table gives."""
+        return load.over(load.place_in(self), self.st.many)
+
+    @property
+    def time(self) -> Number:
+        """The time; None where the poses have none."""
+        return self.setting.time(self.rows, self.st.many)
 
     def forget(self, *, lasting: bool = False) -> None:
         """Drop the arrays, or all but those that others will ask for."""

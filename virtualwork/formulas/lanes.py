@@ -225,10 +225,24 @@ class Lanes:
         return self.poses.over(lambda _, st: setting.twist(st, spring))  # type: ignore[no-any-return]
 
     def _table(self, number: int) -> Any:
-        """The force of a table over the inputs."""
+        """What a table gives."""
         case: LoadCase = self.recording.forces[0].case
         table = [load for load in case.loads if isinstance(load, Tabled)][number]
-        return table.over(self.poses.inputs[:, 0], True)
+        return table.over(self._place(table), True)
+
+    def _place(self, table: Tabled) -> Reals:
+        """What a table is over."""
+        poses = self.poses
+        if table.axis == "input":
+            return poses.inputs[:, 0]
+        if table.axis == "time":
+            return np.asarray(table.timed(poses.time))
+        if table.axis == "speed":
+            return poses.angle_derivative(table.body, 1)
+        known = self.branch.plan.angles[table.body]
+        if known.bases:
+            return np.asarray(table.in_turn(poses.angle(table.body)))
+        return np.asarray(known.const + sum(c * poses.inputs[:, j] for j, c in known.inputs))
 
 
 def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:

@@ -10,7 +10,7 @@ from functools import cached_property
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import DescriptionError
-from virtualwork.describe.loads import Force, Spring, TorsionSpring
+from virtualwork.describe.loads import Force, Spring, Torque, TorsionSpring
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.loads import (
     Constant,
@@ -61,7 +61,7 @@ class LoadCase:
             if r.inertia and self.moves:
                 found.append(InertiaTorque("inertia torque", body, None, r.center, r.inertia))
         found += [self._force(force) for force in m.forces if force.history or force.force]
-        found += [Constant("applied torque", t.link, None, 0j, t.torque) for t in m.torques if t.torque]
+        found += [self._torque(torque) for torque in m.torques if torque.history or torque.torque]
         for spring in m.springs:
             if spring.stiffness or (spring.damping and self.moves):
                 found += self._spring(spring)
@@ -76,6 +76,13 @@ class LoadCase:
         if force.history:
             return Tabled(*at, force.history, force.periodic, force.frame == "link")
         return (Follower if force.frame == "link" else Constant)(*at, force.force)
+
+    @staticmethod
+    def _torque(torque: Torque) -> Load:
+        at = "applied torque", torque.link, None, 0j
+        if torque.history:
+            return Tabled(*at, torque.history, torque.periodic, axis=torque.over)
+        return Constant(*at, torque.torque)
 
     def _spring(self, spring: Spring) -> list[Load]:
         between = [(body, self.mechanism.place(body, point)) for body, point in spring.between]

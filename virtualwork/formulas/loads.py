@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.loads import Spring, TorsionSpring
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
@@ -97,6 +98,10 @@ class Load:
         """The part of `power` that its potential holds; None where it stores nothing."""
         return None
 
+    def wasted(self, block: Block, j: int) -> Number:
+        """The part of `power` that no potential and no speed holds: of dampers, applied loads, drives."""
+        return None if self.stores or self.kind in OWN else self.power(block, j)
+
     def potential(self, block: Block) -> Number:
         """Its potential, J; NaN where it has none, None on the side that does not carry."""
         return np.nan
@@ -165,11 +170,15 @@ class Follower(Load):
 
 @dataclass(frozen=True, eq=False)
 class Tabled(Load):
-    """A force given over the input by a table, linear between its rows; periodic where the table is one."""
+    """A force or a torque given by a table, linear between its rows; periodic where the table is one.
+
+    Its `axis` is the one input, the time, or the angle or speed of the link it acts on.
+    """
 
     table: tuple[tuple[float, complex], ...] = ()
     periodic: bool = False
     link_axes: bool = False
+    axis: str = "input"
 
     def _in_cycle(self, q: Number) -> tuple[Reals, Complexes, Reals]:
         at = np.array([row[0] for row in self.table])
@@ -180,8 +189,40 @@ class Tabled(Load):
             q = at[0] + np.mod(q - at[0], at[-1] - at[0])
         return at, force, q
 
+    def place_in(self, block: Block) -> Number:
+        """What the table is over, at the poses of a block.
+
+        Raises
+        ------
+        DescriptionError
+            Where it is over the time, and the poses have none.
+        """
+        if self.axis == "input":
+            return block.st.inputs[0]
+        if self.axis == "time":
+            return self.timed(block.time)
+        if self.axis == "speed":
+            return 0.0 if block.omega(self.body) is None else block.omega(self.body)
+        known = block.setting.plan.angles[self.body]
+        if not known.bases:
+            return block.st.affine(known)
+        return self.in_turn(block.st.kind.angle(block.st.turn[self.body]))
+
+    def timed(self, time: Number) -> Number:
+        """The time; refused where the poses have none."""
+        if time is None:
+            raise DescriptionError(
+                f"the torque on {self.body} is given over the time: only a motion in time has it"
+            )
+        return time
+
+    def in_turn(self, angle: Number) -> Number:
+        """An angle whose whole turns are not known: in the turn that begins with the table."""
+        first = self.table[0][0]
+        return first + (angle - first) % (2 * np.pi)
+
     def over(self, q: Number, many: bool) -> Number:
-        """The force at inputs, in the axes that it is given in; NaN outside the table."""
+        """The force at places of the table, in the axes that it is given in; NaN outside."""
         at, force, q = self._in_cycle(q)
         outside = (q < at[0]) | (q > at[-1])
         values = np.where(outside, np.nan, np.interp(q, at, force.real) + 1j * np.interp(q, at, force.imag))
@@ -189,14 +230,27 @@ class Tabled(Load):
 
     def form(self, block: Block) -> Number:
         found = block.table(self)
+        if self.path is None:
+            return found.real
         return found * block.st.turn[self.body] if self.link_axes else found
+
+    def second(self, block: Block, rates: Rates) -> Number:
+        total = super().second(block, rates)
+        first = _angle(rates, self.body, 1)
+        if self.path is not None or self.axis != "angle" or first is None:
+            return total
+        return plus(total, self._steep(block).real * first * first)
+
+    def _steep(self, block: Block) -> Number:
+        """The slope of the table."""
+        at, force, q = self._in_cycle(self.place_in(block))
+        place = np.clip(np.searchsorted(at, q, side="right") - 1, 0, len(at) - 2)
+        slopes: NDArray[Any] = np.diff(force)[place] / np.diff(at)[place]
+        return slopes if block.st.many else complex(slopes)
 
     def turned(self, block: Block, rates: Rates) -> Number:
         """Its derivative over the input, in ground axes."""
-        at, force, q = self._in_cycle(block.st.inputs[0])
-        place = np.clip(np.searchsorted(at, q, side="right") - 1, 0, len(at) - 2)
-        slopes: NDArray[Any] = np.diff(force)[place] / np.diff(at)[place]
-        steep: Number = slopes if block.st.many else complex(slopes)
+        steep = self._steep(block)
         if not self.link_axes:
             return steep
         turning = block.by[0].angle[self.body][0]
@@ -269,12 +323,15 @@ class SpringEnd(Load):
     def form(self, block: Block) -> Number:
         s, d = self.spring, self._between(block.position)
         pull = self._elastic(block, d) if s.stiffness else None
-        if s.damping:
-            rate = self._between(block.velocity)
-            if rate is not None:
-                inverse = self._inverse(block, d)
-                pull = plus(pull, (s.damping * dot(d, rate) * (inverse * inverse)) * d)
-        return pull
+        return plus(pull, self._damped(block, d))
+
+    def _damped(self, block: Block, d: Number) -> Number:
+        """The damper's part."""
+        rate = self._between(block.velocity) if self.spring.damping else None
+        if rate is None:
+            return None
+        inverse = self._inverse(block, d)
+        return (self.spring.damping * dot(d, rate) * (inverse * inverse)) * d
 
     def displacement(self, block: Block, j: int) -> Number:
         if not self.carries:
@@ -286,6 +343,11 @@ class SpringEnd(Load):
         if not self.carries or not self.spring.stiffness:
             return None
         return self.work(self._elastic(block, self._between(block.position)), self.displacement(block, 0))
+
+    def wasted(self, block: Block, j: int) -> Number:
+        if not self.carries:
+            return None
+        return self.work(self._damped(block, self._between(block.position)), self.displacement(block, j))
 
     def potential(self, block: Block) -> Number:
         if not self.carries:
@@ -328,9 +390,11 @@ class TorsionEnd(Load):
     def form(self, block: Block) -> Number:
         s = self.spring
         turn = s.stiffness * block.setting.twist(block.st, s) if s.stiffness else None
-        if s.damping:
-            turn = plus(turn, times(self._between(block.omega), s.damping))
-        return times(turn, self.sign)
+        return times(plus(turn, self._damped(block)), self.sign)
+
+    def _damped(self, block: Block) -> Number:
+        """The damper's part."""
+        return times(self._between(block.omega), self.spring.damping) if self.spring.damping else None
 
     def displacement(self, block: Block, j: int) -> Number:
         if not self.carries:
@@ -342,6 +406,11 @@ class TorsionEnd(Load):
             return None
         turn = self.spring.stiffness * block.setting.twist(block.st, self.spring) * self.sign
         return self.work(turn, self.displacement(block, 0))
+
+    def wasted(self, block: Block, j: int) -> Number:
+        if not self.carries:
+            return None
+        return self.work(times(self._damped(block), self.sign), self.displacement(block, j))
 
     def potential(self, block: Block) -> Number:
         if not self.carries:

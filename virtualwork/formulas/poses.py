@@ -113,6 +113,8 @@ class Poses:
             for name, value in (("speed", speed), ("acceleration", acceleration), ("jerk", jerk))
         ]
         self.input_error: ArrayLike = 0.0
+        # (n,) s, where the poses are those of a motion in time
+        self.time: Reals | None = None
         self.solved: list[tuple[Step, int]] = []
         self._done: set[tuple[int, int, int]] = set()
         self._blocks: list[State] | None = None

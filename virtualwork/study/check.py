@@ -135,6 +135,9 @@ class Check:
     def dead_points(self) -> tuple[float, ...]:
         """Inputs at which the linkage locks, every end of a range of the input, rad, or m.
 
+        Of a slide, of the ranges that are met within one size of the mechanism from the guess, or farther where its
+        own range is longer.
+
         Angles in [0, period of the branch): where change points make a branch need two turns of the input, the
         same angle a turn later is another pose (`virtualwork.branch.track.Track.turns`).
         """

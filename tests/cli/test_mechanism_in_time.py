@@ -1,0 +1,124 @@
+"""`dalembert mechanism --time`: what it shows, in every form, and what it refuses."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+
+PENDULUM = """
+name = "Pendulum"
+gravity = [0, -9.81]
+[units]
+angle = "deg"
+[ground]
+O = [0, 0]
+[links.bob]
+points = { O = [0, 0], P = [1, 0] }
+mass = 1
+center = [1, 0]
+[input]
+link = "bob"
+angle = 0
+speed = 0
+"""
+
+
+@pytest.fixture
+def pendulum(tmp_path: Path) -> Path:
+    path = tmp_path / "pendulum.toml"
+    path.write_text(PENDULUM)
+    return path
+
+
+def test_json_has_what_is_promised(dalembert: Dalembert, pendulum: Path) -> None:
+    done = dalembert("mechanism", str(pendulum), "--time", "0:1:0.5", "--only", "P,bob", "--forces", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert [row["t_s"] for row in found["time"]] == [0, 0.5, 1]
+    last = found["time"][-1]
+    # of IFToMM benchmark A01: (−0.98629175, −0.16501085) m
+    assert last["inputs"]["bob"]["angle_deg"] == pytest.approx(math.degrees(-2.975823638319696), abs=1e-6)
+    assert set(last["inputs"]["bob"]) == {
+        "angle_deg",
+        "speed_rad_s",
+        "acceleration_rad_s2",
+        "error_estimate_deg",
+    }
+    assert last["energy_J"] == pytest.approx(0, abs=1e-9)
+    assert last["points"]["P"]["x_m"] == pytest.approx(math.cos(-2.975823638319696), abs=1e-8)
+    assert last["links"]["bob"]["angle_deg"] == last["inputs"]["bob"]["angle_deg"]
+    (reaction,) = last["reactions"]
+    # a point on a bar: its tension alone, 3 m g sin θ downwards from the horizontal start
+    assert math.hypot(reaction["fx_N"], reaction["fy_N"]) == pytest.approx(
+        3 * 9.81 * math.sin(2.975823638319696), rel=1e-7
+    )
+    assert abs(found["energy_drift_J"]) < 1e-8
+    assert found["warnings"] == []
+
+
+def test_csv_and_the_event(dalembert: Dalembert, pendulum: Path) -> None:
+    done = dalembert("mechanism", str(pendulum), "--time", "0:10:0.25", "--until", "bob=-90")
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    assert list(rows[0]) == [
+        "t_s", "input_deg", "input_speed_rad_s", "input_acceleration_rad_s2", "input_error_estimate_deg", "energy_J"
+    ]  # fmt: skip
+    assert float(rows[-1]["input_deg"]) == pytest.approx(-90, abs=1e-12)
+    assert float(rows[-1]["t_s"]) == pytest.approx(1.8540746773013719 / math.sqrt(9.81), abs=1e-9)
+    assert len(rows) == 4
+
+
+def test_digits_are_those_of_the_estimate(dalembert: Dalembert, pendulum: Path) -> None:
+    done = dalembert("mechanism", str(pendulum), "--time", "0:1:1", "--accuracy", "1e-4", "--digits")
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    assert len(rows[-1]["input_deg"].lstrip("-")) < 12
+    assert float(rows[-1]["input_deg"]) == pytest.approx(math.degrees(-2.975823638319696), abs=1e-2)
+
+
+def test_a_picture(dalembert: Dalembert, pendulum: Path, tmp_path: Path) -> None:
+    done = dalembert(
+        "mechanism", str(pendulum), "--time", "0:1:0.1", "--plot", str(tmp_path / "p.svg"), "--text"
+    )
+    assert done.returncode == 0, done.stderr
+    assert "explicit Runge-Kutta method of order 8" in done.stdout
+    assert "mechanism at" in (tmp_path / "p.svg").read_text() or (tmp_path / "p.svg").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "said"),
+    [
+        (("--time", "0:1"), 2, "START:STOP:STEP"),
+        (("--time", "1:0:-0.1"), 2, "rising"),
+        (("--time", "0:1:0.1", "--accuracy", "fine"), 2, "--accuracy"),
+        (("--time", "0:1:0.1", "--until", "bab=3"), 2, "no input drives 'bab'"),
+        (("--time", "0:1:0.1", "--sweep", "0:360:10"), 2, "expected without --sweep"),
+        (("--time", "0:1:0.1", "--check"), 2, "expected without --check"),
+        (("--until", "bob=3"), 2, "expected --time too"),
+        (("--time", "0:1:0.1", "--only", "Q"), 1, "no link or point is named 'Q'"),
+        (("--time", "0:1:0.1", "--set", "links.bob.mass=0"), 1, "no mass moves with input 'bob'"),
+    ],
+)
+def test_what_is_refused(
+    dalembert: Dalembert, pendulum: Path, words: tuple[str, ...], status: int, said: str
+) -> None:
+    done = dalembert("mechanism", str(pendulum), *words)
+    assert done.returncode == status
+    assert said in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
+
+
+def test_a_torque_over_time_is_refused_in_a_pose(dalembert: Dalembert, pendulum: Path) -> None:
+    pendulum.write_text(PENDULUM + '[[torques]]\nlink = "bob"\ntorque = "t.csv"\n')
+    pendulum.with_name("t.csv").write_text("t_s,torque_N_m\n0,1\n2,1\n")
+    done = dalembert("mechanism", str(pendulum), "--at", "30deg", "--forces")
+    assert done.returncode == 1
+    assert "only a motion in time has it" in done.stderr
+    assert dalembert("mechanism", str(pendulum), "--time", "0:1:1").returncode == 0

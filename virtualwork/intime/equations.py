@@ -1,0 +1,394 @@
+"""The equations of motion of an assembly in its inputs, M(q)·q̈ + h(q, q̇, t) = 0, on a tape.
+
+The effort at the inputs by virtual work is linear in their accelerations: with no effort given, it is M·q̈ + h. M is
+its derivative to the accelerations (one sweep backwards over the tape), h its value without them. Loops are closed at
+every evaluation, so that nothing drifts.
+
+What a tape cannot decide enters it as a number: the sign of a closed form at the pose, the whole turns of a spring,
+what a table says. Near change points what is smooth is interpolated (`crossing`). With groups that have no closed form
+the poses' own formulas give M and h from k + 1 motions at once.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from dalembert.arithmetic.adjoint import derivatives
+from dalembert.arithmetic.engines import floats, run
+from dalembert.arithmetic.recorded import RECORDED, Number, rotation
+from dalembert.arithmetic.systems import solved
+from dalembert.arithmetic.tape import Tape
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe.errors import MechanismError
+from virtualwork.formulas.block import Block, Setting
+from virtualwork.formulas.effort import effort
+from virtualwork.formulas.load_case import LoadCase
+from virtualwork.formulas.loads import Load, Tabled
+from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.positions import State
+from virtualwork.formulas.recording import Recording
+from virtualwork.formulas.scene import Scene
+from virtualwork.intime.crossing import Crossing, crossings, nearest
+from virtualwork.intime.tables import Value, ends, kinks, place, reader
+from virtualwork.intime.watch import Floats, Watch
+
+# of a turn: how far beyond an input its change points are looked for
+AHEAD = 1.0
+# how near a change point a fold is its own
+NEAR = 0.1
+TURN = 2 * math.pi
+
+
+class Lost(ArithmeticError):
+    """No acceleration at a state: it cannot be assembled, or lies outside a table."""
+
+
+class Equations:
+    """The motion of one assembly under its loads.
+
+    Attributes
+    ----------
+    k : int
+        Degrees of freedom.
+    scale : list of float
+        What an error of each input is relative to: 1 rad, or the mechanism's size.
+    """
+
+    def __init__(self, assembly: Assembly) -> None:
+        self.assembly, self.mechanism = assembly, assembly.mechanism
+        self.k = len(self.mechanism.inputs)
+        self.scale = [self.mechanism.size if e.is_slide else 1.0 for e in self.mechanism.inputs]
+        self.warnings: list[str] = []
+        self._covered = (math.inf, -math.inf)
+        self._flips: dict[str, list[float]] = {}
+        self._crossings: list[Crossing] = []
+        self._cover(self.mechanism.at[0])
+
+    def __call__(self, t: float, q: Floats, v: Floats) -> Floats:
+        """The accelerations at a state, and the power of what stores nothing.
+
+        Raises
+        ------
+        Lost
+            Where there are none.
+        """
+        if not self._covered[0] <= q[0] <= self._covered[1]:
+            self._cover(q[0])
+        crossing = self._crossing(q[0])
+        if crossing is not None:
+            found = crossing.interpolated(lambda x: self._plain(t, [x], v), q[0])
+        else:
+            found = self._plain(t, q, v)
+        for value in found:
+            # NaN and infinity
+            if value - value != 0.0:
+                raise Lost
+        return found
+
+    def _plain(self, t: float, q: Floats, v: Floats) -> Floats:
+        """The same away from change points."""
+        if self._untaped:
+            mass, rest, power, _ = self.by_poses(np.array([t]), np.array([q]), np.array([v]))
+            if not np.isfinite(mass).all():
+                raise Lost
+            return [*np.linalg.solve(mass[0], -rest[0]).tolist(), float(power[0])]
+        try:
+            return list(self._function(*self._filled(t, q, v)))
+        except (ZeroDivisionError, ValueError, OverflowError):
+            raise Lost from None
+
+    def refuse(self, t: float, q: Floats, v: Floats) -> None:
+        """Refuse a start from which nothing can be followed.
+
+        Raises
+        ------
+        MechanismError
+            Not assembled there, or an input on which no mass moves; which, and what is missing.
+        """
+        names = [e.name for e in self.mechanism.inputs]
+        mass, rest, *_ = self.by_poses(np.array([t]), np.array([q]), np.array([v]))
+        if not (np.isfinite(mass).all() and np.isfinite(rest).all()):
+            raise MechanismError("it cannot be assembled at the start, or stands at a limit of its input")
+        # how much of each input's own inertia is left when the others are free to follow
+        whole = np.linalg.eigvalsh(mass[0] * np.outer(self.scale, self.scale))
+        if not mass[0].any() or whole[0] <= 1e-14 * whole[-1]:
+            least = names[int(np.argmin(np.diag(mass[0]) * np.square(self.scale)))]
+            raise MechanismError(
+                f"no mass moves with input '{least}': its acceleration is not determined; "
+                "expected a mass or an inertia on a link that it moves"
+            )
+
+    def many(self, t: Reals, q: Reals, v: Reals) -> Reals:
+        """The same of many states, (n, k + 1); NaN where there are none."""
+        out = np.full((len(q), self.k + 1), np.nan)
+        if not len(q):
+            return out
+        for end in (float(q[:, 0].min()), float(q[:, 0].max())):
+            self._cover(end)
+        careful = self._careful(q)
+        rows = np.flatnonzero(~careful)
+        if len(rows):
+            found = self._run(self._tape, t, q, v, rows)
+            for j, name in enumerate(self._tape.names):
+                out[rows, j] = found[name]
+        for i in np.flatnonzero(careful):
+            try:
+                out[i] = self(float(t[i]), q[i].tolist(), v[i].tolist())
+            except Lost:
+                continue
+        return out
+
+    def by_poses(self, t: Reals, q: Reals, v: Reals) -> tuple[Reals, Reals, Reals, Reals]:
+        """M (n, k, k), h (n, k), the power of what stores nothing and the potential (n,), by the poses' own formulas.
+
+        The effort of k + 1 motions through each pose gives M and h.
+        """
+        n, k = q.shape
+        speeds = np.repeat(v, k + 1, axis=0)
+        unit = np.tile(np.vstack([np.zeros(k), np.eye(k)]), (n, 1))
+        with np.errstate(all="ignore"):
+            poses = Poses(self.assembly, np.repeat(q, k + 1, axis=0), speeds, unit)
+            poses.time = np.repeat(t, k + 1)
+            scene = Scene(poses)
+            found = effort(scene).reshape(n, k + 1, k)
+            power, stored = np.zeros(n * (k + 1)), np.zeros(n * (k + 1))
+            for block in scene.blocks():
+                power[block.rows] = wasted(scene.loads, block, list(speeds[block.rows].T))
+                stored[block.rows] = potential(scene.loads, block)
+        mass = np.swapaxes(found[:, 1:] - found[:, :1], 1, 2)
+        return mass, found[:, 0], power[:: k + 1], stored[:: k + 1]
+
+    def watches(self) -> list[Watch]:
+        """What a step must not pass: the kinks of tables over what hangs on the inputs alone."""
+        plan = self.assembly.plan
+        found = (kinks(load, plan, f"table {number}") for number, load in enumerate(self._tables))
+        return [watch for watch in found if watch is not None]
+
+    @cached_property
+    def stops(self) -> list[float]:
+        """Times that no step passes: the rows of tables."""
+        return sorted({x for load in self._tables if load.axis == "time" for x, _ in load.table})
+
+    def outside(self, t: float, q: Floats, v: Floats) -> str:
+        """Which table ends at a state; empty where none does."""
+        every = (ends(load, self.assembly.plan, t, q, v) for load in self._tables)
+        return next((said for said in every if said), "")
+
+    # --- the tape ---------------------------------------------------------------------------------------------
+    @cached_property
+    def _recorded(self) -> tuple[Tape, Tape]:
+        """The tapes of accelerations and power, and of the energies."""
+        recording = self.recording(True, True, False)
+        k, names = self.k, [f"effort {j}" for j in range(self.k)]
+        motion = recording.tape([("effort", j) for j in range(k)])
+        free = derivatives(motion, [f"a{j}" for j in range(k)])
+        _, _, block = recording.forces
+        again = recording.recorder
+        inputs = {name: again.input(name) for name in motion.inputs}
+        still = motion.on(inputs | {f"a{j}": 0.0 for j in range(k)}, RECORDED)
+        slopes = free.on(inputs, RECORDED)
+        mass = [[slopes[f"d({name})/d(a{j})"] for j in range(k)] for name in names]
+        right = [-still[name] for name in names]
+        found = [right[0] / mass[0][0]] if k == 1 else solved(mass, right)
+        loads = recording.forces[0].case.loads
+        speeds = [again.input(f"v{j}") for j in range(k)]
+        kinetic: Number = 0.0
+        for i in range(k):
+            for j in range(k):
+                kinetic = kinetic + 0.5 * (speeds[i] * mass[i][j] * speeds[j])
+        outputs = {f"a{j}": value for j, value in enumerate(found)}
+        return (
+            again.tape(outputs | {"power": wasted(loads, block, speeds)}),
+            again.tape({"energy": kinetic + potential(loads, block)}),
+        )
+
+    @cached_property
+    def _tables(self) -> list[Tabled]:
+        """The loads that tables give, in the order of the tape."""
+        case = LoadCase(self.mechanism, self.assembly.plan, moves=True)
+        return [load for load in case.loads if isinstance(load, Tabled)]
+
+    def recording(self, *moves: bool) -> Recording:
+        """The formulas of the assembly, with what the equations can fill in: speeds and accelerations as `moves`."""
+        a = self.assembly
+        turning = {name for name, flips in a.track.flips.items() if len(flips)}
+        return Recording(self.mechanism, a.plan, a.signs, moves, turning_over=turning, geared=a.geared)
+
+    def function(self, tape: Tape) -> Callable[[float, Floats, Floats], tuple[float, ...]]:
+        """A tape of such a recording as a function of a state."""
+        function, fillers = floats.compiled(tape), [self._filler(name) for name in tape.inputs]
+        return lambda t, q, v: function(*(of(t, q, v) for of in fillers))
+
+    @property
+    def _tape(self) -> Tape:
+        return self._recorded[0]
+
+    @cached_property
+    def _function(self) -> Callable[..., tuple[float, ...]]:
+        return floats.compiled(self._tape)
+
+    def energies(self, t: Reals, q: Reals, v: Reals) -> Reals:
+        """Kinetic energy and that of gravity and springs together, (n,) J."""
+        careful = self._careful(q)
+        out = np.empty(len(q))
+        rows = np.flatnonzero(~careful)
+        if len(rows):
+            out[rows] = self._run(self._recorded[1], t, q, v, rows)["energy"]
+        for i in np.flatnonzero(careful):
+            crossing = self._crossing(float(q[i, 0]))
+            places = q[i : i + 1] if crossing is None else np.array(crossing.nodes)[:, None]
+            found = self._energies(np.full(len(places), t[i]), places, np.tile(v[i], (len(places), 1)))
+            if crossing is not None:
+                of = dict(zip(crossing.nodes, found.tolist(), strict=True))
+                (out[i],) = crossing.interpolated(lambda x, of=of: [of[x]], float(q[i, 0]))  # type: ignore[misc]
+            else:
+                (out[i],) = found
+        return out
+
+    def _energies(self, t: Reals, q: Reals, v: Reals) -> Reals:
+        if not self._untaped:
+            return np.asarray(self._run(self._recorded[1], t, q, v, np.arange(len(q)))["energy"])
+        mass, _, _, stored = self.by_poses(t, q, v)
+        return np.asarray(stored + 0.5 * np.einsum("ni,nij,nj->n", v, mass, v))
+
+    def _run(self, tape: Tape, t: Reals, q: Reals, v: Reals, rows: Any) -> Mapping[str, Any]:
+        states = zip(t[rows].tolist(), q[rows].tolist(), v[rows].tolist(), strict=True)
+        given = np.array([self._filled(*state, tape=tape) for state in states])
+        with np.errstate(all="ignore"):
+            return run(tape, dict(zip(tape.inputs, given.T.copy(), strict=True)))
+
+    @cached_property
+    def _fillers(self) -> dict[str, Value]:
+        """What gives each input of the tapes at a state."""
+        return {name: self._filler(name) for tape in self._recorded for name in tape.inputs}
+
+    def _filled(self, t: float, q: Floats, v: Floats, tape: Tape | None = None) -> Floats:
+        return [self._fillers[name](t, q, v) for name in (tape or self._tape).inputs]
+
+    def _filler(self, name: str) -> Value:
+        """How an input of the tape hangs on the state."""
+        kind, _, of = name.partition(" ")
+        if kind == "sign":
+            return self._sign(of)
+        if kind == "turns":
+            return self._turns(int(of.removeprefix("spring ")))
+        if kind == "table":
+            number, axis = of.split()
+            load = self._tables[int(number)]
+            known = place(load, self.assembly.plan)
+            at = self._followed(load) if known is None else known[0]
+            return reader(load, at, imaginary=axis == "y")
+        j = int(name[1:])
+        if name[0] == "q":
+            return lambda t, q, v: q[j]
+        return lambda t, q, v: v[j]
+
+    def _followed(self, load: Tabled) -> Value:
+        """The angle or speed of a link that hangs on more than the inputs, by a tape of its own."""
+        order = 1 if load.axis == "speed" else 0
+        function = self.function(self.recording(True, False, False).tape([("angle", load.body, order)]))
+        first = load.table[0][0]
+
+        def at(t: float, q: Floats, v: Floats) -> float:
+            (x,) = function(t, q, v)
+            return x if order else first + (x - first) % TURN
+
+        return at
+
+    def _turns(self, number: int) -> Value:
+        """The whole turns of a torsion spring, followed from the guess."""
+        spring = self.mechanism.torsion_springs[number]
+        a = self.assembly
+        function = self.function(
+            self.recording(False, False, False).tape([("turn", body) for body in spring.links])
+        )
+        known: list[Setting] = []
+
+        def turns(t: float, q: Floats, v: Floats) -> float:
+            ends = known[-1].poses.inputs[:, 0] if known else (0.0, 0.0)
+            if not ends[0] < q[0] < ends[-1]:
+                span = self.assembly.track.length
+                known.append(
+                    Setting(Poses(a, [min(q[0], ends[0]) - span, max(q[0], ends[-1]) + span]), False)
+                )
+            x, y, *other = function(t, q, v)
+            first, second = complex(x, y), complex(*other)
+            within = cmath.phase(second * first.conjugate() * rotation(-spring.free_angle))
+            return float(round((known[-1].wound(spring, State(list(q)), within) - within) / TURN))
+
+        return turns
+
+    def _sign(self, group: str) -> Value:
+        base, start = self.assembly.signs[group], self.assembly.track.start
+        flips = self._flips
+
+        def sign(t: float, q: Floats, v: Floats) -> float:
+            at = flips[group]
+            return base * (1.0 - 2.0 * ((bisect_right(at, q[0]) - bisect_right(at, start)) & 1))
+
+        return sign
+
+    # --- along the one input ------------------------------------------------------------------------------------
+    def _cover(self, q: float) -> None:
+        """Look for change points around an input, and note them."""
+        track = self.assembly.track
+        low, high = self._covered
+        if track.active and math.isfinite(q) and not low <= q <= high:
+            ahead = AHEAD * track.length
+            try:
+                track.cover(q - ahead, q + ahead)
+            except MechanismError:
+                # too far away: a stage of a step that is too long
+                raise Lost from None
+            low, high = min(low, q - ahead), max(high, q + ahead)
+            self._flips.update({name: at.tolist() for name, at in track.flips.items()})
+            self._crossings = crossings(track.crossings, self.scale[0])
+        self._covered = (low, high) if track.active and not track.settled else (-math.inf, math.inf)
+
+    def _crossing(self, q: float) -> Crossing | None:
+        """The change point that an input is close to."""
+        found = nearest(self._crossings, q) if self._crossings else None
+        return found if found is not None and abs(q - found.at) < found.inner else None
+
+    def _careful(self, q: Reals) -> Any:
+        """Which states no tape can do by itself, (n,)."""
+        if self._untaped:
+            return np.ones(len(q), dtype=bool)
+        return np.array([self._crossing(x) is not None for x in q[:, 0].tolist()], dtype=bool)
+
+    def passes(self, q: float) -> bool:
+        """Whether a change point is near: there every loop folds, in all coordinates, and goes on."""
+        found = nearest(self._crossings, q)
+        return found is not None and abs(q - found.at) < NEAR * self.assembly.track.length
+
+    @cached_property
+    def _untaped(self) -> bool:
+        a = self.assembly
+        return bool(a.geared) or any(g.kind == "Newton" for g in a.plan.groups)
+
+
+def wasted(loads: Iterable[Load], block: Block, speeds: list[Number]) -> Number:
+    """The power of what stores nothing: of applied forces and torques, dampers, drives."""
+    total: Number = 0.0
+    for load in loads:
+        for j, speed in enumerate(speeds):
+            work = load.wasted(block, j)
+            total = total if work is None else total + work * speed
+    return total
+
+
+def potential(loads: Iterable[Load], block: Block) -> Number:
+    """What gravity and springs hold, J."""
+    total: Number = 0.0
+    for load in loads:
+        if load.stores and load.carries:
+            total = total + load.potential(block)
+    return total

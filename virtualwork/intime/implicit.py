@@ -1,0 +1,161 @@
+"""Radau's implicit method of order 9, for q̈ = a(t, q, q̇) with stiff springs and dampers.
+
+The accelerations are a polynomial of degree 4 over a step, equal to a(t, q, q̇) at five nodes, the last of which is the
+step's end (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., Springer 1996, §IV.5): q̇ and q are
+its integrals, with the matrices A and A². The method is stable however stiff a damper is. The nodes' accelerations
+are found by Newton's method with one Jacobian for a step.
+
+How large the error is, the polynomial's own Legendre coefficients tell: they fall off evenly where the step resolves
+the motion, and the end of a step is as much better than its inside as the fourth is smaller than the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.intime.equations import Equations, Lost
+from virtualwork.intime.step import Step
+from virtualwork.intime.watch import Floats
+
+STAGES = 5
+# iterations of Newton's method; a change of the speeds, relative, at which it has converged
+LIMIT, CLOSE = 40, 4 * EPS
+Many = Callable[[Reals, Reals, Reals], Reals]
+
+
+class Nodes(NamedTuple):
+    """The nodes c, the integrals A of their Lagrange polynomials, and the Legendre coefficients of values at them."""
+
+    c: Reals
+    a: Reals
+    legendre: Reals
+
+
+@cache
+def nodes() -> Nodes:
+    """Of Radau's method of the right, worked out from Legendre's polynomials on [0, 1].
+
+    Examples
+    --------
+    >>> c, a, _ = nodes()
+    >>> bool(abs(c[-1] - 1) < 1e-15), bool(np.abs(a[-1] @ c**8 - 1 / 9) < 1e-15)
+    (True, True)
+    """
+    legendre = np.polynomial.legendre
+    # the roots of P_s − P_{s−1}: the right end is one of them
+    c = 0.5 * (1 + np.sort(legendre.legroots([0.0] * (STAGES - 1) + [-1.0, 1.0])))
+    c[-1] = 1.0
+    x, w = legendre.leggauss(STAGES)
+    x, w = 0.5 * (1 + x), 0.5 * w
+
+    def lagrange(j: int, at: Reals) -> Reals:
+        others = [i for i in range(STAGES) if i != j]
+        return np.asarray(np.prod([(at - c[i]) / (c[j] - c[i]) for i in others], axis=0))
+
+    a = np.array([[end * (w @ lagrange(j, end * x)) for j in range(STAGES)] for end in c])
+    return Nodes(c, a, np.asarray(np.linalg.inv(legendre.legvander(2 * c - 1, STAGES - 1)), dtype=float))
+
+
+class Radau:
+    """The method: its steps, and how large the error of one is."""
+
+    name = "implicit Runge-Kutta method of order 9 (Radau), for stiff springs and dampers"
+    order = 9
+    stable = np.inf
+
+    def step(self, f: Equations, t: float, q: Floats, v: Floats, rates: Floats, h: float) -> Step:
+        """One step of length h from a state whose rates are known."""
+
+        def one_by_one(t: Reals, q: Reals, v: Reals) -> Reals:
+            return np.array([f(*state) for state in zip(t.tolist(), q.tolist(), v.tolist(), strict=True)])
+
+        state = np.array([t]), np.array([q]), np.array([v]), np.array([rates]), np.array([h])
+        found = _stages(one_by_one, *state)
+        if found is None:
+            raise Lost
+        _, a, legendre = nodes()
+        values, k = found[0], len(q)
+        dv = h * (a[-1] @ values[:, :k])
+        dq = h * np.array(v) + h * h * ((a @ a)[-1] @ values[:, :k])
+        size = np.abs(legendre @ values[:, :k])
+        largest = np.maximum(size.max(axis=0), 1e-300)
+        error = h * size[-1] * (size[-1] / largest)
+        errors = [*(h * error).tolist(), *error.tolist()]
+        work = h * float(a[-1] @ values[:, k])
+        return Step(dq.tolist(), dv.tolist(), work, values[-1].tolist(), (errors,), 0.0)
+
+    def size(self, done: Step, scale: Floats) -> float:
+        """A step's error over the one allowed in each of (q, q̇)."""
+        (errors,) = done.errors
+        return max(abs(e) / s for e, s in zip(errors, scale, strict=True))
+
+    def steps(
+        self, f: Equations, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals
+    ) -> tuple[Reals, Reals, Reals]:
+        """Changes of q and q̇ (n, k) and the work (n,) over a step from each of n states, each of its own length."""
+        found = _stages(f.many, t, q, v, rates, h)
+        k = q.shape[1]
+        if found is None:
+            return np.full_like(q, np.nan), np.full_like(v, np.nan), np.full(len(q), np.nan)
+        _, a, _ = nodes()
+        length = h[:, None]
+        dv = length * np.einsum("s,nsk->nk", a[-1], found[..., :k])
+        dq = length * v + length**2 * np.einsum("s,nsk->nk", (a @ a)[-1], found[..., :k])
+        return dq, dv, h * (found[..., k] @ a[-1])
+
+
+def _stages(f: Many, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals) -> Reals | None:
+    """The rates at the nodes of steps from n states, (n, s, k + 1); None where Newton's method does not converge."""
+    c, a, _ = nodes()
+    n, k = q.shape
+    twice, step = a @ a, h[:, None, None]
+    by_q, by_v = _slopes(f, t, q, v, rates)
+    whole = (
+        np.eye(STAGES * k)
+        - step * np.einsum("ij,nab->niajb", a, by_v).reshape(n, STAGES * k, STAGES * k)
+        - step**2 * np.einsum("ij,nab->niajb", twice, by_q).reshape(n, STAGES * k, STAGES * k)
+    )
+    if not np.isfinite(whole).all():
+        return None
+    inverse = np.linalg.inv(whole)
+    values = np.repeat(rates[:, None, :k], STAGES, axis=1)
+    times = (t[:, None] + h[:, None] * c).ravel()
+    before = np.inf
+    for _ in range(LIMIT):
+        speeds = v[:, None] + step * np.einsum("ij,njk->nik", a, values)
+        places = (
+            q[:, None] + step * c[:, None] * v[:, None] + step**2 * np.einsum("ij,njk->nik", twice, values)
+        )
+        found = f(times, places.reshape(-1, k), speeds.reshape(-1, k)).reshape(n, STAGES, k + 1)
+        rest = (found[..., :k] - values).reshape(n, -1, 1)
+        change = (inverse @ rest).reshape(n, STAGES, k)
+        values = values + change
+        size = np.abs(speeds).max(axis=1) + np.abs(step[:, 0] * values.max(axis=1)) + 1e-300
+        much = float((np.abs(step * change).max(axis=1) / size).max())
+        if not much < np.inf:
+            return None
+        if much <= CLOSE or (much >= before and much < 1e-10):
+            return np.concatenate([values, found[..., k:]], axis=2)
+        if much > 2 * before and before < 1.0:
+            return None
+        before = much
+    return None
+
+
+def _slopes(f: Many, t: Reals, q: Reals, v: Reals, rates: Reals) -> tuple[Reals, Reals]:
+    """∂a/∂q and ∂a/∂q̇, (n, k, k), by differences: Newton's method needs them roughly."""
+    n, k = q.shape
+    found = np.empty((2, n, k, k))
+    for which, x in enumerate((q, v)):
+        for j in range(k):
+            moved = x.copy()
+            size = 1e-7 * (np.abs(x[:, j]) + 1e-3 * np.abs(x).max() + 1e-6)
+            moved[:, j] += size
+            there = f(t, moved, v) if which == 0 else f(t, q, moved)
+            found[which, :, :, j] = (there - rates)[:, :k] / (moved[:, j] - x[:, j])[:, None]
+    return found[0], found[1]

@@ -1,0 +1,227 @@
+"""A simulation: two ways through time of different tolerance, the answer of the finer, and how far they lie apart.
+
+The errors of the steps add up, and the motion itself makes them grow. How large the error of the answer is, at each
+time, is seen from two solutions: with tolerances a ratio r apart the finer's error is about r times the coarser's,
+and their distance is the coarser's. The estimate is ten times that, at most the distance itself, for the errors of the
+steps do not add up in just the same way. The tolerance is chosen so that the estimate meets the accuracy asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe.parts import Input
+from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.intime.coordinates import Coordinates
+from virtualwork.intime.equations import Equations
+from virtualwork.intime.explicit import DormandPrince
+from virtualwork.intime.friction import Rubbing
+from virtualwork.intime.path import MOST
+from virtualwork.intime.step import Method
+from virtualwork.intime.travel import Travel, travel
+from virtualwork.intime.watch import Floats
+from virtualwork.motion import Motion
+
+# the tolerance of a step over the accuracy asked for, at first; between two solutions
+FIRST, APART = 0.1, 0.03
+# of the estimate
+SAFETY = 10.0
+# below which no tolerance makes a difference; below which rounding has its share in what two solutions differ by
+LEAST, SMALL = 1e-15, 1e-13
+# solutions at most, until the estimate meets the accuracy
+TRIES = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What `Mechanism.simulate` has found.
+
+    Attributes
+    ----------
+    t : array (n,)
+        The times, s; the last is that of the event or of the end, where the motion was not followed further.
+    angle, speed, acceleration : array (n, k)
+        The inputs (rad, or m of a slide; not wrapped) and their rates.
+    error_estimate : array (n, k)
+        How far the inputs may be from the truth.
+    ended : str
+        Why it ends before the last time asked for; empty where it does not.
+    warnings : tuple of str
+    """
+
+    assembly: Assembly
+    t: Reals
+    fine: Travel = field(repr=False)
+    coarse: Travel = field(repr=False)
+    ratio: float = field(repr=False)
+    warnings: tuple[str, ...] = ()
+
+    @cached_property
+    def _states(self) -> tuple[Reals, Reals, Reals, Reals]:
+        return self.fine.at(self.t)
+
+    @cached_property
+    def _others(self) -> tuple[Reals, Reals, Reals, Reals]:
+        return self.coarse.at(self.t)
+
+    @property
+    def angle(self) -> Reals:
+        """(n, k): the inputs, rad or m."""
+        return self._states[0]
+
+    @property
+    def speed(self) -> Reals:
+        """(n, k): their speeds."""
+        return self._states[1]
+
+    @property
+    def acceleration(self) -> Reals:
+        """(n, k): their accelerations."""
+        return self._states[2]
+
+    @property
+    def ended(self) -> str:
+        """Why it ends before the last time."""
+        return self.fine.ended
+
+    @cached_property
+    def energy(self) -> Reals:
+        """(n,): kinetic energy and that of gravity and springs, J."""
+        return self.fine.energy(self.t)
+
+    @cached_property
+    def energy_drift(self) -> Reals:
+        """(n,): the change of energy since the first time that the work of the loads does not explain, J."""
+        return np.asarray((self.energy - self.energy[0]) - self._states[3])
+
+    @cached_property
+    def error_estimate(self) -> Reals:
+        """(n, k): how far the inputs may be from the truth, rad or m."""
+        return self.spread(self.angle, self._others[0])
+
+    def spread(self, fine: Reals, coarse: Reals) -> Reals:
+        """The error of a quantity from its values in the two solutions: the largest so far, and its rounding."""
+        apart = np.abs(fine - coarse) * min(1.0, SAFETY * self.ratio)
+        return np.asarray(np.maximum.accumulate(apart, axis=0) + 4 * EPS * np.abs(fine))
+
+    @cached_property
+    def motion(self) -> Any:
+        """The motion through all times, a `Motion`: points, links, slides, joint forces.
+
+        Where the motion passes a dead point of an input it is several, joined row by row.
+        """
+        return self.fine.motion(self.t)
+
+    @property
+    def first_motion(self) -> Motion:
+        """The motion at the first time, in the coordinates of the beginning: for its joints."""
+        first = self.angle[:1], self.speed[:1], self.acceleration[:1], self.t[:1]
+        return self.fine.legs[0].coordinates.motion(*first)
+
+
+def simulate(
+    assembly: Assembly,
+    times: ArrayLike,
+    angle: ArrayLike | None = None,
+    speed: ArrayLike | None = None,
+    accuracy: float = 1e-9,
+    until: Mapping[str, float] | None = None,
+) -> Run:
+    """Let go of the inputs; see `Mechanism.simulate`."""
+    m, t = assembly.mechanism, _times(times)
+    k = len(m.inputs)
+    q = _state("angle", angle, [e.value for e in m.inputs], list(m.at), k)
+    v = _state("speed", speed, [e.speed for e in m.inputs], [0.0] * k, k)
+    if not 0 < accuracy < 1:
+        raise ValueError(f"accuracy: found {accuracy:g}, expected a number between 0 and 1")
+    equations = (Rubbing if m.friction else Equations)(assembly)
+    equations.refuse(float(t[0]), q, v)
+    scale = np.array(equations.scale)
+    levels = _levels(m.inputs, until)
+    own = Coordinates(equations, m.inputs)
+
+    method: Method = DormandPrince()
+
+    def at(tolerance: float) -> Travel:
+        nonlocal method
+        found = travel(own, (float(t[0]), q, v), float(t[-1]), tolerance, levels, method)
+        # what was found to be stiff once is from the beginning
+        method = found.legs[-1].path.method
+        return found
+
+    tolerance = max(LEAST, FIRST * accuracy)
+    coarse, fine, ratio = at(tolerance / APART), at(tolerance), APART
+    for tries in range(TRIES):
+        shown = _reached(t, fine)
+        # two solutions within rounding of each other tell no more than that
+        found = Run(assembly, shown, fine, coarse, ratio if tolerance > SMALL else 1.0)
+        worst = float((found.error_estimate / scale).max())
+        if worst <= accuracy or tolerance <= LEAST or tries == TRIES - 1:
+            break
+        finer = max(LEAST, tolerance * min(0.3, max(1e-4, 0.3 * accuracy / worst)))
+        coarse, fine, ratio, tolerance = fine, at(finer), finer / tolerance, finer
+    return replace(found, warnings=(*equations.warnings, *_said(found, accuracy, worst, until, t)))
+
+
+def _times(times: ArrayLike) -> Reals:
+    t = np.asarray(times, dtype=float).reshape(-1)
+    if not len(t) or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
+        raise ValueError("times: expected rising finite times, s")
+    return t
+
+
+def _state(
+    name: str, given: ArrayLike | None, own: Sequence[float | None], home: Sequence[float], k: int
+) -> Floats:
+    if given is None:
+        return [float(at if value is None else value) for value, at in zip(own, home, strict=True)]
+    value = np.asarray(given, dtype=float)
+    if value.ndim > 1 or (value.ndim == 1 and len(value) != k) or not np.isfinite(value).all():
+        raise ValueError(f"{name}: expected {k} finite number{'s' if k > 1 else ''}, found {given!r}")
+    return np.broadcast_to(value, (k,)).tolist()  # type: ignore[no-any-return]
+
+
+def _levels(inputs: Sequence[Input], until: Mapping[str, float] | None) -> dict[int, float]:
+    """The values of inputs that end the motion."""
+    names = [e.name for e in inputs]
+    for name in until or ():
+        if name not in names:
+            raise ValueError(f"until: no input is named '{name}': expected {', '.join(names)}")
+    return {names.index(name): float(level) for name, level in (until or {}).items()}
+
+
+def _reached(t: Reals, way: Travel) -> Reals:
+    """The times up to the end of a way; where it ends before the last, its end is the last."""
+    if way.end >= t[-1]:
+        return t
+    near = 1e-8 * (way.end - t[0])
+    return np.append(t[t < way.end - near], way.end)
+
+
+def _said(
+    run: Run, accuracy: float, worst: float, until: Mapping[str, float] | None, asked: Reals
+) -> list[str]:
+    """What must be said of the answer."""
+    found = []
+    if run.fine.ended == "end" and until:
+        found.append(f"{', '.join(until)}: the event is not met before {asked[-1]:g} s")
+    if run.fine.ended == "budget":
+        found.append(f"ends at {run.fine.end:.9g} s, after {MOST} steps: a lower accuracy takes fewer")
+    elif run.fine.ended not in ("end", "until"):
+        found.append(f"ends at {run.fine.end:.9g} s: {run.fine.ended}")
+    if worst > 1.0:
+        bad = (run.error_estimate / np.array(run.fine.legs[0].path.equations.scale)).max(axis=1) > 1e-2
+        found.append(
+            f"no digit is known from {run.t[np.argmax(bad)]:.6g} s on: the motion makes any error grow, "
+            "and beyond rounding it grows past the answer"
+        )
+    elif worst > accuracy:
+        found.append(f"accuracy {accuracy:g} is beyond rounding here: {worst:.1e} is reached")
+    return found

@@ -1,0 +1,236 @@
+"""One way through all times, at one tolerance: as many paths as it takes, each in coordinates that hold there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from virtualwork.formulas.numbers import Reals
+from virtualwork.intime.coordinates import TURN, Coordinates
+from virtualwork.intime.friction import Rubbing
+from virtualwork.intime.implicit import Radau
+from virtualwork.intime.joined import Joined
+from virtualwork.intime.path import MOST, Path, walk
+from virtualwork.intime.step import Method
+from virtualwork.intime.watch import Floats, Watch
+
+# changes of coordinates in one simulation
+CHANGES = 10_000
+
+
+@dataclass
+class Leg:
+    """A path and its coordinates; `first` are the inputs at its beginning."""
+
+    coordinates: Coordinates
+    path: Path
+    first: Floats
+
+    @cached_property
+    def inputs(self) -> Reals:
+        """The inputs at the nodes (n, k), whole turns and all."""
+        q, v = np.array(self.path.q), np.array(self.path.v)
+        if self.coordinates.own:
+            return q
+        rates = np.array(self.path.rates)[:, : q.shape[1]]
+        found, speed, _ = self.coordinates.states(q, v, rates, np.zeros_like(q))
+        step = np.diff(self.path.t)[:, None]
+        near = 0.5 * (speed[1:] + speed[:-1]) * step
+        change = np.diff(found, axis=0)
+        turning = np.array([not e.is_slide for e in self.coordinates.inputs])
+        change = np.where(turning, change - TURN * np.round((change - near) / TURN), change)
+        return np.asarray(self.first + np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(change, axis=0)]))
+
+    def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
+        """The coordinates, their speeds and accelerations, and the work."""
+        q, v, work = self.path.at(times)
+        return q, v, self.path.equations.many(times, q, v)[:, : q.shape[1]], work
+
+    def states(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
+        """The inputs, their speeds and accelerations, and the work."""
+        q, v, a, work = self.at(times)
+        if self.coordinates.own:
+            return q, v, a, work
+        t = np.array(self.path.t)
+        i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
+        near = self.inputs[i]
+        speed = self.coordinates.states(q, v, a, near)[1]
+        return *self.coordinates.states(q, v, a, near + 0.5 * speed * (times - t[i])[:, None]), work
+
+
+@dataclass
+class Travel:
+    """The legs, one after the other, and why the last one ended."""
+
+    legs: list[Leg] = field(default_factory=list)
+    ended: str = ""
+
+    @property
+    def end(self) -> float:
+        """The last time reached."""
+        return self.legs[-1].path.t[-1]
+
+    @property
+    def steps(self) -> int:
+        """How many steps were taken."""
+        return sum(len(leg.path.t) - 1 for leg in self.legs)
+
+    @property
+    def nodes(self) -> Reals:
+        """The times between steps."""
+        return np.unique(np.concatenate([leg.path.t for leg in self.legs]))
+
+    @property
+    def methods(self) -> list[str]:
+        """The methods used."""
+        return list(dict.fromkeys(leg.path.method.name for leg in self.legs))
+
+    def _parts(self, times: Reals) -> list[tuple[Leg, Any]]:
+        """The legs, each with the rows of the times on it."""
+        begins = np.array([leg.path.t[0] for leg in self.legs])
+        which = np.clip(np.searchsorted(begins, times, side="right") - 1, 0, None)
+        return [(leg, rows) for i, leg in enumerate(self.legs) if len(rows := np.flatnonzero(which == i))]
+
+    def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
+        """The inputs, their speeds and accelerations (n, k), and the work done (n,)."""
+        k = self.legs[0].path.equations.k
+        out = [np.empty((len(times), k)) for _ in range(3)]
+        work = np.empty(len(times))
+        for leg, rows in self._parts(times):
+            *found, work[rows] = leg.states(times[rows])
+            for whole, part in zip(out, found, strict=True):
+                whole[rows] = part
+        return out[0], out[1], out[2], work
+
+    def energy(self, times: Reals) -> Reals:
+        """Kinetic energy and that of gravity and springs, (n,) J."""
+        out = np.empty(len(times))
+        for leg, rows in self._parts(times):
+            q, v, _ = leg.path.at(times[rows])
+            out[rows] = leg.path.equations.energies(times[rows], q, v)
+        return out
+
+    def motion(self, times: Reals) -> Any:
+        """The motion through times: a `Motion`, or several joined."""
+        parts = [
+            (rows, leg.coordinates.motion(*leg.at(times[rows])[:3], times[rows]))
+            for leg, rows in self._parts(times)
+        ]
+        return parts[0][1] if len(parts) == 1 else Joined(parts, len(times))
+
+    def link_angle(self, name: str, times: Reals) -> Reals:
+        """A link's angle (n,) rad, followed from the first time on through all whole turns."""
+        every = np.union1d(self.nodes[self.nodes <= times[-1]], times)
+        link = self.motion(every).link(name)
+        angle, omega = link.angle, link.omega
+        near = 0.5 * (omega[1:] + omega[:-1]) * np.diff(every)
+        change = np.diff(angle)
+        change -= TURN * np.round((change - near) / TURN)
+        whole = angle[0] + np.concatenate([[0.0], np.cumsum(change)])
+        for j, entry in enumerate(self.legs[0].coordinates.inputs):
+            if entry.link == name and entry.on == "ground":
+                # as the input itself is counted
+                whole += TURN * np.round((self.legs[0].first[j] - whole[0]) / TURN)
+        return np.asarray(whole[np.searchsorted(every, times)])
+
+
+@dataclass
+class Monitor:
+    """What a path is asked at every node: whether its coordinates fold, and what the inputs are there."""
+
+    coordinates: Coordinates
+    near: Floats
+    folding: bool
+    follows: bool
+
+    def __call__(self, t: float, q: Floats, v: Floats) -> str:
+        if self.follows:
+            self.near = self.inputs(q, v)
+        was, self.folding = self.folding, self.coordinates.folds(q)
+        return "folding" if self.folding and not was else ""
+
+    def inputs(self, q: Floats, v: Floats) -> Floats:
+        """The inputs at a state, with the whole turns of those at the last node."""
+        state = [np.array([x]) for x in (q, v, v, self.near)]
+        return self.coordinates.states(*state)[0][0].tolist()  # type: ignore[no-any-return]
+
+    def until(self, j: int, level: float) -> Watch:
+        """The end where input j has a value."""
+        if self.coordinates.own:
+            return Watch("until", lambda t, q, v: q[j], lambda t, q, v, a: v[j], [level], ends=True)
+        return Watch("until", lambda t, q, v: self.inputs(q, v)[j], None, [level], ends=True)
+
+
+def travel(
+    coordinates: Coordinates,
+    start: tuple[float, Floats, Floats],
+    end: float,
+    tolerance: float,
+    until: Mapping[int, float],
+    method: Method,
+) -> Travel:
+    """Go from a state of the inputs to a time, or until an input has a value.
+
+    Parameters
+    ----------
+    coordinates : Coordinates
+        The inputs themselves.
+    until : mapping of an input's number to its value
+    method : Method
+        Where it is found to be stiff, the implicit one goes on.
+    """
+    found = Travel()
+    t, q, v = start
+    inputs, work = q, 0.0
+    ended = ""
+    while True:
+        equations = coordinates.equations
+        if isinstance(equations, Rubbing):
+            equations, v = equations.going_on(t, q, v, ended)
+        monitor = Monitor(coordinates, inputs, coordinates.folds(q), bool(until) and not coordinates.own)
+        watches = [*(monitor.until(j, level) for j, level in until.items()), *equations.watches()]
+        stops, budget = equations.stops, MOST - found.steps
+        begin = t, q, v, work
+        left = {ended: 0.0} if ended.startswith("friction") else None
+        path = walk(equations, method, begin, end, tolerance, watches, stops, monitor, budget, left)
+        leg = Leg(coordinates, path, inputs)
+        found.legs.append(leg)
+        found.ended = path.ended
+        if path.ended in ("end", "until", "budget") or len(found.legs) > CHANGES:
+            return found
+        t, q, v, work = path.t[-1], path.q[-1], path.v[-1], path.work[-1]
+        inputs, ended = leg.inputs[-1].tolist(), path.ended
+        if ended.startswith("friction"):
+            # the mode of this leg, out of which the next one comes
+            coordinates = coordinates.of(equations)
+            continue
+        if path.ended == "stiff":
+            method = Radau()
+            continue
+        found.ended = equations.outside(t, q, v) if path.ended == "lost" else ""
+        other = None if found.ended else coordinates.better(q)
+        if other is None and path.ended == "lost":
+            found.ended = (
+                found.ended or "it can go no further: a limit, or a pose where its motion is not determined"
+            )
+            return found
+        if other is not None:
+            q, v = _in(coordinates, other, q, v)
+            coordinates = other
+
+
+def _in(old: Coordinates, new: Coordinates, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """A state in other coordinates: where they are, and the speeds of what they measure."""
+    motion = old.motion(np.array([q]), np.array([v]))
+    speeds = []
+    for entry in new.equations.mechanism.inputs:
+        if entry.is_slide:
+            speeds.append(float(motion.slide(entry.name).speed[0]))
+        else:
+            base = 0.0 if entry.on == "ground" else float(motion.link(entry.on).omega[0])
+            speeds.append(float(motion.link(entry.name).omega[0]) - base)
+    return list(new.equations.mechanism.at), speeds
