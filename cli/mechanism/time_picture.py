@@ -31,6 +31,11 @@ def draw(run: Run, m: Mechanism) -> Figure:
         places.plot(run.t, shown, label=f"{entry.name}, {'m' if slide else 'deg'}", **style)
         speeds.plot(run.t, run.speed[:, j], label=f"{entry.name}, {'m/s' if slide else 'rad/s'}", **style)
     energy.plot(run.t, run.energy, color="0.0", lw=1.4)
+    # what is kept is a straight line, not its rounding
+    low, high = energy.get_ylim()
+    room = 1e-3 * float(np.abs(run.energy).max()) or 1.0
+    if high - low < room:
+        energy.set_ylim(low - room, high + room)
     for axes, label in ((places, "input"), (speeds, "speed"), (energy, "energy, J")):
         axes.set_ylabel(label)
         axes.grid(color="0.9")

@@ -203,7 +203,7 @@ def test_event_to_rounding() -> None:
     assert len(run.t) == 2
 
 
-# after 1, 2, 5 and 10 s
+# after 1, 2, 5 and 10 s (benchmarks.truth.double_pendulum)
 DOUBLE_PENDULUM = [
     ("-2.06346047829304440026064", "-2.825698395035491239630028"),
     ("-1.973982413972820947108786", "-2.398486954136604287364049"),
