@@ -44,9 +44,9 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "virtualwork": (
         ("__init__",),
         ("mechanism",),
-        ("family",),
         ("intime",),
         ("motion",),
+        ("family",),
         ("animation", "evaluator", "parts_of_motion", "still"),
         ("forces", "table"),
         ("picture",),

@@ -17,6 +17,7 @@ from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
     from virtualwork.evaluator import Evaluator
+    from virtualwork.family.family import Family
     from virtualwork.intime.run import Run
     from virtualwork.study.check import Check
     from virtualwork.study.equilibrium import Equilibria
@@ -210,6 +211,33 @@ class Mechanism(Description):
         from virtualwork.evaluator import Evaluator
 
         return Evaluator(self.assembly, *wanted)
+
+    def vary(self, numbers: Mapping[str, ArrayLike]) -> Family:
+        """Variants of this mechanism: other numbers at the paths of some dimensions.
+
+        Parameters
+        ----------
+        numbers : mapping of path to array (v,)
+            SI; a point's own path takes (v, 2). The paths are those of `describe.dimensions`.
+
+        Raises
+        ------
+        DescriptionError
+            Where a path names no number of the description.
+        ValueError
+            Where the arrays differ in length, or a number is not finite.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link
+        >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": 1}, mass=2, center=1)}, inputs=Input("arm"),
+        ...                 gravity=-10j)
+        >>> arm.vary({"links.arm.mass": [1.0, 2.0, 4.0]}).motion(0.0).effort[:, 0]
+        array([10., 20., 40.])
+        """
+        from virtualwork.family.family import Family
+
+        return Family(self, numbers)
 
     @cached_property
     def check(self) -> Check:

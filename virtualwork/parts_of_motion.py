@@ -30,6 +30,9 @@ class Whole(Protocol):
     def value(self, key: Key) -> Any:
         """A quantity by its key (`Recording.value`)."""
 
+    def derivative(self, key: Key, path: str) -> Any:
+        """The derivative of a quantity to a number of the description."""
+
 
 class PointMotion:
     """Motion of one point of a link.
@@ -88,6 +91,31 @@ class PointMotion:
         """
         return self.motion.rounding.point(self.body, self.place, self.node, order)
 
+    def sensitivity(self, path: str, order: int = 0) -> Reals:
+        """Return the derivative (n, 2) of the position (order 0), velocity (1), ... to a number of the description.
+
+        Parameters
+        ----------
+        path : str
+            Of the number, such as "links.crank.B.x"; angles count in radians.
+        order : int
+
+        Raises
+        ------
+        DescriptionError
+            Where the path names no number.
+
+        Examples
+        --------
+        A crank's end moves along with its length:
+
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
+        >>> crank.motion(np.pi / 2).point("P").sensitivity("links.crank.P.x").round(15)
+        array([[0., 1.]])
+        """
+        return xy(self.motion.derivative(("point", self.body, self.place, self.node, order), path))
+
     def coefficient(self, j: int = 0) -> Complexes:
         """The velocity coefficient dP/dq_j as x + iy, (n,): the point's virtual displacement for a unit of input j."""
         return self.motion.value(("dpoint", self.body, self.place, self.node, j, 1))  # type: ignore[no-any-return]
@@ -140,6 +168,13 @@ class LinkMotion:
         """
         return self.motion.rounding.angle(self.body, order)
 
+    def sensitivity(self, path: str, order: int = 0) -> Reals:
+        """Return the derivative (n,) of the angle (order 0, rad), ω (1), α (2) to a number of the description.
+
+        `path` names the number, such as "links.crank.B.x".
+        """
+        return self.motion.derivative(("angle", self.body, order), path)  # type: ignore[no-any-return]
+
     def coefficient(self, j: int = 0) -> Reals:
         """The velocity coefficient dθ/dq_j, (n,): the link's virtual rotation for a unit of input j."""
         return self.motion.value(("dangle", self.body, j, 1))  # type: ignore[no-any-return]
@@ -183,3 +218,7 @@ class SlideMotion:
         The dimensions and the input are taken as exact. See `virtualwork.bounds`.
         """
         return self.motion.rounding.slide(self.guide, order)
+
+    def sensitivity(self, path: str, order: int = 0) -> Reals:
+        """Return the derivative (n,) of the slide (order 0, m), its speed (1), ... to a number of the description."""
+        return self.motion.derivative(("slide", self.guide, order), path)  # type: ignore[no-any-return]

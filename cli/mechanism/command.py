@@ -35,7 +35,8 @@ def _print_schema(asked: bool) -> None:
 
 EXAMPLE = "klann"
 PANELS = {
-    "What": "at sweep inputs only branch change vary variants",
+    "What": "at sweep inputs only branch",
+    "Variants": "change vary variants tolerance draws seed distribution workers",
     "How": "order newton time accuracy until",
     "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states html schema",
 }
@@ -158,6 +159,22 @@ def run(
             help="Variants as a table: a column for each path, links.crank.B.x_mm, a row for each variant.",
         ),
     ] = None,
+    tolerance: Annotated[
+        bool,
+        typer.Option("--tolerance", help="What [tolerances] of the file do to every number shown."),
+    ] = False,
+    draws: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Draw so many mechanisms within the tolerances, and solve each."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn.")] = 0,
+    distribution: Annotated[
+        Literal["normal", "uniform"],
+        typer.Option(help="Of what is drawn: a limit is three standard deviations, or the end."),
+    ] = "normal",
+    workers: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Processes that solve what is drawn.")
+    ] = None,
     schema: Annotated[
         bool,
         typer.Option(
@@ -218,11 +235,21 @@ def run(
             own[1],
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
         )
+    spreads = tolerance or draws is not None
+    if workers is not None and draws is None:
+        raise options.bad("--workers", "expected --draws too: other work is done in one process")
+    if spreads:
+        from cli.mechanism.tolerance import Tolerances
+        from cli.mechanism.tolerated import checked, with_tolerances
+
+        others = {"--vary": vary, "--variants": variants, "--branch": branch, "--states": states}
+        others |= {"--graph": graph, "--html": html, **dict.fromkeys(own, "asked"), "--forces": None}
+        checked(draws, tolerance, [flag for flag, given in others.items() if given])
     if time is not None:
         beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
         beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}
         beside |= {"--branch all": branch == "all"}
-        beside |= {"--vary": vary, "--variants": variants, "--html": html}
+        beside |= {"--vary": vary, "--variants": variants, "--html": html, "--tolerance": spreads}
         clash = [flag for flag, value in beside.items() if value and flag != "--forces"]
         if clash:
             raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
@@ -253,7 +280,7 @@ def run(
             from cli.show.page import refuse_long
 
             refuse_long(q.n * (1 if several is None else several.count))
-        alone = several is None and html is None and own in ([], ["--forces"])
+        alone = several is None and html is None and not spreads and own in ([], ["--forces"])
         if alone and show.streams and analysis.is_long:
             return _long(analysis, forces, states)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
@@ -262,6 +289,9 @@ def run(
         analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces, times=times)
         if several is None:
             result = _result(analysis, request, states, explain, graph, about)
+            if spreads:
+                its = Tolerances(analysis, forces, draws or 0, seed, distribution, workers or 1)
+                return with_tolerances(result, its)
             return _with_page(result, html, lambda: [("", analysis)], forces, show.units)
 
         def analysis_of(variant: Mechanism) -> Analysis:

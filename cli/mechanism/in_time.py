@@ -161,7 +161,7 @@ class InTime:
 
     def _error(self, kind: str, name: Any, key: str) -> list[float]:
         spread = self.run.spread(self.fine[kind][name][key], self.coarse[kind][name][key])
-        return bounds_of(spread)
+        return bounds_of(np.where(self.run.unknown, np.inf, spread))
 
     def document(self) -> Document:
         """The JSON document."""

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from dalembert.arithmetic.recorded import bare, rotation, squared
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.solutions import every_solution, guessed_unknowns
 from virtualwork.describe.description import Description
@@ -15,7 +16,7 @@ from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityE
 from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
 from virtualwork.formulas.linear import stack, stack_rows
 from virtualwork.formulas.newton import gaps, newton, write_unknowns
-from virtualwork.formulas.numbers import cross, dot
+from virtualwork.formulas.numbers import Number, cross, dot
 from virtualwork.formulas.positions import Case, State, columns, run
 from virtualwork.formulas.winding import principal
 from virtualwork.plan.guessed import known_by_guess
@@ -249,7 +250,7 @@ class _Chooser:
         found = self.solutions(group, case, st)
         if not found:
             ahead = self._ahead(group, case, signs)
-            if ahead is not None and self._informed(group):
+            if ahead is not None and informed(self.m, group):
                 self.warnings.append(self._meeting(group))
                 sign = (1, -1)[int(np.argmin(ahead))]
                 self._near(group, case, st, signs, sign)
@@ -265,20 +266,13 @@ class _Chooser:
             if ahead is not None:
                 distances = ahead
             self.warnings.append(self._meeting(group))
-        elif len(found) == 2 and not self._informed(group):
+        elif len(found) == 2 and not informed(self.m, group):
             raise AssemblyError(self._choices(group, [t for _, t in found]))
         best = int(np.argmin(distances))
         sign, chosen = found[best]
         for name in ("turn", "point", "slide", "angle", "margin"):
             getattr(st, name).update(getattr(chosen, name))
         return sign
-
-    def _informed(self, group: Group) -> bool:
-        """Does the guess say anything about the links of this group?"""
-        given = self.m.guess
-        return any(b in given.angles for b in group.links) or any(
-            p in given.points for b in group.links for p in self.m.links[b].points
-        )
 
     def _choices(self, group: Group, states: list[State]) -> str:
         texts = []
@@ -291,19 +285,7 @@ class _Chooser:
         )
 
     def _distance(self, group: Group, st: State) -> float:
-        """How far an assembly is from the guess: chords of the unit circle, and points relative to the size."""
-        total = 0.0
-        for body in group.links:
-            if body in self.angles and body in st.turn:
-                total += abs(complex(st.turn[body]) - np.exp(1j * self.angles[body])) ** 2
-            base, terms = self.plan.anchors[body]
-            placed = all(t.body in st.turn and (t.slide is None or t.slide in st.slide) for t in terms)
-            if placed and base in st.point and body in st.turn:
-                for name, z in self.m.links[body].points.items():
-                    if name in self.points:
-                        here = st.point[base] + st.sum(terms) + z * st.turn[body]
-                        total += abs(here - self.points[name]) ** 2 / self.m.size**2
-        return total
+        return float(distance(group, st, self.plan, self.m, self.angles, self.points))
 
     def _sign_of_guess(self, group: Group, case: Case, st: State) -> int:
         """Not assembled at the guess: the sign that the guessed angles would have."""
@@ -351,8 +333,39 @@ class _Chooser:
             trial = st.copy()
             write_unknowns(group, trial, x[None])
             states.append(trial)
-        if len(found) > 1 and not self._informed(group):
+        if len(found) > 1 and not informed(self.m, group):
             raise AssemblyError(self._choices(group, states))
         best = int(np.argmin([self._distance(group, trial) for trial in states]))
         write_unknowns(group, st, found[best][None])
         return found[best]
+
+
+def distance(
+    group: Group,
+    st: State,
+    done: Plan,
+    m: Description,
+    angles: Mapping[str, Number],
+    points: Mapping[str, Number],
+) -> Number:
+    """How far an assembly is from the guess: chords of the unit circle, and points relative to the size, squared."""
+    total: Number = 0.0
+    for body in group.links:
+        if body in angles and body in st.turn:
+            total = total + squared(bare(st.turn[body] - bare(rotation(angles[body]))))
+        base, terms = done.anchors[body]
+        placed = all(t.body in st.turn and (t.slide is None or t.slide in st.slide) for t in terms)
+        if placed and base in st.point and body in st.turn:
+            for name, z in m.links[body].points.items():
+                if name in points:
+                    here = st.point[base] + st.sum(terms) + z * st.turn[body]
+                    total = total + squared(bare(here - points[name])) / bare(m.size**2)
+    return total
+
+
+def informed(m: Description, group: Group) -> bool:
+    """Does the guess say anything about the links of this group?"""
+    given = m.guess
+    return any(b in given.angles for b in group.links) or any(
+        p in given.points for b in group.links for p in m.links[b].points
+    )

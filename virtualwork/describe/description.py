@@ -53,6 +53,7 @@ class Description(Record):
     torsion_springs: tuple[TorsionSpring, ...] = ()
     motors: tuple[Motor, ...] = ()
     friction: tuple[Friction, ...] = ()
+    tolerances: Mapping[str, float] = field(default_factory=dict)
 
     def __init__(
         self,
@@ -70,6 +71,7 @@ class Description(Record):
         torsion_springs: Sequence[TorsionSpring] = (),
         motors: Sequence[Motor] = (),
         friction: Sequence[Friction] = (),
+        tolerances: Mapping[str, float] | None = None,
     ) -> None:
         values = {
             "ground": as_points(ground),
@@ -86,6 +88,7 @@ class Description(Record):
             "torsion_springs": tuple(torsion_springs),
             "motors": tuple(motors),
             "friction": tuple(friction),
+            "tolerances": MappingProxyType(dict(tolerances or {})),
         }
         for key, value in values.items():
             object.__setattr__(self, key, value)

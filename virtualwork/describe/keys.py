@@ -140,6 +140,9 @@ FILE: Keys = {
     "ground": Key("ground", "named fixed points [x, y]"),
     "links": Key("links", "the moving links by name", needed=True),
     "guess": Key("guess", "roughly how it stands: this chooses the assembly"),
+    "tolerances": Key(
+        "tolerances", 'limits of dimensions by their paths: "links.crank.B.x" = "0.05 mm" is ± that'
+    ),
 }
 
 # keys of [guess] that name no link, point or input

@@ -5,12 +5,12 @@ Points and vectors of the plane are complex numbers x + iy: R e^{iθ} is then wr
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
 from types import MappingProxyType
 
+from dalembert.arithmetic.recorded import rotation
 from dalembert.arithmetic.records import record
 from virtualwork.describe.errors import DescriptionError, hint
 from virtualwork.describe.record import Record
@@ -69,7 +69,7 @@ class Polar:
     @property
     def arm(self) -> complex:
         """From the other point to this one."""
-        return self.length * complex(math.cos(self.angle), math.sin(self.angle))
+        return self.length * rotation(self.angle)  # type: ignore[no-any-return]
 
 
 def placed(given: Mapping[str, Point | Polar]) -> Mapping[str, complex]:

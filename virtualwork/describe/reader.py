@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 from virtualwork.describe import keys
 from virtualwork.describe.description import Description
+from virtualwork.describe.dimensions import dimensions, named
 from virtualwork.describe.entries import Load, known_keys, proper
 from virtualwork.describe.errors import DescriptionError, MechanismError, hint
 from virtualwork.describe.load_entries import LoadEntries
@@ -51,7 +52,11 @@ def read_text(
         # a TOMLDecodeError, or a number of thousands of digits
         raise DescriptionError(f"{file}: no valid TOML: {error}") from None
     try:
-        return make(**_Reader(data, folder or Path(), load).parts())
+        reader = _Reader(data, folder or Path(), load)
+        parts = reader.parts()
+        made = make(**parts)
+        tolerances = reader.tolerances(made)
+        return make(**parts, tolerances=tolerances) if tolerances else made
     except MechanismError as error:
         raise type(error)(f"{file}: {error}") from None
 
@@ -86,6 +91,31 @@ class _Reader(LoadEntries):
             "motors": self.every("motors", self.motor),
             "friction": self.every("friction", self.joint_friction),
         }
+
+    def tolerances(self, m: Description) -> dict[str, float]:
+        """The limits ± of dimensions, by their paths; quoted, or with the words of the path as tables."""
+        found: dict[str, float] = {}
+        if "tolerances" not in self.data:
+            return found
+        known = dimensions(m)
+
+        def walk(table: Mapping[str, Any], before: str) -> None:
+            for key, given in table.items():
+                path = f"{before}{key}"
+                if isinstance(given, dict):
+                    walk(given, f"{path}.")
+                    continue
+                where = f"[tolerances] {path}"
+                try:
+                    kind = named(m, path, known)[0].kind
+                except DescriptionError as error:
+                    raise DescriptionError(f"[tolerances]: {error}") from None
+                found[path] = self.number(given, kind, where)
+                if found[path] < 0:
+                    raise wrong(where, given, "a limit of zero or more")
+
+        walk(self.table("tolerances"), "")
+        return found
 
     def every(self, name: str, read: Callable[[dict[str, Any], int], P]) -> list[P]:
         """Every entry of an array of tables, read."""

@@ -97,4 +97,9 @@ _FORMS: dict[str, Schema] = {
 _FORMS["units"] = _table(UNITS)
 _FORMS["points"] = _named({"anyOf": [_A_PAIR, _table(POINT)]})
 _FORMS["links"] = _named(_table(LINK)) | {"minProperties": 1}
+# quoted paths, or their words as tables
+_FORMS["tolerances"] = {
+    "type": "object",
+    "additionalProperties": {"anyOf": [_A_QUANTITY, {"type": "object"}]},
+}
 _FORMS["guess"] = _table(GUESS) | _named({"anyOf": [_A_QUANTITY, _A_PAIR]})

@@ -151,7 +151,7 @@ class Lanes:
         if self.branch.may_open:
             closed = {key: ("closed", *self.recording.hangs_on(key)) for key in keys}
         tape = taped(self.branch, self.recording, (*keys, *more, *dict.fromkeys(closed.values())))
-        out = run(tape, self.entering(tape))
+        out = run(tape, self.entering(tape.inputs))
         n = self.poses.n
         careful: Any = self.branch.close_to_change(self.poses.inputs[:, 0])
         for key in more:
@@ -179,11 +179,11 @@ class Lanes:
             for key in keys:
                 self.known[key][careful] = over_blocks(some, key)
 
-    def entering(self, tape: Tape) -> dict[str, Any]:
-        """The inputs of a tape."""
+    def entering(self, inputs: Iterable[str]) -> dict[str, Any]:
+        """The inputs of a tape, by their names."""
         poses, found = self.poses, {}
         one = poses.n == 1
-        for name in tape.inputs:
+        for name in inputs:
             kind, _, of = name.partition(" ")
             if not of:
                 j = int(name[1:])

@@ -280,7 +280,7 @@ class LoadPaths:
         guide = self.mechanism.guides[g]
         if body == guide.link:
             return points[guide.point], None, 0j
-        return complex(self.mechanism.through(guide)), g, self.plan.directions[g]
+        return self.mechanism.through(guide), g, self.plan.directions[g]
 
     def rest(self, body: str) -> Combination:
         """ΣM of a body's loads and joint forces: what torques must balance.

@@ -200,11 +200,11 @@ class Quantities:
         rest, found = Combination(force), Combination()
         if slide is None and not along and body != GROUND:
             second, bare = self.second("turn", body), self(Turned, body, None)
-            c = complex(rest.get(second, 0.0))
+            c = 0j + rest.get(second, 0.0)
             if c and not c.imag:
                 del rest[second]
                 found.add(Combination({self.second("angle", body): c.real}))
-            c = complex(rest.pop(bare, 0.0))
+            c = 0j + rest.pop(bare, 0.0)
             if c.imag:
                 found.add(Combination({None: c.imag}))
         if rest:

@@ -93,7 +93,12 @@ def walk(
     """
     t, q, v, work = start
     path = Path(equations, method)
-    rates = equations(t, q, v)
+    try:
+        rates = equations(t, q, v)
+    except Lost:
+        path.put(t, q, v, [0.0] * (equations.k + 1), work)
+        path.ended = "lost"
+        return path
     path.put(t, q, v, rates, work)
     k, span = equations.k, end - t
     fastest = [max(abs(x), s / span if span else 1.0) for x, s in zip(v, equations.scale, strict=True)]

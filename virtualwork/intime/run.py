@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.parts import Input
@@ -35,6 +35,8 @@ FIRST, APART = 0.1, 0.03
 SAFETY = 10.0
 # below which no tolerance makes a difference; below which rounding has its share in what two solutions differ by
 LEAST, SMALL = 1e-15, 1e-13
+# an error of the inputs beyond which nothing is known of what hangs on them
+UNKNOWN = 0.1
 # solutions at most, until the estimate meets the accuracy
 TRIES = 6
 
@@ -105,6 +107,12 @@ class Run:
     def error_estimate(self) -> Reals:
         """(n, k): how far the inputs may be from the truth, rad or m."""
         return self.spread(self.angle, self._others[0])
+
+    @property
+    def unknown(self) -> NDArray[np.bool_]:
+        """(n,): from when on no digit is known."""
+        scale = np.array(self.fine.legs[0].path.equations.scale)
+        return np.asarray((self.error_estimate / scale).max(axis=1) > UNKNOWN)
 
     def spread(self, fine: Reals, coarse: Reals) -> Reals:
         """The error of a quantity from its values in the two solutions: the largest so far, and its rounding."""
@@ -216,10 +224,9 @@ def _said(
         found.append(f"ends at {run.fine.end:.9g} s, after {MOST} steps: a lower accuracy takes fewer")
     elif run.fine.ended not in ("end", "until"):
         found.append(f"ends at {run.fine.end:.9g} s: {run.fine.ended}")
-    if worst > 1.0:
-        bad = (run.error_estimate / np.array(run.fine.legs[0].path.equations.scale)).max(axis=1) > 1e-2
+    if run.unknown.any():
         found.append(
-            f"no digit is known from {run.t[np.argmax(bad)]:.6g} s on: the motion makes any error grow, "
+            f"no digit is known from {run.t[np.argmax(run.unknown)]:.6g} s on: the motion makes any error grow, "
             "and beyond rounding it grows past the answer"
         )
     elif worst > accuracy:

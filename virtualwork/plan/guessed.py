@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from dalembert.arithmetic.recorded import heading, rotation
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 
@@ -33,9 +32,9 @@ def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]
                 local = link.points[ends[1]] - link.points[ends[0]]
                 seen = points[ends[1]] - points[ends[0]]
                 if local and seen:
-                    angles[name] = float(np.angle(seen / local))
+                    angles[name] = heading(seen / local)
             if name in angles and here:
-                turn = np.exp(1j * angles[name])
+                turn = rotation(angles[name])
                 for p, z in link.points.items():
-                    points.setdefault(p, complex(points[here[0]] + (z - link.points[here[0]]) * turn))
+                    points.setdefault(p, points[here[0]] + (z - link.points[here[0]]) * turn)
     return angles, points

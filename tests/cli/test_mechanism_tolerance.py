@@ -1,0 +1,197 @@
+"""`--tolerance` and `--draws`: what [tolerances] do to every number shown."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+FILE = """
+name = "four-bar"
+gravity = [0, -9.81]
+[units]
+length = "mm"
+angle = "deg"
+[ground]
+A = [0, 0]
+D = [100, 0]
+[links.crank]
+points = { A = [0, 0], B = [40, 0] }
+mass = 0.5
+center = [20, 0]
+[links.coupler]
+points = { B = [0, 0], C = [120, 0], H = { from = "C", length = 50, angle = 30 } }
+mass = 0.4
+[links.rocker]
+points = { D = [0, 0], C = [80, 0] }
+[input]
+link = "crank"
+angle = 40
+speed = 10
+[guess]
+at = 40
+coupler = 20
+rocker = 57
+[tolerances]
+"""
+LIMITS = """
+"links.crank.B.x" = 0.05
+"links.coupler.C" = "0.1 mm"
+links.coupler.H.angle = "0.2 deg"
+"links.crank.mass" = "5 g"
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    def write(limits=LIMITS):
+        (tmp_path / "m.toml").write_text(FILE + limits)
+        return "m.toml"
+
+    return write
+
+
+def rows(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_every_number_has_its_spread_and_shares_that_sum_to_one(dalembert, file):
+    options = ("--sweep", "0:360:60", "--only", "H,rocker", "--tolerance", "--json")
+    found = json.loads(dalembert("mechanism", file(), *options).stdout)
+    its = found["tolerance"]
+    assert set(its) == {"columns", "shares"}
+    headers = [f"H_{key}" for key in ("x_m", "y_m", "vx_m_s", "vy_m_s")] + [
+        "rocker_angle_deg",
+        "rocker_omega_rad_s",
+    ]
+    assert list(its["columns"]) == headers
+    paths = [
+        "links.crank.B.x",
+        "links.coupler.C.x",
+        "links.coupler.C.y",
+        "links.coupler.H.angle",
+        "links.crank.mass",
+    ]
+    for header in headers:
+        shares = {s["path"]: np.array(s["share"]) for s in its["shares"] if s["column"] == header}
+        assert list(shares) == paths
+        np.testing.assert_allclose(sum(shares.values()), 1.0, rtol=1e-12)
+        worst, sd = (np.array(its["columns"][header][key]) for key in ("worst", "sd"))
+        assert worst.shape == (7,)
+        # between one dimension that does it all, and all that do alike
+        assert (worst <= 3 * sd * np.sqrt(5) * (1 + 1e-12)).all()
+        assert (worst >= 3 * sd * (1 - 1e-12)).all()
+        assert not shares["links.crank.mass"].any()
+
+
+def test_the_spread_is_what_the_changed_files_say(dalembert, file):
+    """Worst case and standard deviation from the file with each number a little larger and smaller."""
+    options = ("--at", "40", "--only", "H", "--forces")
+    whole = rows(dalembert("mechanism", file(), *options, "--tolerance").stdout)[0]
+    limits = {"links.crank.B.x": 0.05, "links.coupler.C.x": 0.1, "links.coupler.C.y": 0.1,
+              "links.coupler.H.angle": 0.2, "links.crank.mass": 0.005}  # fmt: skip
+    start = {"links.crank.B.x": 40, "links.coupler.C.x": 120, "links.coupler.C.y": 0,
+             "links.coupler.H.angle": 30, "links.crank.mass": 0.5}  # fmt: skip
+    moved = []
+    for path, limit in limits.items():
+        ends = [
+            rows(
+                dalembert(
+                    "mechanism", "m.toml", *options, "--set", f"{path}={start[path] + side * limit / 10}"
+                ).stdout
+            )[0]
+            for side in (-1, 1)
+        ]
+        header = "virtual_work_torque_N_m"
+        moved.append((float(ends[1][header]) - float(ends[0][header])) / 2 * 10)
+    worst, sd = (float(whole[f"virtual_work_torque_{what}_N_m"]) for what in ("worst", "sd"))
+    assert abs(worst / np.abs(moved).sum() - 1) < 1e-5
+    assert abs(sd / (np.sqrt(np.square(moved).sum()) / 3) - 1) < 1e-5
+
+
+def test_drawn_mechanisms_agree_with_the_first_order(dalembert, file):
+    options = (
+        "--at",
+        "40",
+        "--only",
+        "H,coupler",
+        "--order",
+        "position",
+        "--draws",
+        "4000",
+        "--seed",
+        "5",
+        "--json",
+    )
+    found = json.loads(dalembert("mechanism", file(), *options).stdout)["tolerance"]
+    assert found["drawn"]["assembled"] == 1.0
+    assert found["drawn"]["draws"] == 4000
+    for header, its in found["drawn"]["columns"].items():
+        sd = found["columns"][header]["sd"][0]
+        assert set(its) == {"mean", "sd", "p0.135", "p99.865", "p0.135_error", "p99.865_error"}
+        # six sampling errors
+        assert abs(its["sd"][0] / sd - 1) < 6 / np.sqrt(8000) + 2e-3
+        assert abs((its["p99.865"][0] - its["p0.135"][0]) / (6 * sd) - 1) < 0.2
+    again = json.loads(dalembert("mechanism", "m.toml", *options).stdout)["tolerance"]
+    assert again == found
+    other = json.loads(dalembert("mechanism", "m.toml", *options[:-3], "--seed", "6", "--json").stdout)[
+        "tolerance"
+    ]
+    assert other["columns"] == found["columns"]
+    assert other["drawn"] != found["drawn"]
+
+
+def test_near_a_limit_the_difference_is_said(dalembert, tmp_path):
+    """A crank that just passes: coupler and rocker reach 100.02 mm beyond it where 100 are needed."""
+    text = FILE.replace("[100, 0]", "[159.98, 0]")
+    (tmp_path / "m.toml").write_text(text + '"links.coupler.C.x" = "0.05 mm"\n')
+    found = dalembert(
+        "mechanism", "m.toml", "--at", "180", "--only", "H", "--order", "position", "--draws", "500"
+    )
+    assert found.returncode == 0
+    assert "the first order is not enough at input 180 deg" in found.stderr
+    assert "% of the drawn mechanisms cannot be assembled" in found.stderr
+
+
+def test_the_picture_is_written(dalembert, file, tmp_path):
+    options = ("--sweep", "0:360:30", "--only", "H", "--tolerance", "--plot")
+    assert dalembert("mechanism", file(), *options, "t.svg").returncode == 0
+    text = (tmp_path / "t.svg").read_text()
+    assert "<svg" in text
+    assert (
+        dalembert(
+            "mechanism", "m.toml", *options[:2], "--forces", "--tolerance", "--plot", "f.png"
+        ).returncode
+        == 0
+    )
+
+
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [
+        ('"links.crnak.B.x" = 1', "did you mean 'links.crank.B.x'"),
+        ('"links.coupler.H.x" = 1', "expected links.coupler.H.length"),
+        ('"links.crank.B.x" = -1', "a limit of zero or more"),
+        ('"links.crank.B.x" = "3 kg"', "a length such as"),
+        ('"links.crank.B.x" = nan', "a length such as"),
+    ],
+)
+def test_a_bad_limit_is_one_line(dalembert, file, limits, said):
+    found = dalembert("mechanism", file(limits), "--tolerance", "-o", "out.csv")
+    assert found.returncode == 1
+    assert "[tolerances]" in found.stderr
+    assert said in found.stderr
+    assert found.stderr.count("\n") == 1
+
+
+def test_a_file_without_tolerances_and_options_that_do_not_go_with_it(dalembert, file):
+    assert dalembert("mechanism", file(""), "--tolerance").returncode == 1
+    for options in (
+        ("--draws", "1"),
+        ("--tolerance", "--vary", "ground.D.x=1:2:1"),
+        ("--tolerance", "--check"),
+    ):
+        assert dalembert("mechanism", "m.toml", *options).returncode == 2

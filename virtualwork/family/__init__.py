@@ -1,0 +1,1 @@
+"""Many mechanisms: variants, sensitivities, tolerances, fitting."""

@@ -1,0 +1,282 @@
+"""Some variants over given inputs, self-contained, and what they do: on the tape together, or described one by one.
+
+On the tape a lane is one variant in one pose. Variants of which the branch is not told by a comparison at the guess, and
+mechanisms whose branch is more than signs (groups without a closed form, gears), are described one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dalembert.arithmetic.engines import run
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe.description import Description
+from virtualwork.describe.dimensions import Dimension, changed
+from virtualwork.describe.errors import MechanismError
+from virtualwork.family.branches import LANES, meet_on_the_way, signs
+from virtualwork.family.written import Written
+from virtualwork.formulas.asked import FORCES, Key, over_blocks
+from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.recording import COMPLEX, NAMES, names
+
+Mask = NDArray[np.bool_]
+# sin² of a transmission angle below which a force may have no digit left
+NEAR = 1e-18
+# the key of 0 where a pose is assembled
+ASSEMBLED: Key = ("assembled",)
+# variants described one by one whose poses are kept for the next question
+KEPT = 500
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Variants and the inputs they are asked at: all that a worker needs to know.
+
+    Attributes
+    ----------
+    mechanism : Description
+    dimensions : tuple of Dimension
+    values : array (v, d)
+    inputs : array (v or 1, n, k)
+    rates : speed, acceleration, jerk of each input
+        A number, or an array that broadcasts to (v, n).
+    """
+
+    mechanism: Description
+    dimensions: tuple[Dimension, ...]
+    values: Reals
+    inputs: Reals
+    rates: list[list[Number]]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Variants and poses."""
+        return len(self.values), self.inputs.shape[1]
+
+    def some(self, rows: slice) -> Part:
+        """A part of the variants."""
+
+        def of(x: Number) -> Number:
+            return x[rows] if np.ndim(x) and len(x) > 1 else x
+
+        rates = [[of(rate) for rate in order] for order in self.rates]
+        return replace(self, values=self.values[rows], inputs=of(self.inputs), rates=rates)
+
+    def described(self, i: int) -> Description:
+        """The i-th variant."""
+        numbers = zip(self.dimensions, self.values[i].tolist(), strict=True)
+        return changed(self.mechanism, {d.path: number for d, number in numbers})
+
+    def poses(self, i: int) -> Poses:
+        """The i-th variant, put together alone.
+
+        Raises
+        ------
+        MechanismError
+        """
+        one = self.some(slice(i, i + 1))
+        q = one.inputs[0]
+        n = len(q)
+        found = Poses(Assembly.from_guess(self.described(i)), q if q.shape[1] > 1 else q[:, 0], 0.0, 0.0, 0.0)
+        found.rates = [
+            [float(np.ravel(r)[0]) if np.size(r) == 1 else np.broadcast_to(r, (1, n))[0] for r in order]
+            for order in one.rates
+        ]
+        return found
+
+
+class Solver:
+    """What the variants of a part do.
+
+    Attributes
+    ----------
+    reasons : dict of a variant's place to why it cannot be put together
+    """
+
+    def __init__(self, part: Part, like: Solver | None = None) -> None:
+        self.part = part
+        if like is not None:
+            # the same formulas: another part of the same variants
+            self.assembly, self.written = like.assembly, like.written
+        self.reasons: dict[int, str] = {}
+        self._poses: dict[int, Poses | None] = {}
+
+    @cached_property
+    def assembly(self) -> Assembly | None:
+        """That of the mechanism itself; None where its own dimensions cannot be put together."""
+        try:
+            found = Assembly.from_guess(self.part.mechanism)
+            _ = found.track
+        except MechanismError:
+            return None
+        return found
+
+    @cached_property
+    def written(self) -> Written | None:
+        """The formulas with the dimensions as inputs; None where the branch is more than signs."""
+        m = self.part.mechanism
+        own = self.assembly
+        if own is None or own.geared or own.folded or any(g.kind == "Newton" for g in own.plan.groups):
+            return None
+        if m.guess.at is None and any(
+            d.where[0] == "inputs" and d.where[-1] == "value" for d in self.part.dimensions
+        ):
+            return None
+        moves = tuple(any(np.any(rate) for rate in order) for order in self.part.rates)
+        fixed = [d for d in self.part.dimensions if d.where[0] != "inputs"]
+        found = Written(own, fixed, moves, own_signs=True)
+        return None if found.open_gears else found
+
+    @cached_property
+    def _given(self) -> dict[str, Reals]:
+        return {d.path: self.part.values[:, i] for i, d in enumerate(self.part.dimensions)}
+
+    @cached_property
+    def _signs(self) -> tuple[dict[str, Reals], Mask]:
+        """The sign of each closed form, and which variants are on the tape."""
+        part, written = self.part, self.written
+        v, _ = part.shape
+        if written is None:
+            return {}, np.zeros(v, dtype=bool)
+        m = part.mechanism
+        found, told = signs(written, m, self._given, v)
+        for d in part.dimensions:
+            if d.kind in ("mass", "inertia"):
+                # what a description refuses
+                told &= self._given[d.path] >= 0
+        if len(m.inputs) == 1 and told.any():
+            q = part.inputs[:, :, 0]
+            low = np.broadcast_to(np.minimum(np.nanmin(q, axis=1, initial=np.inf), m.at[0]), v)
+            high = np.broadcast_to(np.maximum(np.nanmax(q, axis=1, initial=-np.inf), m.at[0]), v)
+            known = self._given | {f"sign {name}": sign for name, sign in found.items()}
+            told &= ~meet_on_the_way(written, m, known, v, low, high)
+        return found, told
+
+    @property
+    def together(self) -> Mask:
+        """Which variants are on the tape, (v,)."""
+        return self._signs[1]
+
+    def values(self, keys: Sequence[Key]) -> list[Any]:
+        """Quantities by their keys (`Recording.value`), each (v, n); NaN where a pose is not assembled."""
+        v, n = self.part.shape
+        out = [np.full((v, n), np.nan, complex if key[0] in COMPLEX else float) for key in keys]
+        there = self.together if self._takes(keys) else np.zeros(v, dtype=bool)
+        places = np.flatnonzero(there)
+        each = max(1, LANES // max(n, 1))
+        alone = ~there
+        for i in range(0, len(places), each):
+            rows = places[i : i + each]
+            alone[rows[self._on_tape(keys, rows, out)]] = True
+        for place in np.flatnonzero(alone):
+            self._one(int(place), keys, out)
+        return out
+
+    def _takes(self, keys: Sequence[Key]) -> bool:
+        """Whether the tape has such quantities: friction iterates, redundant statics and twists are of each variant."""
+        m, written = self.part.mechanism, self.written
+        if written is None:
+            return False
+        if not any(key[0] in FORCES for key in keys):
+            return True
+        if m.friction or m.torsion_springs or any(f.history for f in m.forces):
+            return False
+        joints = any(key[0] in ("newton-euler", "force", "moment") for key in keys)
+        return not (joints and written.recording.forces[0].order.redundant)
+
+    def _on_tape(self, keys: Sequence[Key], rows: NDArray[np.intp], out: list[Any]) -> Mask:
+        """Work out some variants on the tape; which of them are better described alone."""
+        assert self.written is not None
+        n = self.part.shape[1]
+        written = self.written
+        closed = {key: ("closed", *written.recording.hangs_on(key)) for key in keys}
+        forces = any(key[0] in FORCES for key in keys)
+        margins: list[Key] = [("margin", g.name) for g in written.closed] if forces else []
+        asked = [key for key in keys if key != ASSEMBLED]
+        tape = written.tape((*asked, *dict.fromkeys(closed.values()), *margins))
+        with np.errstate(all="ignore"):
+            found = run(tape, {name: self._lanes(name, rows) for name in tape.inputs})
+            lanes = {name: np.broadcast_to(found[name], len(rows) * n).reshape(-1, n) for name in tape.names}
+            near = np.zeros(len(rows), dtype=bool)
+            for key in margins:
+                near |= (np.abs(lanes[names(key)[0]]) < NEAR).any(axis=1)
+        for key, values in zip(keys, out, strict=True):
+            here = np.zeros((len(rows), n), values.dtype)
+            if key != ASSEMBLED:
+                where = names(key)
+                here.real = lanes[where[0]]
+                if len(where) == 2:
+                    here.imag = lanes[where[1]]
+            gap = ~np.isfinite(lanes[names(closed[key])[0]])
+            if gap.any():
+                here[gap] = np.nan
+            values[rows] = here
+        return near
+
+    def _lanes(self, name: str, rows: NDArray[np.intp]) -> Any:
+        """An input of the tape for some variants in all their poses."""
+        v, n = self.part.shape
+        kind, _, group = name.partition(" ")
+        if group and kind == "sign":
+            sign = self._signs[0][group][rows]
+            return float(sign[0]) if (sign == sign[0]).all() else np.repeat(sign, n)
+        if name in self._given:
+            return np.repeat(self._given[name][rows], n)
+        j = int(name[1:])
+        value = self.part.inputs[:, :, j] if name[0] == "q" else self.part.rates[NAMES.index(name[0]) - 1][j]
+        # what is the same in all lanes is worked out once
+        return (
+            np.broadcast_to(value, (v, n))[rows].ravel() if np.size(value) > 1 else float(np.ravel(value)[0])
+        )
+
+    def _one(self, i: int, keys: Sequence[Key], out: list[Any]) -> None:
+        """Describe one variant alone."""
+        if i not in self._poses or self._poses[i] is None:
+            try:
+                poses: Poses | None = None if i in self.reasons else self.part.poses(i)
+            except MechanismError as error:
+                poses = None
+                self.reasons[i] = str(error)
+            if len(self._poses) >= KEPT:
+                self._poses.clear()
+            self._poses[i] = poses
+        poses = self._poses[i]
+        if poses is not None:
+            with np.errstate(all="ignore"):
+                for key, values in zip(keys, out, strict=True):
+                    if key == ASSEMBLED:
+                        values[i] = np.where(poses.assembled, 0.0, np.nan)
+                    else:
+                        values[i] = over_blocks(poses, key)
+
+
+_solvers: dict[tuple[str, int], Solver] = {}
+# parts whose solutions a process keeps for further questions
+PARTS = 16
+
+
+def answer(family: str, number: int, part: Part, keys: Sequence[Key]) -> tuple[list[Any], dict[int, str]]:
+    """Quantities of a part, and why some of its variants have none; what a process has solved of it is kept.
+
+    `family` names what has been asked of which variants, and `number` the part.
+    """
+    solver = _solvers.get((family, number))
+    if solver is None:
+        while len(_solvers) >= PARTS:
+            _solvers.pop(next(iter(_solvers)), None)
+        before = next((s for (name, _), s in list(_solvers.items()) if name == family), None)
+        solver = _solvers[family, number] = Solver(part, before)
+    return solver.values(keys), solver.reasons
+
+
+def forget(family: str) -> None:
+    """Let what this process keeps of a family go."""
+    for key in [key for key in list(_solvers) if key[0] == family]:
+        _solvers.pop(key, None)

@@ -1,0 +1,130 @@
+"""Exact derivatives of what a motion does to the numbers that describe its mechanism.
+
+The formulas are written down with those numbers as inputs of the tape; one sweep backwards over it gives the derivative
+of a result to all of them. A group without a closed form takes one Newton step on the tape, whose derivative is that of
+its solution (the implicit function theorem).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dalembert.arithmetic.adjoint import derivatives
+from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.tape import Tape
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe.dimensions import Dimension, named, value
+from virtualwork.describe.errors import DescriptionError, MechanismError
+from virtualwork.family.written import Written
+from virtualwork.formulas.asked import FORCES, Key
+from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.recording import COMPLEX, NAMES, names
+
+# what an input's own numbers are called on the tape
+ENTERS = {"value": "q", "speed": "v", "acceleration": "a", "jerk": "j"}
+
+
+class Sensitivities:
+    """Derivatives of the quantities of some poses of an assembly."""
+
+    def __init__(self, assembly: Assembly, poses: Poses) -> None:
+        self.assembly, self.poses = assembly, poses
+        self._lanes = Lanes(assembly, poses)
+        self._written: dict[tuple[Dimension, ...], Written] = {}
+        self._tapes: dict[tuple[Any, ...], Tape] = {}
+
+    def dimension(self, path: str) -> Dimension:
+        """The one number that a path names.
+
+        Raises
+        ------
+        DescriptionError
+            Where it names none, or two.
+        """
+        found = named(self.assembly.mechanism, path)
+        if len(found) > 1:
+            raise DescriptionError(f"'{path}' names two numbers: expected {found[0].path} or {found[1].path}")
+        return found[0]
+
+    def of(self, keys: Sequence[Key], dimensions: Sequence[Dimension]) -> list[list[Any]]:
+        """The derivative of each quantity (`Recording.value`) to each dimension, (n,), real or complex.
+
+        Raises
+        ------
+        MechanismError
+            With friction, or redundant statics, where forces have no closed form; with a gear whose phase is that of
+            a link which has to be placed first.
+        """
+        every = tuple(dimensions)
+        written = self._formulas(every)
+        self._refuse(keys, written)
+        enters = [self._enters(d) for d in every]
+        asked = tuple(keys), every
+        if asked not in self._tapes:
+            tape = written.tape(keys)
+            there = [name for name in enters if name in tape.inputs]
+            self._tapes[asked] = derivatives(tape, there)
+        tape = self._tapes[asked]
+        given = {
+            d.path: float(value(self.assembly.mechanism, d.path).real)
+            for d in every
+            if d.where[0] != "inputs"
+        }
+        rest = [name for name in tape.inputs if name not in given]
+        with np.errstate(all="ignore"):
+            found = run(tape, given | self._lanes.entering(rest))
+        return [[self._one(found, tape, key, name) for name in enters] for key in keys]
+
+    def values(self, keys: Sequence[Key]) -> list[Any]:
+        """The quantities themselves, (n,)."""
+        return self._lanes.values(list(keys))
+
+    def _one(self, found: Any, tape: Tape, key: Key, enters: str) -> Any:
+        parts: list[Reals] = []
+        for name in names(key):
+            output = f"d({name})/d({enters})"
+            column = found[output] if output in tape.rows else 0.0
+            parts.append(np.broadcast_to(column, self.poses.n) + 0.0)
+        return parts[0] if key[0] not in COMPLEX else parts[0] + 1j * parts[1]
+
+    @staticmethod
+    def _enters(dimension: Dimension) -> str:
+        """What a dimension is called on the tape."""
+        if dimension.where[0] != "inputs":
+            return dimension.path
+        _, j, name = dimension.where
+        return f"{ENTERS[str(name)]}{j}"
+
+    def _formulas(self, dimensions: tuple[Dimension, ...]) -> Written:
+        if dimensions not in self._written:
+            own = {d.where[-1] for d in dimensions if d.where[0] == "inputs"}
+            moves = tuple(
+                any(np.any(rate) for rate in rates)
+                or {"v": "speed", "a": "acceleration", "j": "jerk"}[name] in own
+                for name, rates in zip(NAMES[1:], self.poses.rates, strict=True)
+            )
+            inner = [d for d in dimensions if d.where[0] != "inputs"]
+            # which signs change on the way is known once the way was looked over
+            _ = self.poses.states()
+            self._written[dimensions] = Written(self.assembly, inner, moves, own_signs=False, settled=False)
+        return self._written[dimensions]
+
+    def _refuse(self, keys: Sequence[Key], written: Written) -> None:
+        m = self.assembly.mechanism
+        if written.open_gears:
+            raise MechanismError(
+                "sensitivity: the phase of a gear hangs on links that have to be placed first"
+            )
+        if self.assembly.folded:
+            raise MechanismError("sensitivity: the mechanism is singular in every pose")
+        if any(key[0] in FORCES for key in keys):
+            if m.friction:
+                raise MechanismError("sensitivity: forces with friction are not differentiated")
+            joints = any(key[0] in ("newton-euler", "force", "moment") for key in keys)
+            if joints and written.recording.forces[0].order.redundant:
+                raise MechanismError("sensitivity: redundant joint forces are not differentiated")
