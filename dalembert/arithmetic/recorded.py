@@ -290,13 +290,6 @@ class Constant(complex):
     recorded: Number
 
 
-def heading(z: Any) -> Any:
-    """The angle of a complex constant, plain or varied, in (−π, π]."""
-    if isinstance(z, Varied):
-        return made(cmath.phase(complex(z)), RECORDED.angle(z.recorded))
-    return cmath.phase(z)
-
-
 def bare(value: Number) -> Number:
     """What is recorded of a constant that varies; any other number as it is."""
     return value.recorded if isinstance(value, Constant) else value

@@ -134,3 +134,10 @@ def _operator(name: str) -> Any:
 for _name in ("add", "sub", "mul", "truediv"):
     for _side in ("__", "__r"):
         setattr(Varied, f"{_side}{_name}__", _operator(f"{_side}{_name}__"))
+
+
+def heading(z: Any) -> Any:
+    """The angle of a complex constant, plain or varied, in (−π, π]."""
+    if isinstance(z, Varied):
+        return made(cmath.phase(complex(z)), RECORDED.angle(z.recorded))
+    return cmath.phase(z)

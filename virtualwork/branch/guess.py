@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from dalembert.arithmetic.recorded import bare, rotation, squared
+from dalembert.arithmetic.recorded import bare, squared
+from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.solutions import every_solution, guessed_unknowns
 from virtualwork.describe.description import Description

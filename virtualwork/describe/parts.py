@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from numbers import Real
 from types import MappingProxyType
 
-from dalembert.arithmetic.recorded import rotation
 from dalembert.arithmetic.records import record
+from dalembert.arithmetic.varied import rotation
 from virtualwork.describe.errors import DescriptionError, hint
 from virtualwork.describe.record import Record
 

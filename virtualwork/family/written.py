@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from dalembert.arithmetic.recorded import Recorder, Varied
+from dalembert.arithmetic.recorded import Recorder
 from dalembert.arithmetic.tape import Tape
+from dalembert.arithmetic.varied import Varied
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import distance
 from virtualwork.describe.description import Description

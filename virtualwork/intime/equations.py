@@ -23,9 +23,9 @@ import numpy as np
 from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.engines import floats, run
 from dalembert.arithmetic.recorded import RECORDED, Number
-from dalembert.arithmetic.varied import rotation
 from dalembert.arithmetic.systems import solved
 from dalembert.arithmetic.tape import Tape
+from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.block import Block, Setting

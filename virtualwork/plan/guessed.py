@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dalembert.arithmetic.recorded import heading, rotation
+from dalembert.arithmetic.varied import heading, rotation
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 
