@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.mechanism import columns
@@ -14,6 +15,7 @@ from virtualwork import MechanismError
 from virtualwork.animation import JointForce, Series, moving_page
 
 if TYPE_CHECKING:
+    from cli.show.columns import Result
     from dalembert.page import Page
 
 
@@ -58,3 +60,18 @@ def _series(variant: str, analysis: Analysis, forces: bool, units: str | None) -
         ]
         name = ", ".join(filter(None, names))
         yield Series(motion.poses, motion.drawing, listed, one.input_columns, arrows, name)
+
+
+def with_page(
+    result: Result,
+    html: Path,
+    analyses: Callable[[], list[tuple[str, Analysis]]],
+    forces: bool,
+    units: str | None,
+) -> Result:
+    """Add the page that moves to what a result writes beside."""
+
+    def written() -> bytes:
+        return page(analyses(), forces, units).html.encode()
+
+    return replace(result, beside={**result.beside, html: written})

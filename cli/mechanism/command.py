@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -36,7 +36,7 @@ def _print_schema(asked: bool) -> None:
 EXAMPLE = "klann"
 PANELS = {
     "What": "at sweep inputs only branch",
-    "Variants": "change vary variants tolerance draws seed distribution workers",
+    "Variants": "change vary variants tolerance draws seed distribution workers fit point free",
     "How": "order newton time accuracy until",
     "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states html schema",
 }
@@ -167,13 +167,22 @@ def run(
         int | None,
         typer.Option(metavar="N", help="Draw so many mechanisms within the tolerances, and solve each."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn, and of --fit.")] = 0,
     distribution: Annotated[
         Literal["normal", "uniform"],
         typer.Option(help="Of what is drawn: a limit is three standard deviations, or the end."),
     ] = "normal",
     workers: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Processes that solve what is drawn.")
+    ] = None,
+    fit: Annotated[
+        str | None,
+        typer.Option(metavar="TARGET.csv", help="Dimensions of which a point comes through these places."),
+    ] = None,
+    point: Annotated[str | None, typer.Option(metavar="NAME", help="Of --fit.")] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PATH=LOW:HIGH", help="With --fit: a dimension and its bounds; repeatable."),
     ] = None,
     schema: Annotated[
         bool,
@@ -245,6 +254,22 @@ def run(
         others = {"--vary": vary, "--variants": variants, "--branch": branch, "--states": states}
         others |= {"--graph": graph, "--html": html, **dict.fromkeys(own, "asked"), "--forces": None}
         checked(draws, tolerance, [flag for flag, given in others.items() if given])
+    if fit is not None or point is not None or free:
+        from cli.mechanism.fitted import fitted
+
+        unfit: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--vary": vary}
+        unfit |= {
+            "--variants": variants,
+            "--time": time,
+            "--only": only,
+            "--order": order,
+            "--branch": branch,
+            "--html": html,
+        }
+        unfit |= {"--states": states, "--tolerance": spreads, "--explain": explain, "--plot": show.plot}
+        there = [*own, *(flag for flag, value in unfit.items() if value)]
+        with _told(file):
+            return replace(fitted(file, fit, point, free, change, seed, there), within=lambda: _told(file))
     if time is not None:
         beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
         beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}
@@ -277,6 +302,7 @@ def run(
         analysis.warnings += said
         analysis.check_names()
         if html is not None:
+            from cli.mechanism.animation import with_page
             from cli.show.page import refuse_long
 
             refuse_long(q.n * (1 if several is None else several.count))
@@ -292,7 +318,9 @@ def run(
             if spreads:
                 its = Tolerances(analysis, forces, draws or 0, seed, distribution, workers or 1)
                 return with_tolerances(result, its)
-            return _with_page(result, html, lambda: [("", analysis)], forces, show.units)
+            if html is not None:
+                result = with_page(result, html, lambda: [("", analysis)], forces, show.units)
+            return result
 
         def analysis_of(variant: Mechanism) -> Analysis:
             home = at is None and sweep is None and inputs is None
@@ -304,9 +332,9 @@ def run(
         found = Many(
             mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
         )
-        result = _with_page(
-            found.result(show.streams, show.as_json, table), html, found.analyses, forces, show.units
-        )
+        result = found.result(show.streams, show.as_json, table)
+        if html is not None:
+            result = with_page(result, html, found.analyses, forces, show.units)
         return replace(
             result,
             warnings=[*said, *result.warnings],
@@ -402,25 +430,6 @@ def _result(
         failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),
         within=lambda: _told(analysis.file),
     )
-
-
-def _with_page(
-    result: Result,
-    html: Path | None,
-    analyses: Callable[[], list[tuple[str, Analysis]]],
-    forces: bool,
-    units: str | None,
-) -> Result:
-    """Add the page that moves to what a result writes beside, where it is asked for."""
-    if html is None:
-        return result
-
-    def page() -> bytes:
-        from cli.mechanism.animation import page
-
-        return page(analyses(), forces, units).html.encode()
-
-    return replace(result, beside={**result.beside, html: page})
 
 
 @contextmanager
