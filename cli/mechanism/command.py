@@ -249,12 +249,14 @@ def run(
         beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
         beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}
         beside |= {"--branch all": branch == "all"}
-        beside |= {"--vary": vary, "--variants": variants, "--html": html, "--tolerance": spreads}
+        beside |= {"--vary": vary, "--variants": variants, "--tolerance": spreads}
         clash = [flag for flag, value in beside.items() if value and flag != "--forces"]
         if clash:
             raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
     elif accuracy is not None or until is not None:
         raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
+    if html is not None:
+        from cli.show.page import refuse_long
     with _told(file):
         mechanism, bare, said, about = load(file)
         several = None
@@ -270,15 +272,15 @@ def run(
             home.warnings += said
             home.check_names()
             motion = InTime(home, *times_and_accuracy(time, accuracy), until, bare, forces)
-            return replace(motion.result(about), within=lambda: _told(file))
+            if html is not None:
+                refuse_long(len(motion.times))
+            return replace(motion.result(about, html, show.units), within=lambda: _told(file))
         q = wanted(mechanism, at, sweep, inputs, bare)
         rates = None if order is None else ORDERS.index(order)
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)
         analysis.warnings += said
         analysis.check_names()
         if html is not None:
-            from cli.show.page import refuse_long
-
             refuse_long(q.n * (1 if several is None else several.count))
         alone = several is None and html is None and not spreads and own in ([], ["--forces"])
         if alone and show.streams and analysis.is_long:
