@@ -20,7 +20,6 @@ from cli.show.columns import Result, Table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -212,17 +211,11 @@ class InTime:
             f"energy that the work of the loads does not explain: {drift:.1e} J"
         )
 
-    def result(self, about: dict[str, str], html: Path | None, units: str | None) -> Result:
+    def result(self, about: dict[str, str]) -> Result:
         """The call in every form it can be shown in."""
         from cli.mechanism.time_picture import draw
 
         a = self.analysis
-
-        def page() -> bytes:
-            from cli.mechanism.animation import page_in_time
-
-            return page_in_time(self, units).html.encode()
-
         return Result(
             document=self.document,
             tables={"time": self.table},
@@ -231,7 +224,6 @@ class InTime:
             figure=lambda: draw(self.run, a.mechanism),
             method=METHOD,
             about={"title": a.mechanism.name or "Mechanism"} | about,
-            beside={} if html is None else {html: page},
             warnings=[*a.warnings, *self.run.warnings],
         )
 
