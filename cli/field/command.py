@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = "fan-one-plane"
 PANELS = {
-    "What": "influence runout phase_lag rotation signal exclude",
+    "What": "influence runout phase_lag rotation signal pulses exclude",
     "How": "method fit robust objective max_mass max_residual from_here ridge reading_error monte_carlo",
     "How: the tolerance, the first trial mass": "grade speed rotor_mass permissible radius suggest_trial planes",
     "Output: where masses go, the next run": "blades positions first predict suggest save_influence",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cli.mechanism.solve import Analysis
     from cli.mechanism.studies import Request
     from cli.show.columns import Document, Result, Table
+    from dalembert.page import Page
     from virtualwork import Mechanism
 
 
@@ -216,28 +217,17 @@ def run(
         raise options.bad("--counterweights", "expected names of links")
     if flywheel is not None and not 0 < flywheel < float("inf"):
         raise options.bad("--flywheel", "expected a positive speed fluctuation, such as 0.02")
-    if (flywheel is not None or counterweights is not None) and sweep is None and inputs is None:
+    cycle = sweep is not None or inputs is not None
+    if (flywheel is not None or counterweights is not None) and not cycle:
         flag = "--flywheel" if flywheel is not None else "--counterweights"
         raise options.bad(flag, "expected a cycle too: --sweep, such as --sweep 0deg:360deg:1deg")
     if graph is not None and show.plot is None:
         raise options.bad("--graph", "expected --plot FILE too: the picture that the curves are drawn into")
-    for flag, given in (
-        ("--states", states),
-        ("--explain", explain),
-        ("--graph", graph),
-        ("--plot", show.plot),
-    ):
+    of_one = {"--states": states, "--explain": explain, "--graph": graph, "--plot": show.plot}
+    for flag, given in of_one.items():
         if given and (vary or variants is not None):
             raise options.bad(flag, "expected one mechanism, and no --vary or --variants beside it")
-    request = Request(
-        newton,
-        check,
-        forces,
-        equilibrium,
-        flywheel,
-        counterweights,
-        swept=sweep is not None or inputs is not None,
-    )
+    request = Request(newton, check, forces, equilibrium, flywheel, counterweights, swept=cycle)
     own = request.tables
     if show.holds_one and len(own) > 1:
         raise options.bad(
@@ -258,15 +248,8 @@ def run(
         from cli.mechanism.fitted import fitted
 
         unfit: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--vary": vary}
-        unfit |= {
-            "--variants": variants,
-            "--time": time,
-            "--only": only,
-            "--order": order,
-            "--branch": branch,
-            "--html": html,
-        }
-        unfit |= {"--states": states, "--tolerance": spreads, "--explain": explain, "--plot": show.plot}
+        unfit |= {"--variants": variants, "--time": time, "--only": only, "--order": order, "--html": html}
+        unfit |= {"--states": states, "--tolerance": spreads, "--branch": branch, **of_one}
         there = [*own, *(flag for flag, value in unfit.items() if value)]
         with _told(file):
             return replace(fitted(file, fit, point, free, change, seed, there), within=lambda: _told(file))
@@ -274,12 +257,15 @@ def run(
         beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
         beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}
         beside |= {"--branch all": branch == "all"}
-        beside |= {"--vary": vary, "--variants": variants, "--html": html, "--tolerance": spreads}
+        beside |= {"--vary": vary, "--variants": variants, "--tolerance": spreads}
         clash = [flag for flag, value in beside.items() if value and flag != "--forces"]
         if clash:
             raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
     elif accuracy is not None or until is not None:
         raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
+    if html is not None:
+        from cli.mechanism import animation
+        from cli.show.page import refuse_long
     with _told(file):
         mechanism, bare, said, about = load(file)
         several = None
@@ -295,16 +281,18 @@ def run(
             home.warnings += said
             home.check_names()
             motion = InTime(home, *times_and_accuracy(time, accuracy), until, bare, forces)
-            return replace(motion.result(about), within=lambda: _told(file))
+            if html is not None:
+                refuse_long(len(motion.times))
+            result = _with_page(
+                motion.result(about), html, lambda: animation.page_in_time(motion, show.units)
+            )
+            return replace(result, within=lambda: _told(file))
         q = wanted(mechanism, at, sweep, inputs, bare)
         rates = None if order is None else ORDERS.index(order)
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)
         analysis.warnings += said
         analysis.check_names()
         if html is not None:
-            from cli.mechanism.animation import with_page
-            from cli.show.page import refuse_long
-
             refuse_long(q.n * (1 if several is None else several.count))
         alone = several is None and html is None and not spreads and own in ([], ["--forces"])
         if alone and show.streams and analysis.is_long:
@@ -318,9 +306,7 @@ def run(
             if spreads:
                 its = Tolerances(analysis, forces, draws or 0, seed, distribution, workers or 1)
                 return with_tolerances(result, its)
-            if html is not None:
-                result = with_page(result, html, lambda: [("", analysis)], forces, show.units)
-            return result
+            return _with_page(result, html, lambda: animation.page([("", analysis)], forces, show.units))
 
         def analysis_of(variant: Mechanism) -> Analysis:
             home = at is None and sweep is None and inputs is None
@@ -332,9 +318,11 @@ def run(
         found = Many(
             mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
         )
-        result = found.result(show.streams, show.as_json, table)
-        if html is not None:
-            result = with_page(result, html, found.analyses, forces, show.units)
+        result = _with_page(
+            found.result(show.streams, show.as_json, table),
+            html,
+            lambda: animation.page(found.analyses(), forces, show.units),
+        )
         return replace(
             result,
             warnings=[*said, *result.warnings],
@@ -430,6 +418,13 @@ def _result(
         failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),
         within=lambda: _told(analysis.file),
     )
+
+
+def _with_page(result: Result, html: Path | None, page: Callable[[], Page]) -> Result:
+    """Add the page that moves to what a result writes beside, where it is asked for."""
+    if html is None:
+        return result
+    return replace(result, beside={**result.beside, html: lambda: page().html.encode()})
 
 
 @contextmanager

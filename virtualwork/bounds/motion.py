@@ -189,9 +189,9 @@ class MotionErrors:
         residual = [self._residual(rates, rows, k, n) for k in range(order + 1)]
         # a group that has no pose, or no rates, takes none from those before it
         unknown = [self._unknown(j[k], residual[k]) for k in range(order + 1)]
+        back = -self._inverse(j[0])
         for matrix in (*j, *residual):
             matrix[~np.isfinite(matrix)] = 0.0
-        back = -inverse(j[0])
         a: list[list[Reals]] = []
         for k in range(order + 1):
             row = []
@@ -214,14 +214,36 @@ class MotionErrors:
         """Which unknowns belong to a group with a loop that is no number, (n, unknowns)."""
         bad: Any = ~(np.isfinite(j).all(axis=2) & np.isfinite(residual))
         out = np.zeros((len(j), j.shape[2]), dtype=bool)
-        row = 0
+        for rows, own in self._blocks:
+            out[:, own] |= np.any(bad[:, rows], axis=1)[:, None]
+        return out
+
+    @cached_property
+    def _blocks(self) -> list[tuple[slice, list[int]]]:
+        """The rows and the columns of every group in J."""
+        found, row = [], 0
         for g in self.groups:
-            lost = np.any(bad[:, row : row + 2 * len(g.closures)], axis=1)
+            slides = [len(self.angles) + self.slides.index(s) for s in g.slides]
+            own = [self.angles.index(a) for a in g.angles] + slides
+            found.append((slice(row, row + 2 * len(g.closures)), own))
             row += 2 * len(g.closures)
-            own = [self.angles.index(a) for a in g.angles] + [
-                len(self.angles) + self.slides.index(s) for s in g.slides
-            ]
-            out[:, own] |= lost[:, None]
+        return found
+
+    def _inverse(self, j: Reals) -> Reals:
+        """J⁻¹, group after group; zero for the unknowns of a group that is not assembled.
+
+        As one matrix it would be of least squares wherever one group is not assembled or stands at a limit: the loops
+        of that group would then count as equations of the groups before it, and make their bounds too small.
+        """
+        out = np.zeros((len(j), j.shape[2], j.shape[1]))
+        for rows, own in self._blocks:
+            block = inverse(j[:, rows, own])
+            block[~np.isfinite(block)] = 0.0
+            # what the groups before it move in its loops
+            moved = j[:, rows] @ out
+            moved[~np.isfinite(moved)] = 0.0
+            out[:, own] = -block @ moved
+            out[:, own, rows] = block
         return out
 
     def _jacobian(self, rates: Rates, m: int, n: int) -> Reals:
