@@ -37,7 +37,8 @@ def _print_schema(asked: bool) -> None:
 EXAMPLE = "klann"
 PANELS = {
     "What": "at sweep inputs only branch",
-    "Variants": "change vary variants tolerance draws seed distribution workers fit point free",
+    "Variants": "change vary variants tolerance draws seed distribution workers",
+    "Fitting": "fit point free",
     "How": "order newton time accuracy until",
     "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states html schema",
 }

@@ -25,7 +25,7 @@ D = TypeVar("D", bound=Description)
 
 # of the starts, the first by distance are put in order, and the first of those refined: roughly, then the best to the end
 ORDERED, REFINED = 48, 24
-ROUGH, LAST = 60, 300
+ROUGH, LAST = 40, 300
 # of the mechanism's size: a fit as near as this is not looked for again
 MET = 1e-12
 # of the mechanism's size: how far a pose that cannot be assembled counts as away
@@ -218,7 +218,9 @@ class _Problem(Generic[D]):
                 inputs = q[::sense][k] + sense * turns * span
                 found.append((cost, np.concatenate([shares[i], inputs])))
         found.sort(key=lambda each: each[0])
-        return [x for _, x in found[:REFINED]]
+        # what cannot be assembled near every place leads nowhere, while anything else does
+        there = [x for cost, x in found[:REFINED] if cost < (AWAY * self.size) ** 2]
+        return there or [x for _, x in found[:1]]
 
     def _cost(self, squared: Reals) -> Reals:
         return np.where(np.isfinite(squared), squared, (AWAY * self.size) ** 2)
