@@ -10,7 +10,7 @@ A page holds a list of series: the first is drawn in full, the others as ghosts 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,8 @@ from virtualwork.table import columns
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+    from virtualwork.plan.joints import Joint
 
 TURN = 6.0
 """A turn of the input takes so many seconds at speed 1."""
@@ -45,6 +47,11 @@ class JointForce:
     name: str
     column: str
 
+    @classmethod
+    def of(cls, joint: Joint, on: str, of: str) -> JointForce:
+        """Return a joint's force on a link from another, its columns named as in the CSV."""
+        return cls(joint.name, f"{joint.name}: {of} on {on}", f"{joint.name}_{of}_on_{on}_fx_N")
+
 
 @dataclass
 class Series:
@@ -58,6 +65,8 @@ class Series:
         Of numbers, under their SI names; (n,) each.
     over : sequence of str
         The columns of the inputs, or of time.
+    fine : bool
+        Draw paths over the inputs' range where the poses are too few to draw them; else through the poses alone.
     """
 
     poses: Poses
@@ -66,6 +75,7 @@ class Series:
     over: Sequence[str]
     forces: Sequence[JointForce] = ()
     name: str = ""
+    fine: bool = True
     _packed: list[dict[str, Any]] = field(default_factory=list)
     _index: dict[str, int] = field(default_factory=dict)
 
@@ -185,7 +195,7 @@ class Series:
         """Return the paths of points where the poses themselves are too few to draw them."""
         m, q = self.mechanism, self.poses.inputs
         self._fine = np.empty(0)
-        if len(m.inputs) != 1:
+        if len(m.inputs) != 1 or not self.fine:
             return {}
         slide = m.inputs[0].is_slide
         low, high = float(np.nanmin(q)), float(np.nanmax(q))
@@ -257,11 +267,12 @@ def moving_page(
     rate = "m/s" if documents[0]["timed"] else f"m for each {'m' if slide else 'rad'} of the input"
     span = float(np.ptp(first.poses.inputs[:, 0])) if first.poses.n else 0.0
     shown = [first.columns[name].header for name in plots] or _first_plots(first)
-    back = first.poses.n > 1 and all(_comes_back(first, name) for name in m.links)
+    # a motion in time begins anew, wherever it ended
+    wraps = bool(time) or (first.poses.n > 1 and all(_comes_back(first, name) for name in m.links))
     rest: dict[str, Any] = {
         "units": {"v": rate, "a": "m/s²", "f": "N"},
         "lasts": TURN if slide or len(m.inputs) > 1 else TURN * max(span / (2 * np.pi), 0.25),
-        "wraps": bool(time) or back,
+        "wraps": wraps,
         "plots": [columns.index(header) for header in shown],
     }
     if time:
@@ -295,12 +306,23 @@ def of_motion(poses: Poses, drawing: Drawing, forces: Forces | None) -> Page:
     table = columns(poses)
     over = list(table)[: poses.inputs.shape[1]]
     del table["assembled"]
-    arrows = []
-    for joint, on, of in forces.reactions.order.pairs if forces is not None else ():
-        lead = f"{joint.name}_{of}_on_{on}"
-        assert forces is not None
+    pairs = () if forces is None else forces.reactions.order.pairs
+    arrows = [JointForce.of(*pair) for pair in pairs]
+    if forces is not None:
+        table |= force_columns(forces, pairs)
+    return moving_page(poses.mechanism.name, [Series(poses, drawing, plain(table), over, arrows)])
+
+
+def force_columns(forces: Forces, pairs: Iterable[tuple[Joint, str, str]]) -> dict[str, ArrayLike]:
+    """Return the columns of joint forces: (joint, on, from) each."""
+    table: dict[str, ArrayLike] = {}
+    for joint, on, of in pairs:
         parts = xy(forces.joint_force(joint, on))
+        lead = f"{joint.name}_{of}_on_{on}"
         table |= {f"{lead}_fx_N": parts[:, 0], f"{lead}_fy_N": parts[:, 1]}
-        arrows.append(JointForce(joint.name, f"{joint.name}: {of} on {on}", f"{lead}_fx_N"))
-    shown = {name: Shown(values, name) for name, values in table.items()}
-    return moving_page(poses.mechanism.name, [Series(poses, drawing, shown, over, arrows)])
+    return table
+
+
+def plain(table: Mapping[str, ArrayLike]) -> dict[str, Shown]:
+    """Return columns as a page shows them, in SI units under their own names."""
+    return {name: Shown(values, name) for name, values in table.items()}

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from virtualwork.describe.description import Description
 from virtualwork.formulas.poses import Poses
 
 POINT = (("x_m", "y_m"), ("vx_m_s", "vy_m_s"), ("ax_m_s2", "ay_m_s2"))
@@ -20,6 +21,12 @@ def columns(poses: Poses) -> dict[str, Any]:
         f"{e.name}_{'m' if e.is_slide else 'rad'}": poses.inputs[:, j] for j, e in enumerate(m.inputs)
     }
     table["assembled"] = poses.assembled
+    return table | moving_columns(m, poses, orders)
+
+
+def moving_columns(m: Description, poses: Poses, orders: int) -> dict[str, Any]:
+    """Return the columns of links and points that move, so many orders of them."""
+    table: dict[str, Any] = {}
     for name in m.links:
         for order, header in enumerate(LINK[:orders]):
             values = poses.angle_derivative(name, order) if order else poses.angle(name)

@@ -14,6 +14,7 @@ from virtualwork import MechanismError
 from virtualwork.animation import JointForce, Series, moving_page
 
 if TYPE_CHECKING:
+    from cli.mechanism.in_time import InTime
     from dalembert.page import Page
 
 
@@ -33,6 +34,18 @@ def page(analyses: Sequence[tuple[str, Analysis]], forces: bool, units: str | No
     return moving_page(series[0].mechanism.name, series)
 
 
+def page_in_time(found: InTime, units: str | None) -> Page:
+    """Return the page of a motion under forces: all points and links over time, whatever --only names."""
+    home = found.analysis
+    every = replace(home, only=[*home.mechanism.links, *replace(home, only=None).points])
+    every.assemblies = home.assemblies
+    whole = replace(found, analysis=every)
+    whole.run = found.run
+    arrows = rows_of(every, found.run.first_motion) if found.forces else ()
+    columns = shown(whole.table(), units)
+    return found.run.page(columns, ["t_s", *home.input_columns], [JointForce.of(*row) for row in arrows])
+
+
 def _series(variant: str, analysis: Analysis, forces: bool, units: str | None) -> Iterator[Series]:
     """Every assembly asked for; none of a variant that cannot be put together, which the poses' own remarks name."""
     try:
@@ -48,10 +61,7 @@ def _series(variant: str, analysis: Analysis, forces: bool, units: str | None) -
         listed = shown(columns.poses(one), units)
         if forces:
             listed |= shown(columns.forces(one), units)
-        arrows = [
-            JointForce(joint.name, f"{joint.name}: {of} on {on}", f"{joint.name}_{of}_on_{on}_fx_N")
-            for joint, on, of in (rows_of(one, motion) if forces else ())
-        ]
+        arrows = [JointForce.of(*row) for row in (rows_of(one, motion) if forces else ())]
         names = [
             f"variant {variant}" if variant else "",
             f"branch {assembly.number}" if analysis.several else "",

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cli.mechanism.solve import Analysis
     from cli.mechanism.studies import Request
     from cli.show.columns import Document, Result, Table
+    from dalembert.page import Page
     from virtualwork import Mechanism
 
 
@@ -249,12 +250,15 @@ def run(
         beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
         beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}
         beside |= {"--branch all": branch == "all"}
-        beside |= {"--vary": vary, "--variants": variants, "--html": html, "--tolerance": spreads}
+        beside |= {"--vary": vary, "--variants": variants, "--tolerance": spreads}
         clash = [flag for flag, value in beside.items() if value and flag != "--forces"]
         if clash:
             raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
     elif accuracy is not None or until is not None:
         raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
+    if html is not None:
+        from cli.mechanism import animation
+        from cli.show.page import refuse_long
     with _told(file):
         mechanism, bare, said, about = load(file)
         several = None
@@ -270,15 +274,18 @@ def run(
             home.warnings += said
             home.check_names()
             motion = InTime(home, *times_and_accuracy(time, accuracy), until, bare, forces)
-            return replace(motion.result(about), within=lambda: _told(file))
+            if html is not None:
+                refuse_long(len(motion.times))
+            result = _with_page(
+                motion.result(about), html, lambda: animation.page_in_time(motion, show.units)
+            )
+            return replace(result, within=lambda: _told(file))
         q = wanted(mechanism, at, sweep, inputs, bare)
         rates = None if order is None else ORDERS.index(order)
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)
         analysis.warnings += said
         analysis.check_names()
         if html is not None:
-            from cli.show.page import refuse_long
-
             refuse_long(q.n * (1 if several is None else several.count))
         alone = several is None and html is None and not spreads and own in ([], ["--forces"])
         if alone and show.streams and analysis.is_long:
@@ -292,7 +299,7 @@ def run(
             if spreads:
                 its = Tolerances(analysis, forces, draws or 0, seed, distribution, workers or 1)
                 return with_tolerances(result, its)
-            return _with_page(result, html, lambda: [("", analysis)], forces, show.units)
+            return _with_page(result, html, lambda: animation.page([("", analysis)], forces, show.units))
 
         def analysis_of(variant: Mechanism) -> Analysis:
             home = at is None and sweep is None and inputs is None
@@ -305,7 +312,9 @@ def run(
             mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
         )
         result = _with_page(
-            found.result(show.streams, show.as_json, table), html, found.analyses, forces, show.units
+            found.result(show.streams, show.as_json, table),
+            html,
+            lambda: animation.page(found.analyses(), forces, show.units),
         )
         return replace(
             result,
@@ -404,23 +413,11 @@ def _result(
     )
 
 
-def _with_page(
-    result: Result,
-    html: Path | None,
-    analyses: Callable[[], list[tuple[str, Analysis]]],
-    forces: bool,
-    units: str | None,
-) -> Result:
+def _with_page(result: Result, html: Path | None, page: Callable[[], Page]) -> Result:
     """Add the page that moves to what a result writes beside, where it is asked for."""
     if html is None:
         return result
-
-    def page() -> bytes:
-        from cli.mechanism.animation import page
-
-        return page(analyses(), forces, units).html.encode()
-
-    return replace(result, beside={**result.beside, html: page})
+    return replace(result, beside={**result.beside, html: lambda: page().html.encode()})
 
 
 @contextmanager

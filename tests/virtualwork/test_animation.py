@@ -118,6 +118,52 @@ def test_a_page_over_time_plays_by_its_own_clock() -> None:
     assert len(held["series"]) == 2
 
 
+def test_a_run_in_time_is_animated_through_dead_points() -> None:
+    """The rocker lets the crank go round; every column is that of the run's own motion."""
+    links = {
+        "crank": Link({"A": 0j, "B": 0.1}, mass=1, center=0.05),
+        "coupler": Link({"B": 0j, "C": 0.35}, mass=2, center=0.175, inertia=0.02),
+        "rocker": Link({"D": 0j, "C": 0.25}, mass=1.5, center=0.125, inertia=0.008),
+    }
+    at = np.radians(98.95026226818)
+    mechanism = Mechanism(
+        {"A": 0j, "D": 0.4},
+        links,
+        inputs=Input(link="rocker", value=at),
+        guess=Guess(at, {"crank": 1.05, "coupler": 0.47}),
+    )
+    run = mechanism.simulate(np.linspace(0, 1, 51), speed=5.0)
+    assert len(run.fine.legs) > 1
+    held = data(run.animate(forces=True))
+    (series,) = held["series"]
+    columns = {c["header"]: unpacked(c, 51) for c in series["columns"] if c["header"]}
+    assert (unpacked(series["columns"][held["clock"]], 51) == run.t).all()
+    assert (columns["rocker_rad"] == run.angle[:, 0]).all()
+    assert np.ptp(np.unwrap(columns["crank_angle_rad"])) > 2 * np.pi
+    for name in "BC":
+        assert (columns[f"{name}_x_m"] == run.motion.point(name).position[:, 0]).all()
+    # a link keeps its length in the columns
+    B, C = (columns[f"{name}_x_m"] + 1j * columns[f"{name}_y_m"] for name in "BC")
+    np.testing.assert_allclose(np.abs(C - B), 0.35, rtol=1e-14)
+    force = run.motion.reaction("A", on="crank")
+    np.testing.assert_allclose(columns["A_ground_on_crank_fy_N"], force[:, 1], rtol=1e-6)
+    assert len(series["forces"]) == 4
+    # no path over the rocker's range, which has two poses at each angle
+    assert not any("path" in p for p in series["points"])
+
+
+def test_few_times_have_fine_paths() -> None:
+    """A pendulum's bob stays on its circle between the times."""
+    bob = Link({"O": 0j, "P": 1}, mass=1, center=1)
+    pendulum = Mechanism({"O": 0j}, {"bob": bob}, inputs=Input(link="bob"), gravity=-9.81j)
+    run = pendulum.simulate([0, 0.3, 0.6], angle=0.0)
+    (series,) = data(run.animate())["series"]
+    path = {p["name"]: p["path"] for p in series["points"] if "path" in p}["P"]
+    x, y = (unpacked(part, series["fine"]) for part in path)
+    assert len(x) >= 181 * np.ptp(run.angle) / (2 * np.pi) > 40
+    np.testing.assert_allclose(np.hypot(x, y), 1, rtol=1e-6)
+
+
 def test_a_notebook_draws_a_mechanism() -> None:
     """The pins stand as far apart as the links are long, y upwards; a name stays text."""
     mechanism = four_bar("a < b & <script>", "<i>coupler</i>")

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +28,10 @@ from virtualwork.intime.step import Method
 from virtualwork.intime.travel import Travel, travel
 from virtualwork.intime.watch import Floats
 from virtualwork.motion import Motion
+
+if TYPE_CHECKING:
+    from dalembert.page import Page, Shown
+    from virtualwork.animation import JointForce
 
 # the tolerance of a step over the accuracy asked for, at first; between two solutions
 FIRST, APART = 0.1, 0.03
@@ -132,6 +136,58 @@ class Run:
         """The motion at the first time, in the coordinates of the beginning: for its joints."""
         first = self.angle[:1], self.speed[:1], self.acceleration[:1], self.t[:1]
         return self.fine.legs[0].coordinates.motion(*first)
+
+    def animate(self, forces: bool = False) -> Page:
+        """Return a page that moves: the mechanism by its own clock with play, slider, curves and values.
+
+        As `Motion.animate`, over time; its columns are in SI units and radians.
+
+        Parameters
+        ----------
+        forces : bool
+            Draw the joint forces too.
+
+        Raises
+        ------
+        ValueError
+            More times than a page can hold.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> bob = Link({"O": 0j, "P": 1}, mass=1, center=1)
+        >>> pendulum = Mechanism({"O": 0j}, {"bob": bob}, inputs=Input(link="bob"), gravity=-9.81j)
+        >>> "P_vx_m_s" in pendulum.simulate([0, 0.1, 0.2], angle=0.0).animate().html
+        True
+        """
+        from virtualwork.animation import JointForce, force_columns, plain
+        from virtualwork.table import moving_columns
+
+        m = self.assembly.mechanism
+        inputs = {
+            f"{e.name}_{'m' if e.is_slide else 'rad'}": self.angle[:, j] for j, e in enumerate(m.inputs)
+        }
+        table: dict[str, Any] = {"t_s": self.t, **inputs, "energy_J": self.energy}
+        table |= moving_columns(m, self.motion.poses, 3)
+        pairs = self.first_motion.dynamics.reactions.order.pairs if forces else ()
+        table |= force_columns(self.motion.dynamics, pairs)
+        return self.page(plain(table), ["t_s", *inputs], [JointForce.of(*pair) for pair in pairs])
+
+    def page(self, columns: Mapping[str, Shown], over: Sequence[str], arrows: Sequence[JointForce]) -> Page:
+        """Return the page of columns of this run, `t_s` and `over` among them; see `virtualwork.animation.Series`.
+
+        They have every place and rate, for a page solves nothing of a motion whose coordinates change on the way.
+        """
+        from virtualwork.animation import Series, moving_page
+        from virtualwork.picture.shapes import shapes_of
+
+        home = self.fine.legs[0].coordinates
+        poses = home.motion(self.angle, self.speed, self.acceleration, self.t).poses
+        drawing = shapes_of(self.first_motion.poses, self.motion.poses)
+        # beyond a dead point the inputs have another pose
+        fine = len(self.fine.legs) == 1
+        series = Series(poses, drawing, columns, over, arrows, fine=fine)
+        return moving_page(poses.mechanism.name, [series], time="t_s")
 
 
 def simulate(
