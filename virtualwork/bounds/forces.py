@@ -32,11 +32,10 @@ from virtualwork.formulas.loads import (
     InertiaForce,
     InertiaTorque,
     Load,
-    SpringEnd,
     Tabled,
-    TorsionEnd,
 )
 from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.formulas.springs import SpringEnd, TorsionEnd
 from virtualwork.formulas.statics import Statics
 from virtualwork.plan.joints import Joint
 

@@ -10,10 +10,8 @@ points between the guess and it: nothing is marched in angle.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from fractions import Fraction
+from dataclasses import replace
 from functools import cached_property, partial
-from math import lcm
 from typing import Any
 
 import numpy as np
@@ -21,10 +19,12 @@ import numpy as np
 from virtualwork.branch.change_point import ChangePoint, near_by, put, through
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.continuation import Continuation, along_lines
-from virtualwork.branch.radicand import crossing, lowest, rounding, vanishes
+from virtualwork.branch.limits import Limit, limits, own_range
+from virtualwork.branch.period import SAME, repetition
+from virtualwork.branch.radicand import lowest, rounding, vanishes
 from virtualwork.branch.winding import Winding, wind_along_lines
 from virtualwork.describe.errors import MechanismError
-from virtualwork.formulas.numbers import Complexes, Number, Reals
+from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.positions import State, run
 from virtualwork.plan.steps import Group, Step, turns
 
@@ -32,25 +32,6 @@ from virtualwork.plan.steps import Group, Step, turns
 SAMPLES = 720
 # a radicand below this may touch zero between two samples
 DIP = 0.05
-# change points nearer than this share of a turn are one
-SAME = 1e-6
-# turns of the input within which a branch is looked for to come back to itself
-TURNS = 32
-# within which the ends of its range are looked for
-TURNED = (1, 2, 4, 8, 16, TURNS)
-# sizes of the mechanism within which the limits of a slide are looked for
-SLIDES = (1, 2, 4)
-# poses of a turn that are compared for it
-COMPARED = 60
-
-
-@dataclass(frozen=True)
-class Limit:
-    """Where the input can go no further, because a group's radicand crosses zero; `side` is where it is assembled."""
-
-    group: str
-    input: float
-    side: int
 
 
 class Track:
@@ -63,23 +44,23 @@ class Track:
         self.active = len(m.inputs) == 1
         self.start = m.at[0]
         self.low = self.high = self.start
-        self._slides = m.inputs[0].is_slide
-        self.length = m.size if self._slides else 2 * np.pi
+        self.slides = m.inputs[0].is_slide
+        self.length = m.size if self.slides else 2 * np.pi
         self.flips: dict[str, Reals] = {}
         self.changes: dict[str, list[ChangePoint]] = {}
-        self._brackets: list[tuple[str, float, float]] = []
-        self._continuations: dict[str, Continuation] = {}
+        self.brackets: list[tuple[str, float, float]] = []
+        self.continuations: dict[str, Continuation] = {}
         self._winding = Winding(self)
         # one turn says it all where every turn of a body is a whole number of turns of the input
         factors = [k for t in turns(self.plan.steps) for _, k in (*t.angle.inputs, *t.angle.bases)]
-        self.whole = not self._slides and all(float(k).is_integer() for k in factors)
-        self._repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
+        self.whole = not self.slides and all(float(k).is_integer() for k in factors)
+        self.repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
         # no change point anywhere, however far the input turns
         self.settled = False
         # groups that are singular in every pose
         self.folded: set[str] = set()
-        # where one turn begins, and what it has
-        self._period: tuple[float, dict[str, list[ChangePoint]]] | None = None
+        # where one turn begins and what it has, where all others have the same
+        self.one_turn: tuple[float, dict[str, list[ChangePoint]]] | None = None
         if not self.active:
             self._look_around()
 
@@ -137,7 +118,7 @@ class Track:
 
     def _look_back(self, low: float, high: float) -> None:
         """Beyond an end of a group without a closed form it may stand as a turn before: then its other end matters too."""
-        for way in list(self._continuations.values()) if self.whole else ():
+        for way in list(self.continuations.values()) if self.whole else ():
             while (
                 way.stopped[1]
                 and not way.stopped[-1]
@@ -157,22 +138,22 @@ class Track:
 
     def _seen_all(self) -> bool:
         """Whether the one turn looked through says it all, or that it repeats."""
-        self.settled = self._repeats and not any(len(f) for f in self.flips.values())
-        if self._repeats and not self.assembly.geared:
+        self.settled = self.repeats and not any(len(f) for f in self.flips.values())
+        if self.repeats and not self.assembly.geared:
             # the first point of the turn may be found at its end again
             seam = self.low + (1 - SAME) * self.length
             turn = {name: [c for c in points if c.input < seam] for name, points in self.changes.items()}
             # every group is back on its branch
             if not any(len(points) % 2 for points in turn.values()):
-                self._period = self.low, turn
+                self.one_turn = self.low, turn
         return self.settled
 
     def _turn(self, a: float) -> None:
         """Look through the turn that begins at a, or take over what a turn before it had."""
-        if self._period is None:
+        if self.one_turn is None:
             self._scan(a, a + self.length)
             return
-        begin, turn = self._period
+        begin, turn = self.one_turn
         for name, points in turn.items():
             for change in points:
                 where = change.input + self.length * round((a - begin) / self.length)
@@ -215,10 +196,10 @@ class Track:
 
     def bridge_rates(self, group: Group, q: Number, k: int, x: list[Number], singular: Any) -> list[Number]:
         """Derivatives of a Newton group at poses where its Jacobian is singular though the branch goes on."""
-        if not self.active or group.name not in self._continuations:
+        if not self.active or group.name not in self.continuations:
             return x
         for i in np.flatnonzero(singular):
-            rate = self._continuations[group.name].bridge(float(np.atleast_1d(q)[i]), k)
+            rate = self.continuations[group.name].bridge(float(np.atleast_1d(q)[i]), k)
             if not np.isfinite(
                 rate
                 # close to a limit nothing goes on: what the Jacobian gives is kept
@@ -317,7 +298,7 @@ class Track:
         crossing = np.flatnonzero((m[:-1] >= 0) != (m[1:] >= 0))
         for i in crossing:
             if np.isfinite(m[i]) and np.isfinite(m[i + 1]) and inside[i] | inside[i + 1]:
-                self._brackets.append((group.name, float(q[i]), float(q[i + 1])))
+                self.brackets.append((group.name, float(q[i]), float(q[i + 1])))
         dips = 1 + np.flatnonzero((m[1:-1] <= m[:-2]) & (m[1:-1] < m[2:]) & (np.abs(m[1:-1]) < DIP))
         fresh: list[float] = []
         for i in dips:
@@ -327,15 +308,15 @@ class Track:
             where, depth, noise = found
             # the gap is narrower than the samples
             if depth < -noise and m[i] > 0:
-                self._brackets += [(group.name, float(q[i - 1]), where), (group.name, where, float(q[i + 1]))]
+                self.brackets += [(group.name, float(q[i - 1]), where), (group.name, where, float(q[i + 1]))]
             # a change point at the seam of two chunks belongs to both
             edge = 1e-9 * self.length
             if abs(depth) <= noise and a - edge <= where < b + edge:
                 known = self.flips.setdefault(group.name, np.empty(0))
                 self.assembly.plain.pop(group.name, None)
                 if not len(known) or np.abs(known - where).min() > SAME * self.length:
-                    self._brackets = [
-                        x for x in self._brackets if not (x[0] == group.name and x[1] <= where <= x[2])
+                    self.brackets = [
+                        x for x in self.brackets if not (x[0] == group.name and x[1] <= where <= x[2])
                     ]
                     # a guess at the change point itself means the branch beyond it
                     here = min(where, self.start) if abs(where - self.start) < 1e-9 * self.length else where
@@ -349,7 +330,7 @@ class Track:
     @property
     def has_limits(self) -> bool:
         """Was any limit met in what was covered?"""
-        return bool(self._brackets) or any(way.ends for way in self._continuations.values())
+        return bool(self.brackets) or any(way.ends for way in self.continuations.values())
 
     # --- the branch's own scale -----------------------------------------------------------------------------------
     @cached_property
@@ -357,48 +338,21 @@ class Track:
         """How many turns of the input tell the poses of the branch apart: its period.
 
         A branch between two limits needs what tells its own inputs apart; any other as many as bring every group back
-        to where it stood. None with a slide or several inputs, and where no number of turns up to `TURNS` does it.
+        to where it stood. None with a slide or several inputs, and where no number of turns up to `period.TURNS` does it.
         """
-        n = self._repetition
-        if n == 1 or self._slides or not self.has_limits:
+        n = self.repetition
+        if n == 1 or self.slides or not self.has_limits:
             return n
         low, high = self.range
         return max(1, int(np.ceil((high - low) / self.length))) if np.isfinite(high - low) else n
 
     @cached_property
-    def _repetition(self) -> int | None:
+    def repetition(self) -> int | None:
         """How many turns of the input bring every group back to where it stood, as far as poses can be compared.
 
         A branch that passes an odd number of change points in a turn needs two; a fractional gear its own number.
         """
-        if not self.active or self._slides:
-            return None
-        self.cover(self.start, self.start + self.length)
-        if self.settled or self._period is not None or not self.plan.groups:
-            return 1
-        steps = self.assembly.needed([key for g in self.plan.groups for key in self.plan.writes(g)])
-        factors = [k for t in turns(steps) for _, k in t.angle.inputs]
-        ratios = [Fraction(k).limit_denominator(TURNS) for k in factors]
-        if any(abs(float(r) - k) > 1e-12 * abs(k) for r, k in zip(ratios, factors, strict=True)):
-            return None
-        whole = lcm(*(r.denominator for r in ratios))
-        q = self.start + self.length * (np.arange(COMPARED) + 0.5) / COMPARED
-        here = self._stands(q)
-        for n in range(whole, TURNS + 1, whole):
-            self.cover(self.start - n * self.length, self.start + self.length)
-            # beyond a limit there is nothing to compare: what is not assembled contradicts nothing
-            if not (np.abs(self._stands(q - n * self.length) - here) > SAME).any():
-                return n
-        return None
-
-    def _stands(self, q: Reals) -> Complexes:
-        """Rotations and slides (over the size) of all groups at inputs q; NaN where not assembled."""
-        st = State([q], many=True)
-        with np.errstate(all="ignore"):
-            self.run(self.assembly.needed([key for g in self.plan.groups for key in self.plan.writes(g)]), st)
-        rows = [st.turn[b] for g in self.plan.groups for b in g.members]
-        rows += [st.slide[s] / self.assembly.mechanism.size for g in self.plan.groups for s in g.slides]
-        return np.array([np.broadcast_to(row, q.shape) for row in rows])
+        return repetition(self)
 
     @property
     def period(self) -> float | None:
@@ -414,18 +368,7 @@ class Track:
     @cached_property
     def range(self) -> tuple[float, float]:
         """The ends of the input's range around the guess, rad or m; infinite where none was met."""
-        low, high = -np.inf, np.inf
-        within = [n for n in TURNED if n <= (self._repetition or TURNS)]
-        for reach in SLIDES if self._slides else within[-1:] if self._repeats else within:
-            back = 0 if self._repeats else reach
-            self.cover(self.start - back * self.length, self.start + reach * self.length)
-            ends = self._around()
-            low = max((v.input for v in ends if v.side > 0 and v.input < self.start), default=-np.inf)
-            high = min((v.input for v in ends if v.side < 0 and v.input > self.start), default=np.inf)
-            # a slide: on, until every range that was met has both of its ends
-            if np.isfinite(high - low) and not (self._slides and (ends[0].side < 0 or ends[-1].side > 0)):
-                break
-        return low, high
+        return own_range(self)
 
     def limits(self) -> list[Limit]:
         """Where the input can go no further, over one period of the branch or what was covered, to full precision.
@@ -433,52 +376,19 @@ class Track:
         The poses of a branch between two limits are told apart over less than brings them back: ends of other ranges
         are those of the turns in which its own lies.
         """
-        back = 0.0 if self._repeats else self.length
-        self.cover(self.start - back, self.start + (self.period or self.length))
-        # a slide is looked along farther
-        if not self._slides and not self.has_limits:
-            return []
-        low, high = self.range
-        apart = not self._repeats or self.turns != self._repetition
-        if self.period is None or not np.isfinite(high - low) or not apart:
-            return self._ends()
-        self.cover(low, low + self.period)
-        near = SAME * self.length
-        return [v for v in self._around() if -near < v.input - low < self.period - near]
-
-    def _around(self) -> list[Limit]:
-        """The limits in what was covered; of a branch that repeats itself, before and after it too."""
-        ends = self._ends()
-        if not self._repeats:
-            return ends
-        again = (self._repetition or 1) * self.length
-        return [replace(v, input=v.input + n * again) for n in (-1, 0, 1) for v in ends]
-
-    def _ends(self) -> list[Limit]:
-        """The limits in what was covered."""
-        by_name = {g.name: g for g in self.plan.groups}
-        found = [
-            Limit(name, *crossing(partial(self.margin, by_name[name]), a, b)) for name, a, b in self._brackets
-        ]
-        for name, way in self._continuations.items():
-            found += [Limit(name, q, side) for q, side in way.ends]
-        unique: list[Limit] = []
-        for limit in sorted(found, key=lambda x: x.input):
-            if not unique or abs(limit.input - unique[-1].input) > 1e-10 * self.length:
-                unique.append(limit)
-        return unique
+        return limits(self)
 
     @property
     def crossings(self) -> list[float]:
         """Inputs at which two branches cross, in what was covered: of closed forms, and met on the way of the others."""
         found = [float(q) for flips in self.flips.values() for q in flips]
-        return found + [float(q) for way in self._continuations.values() for q in way.crossings]
+        return found + [float(q) for way in self.continuations.values() for q in way.crossings]
 
     # --- groups with no closed form ------------------------------------------------------------------------------
     def _continued(self, group: Group) -> Continuation:
-        if group.name not in self._continuations:
-            self._continuations[group.name] = Continuation(self, group)
-        return self._continuations[group.name]
+        if group.name not in self.continuations:
+            self.continuations[group.name] = Continuation(self, group)
+        return self.continuations[group.name]
 
     def _close_newton(self, group: Group, st: State) -> None:
         """Close a Newton group at the state's poses, from its continued branch."""
