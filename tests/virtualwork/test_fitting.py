@@ -122,22 +122,28 @@ def test_a_target_that_no_dimension_meets_is_met_at_the_least_squares():
 
 
 def test_a_gap_between_the_target_points_is_a_branch_defect():
-    # a triple rocker: the links reach 40 mm short of the input's dead centre at 0
-    rocker = changed(FOUR_BAR, {"links.crank.B.x": 0.09, "ground.D.x": 0.17, "links.coupler.C.x": 0.08})
+    # 100² + 90² − 2·100·90 cos q < (120 − 80)²: no pose for |q| < 23.56 deg, and the way round leads past it
+    longer = changed(FOUR_BAR, {"links.crank.B.x": 0.09})
     q = np.array([-1.0, -0.9, 0.9, 1.0])
-    motion = rocker.motion(np.linspace(-1, 1, 201)).assembled
-    assert rocker.motion(q).assembled.all()
-    free = {"links.rocker.C.x": (0.05, 0.11)}
-    found = rocker.fit("H", rocker.motion(q).point("H").position, free, inputs=q)
-    assert any("branch defect" in remark for remark in found.remarks) == (not motion.all())
+    target = longer.motion(q).point("H").position
+    found = longer.fit("H", target, {"links.coupler.H.y": (0.02, 0.07)}, inputs=q)
+    assert found.max < 1e-9
+    (said,) = found.remarks
+    limit = np.degrees(np.arccos((0.1**2 + 0.09**2 - 0.04**2) / (2 * 0.1 * 0.09)))
+    low, high = (float(word.split()[0]) for word in said.split("from ")[1].split(" (")[0].split(" to "))
+    assert "branch defect" in said
+    # the range is looked at in 720 steps
+    assert -limit <= low < -limit + np.degrees(2 / 720)
+    assert limit - np.degrees(2 / 720) < high <= limit
 
 
 def test_points_out_of_order_are_an_order_defect():
     # on a circle in the order 1, 3, 2, 4: whichever way the arm turns
     arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": 1})}, inputs=Input("arm"))
-    target = np.exp(1j * np.array([0.1, 0.8, 0.5, 1.2]))
-    found = arm.fit("P", target, {"links.arm.P.x": (0.5, 3)})
-    assert found.max > 0.1 or any("order defect" in remark for remark in found.remarks)
+    angles = np.array([0.1, 0.8, 0.5, 1.2])
+    found = arm.fit("P", np.exp(1j * angles), {"links.arm.P.x": (0.5, 3)})
+    assert found.inputs == pytest.approx(angles, abs=1e-9)
+    assert found.remarks == ("fit: order defect: the input meets target point 3 before target point 2",)
 
 
 def test_a_mechanism_off_the_tape_is_fitted_with_differences(monkeypatch):
