@@ -102,7 +102,7 @@ def test_ctrl_c_stops_all_workers(tmp_path):
         "mechanism",
         "m.toml",
         "--sweep",
-        "0deg:360deg:1deg",
+        "0deg:360deg:10deg",
     ]
     options = ["--draws", "300000", "--workers", "2", "--only", "C"]
     running = subprocess.Popen(
