@@ -15,11 +15,13 @@ from rigidbody3d import attitude as quaternion
 from rigidbody3d.free_rotation import FreeRotation
 from rigidbody3d.inertia import principal
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require, tensors_off
-from rigidbody3d.states import frame_of, in_blocks, plot_of
+from rigidbody3d.states import frame_of, in_blocks, page_of, plot_of
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import FigureBase
+
+    from dalembert.page import Page
 
 Array = NDArray[np.float64]
 
@@ -182,6 +184,13 @@ class FreeState:
         (the extra `plot`) an ImportError.
         """
         return plot_of(self, self.time, self.body.inertia, free=True, top=False, figure=figure)
+
+    def animate(self) -> Page:
+        """Return a page that moves: the body by its own clock with play, slider, curves and values.
+
+        A notebook shows it; `.save("body.html")` writes it. One body at several times, else a ValueError.
+        """
+        return page_of(self, self.time, self.body.inertia, top=False)
 
     def error_estimate(self, of: str = "attitude", tensor: ArrayLike = 0.0) -> Array:
         """Return a bound of the rounding error of a quantity, the given data as exact.

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import FigureBase
 
+    from dalembert.page import Page
+
 Array = NDArray[np.float64]
 
 BLOCK = 8192
@@ -32,14 +34,34 @@ def in_blocks(work: Callable[[Array], Array], time: Array, lead: tuple[int, ...]
     return out.reshape(lead + time.shape + (width,))
 
 
-def frame_of(state: State, time: Array) -> pd.DataFrame:
-    """Return a table of states: t_s, ω in body axes, attitude, momentum in space axes, energy."""
+def _columns(state: State, time: Array) -> dict[str, Array]:
     columns = {"t_s": time}
     columns |= components("omega_*_rad_s", state.omega)
     columns |= components("attitude_*", state.attitude, "wxyz")
     columns |= components("momentum_*_kg_m2_s", state.momentum)
-    columns |= {"energy_J": state.energy}
-    return table(columns, ("body", "state") if time.ndim else ("body",))
+    return columns | {"energy_J": state.energy}
+
+
+def frame_of(state: State, time: Array) -> pd.DataFrame:
+    """Return a table of states: t_s, ω in body axes, attitude, momentum in space axes, energy."""
+    return table(_columns(state, time), ("body", "state") if time.ndim else ("body",))
+
+
+def _one_body(state: State, time: Array) -> None:
+    if np.shape(state.omega) != (np.size(time), 3) or np.size(time) < 2:
+        raise ValueError(
+            f"a picture shows one body at several times, found ω of the shape {np.shape(state.omega)}"
+        )
+
+
+def page_of(state: State, time: Array, inertia: ArrayLike, *, top: bool) -> Page:
+    """Return the page of one body's states, its columns those of the table."""
+    from dalembert.page import Shown
+    from rigidbody3d.animation import turning_page
+
+    _one_body(state, time)
+    shown = {name: Shown(values, name) for name, values in _columns(state, time).items()}
+    return turning_page("", inertia, state.omega[0], shown, top)
 
 
 def plot_of(
@@ -48,8 +70,5 @@ def plot_of(
     """Draw one body's states over time: ω, its path in body axes (the polhode), the trace of an axis in space."""
     from rigidbody3d.picture.rotation import rotation
 
-    if np.shape(state.omega) != (np.size(time), 3) or np.size(time) < 2:
-        raise ValueError(
-            f"a picture shows one body at several times, found ω of the shape {np.shape(state.omega)}"
-        )
+    _one_body(state, time)
     return rotation(time, state.omega, state.attitude, inertia, free=free, top=top, figure=figure)

@@ -29,12 +29,14 @@ from dalembert.arithmetic.records import record
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require
-from rigidbody3d.states import frame_of, in_blocks, plot_of
+from rigidbody3d.states import frame_of, in_blocks, page_of, plot_of
 from rigidbody3d.top_roots import constants
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import FigureBase
+
+    from dalembert.page import Page
 
 Array = NDArray[np.float64]
 
@@ -182,6 +184,13 @@ class TopState:
         (the extra `plot`) an ImportError.
         """
         return plot_of(self, self.time, self.top.inertia, free=False, top=True, figure=figure)
+
+    def animate(self) -> Page:
+        """Return a page that moves: the body by its own clock with play, slider, curves and values.
+
+        A notebook shows it; `.save("body.html")` writes it. One body at several times, else a ValueError.
+        """
+        return page_of(self, self.time, self.top.inertia, top=True)
 
     def error_estimate(self, of: str = "attitude", moments: ArrayLike = 0.0) -> Array:
         """Return a bound of the rounding error of a quantity, the given data as exact.

@@ -60,9 +60,9 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "rigidbody3d": (
         ("__init__",),
-        ("animation", "freebody", "gyroscope", "integration", "momentum", "shaft", "top"),
+        ("freebody", "gyroscope", "integration", "momentum", "shaft", "top"),
         ("body", "free_rotation", "states"),
-        ("picture",),
+        ("animation", "picture"),
         ("rounding_in_time", "solids", "traced"),
         ("inertia",),
         ("rounding",),
