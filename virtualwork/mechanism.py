@@ -18,6 +18,7 @@ from virtualwork.motion import Motion
 if TYPE_CHECKING:
     from virtualwork.evaluator import Evaluator
     from virtualwork.family.family import Family
+    from virtualwork.family.fitting import Fit
     from virtualwork.intime.run import Run
     from virtualwork.study.check import Check
     from virtualwork.study.equilibrium import Equilibria
@@ -238,6 +239,53 @@ class Mechanism(Description):
         from virtualwork.family.family import Family
 
         return Family(self, numbers)
+
+    def fit(
+        self,
+        point: str,
+        target: ArrayLike,
+        free: Mapping[str, tuple[float, float]],
+        inputs: ArrayLike | None = None,
+        starts: int = 256,
+        seed: int = 0,
+    ) -> Fit[Mechanism]:
+        """Find the dimensions of which a point comes nearest to a target, in the sense of least squares.
+
+        Parameters
+        ----------
+        point : str
+            Its name.
+        target : array (n, 2), or complex (n,)
+            Places, m, two or more.
+        free : mapping of path to (low, high)
+            The dimensions that are looked for, and their bounds, SI.
+        inputs : array (n,), optional
+            The input at each place, rad or m; without it that is free, in the order of the places.
+        starts : int
+            Points of a Sobol sequence within the bounds; the description's own numbers are the first start.
+        seed : int
+            Of that sequence.
+
+        Raises
+        ------
+        DescriptionError
+            Unknown names, a dimension that moves no point, bounds the wrong way round.
+        MechanismError
+            Where no start within the bounds can be assembled at every place.
+        ValueError
+            A target of fewer than two points, or not as many inputs.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link
+        >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": 1})}, inputs=Input("arm"))
+        >>> found = arm.fit("P", [(2, 0), (0, 2)], {"links.arm.P.x": (0.5, 3)}, inputs=[0, 1.5707963267948966])
+        >>> round(found.parameters["links.arm.P.x"], 9), found.max < 1e-9
+        (2.0, True)
+        """
+        from virtualwork.family.fitting import fit
+
+        return fit(self, point, target, free, inputs, starts, seed)
 
     @cached_property
     def check(self) -> Check:

@@ -38,6 +38,7 @@ EXAMPLE = "klann"
 PANELS = {
     "What": "at sweep inputs only branch",
     "Variants": "change vary variants tolerance draws seed distribution workers",
+    "Fitting": "fit point free",
     "How": "order newton time accuracy until",
     "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states html schema",
 }
@@ -168,13 +169,22 @@ def run(
         int | None,
         typer.Option(metavar="N", help="Draw so many mechanisms within the tolerances, and solve each."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn, and of --fit.")] = 0,
     distribution: Annotated[
         Literal["normal", "uniform"],
         typer.Option(help="Of what is drawn: a limit is three standard deviations, or the end."),
     ] = "normal",
     workers: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Processes that solve what is drawn.")
+    ] = None,
+    fit: Annotated[
+        str | None,
+        typer.Option(metavar="TARGET.csv", help="Dimensions of which a point comes through these places."),
+    ] = None,
+    point: Annotated[str | None, typer.Option(metavar="NAME", help="Of --fit.")] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PATH=LOW:HIGH", help="With --fit: a dimension and its bounds; repeatable."),
     ] = None,
     schema: Annotated[
         bool,
@@ -208,28 +218,17 @@ def run(
         raise options.bad("--counterweights", "expected names of links")
     if flywheel is not None and not 0 < flywheel < float("inf"):
         raise options.bad("--flywheel", "expected a positive speed fluctuation, such as 0.02")
-    if (flywheel is not None or counterweights is not None) and sweep is None and inputs is None:
+    cycle = sweep is not None or inputs is not None
+    if (flywheel is not None or counterweights is not None) and not cycle:
         flag = "--flywheel" if flywheel is not None else "--counterweights"
         raise options.bad(flag, "expected a cycle too: --sweep, such as --sweep 0deg:360deg:1deg")
     if graph is not None and show.plot is None:
         raise options.bad("--graph", "expected --plot FILE too: the picture that the curves are drawn into")
-    for flag, given in (
-        ("--states", states),
-        ("--explain", explain),
-        ("--graph", graph),
-        ("--plot", show.plot),
-    ):
+    of_one = {"--states": states, "--explain": explain, "--graph": graph, "--plot": show.plot}
+    for flag, given in of_one.items():
         if given and (vary or variants is not None):
             raise options.bad(flag, "expected one mechanism, and no --vary or --variants beside it")
-    request = Request(
-        newton,
-        check,
-        forces,
-        equilibrium,
-        flywheel,
-        counterweights,
-        swept=sweep is not None or inputs is not None,
-    )
+    request = Request(newton, check, forces, equilibrium, flywheel, counterweights, swept=cycle)
     own = request.tables
     if show.holds_one and len(own) > 1:
         raise options.bad(
@@ -246,6 +245,15 @@ def run(
         others = {"--vary": vary, "--variants": variants, "--branch": branch, "--states": states}
         others |= {"--graph": graph, "--html": html, **dict.fromkeys(own, "asked"), "--forces": None}
         checked(draws, tolerance, [flag for flag, given in others.items() if given])
+    if fit is not None or point is not None or free:
+        from cli.mechanism.fitted import fitted
+
+        unfit: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--vary": vary}
+        unfit |= {"--variants": variants, "--time": time, "--only": only, "--order": order, "--html": html}
+        unfit |= {"--states": states, "--tolerance": spreads, "--branch": branch, **of_one}
+        there = [*own, *(flag for flag, value in unfit.items() if value)]
+        with _told(file):
+            return replace(fitted(file, fit, point, free, change, seed, there), within=lambda: _told(file))
     if time is not None:
         beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
         beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}

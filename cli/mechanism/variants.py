@@ -72,7 +72,7 @@ def assigned(m: Mechanism, bare: Mapping[str, str], given: Sequence[str]) -> Mec
     """The mechanism after every `--set PATH=VALUE`; both coordinates of a point as `X,Y`."""
     numbers: list[tuple[Dimension, float]] = []
     for text in given:
-        found, value = _assignment(m, text, "--set", "VALUE")
+        found, value = assignment(m, text, "--set", "VALUE")
         parts = value.split(",")
         if len(parts) != len(found):
             wanted = "one value" if len(found) == 1 else "two values X,Y"
@@ -99,7 +99,7 @@ def asked(
         return None
     found: dict[Dimension, list[float]] = {}
     for text in vary:
-        (dimension, *both), span = _assignment(m, text, "--vary", "FROM:TO:STEP")
+        (dimension, *both), span = assignment(m, text, "--vary", "FROM:TO:STEP")
         if both:
             raise options.bad("--vary", f"'{text}': two numbers: expected {dimension.path} or {both[0].path}")
         if dimension in found:
@@ -118,7 +118,7 @@ def asked(
     return variants
 
 
-def _assignment(m: Mechanism, text: str, flag: str, what: str) -> tuple[tuple[Dimension, ...], str]:
+def assignment(m: Mechanism, text: str, flag: str, what: str) -> tuple[tuple[Dimension, ...], str]:
     """Part `PATH=VALUE`, and find the path."""
     path, equals, value = text.rpartition("=")
     if not equals or not path.strip():

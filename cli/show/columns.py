@@ -105,5 +105,7 @@ class Result:
     """What the table in parts is called."""
     within: Callable[[], AbstractContextManager[None]] = nullcontext
     """What the forms are made within: it turns errors of a library into those that a user is told."""
+    toml: Callable[[], bytes] | None = None
+    """The mechanism's file that was found, for -o FILE.toml."""
     late_warnings: Callable[[], list[str]] = list
     """What there is to say once all parts are written."""

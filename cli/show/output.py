@@ -31,6 +31,10 @@ PANELS = {
 """Heading of the help -> the options below it that every command shares."""
 
 
+FORMS = (".csv", ".json", ".xlsx", ".parquet", ".md", ".tex", ".html")
+"""Suffixes of what every result can be written as."""
+
+
 def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
     """Return the check of a file's option: its suffix is one of these."""
 
@@ -57,7 +61,7 @@ class ShowOptions:
             "--output",
             metavar="FILE",
             help="Write the result to FILE (.csv, .json, .xlsx, .parquet, .md, .tex or .html).",
-            callback=suffix_among(".csv", ".json", ".xlsx", ".parquet", ".md", ".tex", ".html"),
+            callback=suffix_among(*FORMS, ".toml"),
         ),
     ] = None
     plot: Annotated[
@@ -211,6 +215,10 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
     from cli.show.files import write
     from cli.show.text import csv_text, json_parts, paragraphs, table_text
 
+    if options.form == ".toml" and result.toml is None:
+        raise typer.BadParameter(
+            f"'{options.output}' has no known suffix: expected {', '.join(FORMS)}", param_hint="-o"
+        )
     files = named()
     result = _in_chosen_units(result, options.units)
     if result.blocks is not None:
@@ -248,6 +256,8 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         write(options.plot, drawn(result.figure, options.plot.suffix.lower()[1:]))
     if output is not None and options.form == ".json":
         write(output, (part.encode() for part in json_parts(_document(result))))
+    elif output is not None and options.form == ".toml" and result.toml is not None:
+        write(output, result.toml())
     elif output is not None and options.holds_one:
         write(output, _one_table(options.form, iter([first()])))
     elif output is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.recorded import Recorder
 from dalembert.arithmetic.tape import Tape
 from dalembert.arithmetic.varied import Varied
@@ -56,6 +57,7 @@ class Written:
             self.mechanism, self.plan, signs, moves, turning, assembly.geared, settled, recorder
         )
         self._tapes: dict[tuple[Key, ...], Tape] = {}
+        self._slopes: dict[tuple[Key, tuple[str, ...]], Tape] = {}
 
     @property
     def closed(self) -> list[Group]:
@@ -68,6 +70,14 @@ class Written:
         if asked not in self._tapes:
             self._tapes[asked] = self.recording.tape(asked)
         return self._tapes[asked]
+
+    def slopes(self, key: Key, enters: tuple[str, ...]) -> Tape:
+        """The tape of a quantity's derivatives to what enters, as far as it hangs on that; written once."""
+        if (key, enters) not in self._slopes:
+            tape = self.tape((key,))
+            there = [name for name in enters if name in tape.inputs]
+            self._slopes[key, enters] = derivatives(tape, there)
+        return self._slopes[key, enters]
 
     def choice(self, group: Group) -> Tape:
         """The tape of a group's radicand, and of its distance from what the guess says, at the inputs of the guess."""

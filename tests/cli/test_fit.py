@@ -1,0 +1,135 @@
+"""`--fit`: a path of a mechanism with other dimensions is met, and the file written with them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import pytest
+
+FOUR_BAR = """name = "four-bar"  # as drawn
+[units]
+length = "mm"
+angle = "deg"
+[ground]
+A = [0, 0]
+D = [100, 0]  # held
+[links.crank]
+points = { A = [0, 0], B = [40, 0] }
+[links.coupler]
+points = { B = [0, 0], C = ["12 cm", 0], H = { from = "C", length = 50, angle = 30 } }
+[links.rocker]
+points = { D = [0, 0], C = [80, 0] }
+[input]
+link = "crank"
+angle = 40
+[guess]
+at = 40
+coupler = 20
+rocker = 57
+"""
+TRUE = ("--set", "links.crank.B.x=36", "--set", "links.coupler.C.x=117", "--set", "links.coupler.H.angle=34")
+FREE = (
+    *("--free", "links.crank.B.x=28:52", "--free", "links.coupler.C.x=84:156"),
+    *("--free", "links.coupler.H.angle=21:39"),
+)
+FIT = ("mechanism", "m.toml", "--fit", "t.csv", "--point", "H")
+
+
+@pytest.fixture
+def target(dalembert, tmp_path):
+    """The file, and a target that the sweep of another mechanism wrote."""
+    (tmp_path / "m.toml").write_text(FOUR_BAR)
+    options = (*TRUE, "--sweep", "0:330:30", "--only", "H", "-o", "t.csv")
+    assert dalembert("mechanism", "m.toml", *options).returncode == 0
+    return tmp_path / "t.csv"
+
+
+def rows(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_the_file_is_written_with_what_was_found(dalembert, target, tmp_path):
+    found = dalembert(*FIT, *FREE, "-o", "fitted.toml", "--json")
+    assert found.returncode == 0
+    assert found.stderr == ""
+    fit = json.loads(found.stdout)["fit"]
+    assert fit["parameters"] == pytest.approx(
+        {"links.crank.B.x_m": 0.036, "links.coupler.C.x_m": 0.117, "links.coupler.H.angle_deg": 34}, rel=1e-9
+    )
+    assert fit["max_m"] < 1e-10
+    assert fit["rms_m"] <= fit["max_m"]
+    assert fit["starts"] > 0
+    assert fit["evaluations"] >= fit["starts"]
+    # every line but those of the free points is as it was
+    before, after = FOUR_BAR.splitlines(), (tmp_path / "fitted.toml").read_text().splitlines()
+    assert [i for i, (a, b) in enumerate(zip(before, after, strict=True)) if a != b] == [8, 10]
+    again = dalembert(
+        "mechanism",
+        "fitted.toml",
+        "--sweep",
+        "0:330:30",
+        "--only",
+        "H",
+        "--expect",
+        "t.csv",
+        "--rtol",
+        "1e-9",
+    )
+    assert again.returncode == 0, again.stdout
+
+
+def test_without_timing_the_inputs_are_found_too(dalembert, target):
+    table = rows(target.read_text())
+    target.write_text(
+        "x_mm,y_mm\n" + "".join(f"{1e3 * float(r['H_x_m'])},{1e3 * float(r['H_y_m'])}\n" for r in table)
+    )
+    found = dalembert(*FIT, *FREE)
+    (row,) = rows(found.stdout)
+    assert float(row["max_m"]) < 1e-10
+    assert set(row) >= {"links.crank.B.x_m", "links.coupler.H.angle_deg", "rms_m", "starts", "evaluations"}
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--point", "H", "--fit", "t.csv"), "expected --free"),
+        ((*FREE, "--fit", "t.csv"), "expected --point"),
+        ((*FREE, "--point", "H"), "expected --fit"),
+        ((*FREE, "--point", "X", "--fit", "t.csv"), "no point is named 'X'"),
+        (
+            ("--free", "links.crnk.B.x=1:2", "--point", "H", "--fit", "t.csv"),
+            "did you mean 'links.crank.B.x'",
+        ),
+        (("--free", "ground.D.x=3:2", "--point", "H", "--fit", "t.csv"), "the lower bound first"),
+        (("--free", "ground.D.x=3", "--point", "H", "--fit", "t.csv"), "PATH=LOW:HIGH"),
+        (("--free", "ground.D=1:2", "--point", "H", "--fit", "t.csv"), "two numbers"),
+        (("--free", "links.crank.mass=1:2", "--point", "H", "--fit", "t.csv"), "moves no point"),
+        ((*FREE, "--point", "H", "--fit", "t.csv", "--at", "3"), "without --at"),
+        (("--at", "3"), "has no known suffix"),
+    ],
+)
+def test_a_bad_option_is_named_and_nothing_is_written(dalembert, target, tmp_path, options, said):
+    found = dalembert("mechanism", "m.toml", *options, "-o", "fitted.toml")
+    assert found.returncode == 2
+    assert said in found.stderr
+    assert not found.stdout
+    assert not (tmp_path / "fitted.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("x_mm,y_mm\n1,2\n", "a target of one point"),
+        ("x_mm\n1\n2\n", "no column y_m"),
+        ("x_mm,y_mm\n1,2\nNaN,3\n", "row 2 (line 3), column x_mm"),
+    ],
+)
+def test_a_bad_target_is_one_line_and_nothing_is_written(dalembert, target, tmp_path, table, said):
+    target.write_text(table)
+    found = dalembert(*FIT, *FREE, "-o", "fitted.toml")
+    assert found.returncode == 1
+    assert said in found.stderr
+    assert found.stderr.count("\n") == 1
+    assert not (tmp_path / "fitted.toml").exists()
