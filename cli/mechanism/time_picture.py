@@ -49,6 +49,8 @@ def draw(run: Run, m: Mechanism) -> Figure:
 
 def _instants(axes: Axes, run: Run, m: Mechanism) -> None:
     """The mechanism at a few times, the later the darker, with the way of its free points."""
+    from matplotlib.ticker import MaxNLocator
+
     scale, unit = (1e3, "mm") if m.size < 2 else (1.0, "m")
     motion = run.motion
     chosen = np.unique(np.linspace(0, len(run.t) - 1, INSTANTS).astype(int))
@@ -69,6 +71,7 @@ def _instants(axes: Axes, run: Run, m: Mechanism) -> None:
     for z in m.ground.values():
         axes.plot(z.real * scale, z.imag * scale, marker="^", ms=8, mfc="white", mec="black", zorder=10)
     axes.set_aspect("equal", adjustable="datalim")
+    axes.xaxis.set_major_locator(MaxNLocator(4))
     axes.legend(fontsize=8, frameon=False, title="mechanism at")
     axes.set_xlabel(f"x, {unit}")
     axes.set_ylabel(f"y, {unit}")

@@ -146,7 +146,7 @@ free_angle = 70
 MASSIVE = {"four-bar": FOUR_BAR, "springs": SPRINGS, "slider-crank": SLIDER_CRANK, "planetary": PLANETARY}
 ROBOTS = (".xml", ".urdf", ".sdf")
 # inputs that no joint is: another joint is driven in their place, and it is said
-ELSEWHERE = {"desk-lamp"}
+ELSEWHERE = {"desk-lamp", "double-pendulum"}
 FILES = sorted(p for p in EXAMPLES.glob("*/*.toml") if "[links." in p.read_text())
 
 
@@ -170,6 +170,7 @@ def moved(m: Mechanism, inputs: Any) -> Any:
 
 
 # --- round trips --------------------------------------------------------------------------------------------------
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ROBOTS)
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.parent.name)
 def test_every_example_comes_back_with_the_same_motion(file: Path, suffix: str) -> None:
@@ -217,6 +218,7 @@ def test_the_effort_comes_back(name: str, suffix: str) -> None:
     assert theirs == pytest.approx(ours, abs=1e-10 * np.abs(ours).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ROBOTS)
 def test_mechanisms_of_any_topology_come_back(suffix: str) -> None:
     """Pins, slots, prisms and gears joined at random; where the format or the import leaves out by name is no case."""
@@ -466,6 +468,7 @@ def test_curves_are_the_motion(tmp_path: Path, dalembert: Run) -> None:
     assert found == pytest.approx(m.motion(q).point("P").position * 1000, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".dxf", ".svg"])
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.parent.name)
 def test_every_example_is_drawn(file: Path, suffix: str) -> None:

@@ -205,6 +205,7 @@ def test_keys(four_bar: tuple[Opened, list[Row], list[Row]]) -> None:
     assert {before, opened("return document.documentElement.dataset.theme")} == {"dark", "light"}
 
 
+@pytest.mark.slow
 def test_it_is_drawn_to_scale(four_bar: tuple[Opened, list[Row], list[Row]]) -> None:
     """Crank 40, rocker 80 and the coupler's sides keep their lengths in every pose, all in one scale."""
     opened = four_bar[0]
@@ -222,6 +223,7 @@ def test_it_is_drawn_to_scale(four_bar: tuple[Opened, list[Row], list[Row]]) -> 
         assert turned == pytest.approx(i, abs=0.1)
 
 
+@pytest.mark.slow
 def test_arrows_point_as_the_forces_and_velocities_do(four_bar: tuple[Opened, list[Row], list[Row]]) -> None:
     opened, poses, forces = four_bar
     opened.set(77)
@@ -246,6 +248,7 @@ def test_arrows_point_as_the_forces_and_velocities_do(four_bar: tuple[Opened, li
     assert ratios == pytest.approx([ratios[0].real] * len(ratios), rel=0.1)
 
 
+@pytest.mark.slow
 def test_instant_centres_are_where_the_lines_meet(four_bar: tuple[Opened, list[Row], list[Row]]) -> None:
     """Aronhold and Kennedy: coupler on ground where crank and rocker meet, crank on rocker where coupler and ground do."""
     opened, poses, _ = four_bar
@@ -264,6 +267,7 @@ def test_instant_centres_are_where_the_lines_meet(four_bar: tuple[Opened, list[R
         }
 
 
+@pytest.mark.slow
 def test_the_velocity_polygon_holds_an_image_of_the_coupler(
     four_bar: tuple[Opened, list[Row], list[Row]],
 ) -> None:
@@ -280,6 +284,7 @@ def test_the_velocity_polygon_holds_an_image_of_the_coupler(
     assert opened.faults() == []
 
 
+@pytest.mark.slow
 def test_a_plot_shows_any_column_and_seeks(four_bar: tuple[Opened, list[Row], list[Row]]) -> None:
     opened, poses, forces = four_bar
     listed = set(
@@ -306,6 +311,7 @@ def test_a_plot_shows_any_column_and_seeks(four_bar: tuple[Opened, list[Row], li
     assert opened.pose() == pytest.approx(180, abs=1)
 
 
+@pytest.mark.slow
 def test_it_fits_a_phone(four_bar: tuple[Opened, list[Row], list[Row]]) -> None:
     opened = four_bar[0]
     for width in (360, 768, 1200):
@@ -321,6 +327,7 @@ def test_it_fits_a_phone(four_bar: tuple[Opened, list[Row], list[Row]]) -> None:
             opened.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
+@pytest.mark.slow
 def test_a_pose_that_cannot_be_assembled_is_named(dalembert: Run, tmp_path: Path, browser: Any) -> None:
     text = FOUR_BAR.replace("B = [40, 0]", "B = [70, 0]")
     (tmp_path / "m.toml").write_text(text)
@@ -337,6 +344,7 @@ def test_a_pose_that_cannot_be_assembled_is_named(dalembert: Run, tmp_path: Path
     assert opened.faults() == []
 
 
+@pytest.mark.slow
 def test_a_six_bar_takes_less_than_300_kB(dalembert: Run, tmp_path: Path) -> None:
     """The Klann leg with masses, velocities, accelerations and all joint forces."""
     text = (files("cli.examples") / "klann" / "klann.toml").read_text()
@@ -350,6 +358,7 @@ def test_a_six_bar_takes_less_than_300_kB(dalembert: Run, tmp_path: Path) -> Non
     assert len(page.encode()) <= 300_000
 
 
+@pytest.mark.slow
 def test_variants_are_ghosts_over_the_first(dalembert: Run, tmp_path: Path, browser: Any) -> None:
     """Cranks of 40, 35 and 30 mm; with 500 mm it cannot be put together."""
     (tmp_path / "m.toml").write_text(FOUR_BAR)
@@ -370,6 +379,7 @@ def test_variants_are_ghosts_over_the_first(dalembert: Run, tmp_path: Path, brow
     assert opened.faults() == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("example", "file", "options"),
     [
@@ -408,6 +418,7 @@ def test_examples_open_without_a_fault(
         assert centre[1] == pytest.approx(point.position[0, 1], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_spin(dalembert: Run, tmp_path: Path, browser: Any) -> None:
     (tmp_path / "body.toml").write_text(
         f"name = '{EVIL}'\ninertia = [1, 2, 3]\nomega = [0.01, 1, 0.01]\nattitude = [0.8, 0.6, 0, 0]\n"
@@ -437,6 +448,7 @@ def test_spin(dalembert: Run, tmp_path: Path, browser: Any) -> None:
     assert opened.faults() == []
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_the_same_page_in_a_frame(tmp_path: Path, browser: Any) -> None:
     motion = Mechanism.from_toml_text(FOUR_BAR).motion(np.linspace(0, 2 * np.pi, 37), speed=10.0)
     (tmp_path / "cell.html").write_text(
@@ -505,6 +517,7 @@ crank = 60
 """
 
 
+@pytest.mark.slow
 def test_a_motion_under_forces_moves_by_its_own_time(dalembert: Run, tmp_path: Path, browser: Any) -> None:
     """The rocker drives the crank through dead points, where the run goes on in another coordinate."""
     (tmp_path / "m.toml").write_text(LET_GO)

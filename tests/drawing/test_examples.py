@@ -81,7 +81,9 @@ def draw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Draw:
     return drawn
 
 
-@pytest.mark.parametrize(("name", "words"), CALLS)
+@pytest.mark.parametrize(
+    ("name", "words"), [*CALLS[:6], *(pytest.param(*call, marks=pytest.mark.slow) for call in CALLS[6:])]
+)
 def test_a_picture_can_be_handed_on(
     name: str, words: str | None, draw: Draw, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -233,6 +233,7 @@ def double_pendulum(**more: object) -> Mechanism:
     )
 
 
+@pytest.mark.slow
 def test_free_double_pendulum_keeps_energy_and_momentum() -> None:
     m = double_pendulum(gravity=0j)
     run = m.simulate(np.linspace(0, 20, 101), speed=[3.0, -5.0], accuracy=1e-10)
@@ -304,6 +305,7 @@ def bars(n: int) -> Mechanism:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("n", "exact"), [(1, 31.9147412977380245), (2, 31.7505971869861018), (10, 31.6217298227818726)]
 )
@@ -395,6 +397,7 @@ def test_breaking_away_when_a_torque_has_grown() -> None:
     assert np.allclose(run.speed[:, 0], [0, 0, 0, 0.5, 2], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_four_bar_with_friction_in_every_pin_against_the_poses_own() -> None:
     """The effort of every pose that moves, friction settled by iteration there, is none; at last it stands."""
     m = four_bar(friction=[Friction(j, 0.3, 0.02) for j in "ABCD"])
@@ -406,6 +409,7 @@ def test_four_bar_with_friction_in_every_pin_against_the_poses_own() -> None:
     assert np.abs(run.energy_drift).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_double_pendulum_with_friction_comes_to_rest_one_joint_at_a_time() -> None:
     m = double_pendulum(friction=[Friction("O", 0.3, 0.1), Friction("P", 0.3, 0.1)])
     run = m.simulate(np.linspace(0, 60, 61), accuracy=1e-6)
@@ -426,12 +430,14 @@ def test_no_mass_on_an_input_is_named() -> None:
         bare.simulate([0, 1])
 
 
+@pytest.mark.slow
 def test_an_accuracy_beyond_rounding_names_what_is_reached() -> None:
     run = pendulum().simulate(np.linspace(0, 100, 11), angle=0.0, accuracy=1e-15)
     assert "accuracy 1e-15 is beyond rounding here" in run.warnings[0]
     assert run.error_estimate.max() < 1e-9
 
 
+@pytest.mark.slow
 def test_chaos_past_all_digits_is_said() -> None:
     run = double_pendulum().simulate(np.linspace(0, 60, 61), angle=[2.0, 2.5])
     assert "no digit is known from" in run.warnings[0]

@@ -43,6 +43,7 @@ def family(v=60):
     return four_bar().vary({path: nominal + 0.02 * rng.normal(size=v) for path, nominal in lengths.items()})
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("default")
 def test_a_dask_cluster_gives_the_same_numbers(monkeypatch):
     distributed = pytest.importorskip("distributed")
@@ -69,6 +70,7 @@ def test_a_part_whose_worker_died_is_done_again_once(tmp_path):
     assert again
 
 
+@pytest.mark.slow
 def test_a_part_that_kills_its_worker_twice_is_named():
     with Processes(1) as pool, pytest.raises(LostPart, match="part 2: its worker died"):
         list(in_parts(eval, [("1",), ("__import__('os')._exit(1)",)], pool))
@@ -88,6 +90,7 @@ def test_what_is_sent_of_a_part_is_the_numbers_of_its_variants():
     assert sizes[2] - sizes[0] == pytest.approx(8 * 4 * 9999, abs=16)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
 def test_ctrl_c_stops_all_workers(tmp_path):
     text = (
@@ -102,7 +105,7 @@ def test_ctrl_c_stops_all_workers(tmp_path):
         "mechanism",
         "m.toml",
         "--sweep",
-        "0deg:360deg:1deg",
+        "0deg:360deg:10deg",
     ]
     options = ["--draws", "300000", "--workers", "2", "--only", "C"]
     running = subprocess.Popen(
