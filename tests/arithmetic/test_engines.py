@@ -52,7 +52,9 @@ def random_tape(seed: int, length: int = 60) -> Tape:
     )
 
 
-@pytest.mark.parametrize("n", [1, 3, 7, 8, 9, 1000, 1024, 1025, 2500])
+@pytest.mark.parametrize(
+    "n", [7, 1025, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 3, 8, 9, 1000, 1024, 2500))]
+)
 @pytest.mark.parametrize("uniform", ["", "b", "ac", "abc"])
 def test_engines_agree_for_any_count_of_lanes(n: int, uniform: str) -> None:
     rng = np.random.default_rng(n)
@@ -178,6 +180,7 @@ def test_threads_at_once_get_the_right_numbers(engine: str) -> None:
         np.testing.assert_array_equal(got, wanted)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_very_long_tape_is_not_compiled() -> None:
     recorder = Recorder()
     x = recorder.input("x")

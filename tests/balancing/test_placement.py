@@ -13,6 +13,7 @@ from scipy.optimize import linprog, lsq_linear
 from balancing import drill_depth, place, place_from_stock, transfer
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.integers(1, 9), st.integers(0, 2**31), st.booleans())
 def test_least_mass_or_least_error(n: int, seed: int, limited: bool) -> None:
@@ -68,6 +69,7 @@ def test_of_every_choice_the_nearest_and_then_the_lightest(n: int, seed: int, mo
         assert found.bound == pytest.approx(miss.min(), abs=1e-11)
 
 
+@pytest.mark.slow
 def test_several_pieces_on_a_place_and_its_limit() -> None:
     square = np.radians([0, 90, 180, 270])
     assert place_from_stock(7, square, [1, 2, 5], pieces=2).masses.tolist() == [7, 0, 0, 0]
