@@ -17,6 +17,22 @@ COMMAND = Path(sys.executable).with_name("dalembert")
 sys.path.append(str(Path(__file__).parents[1]))
 
 
+# of a test with a table of cases so many run at once; the others are slow, so that README's command stays short
+CASES = 2
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what is beyond the first cases of a test as slow: `-m slow` and .ci/run have them all."""
+    seen: dict[tuple[str, str], int] = {}
+    for item in items:
+        if getattr(item, "callspec", None) is not None:
+            key = item.nodeid.split("::")[0], item.originalname  # type: ignore[attr-defined]
+            seen[key] = seen.get(key, 0) + 1
+            if seen[key] > CASES:
+                item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture
 def dalembert(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
     """Run `dalembert ARGS` in an empty folder; a traceback or an internal error fails the test."""
