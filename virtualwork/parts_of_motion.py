@@ -83,10 +83,11 @@ class PointMotion:
         --------
         A crank of length 1 at 60°: y = √3/2.
 
+        >>> import math
         >>> from virtualwork import Input, Link, Mechanism
         >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
-        >>> point = crank.motion(np.pi / 3).point("P")
-        >>> bool(abs(point.position[0, 1] - np.sqrt(0.75)) <= point.error_estimate()[0] < 1e-15)
+        >>> point = crank.motion(math.pi / 3).point("P")
+        >>> bool(abs(point.position[0, 1] - math.sqrt(0.75)) <= point.error_estimate()[0] < 1e-15)
         True
         """
         return self.motion.rounding.point(self.body, self.place, self.node, order)
@@ -109,9 +110,10 @@ class PointMotion:
         --------
         A crank's end moves along with its length:
 
+        >>> import math
         >>> from virtualwork import Input, Link, Mechanism
         >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
-        >>> crank.motion(np.pi / 2).point("P").sensitivity("links.crank.P.x").round(15)
+        >>> crank.motion(math.pi / 2).point("P").sensitivity("links.crank.P.x").round(15)
         array([[0., 1.]])
         """
         return xy(self.motion.derivative(("point", self.body, self.place, self.node, order), path))

@@ -47,8 +47,9 @@ def prefixed(largest: float, unit: str, at_most: float = 1e4) -> tuple[float, st
 def quiet(values: ArrayLike, scale: float) -> NDArray[np.float64]:
     """Return numbers without what rounding leaves of zero, or of a constant, beside the scale of their kind.
 
-    >>> quiet([1e-15, 1.0, 1.0 + 2e-16], 1.0).tolist()
-    [0.0, 1.0, 1.0]
+    >>> nothing, one, also_one = quiet([1e-15, 1.0, 1.0 + 2e-16], 1.0).tolist()
+    >>> nothing, one == also_one
+    (0.0, True)
     """
     x = np.asarray(values, dtype=float)
     finite = np.abs(x[np.isfinite(x)])
