@@ -22,13 +22,12 @@ from virtualwork.describe.errors import MechanismError
 from virtualwork.family.branches import LANES, meet_on_the_way, signs
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import FORCES, Key, over_blocks
+from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.recording import COMPLEX, NAMES, names
+from virtualwork.formulas.recording import COMPLEX, NAMES, NEAR, names
 
 Mask = NDArray[np.bool_]
-# sin² of a transmission angle below which a force may have no digit left
-NEAR = 1e-18
 # the key of 0 where a pose is assembled
 ASSEMBLED: Key = ("assembled",)
 # variants described one by one whose poses are kept for the next question
@@ -203,12 +202,10 @@ class Solver:
         m, written = self.part.mechanism, self.written
         if written is None:
             return False
-        if not any(key[0] in FORCES for key in keys):
-            return True
-        if m.friction or m.torsion_springs or any(f.history for f in m.forces):
+        forces = any(key[0] in FORCES for key in keys)
+        if forces and (m.torsion_springs or any(f.history for f in m.forces)):
             return False
-        joints = any(key[0] in ("newton-euler", "force", "moment") for key in keys)
-        return not (joints and written.recording.forces[0].order.redundant)
+        return written.recording.takes(keys)
 
     def _on_tape(self, keys: Sequence[Key], rows: NDArray[np.intp], out: list[Any]) -> Mask:
         """Work out some variants on the tape; which of them are better described alone."""
@@ -268,12 +265,14 @@ class Solver:
             self._poses[i] = poses
         poses = self._poses[i]
         if poses is not None:
+            # one for all: friction and the order of joint forces are worked out once
+            forces = Dynamics(poses)
             with np.errstate(all="ignore"):
                 for key, values in zip(keys, out, strict=True):
                     if key == ASSEMBLED:
                         values[i] = np.where(poses.assembled, 0.0, np.nan)
                     else:
-                        values[i] = over_blocks(poses, key)
+                        values[i] = over_blocks(poses, key, forces)
 
 
 _solvers: dict[tuple[str, int], Solver] = {}

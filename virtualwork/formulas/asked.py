@@ -31,13 +31,11 @@ def pays(asked: dict[Any, int], n: int, keys: Sequence[Key]) -> Literal["blocks"
     asked[key] = asked.get(key, 0) + n
     if n == 1:
         return "one" if asked[key] > OFTEN else "blocks"
-    return "lanes" if asked[key] > MANY_POSES and _compiled_code() else "blocks"
-
-
-def _compiled_code() -> bool:
+    if asked[key] <= MANY_POSES:
+        return "blocks"
     from dalembert.arithmetic.engines import compiled_code
 
-    return compiled_code()
+    return "lanes" if compiled_code() else "blocks"
 
 
 def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:

@@ -17,21 +17,17 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.engines import floats, run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.asked import FORCES, Key, over_blocks
+from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.linear import SINGULAR
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.poses import Branch, Poses
-from virtualwork.formulas.recording import NAMES, Recording, names
+from virtualwork.formulas.recording import NAMES, NEAR, Recording, names
 from virtualwork.formulas.scene import Scene
-
-# sin² of a transmission angle below which a force may have no digit left
-NEAR = 1e-18
-
 
 # two threads that ask one assembly at once
 _writing = Lock()
-
 
 # a function of floats, the places of its arguments among the input and its rates, and whether each result is a vector
 Ready = tuple[Callable[..., tuple[float, ...]], tuple[int, ...], tuple[bool, ...]]
@@ -92,18 +88,9 @@ class Lanes:
         return recorded(self.branch, moves)
 
     def takes(self, keys: Iterable[Key]) -> bool:
-        """Whether the tape has these quantities: friction iterates, and redundant statics is a system of its own."""
+        """Whether the tape has these quantities; a group that is singular in every pose it has not."""
         recording = self.recording
-        if self.branch.folded:
-            return False
-        if not any(key[0] in FORCES for key in keys):
-            return True
-        if self.branch.mechanism.friction:
-            return False
-        return not (
-            any(key[0] in ("newton-euler", "force", "moment") for key in keys)
-            and recording.forces[0].order.redundant
-        )
+        return not self.branch.folded and recording.takes(keys)
 
     def operations(self, keys: Iterable[Key]) -> int:
         """What quantities of a pose cost, in operations on real numbers, with all that they hang on."""
@@ -118,8 +105,9 @@ class Lanes:
         if new and self.poses.n == 1 and self.one(tuple(new)):
             return [self.known[key] for key in keys]
         if new and not self.takes(new):
+            forces = Dynamics(self.poses)
             for key in new:
-                self.known[key] = over_blocks(self.poses, key)
+                self.known[key] = over_blocks(self.poses, key, forces)
         elif new:
             self._run(new)
         return [self.known[key] for key in keys]
@@ -176,19 +164,19 @@ class Lanes:
             self.known[key] = value
         if careful.any():
             some = self.poses.some(careful)
+            again = Dynamics(some)
             for key in keys:
-                self.known[key][careful] = over_blocks(some, key)
+                self.known[key][careful] = over_blocks(some, key, again)
 
     def entering(self, inputs: Iterable[str]) -> dict[str, Any]:
         """The inputs of a tape, by their names."""
         poses, found = self.poses, {}
-        one = poses.n == 1
         for name in inputs:
             kind, _, of = name.partition(" ")
             if not of:
                 j = int(name[1:])
                 value = poses.inputs[:, j] if name[0] == "q" else poses.rates[NAMES.index(name[0]) - 1][j]
-                found[name] = float(value[0]) if one and np.ndim(value) else value
+                found[name] = value
             elif kind == "sign":
                 found[name] = np.asarray(self.branch.sign(of, poses.inputs[:, 0]), dtype=float)
             elif kind == "x":
@@ -201,7 +189,7 @@ class Lanes:
                 found[name] = self._spring(int(of.removeprefix("spring ")))
             else:
                 found[name] = self._angle(of)
-        if one:
+        if poses.n == 1:
             found = {name: float(np.ravel(value)[0]) for name, value in found.items()}
         return found
 

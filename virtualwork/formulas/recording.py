@@ -25,7 +25,7 @@ from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
 from virtualwork.describe.loads import TorsionSpring
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.asked import FORCES, Key
 from virtualwork.formulas.block import Block, Shared, Table
 from virtualwork.formulas.dynamics import resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
@@ -40,6 +40,8 @@ from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import JointForces
 from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
 
+# sin² of a transmission angle below which a force may have no digit left
+NEAR = 1e-18
 NAMES = ("q", "v", "a", "j")
 
 
@@ -228,6 +230,15 @@ class Recording:
             found = getattr(self, f"_{key[0].replace('-', '_').replace(' ', '_')}")(*key[1:])
             self._values[key] = 0.0 if found is None else bare(found)
         return self._values[key]
+
+    def takes(self, keys: Iterable[Key]) -> bool:
+        """Whether quantities can be written down: friction iterates, and redundant statics is a system of its own."""
+        kinds = {key[0] for key in keys}
+        if kinds.isdisjoint(FORCES):
+            return True
+        if self.mechanism.friction:
+            return False
+        return kinds.isdisjoint(("newton-euler", "force", "moment")) or not self.forces[0].order.redundant
 
     def tape(self, keys: Iterable[Key]) -> Tape:
         """The tape of quantities: outputs are called as `names` says."""
