@@ -25,15 +25,7 @@ from cli.read.robots.robot import (
     unit,
 )
 
-KINDS: dict[str, Kind] = {
-    "revolute": "turn",
-    "continuous": "turn",
-    "prismatic": "slide",
-    "fixed": "fixed",
-    "ball": "ball",
-    "spherical": "ball",
-}
-ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+KINDS: dict[str, Kind] = {**sdf.KINDS, "spherical": "ball"}
 
 
 def read(file: str, root: Element) -> Robot:
@@ -74,7 +66,7 @@ def _inertial(file: str, where: str, element: Element | None) -> Inertial | None
     if element is None:
         return None
     mass, inertia = child(element, "mass"), child(element, "inertia")
-    texts = {key: "0" if inertia is None else inertia.get(key, "0") for key in ENTRIES}
+    texts = {key: "0" if inertia is None else inertia.get(key, "0") for key in sdf.ENTRIES}
     entries = {key: number(file, f"{where}, inertia {key}", text) for key, text in texts.items()}
     return Inertial(
         0.0 if mass is None else number(file, f"{where}, mass", mass.get("value")),
