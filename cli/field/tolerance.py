@@ -71,8 +71,9 @@ def _read(found: FieldBalancing, solved: Solved, i: int, run: str) -> Complex:
     rows = [j for j, (name, _) in enumerate(solved.group.logs[i].rows) if name == run]
     there = fit.present[rows]
     sums = np.where(there, fit.readings[rows], 0).sum(axis=0)
-    count = np.where(there.any(axis=0), there.sum(axis=0), np.nan)
-    return np.asarray(sums / count - _runout(found, solved))
+    mean = np.full_like(sums, np.nan)
+    np.divide(sums, there.sum(axis=0), out=mean, where=there.any(axis=0))
+    return np.asarray(mean - _runout(found, solved))
 
 
 def _runout(found: FieldBalancing, solved: Solved) -> Complex:

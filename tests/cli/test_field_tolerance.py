@@ -117,3 +117,21 @@ def test_an_unbalance_that_the_readings_do_not_determine(
     done = dalembert("field", "-", "--text", *options, "--report", "r.html", stdin=text)
     assert "initial not determined" in done.stdout
     assert ">not determined</td>" in (tmp_path / "r.html").read_text()
+
+
+def test_a_sensor_that_the_first_run_lacks(dalembert: Dalembert, tmp_path: Path) -> None:
+    """A mean of no reading is no number; numpy's warning of it is none to show."""
+    log = """run,sensor,speed_rpm,amplitude_um_pp,phase_deg,trial_plane,trial_unbalance_g_mm,trial_angle_deg
+0,1,1500,70,40,,,
+A,1,1500,95,60,A,500,30
+A,2,1500,40,100,A,500,30
+B,1,1500,60,10,A;B,400;100,90;120
+B,2,1500,80,140,A;B,400;100,90;120
+C,1,1500,20,10,,,
+C,2,1500,50,120,,,
+"""
+    (tmp_path / "runs.csv").write_text(log)
+    done = dalembert("field", "runs.csv", "--report", "out.html", *TOLERANCE)
+    assert done.returncode == 0, done.stderr
+    assert "RuntimeWarning" not in done.stderr
+    assert "nan" not in (tmp_path / "out.html").read_text()
