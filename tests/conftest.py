@@ -12,9 +12,13 @@ from typing import Any
 
 import pytest
 
-COMMAND = Path(sys.executable).with_name("dalembert")
-# for `benchmarks`, which is not installed; last, so that what is installed is what is tested
+# for `benchmarks` and `tests`, which are not installed; last, so that what is installed is what is tested
 sys.path.append(str(Path(__file__).parents[1]))
+
+from tests.forks import LONGEST, Forks
+
+COMMAND = Path(sys.executable).with_name("dalembert")
+Dalembert = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
 # of a test with a table of cases so many run at once; the others are slow, so that README's command stays short
@@ -33,24 +37,41 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 item.add_marker(pytest.mark.slow)
 
 
+@pytest.fixture(scope="session")
+def forks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Forks]:
+    """The process that has imported the command and forks for each call of it."""
+    made = Forks(tmp_path_factory.mktemp("streams"))
+    yield made
+    made.close()
+
+
 @pytest.fixture
-def dalembert(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Run `dalembert ARGS` in an empty folder; a traceback or an internal error fails the test."""
+def dalembert(forks: Forks, tmp_path: Path) -> Dalembert:
+    """Run `dalembert ARGS` in an empty folder; a traceback or an internal error fails the test.
+
+    DALEMBERT_TESTS_BY_SCRIPT=1 calls the installed script itself: .ci/run does so in its slow tests.
+    """
 
     def run(*arguments: object, stdin: str | bytes = "") -> subprocess.CompletedProcess[str]:
-        done = subprocess.run(
-            [str(COMMAND), *map(str, arguments)],
-            input=stdin if isinstance(stdin, bytes) else stdin.encode(),
-            capture_output=True,
-            cwd=tmp_path,
-            env={**os.environ, "COLUMNS": "120"},
-            timeout=120,
-            check=False,
-        )
-        out, err = done.stdout.decode(), done.stderr.decode()
+        words, given = [*map(str, arguments)], stdin if isinstance(stdin, bytes) else stdin.encode()
+        env = {**os.environ, "COLUMNS": "120"}
+        if os.environ.get("DALEMBERT_TESTS_BY_SCRIPT"):
+            done = subprocess.run(
+                [str(COMMAND), *words],
+                input=given,
+                capture_output=True,
+                cwd=tmp_path,
+                env=env,
+                timeout=LONGEST,
+                check=False,
+            )
+            status, out, err = done.returncode, done.stdout.decode(), done.stderr.decode()
+        else:
+            status, *streams = forks.run(words, tmp_path, env, given)
+            out, err = (stream.decode() for stream in streams)
         assert "Traceback" not in err, err
         assert "internal error" not in err, err
-        return subprocess.CompletedProcess(done.args, done.returncode, out, err)
+        return subprocess.CompletedProcess([str(COMMAND), *words], status, out, err)
 
     return run
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import re
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
+
 HEAD = "mass_kg,radius_mm,angle_deg,z_mm\n"
 GOOD = HEAD + "9,30,60,20\n6,50,210,65\n"
 TWO = ("--plane", "A:0mm:20mm", "--plane", "B:90mm:20mm")

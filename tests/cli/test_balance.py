@@ -8,13 +8,13 @@ import io
 import json
 import math
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
+
 ROTOR = "name,mass_kg,radius_mm,angle_deg,z_mm\nm1,9,30,60,20\nm2,6,50,210,65\n"
 TWO = ("--plane", "A:0mm:20mm", "--plane", "B:90mm:20mm")
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import openpyxl
 import pytest
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
 
 KLANN = ("mechanism", "klann.toml", "--only", "H")
 SLIDE = """

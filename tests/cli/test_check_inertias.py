@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from subprocess import CompletedProcess
 from typing import Any
 
 import numpy as np
@@ -13,8 +11,8 @@ import pytest
 
 from cli.body.inertias import Check, checks
 from cli.read.robots.reading import read
+from tests.conftest import Dalembert
 
-Run = Callable[..., "CompletedProcess[str]"]
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
@@ -134,7 +132,7 @@ MJCF = """<mujoco><worldbody><body name="arm"><inertial pos="0 0 0" mass="1" {}/
         ("r.xml", MJCF.format('fullinertia="0.01 0.01 0.2 0 0 0"')),
     ],
 )
-def test_every_format_by_the_command(name: str, text: str, tmp_path: Path, dalembert: Run) -> None:
+def test_every_format_by_the_command(name: str, text: str, tmp_path: Path, dalembert: Dalembert) -> None:
     (tmp_path / name).write_text(text)
     done = dalembert("body", name, "--check-inertias", "--json")
     assert done.returncode == 1
@@ -162,7 +160,7 @@ def test_every_format_by_the_command(name: str, text: str, tmp_path: Path, dalem
     ],
 )
 def test_bad_calls(
-    text: str, arguments: list[Any], status: int, said: str, tmp_path: Path, dalembert: Run
+    text: str, arguments: list[Any], status: int, said: str, tmp_path: Path, dalembert: Dalembert
 ) -> None:
     (tmp_path / "r.urdf").write_text(text)
     done = dalembert("body", "r.urdf", "--check-inertias", *arguments)

@@ -6,12 +6,11 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
 
 COMMAND = Path(sys.executable).with_name("dalembert")
 

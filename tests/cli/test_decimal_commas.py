@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
 
 FAN = """run;sensor;amplitude_mm_s;phase_deg;trial_plane;trial_mass_g;trial_angle_deg
 0;1;3,4;116,5;;;

@@ -6,7 +6,6 @@ import csv
 import io
 import math
 import subprocess
-from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path
 
@@ -15,9 +14,8 @@ import pytest
 
 from benchmarks.truth.four_bar import coupler_point
 from benchmarks.truth.mechanism import Exact
+from tests.conftest import Dalembert
 from virtualwork import Mechanism
-
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 
 # the triple rocker of 2.1, 1.3, 0.9 and 2.7 ends where coupler and rocker are in line
 LENGTHS = ("2.1", "1.3", "0.9", "2.7")

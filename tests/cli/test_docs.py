@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,7 +15,6 @@ from cli.spin.read import KEYS
 from virtualwork.describe.keys import ENTRIES, FILE, GUESS, LINK, POINT
 from virtualwork.describe.keys import UNITS as OF_FILE
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 ROOT = Path(__file__).parents[2]
 PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs").glob("*.md"))}
 DOCS = "\n".join(PAGES.values())

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import shlex
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from cli.examples.command import describe, names
-
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
 
 
 def test_the_list_has_one_line_each(dalembert: Dalembert) -> None:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable
 from pathlib import Path
-from subprocess import CompletedProcess
 from typing import Any
 from xml.etree import ElementTree
 
@@ -18,9 +16,9 @@ from cli.exports.written import written
 from cli.imports.assembled import described
 from cli.imports.drawn import settle
 from cli.imports.told import read
+from tests.conftest import Dalembert
 from virtualwork import Mechanism
 
-Run = Callable[..., "CompletedProcess[str]"]
 EXAMPLES = Path(__file__).parents[2] / "cli" / "examples"
 FOUR_BAR = """
 name = "Four-bar <A & B>"
@@ -402,7 +400,7 @@ def test_gears_of_two_joints_are_mimicked_others_are_gearboxes() -> None:
 
 
 # --- drawings -------------------------------------------------------------------------------------------------------
-def test_ezdxf_reads_the_drawing_in_the_unit_of_the_file(tmp_path: Path, dalembert: Run) -> None:
+def test_ezdxf_reads_the_drawing_in_the_unit_of_the_file(tmp_path: Path, dalembert: Dalembert) -> None:
     ezdxf = pytest.importorskip(
         "ezdxf", reason="DXF is written and read by ezdxf: pip install 'dalembert[cad]'"
     )
@@ -437,7 +435,7 @@ def test_ezdxf_reads_the_drawing_in_the_unit_of_the_file(tmp_path: Path, dalembe
     assert (tmp_path / "m.dxf").read_text().startswith("999\nFour-bar <A & B>, from m.toml by dalembert ")
 
 
-def test_svg_is_in_true_size_with_a_group_for_each_layer(tmp_path: Path, dalembert: Run) -> None:
+def test_svg_is_in_true_size_with_a_group_for_each_layer(tmp_path: Path, dalembert: Dalembert) -> None:
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     assert dalembert("export", "m.toml", "-o", "m.svg", "--at", "90").returncode == 0
     text = (tmp_path / "m.svg").read_text()
@@ -456,7 +454,7 @@ def test_svg_is_in_true_size_with_a_group_for_each_layer(tmp_path: Path, dalembe
     assert "Four-bar &lt;A &amp; B" not in text.partition("<svg")[0]
 
 
-def test_curves_are_the_motion(tmp_path: Path, dalembert: Run) -> None:
+def test_curves_are_the_motion(tmp_path: Path, dalembert: Dalembert) -> None:
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     assert dalembert("export", "m.toml", "-o", "m.csv").returncode == 0
     rows = list(csv.DictReader((tmp_path / "m.csv").read_text().splitlines()))
@@ -478,7 +476,7 @@ def test_every_example_is_drawn(file: Path, suffix: str) -> None:
 
 
 # --- what is said, and what is refused ----------------------------------------------------------------------------
-def test_source_and_version_stand_in_every_robot(tmp_path: Path, dalembert: Run) -> None:
+def test_source_and_version_stand_in_every_robot(tmp_path: Path, dalembert: Dalembert) -> None:
     (tmp_path / "my--file.toml").write_text(FOUR_BAR)
     for suffix in ROBOTS:
         assert dalembert("export", "my--file.toml", "-o", f"m{suffix}").returncode == 0
@@ -487,7 +485,7 @@ def test_source_and_version_stand_in_every_robot(tmp_path: Path, dalembert: Run)
         assert "crank = 60 deg" in head
 
 
-def test_what_a_format_cannot_hold_is_named(tmp_path: Path, dalembert: Run) -> None:
+def test_what_a_format_cannot_hold_is_named(tmp_path: Path, dalembert: Dalembert) -> None:
     (tmp_path / "m.toml").write_text(
         FOUR_BAR.replace("mass = 0.5\n", "") + '[[springs]]\nbetween = ["P", "ground.D"]\nstiffness = 100\n'
     )
@@ -509,7 +507,9 @@ def test_what_a_format_cannot_hold_is_named(tmp_path: Path, dalembert: Run) -> N
         (["broken.toml", "-o", "m.xml"], 1, "no valid TOML"),
     ],
 )  # fmt: skip
-def test_bad_calls(arguments: list[str], status: int, said: str, tmp_path: Path, dalembert: Run) -> None:
+def test_bad_calls(
+    arguments: list[str], status: int, said: str, tmp_path: Path, dalembert: Dalembert
+) -> None:
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     (tmp_path / "far.toml").write_text(FOUR_BAR.replace("C = [110, 0]", "C = [400, 0]"))
     (tmp_path / "broken.toml").write_text("[ground\n")
@@ -519,7 +519,7 @@ def test_bad_calls(arguments: list[str], status: int, said: str, tmp_path: Path,
     assert not list(tmp_path.glob("m.[!t]*"))
 
 
-def test_an_input_is_never_written_over(tmp_path: Path, dalembert: Run) -> None:
+def test_an_input_is_never_written_over(tmp_path: Path, dalembert: Dalembert) -> None:
     (tmp_path / "m.xml").write_text(FOUR_BAR)
     assert dalembert("export", "m.xml", "-o", "m.xml").returncode == 2
     assert (tmp_path / "m.xml").read_text() == FOUR_BAR

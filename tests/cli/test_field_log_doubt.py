@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import subprocess
-from collections.abc import Callable
 from datetime import datetime
 from typing import Any
 
 import numpy as np
 import pytest
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
 
 HEAD = "date,run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n"
 DATES = ["2012-03-01", "14.03.2013", "2014/07/02", "2015-01-01 08:30", "2016-12-24", "1.2.2018", "2019-05"]

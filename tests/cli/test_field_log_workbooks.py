@@ -14,7 +14,8 @@ from xml.sax.saxutils import escape
 import openpyxl
 import pytest
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
+
 Rows = Sequence[Sequence[object]]
 
 LAYOUT_1 = """ ;DoubleA;phase;mass;phase

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +12,7 @@ import numpy as np
 import pytest
 
 from balancing import LogBalance, fit_with_prior, joint_fit, least_squares, pooled_prior, stored_prior
-
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
 
 HEAD = "run,sensor,state,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n"
 STATES = ("cold", "hot")

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
 
 PLANE = ("--plane", "A:20mm")
 PLAIN = "mass_g,radius_mm,angle_deg\n90.5,30,60\n60,50.25,210\n"

@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,11 +14,11 @@ import pytest
 from cli.errors import LONGEST
 from cli.mechanism.read import wanted
 from cli.mechanism.solve import Analysis, load
+from tests.conftest import Dalembert
 
 # each is a whole command, or several
 pytestmark = pytest.mark.slow
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 COMMAND = Path(sys.executable).with_name("dalembert")
 
 CRANK = "[ground]\nA = [0, 0]\n[links.crank]\npoints = { A = [0, 0], B = [1, 0] }\n"

@@ -9,13 +9,12 @@ import os
 import pty
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import openpyxl
 import pytest
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
 
 ROTOR = "rotor,name,mass_g,radius_mm,angle_deg,z_mm\na|b_%,W1,90.5,30,60,20\na|b_%,W2,60,50.25,210,65\n=1+1,W,1,2,3,4\n"
 BALANCE = ("balance", "-", "--plane", "A:0mm:20mm", "--plane", "B:90mm:20mm")

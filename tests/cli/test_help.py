@@ -9,15 +9,14 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from cli.app import COMMANDS
 from cli.show.progress import progress
+from tests.conftest import Dalembert
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 COMMAND = Path(sys.executable).with_name("dalembert")
 SOLVING = ("balance", "field", "place", "mechanism", "work", "body", "spin")
 

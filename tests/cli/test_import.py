@@ -8,10 +8,8 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from subprocess import CompletedProcess
 from typing import Any
 
 import numpy as np
@@ -24,9 +22,9 @@ from cli.imports.assembled import described
 from cli.imports.drawn import settle
 from cli.imports.pmksweb import number
 from cli.imports.told import read
+from tests.conftest import Dalembert
 from virtualwork import Guess, Mechanism
 
-Run = Callable[..., "CompletedProcess[str]"]
 FORMATS = Path(__file__).parents[1] / "data" / "formats"
 FILES = sorted(file for file in FORMATS.glob("*/*"))
 POINT = re.compile(r"-?\d+(?:\.\d+)?")
@@ -66,7 +64,9 @@ def moves(m: Mechanism, way: float) -> None:
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: f"{file.parent.name}/{file.name}")
-def test_every_example_is_taken_over_assembled_and_moves(file: Path, dalembert: Run, tmp_path: Path) -> None:
+def test_every_example_is_taken_over_assembled_and_moves(
+    file: Path, dalembert: Dalembert, tmp_path: Path
+) -> None:
     done = dalembert("import", file, "-o", "m.toml")
     assert done.returncode == 0, done.stderr
     assert "refuse" not in done.stderr
@@ -187,7 +187,7 @@ def test_a_slot_turns_with_its_first_link_over_a_pin_of_the_ground() -> None:
     assert (x, y) == pytest.approx((5 * 4 / math.hypot(4, 1), 1 - 5 / math.hypot(4, 1)))
 
 
-def test_several_links_become_several_files(dalembert: Run, tmp_path: Path) -> None:
+def test_several_links_become_several_files(dalembert: Dalembert, tmp_path: Path) -> None:
     text = f"Walkers:\nhttp://x/?mech={FOUR_BAR}\n\nslower\nhttp://x/?set=s5&mech={FOUR_BAR}\n"
     (tmp_path / "links.txt").write_text(text)
     assert dalembert("import", "links.txt").returncode == 2
@@ -518,7 +518,7 @@ def test_bad_files_are_refused_with_their_place(text: str, said: str) -> None:
     assert said in str(error.value)
 
 
-def test_a_bad_file_is_one_line_and_status_1(dalembert: Run, tmp_path: Path) -> None:
+def test_a_bad_file_is_one_line_and_status_1(dalembert: Dalembert, tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("ground a R 0 0\na b R 1")
     done = dalembert("import", "a.txt", "-o", "b.toml")
     assert done.returncode == 1
@@ -532,7 +532,7 @@ def test_a_bad_file_is_one_line_and_status_1(dalembert: Run, tmp_path: Path) -> 
     assert "10 MB" in dalembert("import", "big.txt").stderr
 
 
-def test_an_input_is_never_written_over(dalembert: Run, tmp_path: Path) -> None:
+def test_an_input_is_never_written_over(dalembert: Dalembert, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(FOUR_BAR.replace("|", "\n"))
     assert dalembert("import", "a.toml", "-o", "a.toml").returncode == 2
     assert "ground input" in (tmp_path / "a.toml").read_text()

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 import random
 import re
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
@@ -17,9 +15,8 @@ from cli.errors import DataError
 from cli.imports.assembled import described
 from cli.imports.drawn import settle
 from cli.imports.told import read
+from tests.conftest import Dalembert
 from virtualwork import Mechanism
-
-Run = Callable[..., "CompletedProcess[str]"]
 
 
 def taken(text: str, folder: Path | None = None) -> tuple[Mechanism, list[str]]:
@@ -368,7 +365,7 @@ def test_includes_are_followed_inside_the_folder_alone(tmp_path: Path) -> None:
     assert "more than 20 files are included" in refused(text.format("loop.xml"), home)
 
 
-def test_a_large_robot_is_refused(dalembert: Run, tmp_path: Path) -> None:
+def test_a_large_robot_is_refused(dalembert: Dalembert, tmp_path: Path) -> None:
     (tmp_path / "big.urdf").write_bytes(b"<robot>" + b" " * 10_000_001)
     for arguments in (("import", "big.urdf"), ("body", "big.urdf", "--check-inertias")):
         done = dalembert(*arguments)
@@ -376,7 +373,7 @@ def test_a_large_robot_is_refused(dalembert: Run, tmp_path: Path) -> None:
         assert "expected at most 10000000 (10 MB)" in done.stderr
 
 
-def test_the_command_tells_the_format_or_takes_its_name(dalembert: Run, tmp_path: Path) -> None:
+def test_the_command_tells_the_format_or_takes_its_name(dalembert: Dalembert, tmp_path: Path) -> None:
     (tmp_path / "robot.txt").write_text(SDF)
     done = dalembert("import", "robot.txt", "-o", "m.toml")
     assert done.returncode == 0, done.stderr

@@ -6,20 +6,17 @@ import csv
 import re
 import subprocess
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.conftest import COMMAND
+from tests.conftest import COMMAND, Dalembert
 from virtualwork import Mechanism
-
-Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
 @pytest.fixture(autouse=True)
-def _klann(dalembert: Run) -> None:
+def _klann(dalembert: Dalembert) -> None:
     dalembert("examples", "klann")
 
 
@@ -29,7 +26,7 @@ def columns(path: Path) -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize("count", [16384, 20000])  # the last block is of one pose, or of many
-def test_the_digits_of_the_sweep_solved_whole(count: int, dalembert: Run, tmp_path: Path) -> None:
+def test_the_digits_of_the_sweep_solved_whole(count: int, dalembert: Dalembert, tmp_path: Path) -> None:
     sweep = f"0deg:360deg/{count}"
     done = dalembert("mechanism", "klann.toml", "--sweep", sweep, "--only", "H,leg", "-o", "h.csv")
     assert done.returncode == 0, done.stderr
@@ -41,7 +38,7 @@ def test_the_digits_of_the_sweep_solved_whole(count: int, dalembert: Run, tmp_pa
     assert found["step"][-1] == str(count + 1)
 
 
-def test_poses_that_are_not_there_are_counted_over_all_blocks(dalembert: Run, tmp_path: Path) -> None:
+def test_poses_that_are_not_there_are_counted_over_all_blocks(dalembert: Dalembert, tmp_path: Path) -> None:
     text = """
         [ground]
         A = [0, 0]
@@ -81,7 +78,7 @@ def test_the_reader_of_a_pipe_may_leave(tmp_path: Path) -> None:
     assert time.monotonic() - begun < 30
 
 
-def test_json_names_the_largest_count_that_fits(dalembert: Run) -> None:
+def test_json_names_the_largest_count_that_fits(dalembert: Dalembert) -> None:
     sweep = "0deg:360deg/999999999"
     done = dalembert("mechanism", "klann.toml", "--sweep", sweep, "--forces", "--json")
     assert (done.returncode, done.stdout) == (1, "")

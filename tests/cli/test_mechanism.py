@@ -7,14 +7,14 @@ import io
 import json
 import math
 import subprocess
-from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
+
 EXAMPLES = Path(str(files("cli") / "examples"))
 KLANN = EXAMPLES / "klann" / "klann.toml"
 FOUR = """

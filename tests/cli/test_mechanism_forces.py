@@ -6,14 +6,12 @@ import csv
 import io
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
-from subprocess import CompletedProcess
 from typing import Any
 
 import pytest
 
-Run = Callable[..., "CompletedProcess[str]"]
+from tests.conftest import Dalembert
 
 FOUR_BAR = """
 name = "four-bar"
@@ -131,13 +129,13 @@ two = 140
 """
 
 
-def run_json(dalembert: Run, *arguments: str, stdin: str = "") -> Any:
+def run_json(dalembert: Dalembert, *arguments: str, stdin: str = "") -> Any:
     done = dalembert("mechanism", *arguments, "--json", stdin=stdin)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
 
-def test_json_of_forces(dalembert: Run) -> None:
+def test_json_of_forces(dalembert: Dalembert) -> None:
     found = run_json(dalembert, "-", "--forces", "--at", "40deg", "--at", "200deg", stdin=FOUR_BAR)
     for pose in found["poses"]:
         effort = pose["effort"]
@@ -153,13 +151,13 @@ def test_json_of_forces(dalembert: Run) -> None:
     assert "cycle" not in found
 
 
-def test_only_restricts_the_reactions(dalembert: Run) -> None:
+def test_only_restricts_the_reactions(dalembert: Dalembert) -> None:
     found = run_json(dalembert, "-", "--forces", "--only", "C", stdin=FOUR_BAR)
     (pose,) = found["poses"]
     assert [r["joint"] for r in pose["reactions"]] == ["C"]
 
 
-def test_three_links_at_a_pin(dalembert: Run) -> None:
+def test_three_links_at_a_pin(dalembert: Dalembert) -> None:
     text = FOUR_BAR + "\n[links.arm]\npoints = { C = [0, 0], F = [90, 0] }\nmass = 0.4\ncenter = [40, 0]\n"
     text += "[links.last]\npoints = { H = [0, 0], F = [110, 0] }\n"
     text = text.replace("D = [100, 0]", "D = [100, 0]\nH = [200, 20]").replace(
@@ -173,7 +171,7 @@ def test_three_links_at_a_pin(dalembert: Run) -> None:
     assert abs(sum(r["fy_N"] for r in rows)) <= 1e-12 * size
 
 
-def test_cycle_and_flywheel(dalembert: Run) -> None:
+def test_cycle_and_flywheel(dalembert: Dalembert) -> None:
     found = run_json(
         dalembert, "-", "--forces", "--sweep", "0deg:360deg:2deg", "--flywheel", "0.05", stdin=FOUR_BAR
     )
@@ -192,7 +190,7 @@ def test_cycle_and_flywheel(dalembert: Run) -> None:
 
 
 @pytest.mark.parametrize("text", [FOUR_BAR, CYLINDER, FIVE_BAR], ids=["four-bar", "cylinder", "five-bar"])
-def test_work_reads_the_states_that_mechanism_writes(dalembert: Run, tmp_path: Path, text: str) -> None:
+def test_work_reads_the_states_that_mechanism_writes(dalembert: Dalembert, tmp_path: Path, text: str) -> None:
     (tmp_path / "m.toml").write_text(text)
     assert dalembert("mechanism", "m.toml", "--states", "states.csv").returncode == 0
     effort = run_json(dalembert, "m.toml", "--forces")["poses"][0]["effort"]
@@ -212,7 +210,7 @@ def test_work_reads_the_states_that_mechanism_writes(dalembert: Run, tmp_path: P
         assert step["unknowns"][0]["value"] == pytest.approx(effort["input_torque_N_m"], rel=1e-12)
 
 
-def test_equilibrium(dalembert: Run) -> None:
+def test_equilibrium(dalembert: Dalembert) -> None:
     text = """
     gravity = [0, -9.81]
     [ground]
@@ -233,7 +231,7 @@ def test_equilibrium(dalembert: Run) -> None:
     assert "effort" not in found["poses"][0]
 
 
-def test_counterweights(dalembert: Run) -> None:
+def test_counterweights(dalembert: Dalembert) -> None:
     found = run_json(
         dalembert, "-", "--sweep", "0deg:360deg:5deg", "--counterweights", "crank,rocker", stdin=FOUR_BAR
     )
@@ -242,7 +240,7 @@ def test_counterweights(dalembert: Run) -> None:
     assert [w["link"] for w in part["weights"]] == ["crank", "rocker"]
 
 
-def test_explain_names_what_is_left_out(dalembert: Run) -> None:
+def test_explain_names_what_is_left_out(dalembert: Dalembert) -> None:
     text = FOUR_BAR.replace('speed = "30 rad/s"', "").replace("center = [10, 3]", "center = [0, 0]")
     done = dalembert("mechanism", "-", "--forces", "--explain", "--text", stdin=text)
     assert "do no work, never evaluated for it: crank: weight" in done.stdout
@@ -250,7 +248,7 @@ def test_explain_names_what_is_left_out(dalembert: Run) -> None:
     assert "joint forces, action and reaction, do no work together" in done.stdout
 
 
-def test_a_change_point_is_said_and_spoils_no_other_pose(dalembert: Run) -> None:
+def test_a_change_point_is_said_and_spoils_no_other_pose(dalembert: Dalembert) -> None:
     text = """
     gravity = [0, -9.81]
     [units]
@@ -308,7 +306,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_calls_are_one_line(dalembert: Run, case: str) -> None:
+def test_bad_calls_are_one_line(dalembert: Dalembert, case: str) -> None:
     options, status, expected = BAD[case]
     done = dalembert("mechanism", "-", *options, stdin=FOUR_BAR)
     assert done.returncode == status
@@ -316,7 +314,7 @@ def test_bad_calls_are_one_line(dalembert: Run, case: str) -> None:
     assert status == 2 or len(done.stderr.splitlines()) == 1
 
 
-def test_bad_friction_joint(dalembert: Run) -> None:
+def test_bad_friction_joint(dalembert: Dalembert) -> None:
     done = dalembert(
         "mechanism",
         "-",
@@ -335,7 +333,7 @@ def test_bad_friction_joint(dalembert: Run) -> None:
 
 @pytest.mark.parametrize("name", ["crank-press", "scissors-lift", "engine", "toggle-clamp", "desk-lamp"])
 @pytest.mark.slow
-def test_examples_run(dalembert: Run, tmp_path: Path, name: str) -> None:
+def test_examples_run(dalembert: Dalembert, tmp_path: Path, name: str) -> None:
     shown = dalembert("examples", name).stdout.splitlines()
     command = shown[shown.index("run:") + 1].split()[1:]
     done = dalembert(*command)
@@ -345,7 +343,7 @@ def test_examples_run(dalembert: Run, tmp_path: Path, name: str) -> None:
         assert "the loads balance in every position" in done.stderr
 
 
-def test_scissors_lift_in_closed_form(dalembert: Run) -> None:
+def test_scissors_lift_in_closed_form(dalembert: Dalembert) -> None:
     """The thrust is W cot θ, with cos θ = x/1.2."""
     dalembert("examples", "scissors-lift")
     for x in (1.1, 0.5):
@@ -402,7 +400,9 @@ def test_newton_where_the_pose_cannot_be_assembled(dalembert, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("damping", [0, 2])
-def test_a_spring_whose_ends_meet_has_no_direction(damping: float, dalembert: Run, tmp_path: Path) -> None:
+def test_a_spring_whose_ends_meet_has_no_direction(
+    damping: float, dalembert: Dalembert, tmp_path: Path
+) -> None:
     """Nothing is printed of what it does there, nor made of the rounding of its length, and the reason is said."""
     (tmp_path / "m.toml").write_text(
         f"""ground = {{ O = [0, 0], S = [1, 0] }}

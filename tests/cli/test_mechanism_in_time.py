@@ -6,13 +6,11 @@ import csv
 import io
 import json
 import math
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
 
 PENDULUM = """
 name = "Pendulum"

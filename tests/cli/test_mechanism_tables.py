@@ -5,13 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable
 from pathlib import Path
-from subprocess import CompletedProcess
 
 import pytest
 
-Run = Callable[..., "CompletedProcess[str]"]
+from tests.conftest import Dalembert
 
 FOUR_BAR = """
 gravity = [0, -9.81]
@@ -49,7 +47,7 @@ def rows(text: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text)))
 
 
-def test_output_holds_what_standard_output_shows(dalembert: Run, tmp_path: Path) -> None:
+def test_output_holds_what_standard_output_shows(dalembert: Dalembert, tmp_path: Path) -> None:
     call = ("mechanism", "m.toml", *SWEEP, "--forces")
     shown = dalembert(*call).stdout
     assert "input_torque_N_m" in shown
@@ -59,13 +57,13 @@ def test_output_holds_what_standard_output_shows(dalembert: Run, tmp_path: Path)
     assert (tmp_path / "states.csv").read_text() == dalembert("mechanism", "m.toml", *SWEEP).stdout
 
 
-def test_states_beside_json(dalembert: Run, tmp_path: Path) -> None:
+def test_states_beside_json(dalembert: Dalembert, tmp_path: Path) -> None:
     done = dalembert("mechanism", "m.toml", "--only", "C", "--json", "--states", "states.csv")
     assert "C" in json.loads(done.stdout)["poses"][0]["points"]
     assert "torque_N_m" in (tmp_path / "states.csv").read_text().splitlines()[0]
 
 
-def test_check_in_a_pipe(dalembert: Run) -> None:
+def test_check_in_a_pipe(dalembert: Dalembert) -> None:
     check = json.loads(dalembert("mechanism", "m.toml", "--check", "--json").stdout)["check"]
     shown = rows(dalembert("mechanism", "m.toml", "--check").stdout)
     value = {(row["quantity"], row["of"]): row["value"] for row in shown}
@@ -84,7 +82,7 @@ def test_check_in_a_pipe(dalembert: Run) -> None:
         (["--newton"], "iterates", "residual_m"),
     ],
 )
-def test_a_table_of_its_own_in_a_pipe(options: list[str], key: str, name: str, dalembert: Run) -> None:
+def test_a_table_of_its_own_in_a_pipe(options: list[str], key: str, name: str, dalembert: Dalembert) -> None:
     document = json.loads(dalembert("mechanism", "m.toml", *options, "--json").stdout)[key]
     listed = document["weights"] if key == "counterweights" else document
     listed = [listed] if isinstance(listed, dict) else listed
@@ -97,7 +95,9 @@ def test_a_table_of_its_own_in_a_pipe(options: list[str], key: str, name: str, d
     "options",
     [["--check", "--equilibrium"], ["--forces", *SWEEP, "--flywheel", "0.1"], ["--newton", "--check"]],
 )
-def test_two_tables_are_one_too_many_for_csv(options: list[str], dalembert: Run, tmp_path: Path) -> None:
+def test_two_tables_are_one_too_many_for_csv(
+    options: list[str], dalembert: Dalembert, tmp_path: Path
+) -> None:
     for more in ([], ["-o", "both.csv"]):
         done = dalembert("mechanism", "m.toml", *options, *more)
         assert done.returncode == 2
@@ -108,7 +108,7 @@ def test_two_tables_are_one_too_many_for_csv(options: list[str], dalembert: Run,
     assert dalembert("mechanism", "m.toml", *options, "--text").returncode == 0
 
 
-def test_flywheel_has_one_input(dalembert: Run, tmp_path: Path) -> None:
+def test_flywheel_has_one_input(dalembert: Dalembert, tmp_path: Path) -> None:
     (tmp_path / "two.toml").write_text("""
         [ground]
         A = [0, 0]
@@ -128,7 +128,7 @@ def test_flywheel_has_one_input(dalembert: Run, tmp_path: Path) -> None:
     assert "one input" in done.stderr
 
 
-def test_expected_values_are_found_by_their_input(dalembert: Run, tmp_path: Path) -> None:
+def test_expected_values_are_found_by_their_input(dalembert: Dalembert, tmp_path: Path) -> None:
     call = ("mechanism", "m.toml", *SWEEP, "--only", "C")
     x = {row["input_deg"]: row["C_x_m"] for row in rows(dalembert(*call).stdout)}
     (tmp_path / "e.csv").write_text(f"C_x_m,input_deg\n{x['90.0']},90\n{x['20.0']},20\n{x['360.0']},360\n")
@@ -139,7 +139,7 @@ def test_expected_values_are_found_by_their_input(dalembert: Run, tmp_path: Path
     assert "no (further) row with input_deg 95" in done.stderr
 
 
-def test_expected_poses_beside_another_table(dalembert: Run, tmp_path: Path) -> None:
+def test_expected_poses_beside_another_table(dalembert: Dalembert, tmp_path: Path) -> None:
     angle = rows(dalembert("mechanism", "m.toml").stdout)[1]["angle_deg"]
     (tmp_path / "e.csv").write_text(f"link,angle_deg\ncoupler,{angle}\n")
     assert dalembert("mechanism", "m.toml", "--newton", "--expect", "e.csv").returncode == 0
@@ -149,13 +149,13 @@ def test_expected_poses_beside_another_table(dalembert: Run, tmp_path: Path) -> 
     assert dalembert("mechanism", "m.toml", "--check", "--expect", "e.csv").returncode == 1
 
 
-def test_a_graph_needs_a_picture(dalembert: Run) -> None:
+def test_a_graph_needs_a_picture(dalembert: Dalembert) -> None:
     done = dalembert("mechanism", "m.toml", "--graph", "C.x")
     assert done.returncode == 2
     assert "--plot" in done.stderr
 
 
-def test_digits_beside_another_table(dalembert: Run) -> None:
+def test_digits_beside_another_table(dalembert: Dalembert) -> None:
     done = dalembert("mechanism", "m.toml", "--equilibrium", "--digits")
     assert done.stdout == dalembert("mechanism", "m.toml", "--equilibrium").stdout
     assert dalembert("mechanism", "m.toml", "--equilibrium", "--digits", "--text").returncode == 0

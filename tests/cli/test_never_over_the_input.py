@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import os
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 from subprocess import CompletedProcess
 
 import pytest
 
-from tests.conftest import COMMAND
-
-Run = Callable[..., "CompletedProcess[str]"]
+from tests.conftest import COMMAND, Dalembert
 
 RUNS = """run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg
 0,1,50,30,,,
@@ -50,7 +47,7 @@ def refused(done: CompletedProcess[str], name: str) -> None:
 
 @pytest.mark.parametrize("option", ["-o", "--save-influence"])
 @pytest.mark.parametrize("link", [None, "symbolic", "hard"])
-def test_runs_are_kept(option: str, link: str | None, dalembert: Run, tmp_path: Path) -> None:
+def test_runs_are_kept(option: str, link: str | None, dalembert: Dalembert, tmp_path: Path) -> None:
     name = "runs.csv" if link is None else "other.csv"
     if link == "symbolic":
         (tmp_path / name).symlink_to("runs.csv")
@@ -77,25 +74,27 @@ def test_what_standard_input_is_read_from_is_kept(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["law.csv", "gas.csv"])
 @pytest.mark.parametrize("option", ["-o", "--states"])
-def test_tables_beside_a_mechanism_are_kept(option: str, name: str, dalembert: Run, tmp_path: Path) -> None:
+def test_tables_beside_a_mechanism_are_kept(
+    option: str, name: str, dalembert: Dalembert, tmp_path: Path
+) -> None:
     before = (tmp_path / name).read_text()
     refused(dalembert("mechanism", "m.toml", option, name), name)
     assert (tmp_path / name).read_text() == before
 
 
-def test_expected_values_are_kept(dalembert: Run, tmp_path: Path) -> None:
+def test_expected_values_are_kept(dalembert: Dalembert, tmp_path: Path) -> None:
     (tmp_path / "e.csv").write_text("step,link,angle_deg\n1,crank,0\n")
     refused(dalembert("mechanism", "m.toml", "--expect", "e.csv", "-o", "e.csv"), "e.csv")
 
 
-def test_one_file_for_two_outputs(dalembert: Run, tmp_path: Path) -> None:
+def test_one_file_for_two_outputs(dalembert: Dalembert, tmp_path: Path) -> None:
     done = dalembert("mechanism", "m.toml", "--states", "s.csv", "-o", "./s.csv")
     assert done.returncode == 2
     assert "given twice" in done.stderr
     assert not (tmp_path / "s.csv").exists()
 
 
-def test_decimal_commas_in_the_tables_of_a_mechanism(dalembert: Run, tmp_path: Path) -> None:
+def test_decimal_commas_in_the_tables_of_a_mechanism(dalembert: Dalembert, tmp_path: Path) -> None:
     shown = dalembert("mechanism", "m.toml", "--forces")
     assert shown.returncode == 0, shown.stderr
     (tmp_path / "law.csv").write_text("time_s,angle_deg\n0,0\n0.5,10\n1,25.5\n2,60\n")
@@ -111,7 +110,7 @@ def test_decimal_commas_in_the_tables_of_a_mechanism(dalembert: Run, tmp_path: P
     )
 
 
-def test_a_spring_between_plain_names(dalembert: Run, tmp_path: Path) -> None:
+def test_a_spring_between_plain_names(dalembert: Dalembert, tmp_path: Path) -> None:
     spring = "[[springs]]\nbetween = [{}]\nstiffness = 5\n"
     base = CRANK.replace("O = [0, 0]\n[links", "O = [0, 0]\nS = [0, 3]\n[links")
     texts = [

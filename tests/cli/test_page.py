@@ -5,18 +5,16 @@ from __future__ import annotations
 import csv
 import re
 import time
-from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
-from subprocess import CompletedProcess
 from typing import Any
 
 import numpy as np
 import pytest
 
+from tests.conftest import Dalembert
 from virtualwork import Mechanism
 
-Run = Callable[..., "CompletedProcess[str]"]
 Row = dict[str, str]
 
 EVIL = "<script>window.broken=1</script>"
@@ -111,7 +109,7 @@ class Opened:
 
 
 @pytest.fixture
-def four_bar(dalembert: Run, tmp_path: Path, browser: Any) -> tuple[Opened, list[Row], list[Row]]:
+def four_bar(dalembert: Dalembert, tmp_path: Path, browser: Any) -> tuple[Opened, list[Row], list[Row]]:
     """Return the page, its poses and its forces as CSV."""
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     sweep = ("m.toml", "--sweep", "0:360:1")
@@ -328,7 +326,7 @@ def test_it_fits_a_phone(four_bar: tuple[Opened, list[Row], list[Row]]) -> None:
 
 
 @pytest.mark.slow
-def test_a_pose_that_cannot_be_assembled_is_named(dalembert: Run, tmp_path: Path, browser: Any) -> None:
+def test_a_pose_that_cannot_be_assembled_is_named(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
     text = FOUR_BAR.replace("B = [40, 0]", "B = [70, 0]")
     (tmp_path / "m.toml").write_text(text)
     done = dalembert("mechanism", "m.toml", "--sweep", "0:180:1", "--html", "m.html")
@@ -345,7 +343,7 @@ def test_a_pose_that_cannot_be_assembled_is_named(dalembert: Run, tmp_path: Path
 
 
 @pytest.mark.slow
-def test_a_six_bar_takes_less_than_300_kB(dalembert: Run, tmp_path: Path) -> None:
+def test_a_six_bar_takes_less_than_300_kB(dalembert: Dalembert, tmp_path: Path) -> None:
     """The Klann leg with masses, velocities, accelerations and all joint forces."""
     text = (files("cli.examples") / "klann" / "klann.toml").read_text()
     heavy = text.replace("points = {", "mass = 0.7\ncenter = [80, 5]\ninertia = 0.01\npoints = {") + "\n"
@@ -359,7 +357,7 @@ def test_a_six_bar_takes_less_than_300_kB(dalembert: Run, tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_variants_are_ghosts_over_the_first(dalembert: Run, tmp_path: Path, browser: Any) -> None:
+def test_variants_are_ghosts_over_the_first(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
     """Cranks of 40, 35 and 30 mm; with 500 mm it cannot be put together."""
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     (tmp_path / "v.csv").write_text("links.crank.B.x_mm\n40\n35\n30\n500\n")
@@ -392,7 +390,7 @@ def test_variants_are_ghosts_over_the_first(dalembert: Run, tmp_path: Path, brow
     ],
 )
 def test_examples_open_without_a_fault(
-    example: str, file: str, options: tuple[str, ...], dalembert: Run, tmp_path: Path, browser: Any
+    example: str, file: str, options: tuple[str, ...], dalembert: Dalembert, tmp_path: Path, browser: Any
 ) -> None:
     folder = Path(str(files("cli.examples")))
     options = tuple(str(folder / word) if word.endswith(".csv") else word for word in options)
@@ -419,7 +417,7 @@ def test_examples_open_without_a_fault(
 
 
 @pytest.mark.slow
-def test_spin(dalembert: Run, tmp_path: Path, browser: Any) -> None:
+def test_spin(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
     (tmp_path / "body.toml").write_text(
         f"name = '{EVIL}'\ninertia = [1, 2, 3]\nomega = [0.01, 1, 0.01]\nattitude = [0.8, 0.6, 0, 0]\n"
     )
@@ -467,7 +465,7 @@ def test_a_notebook_shows_the_same_page_in_a_frame(tmp_path: Path, browser: Any)
     assert opened.faults() == []
 
 
-def test_a_page_of_too_few_states_says_so(dalembert: Run, tmp_path: Path) -> None:
+def test_a_page_of_too_few_states_says_so(dalembert: Dalembert, tmp_path: Path) -> None:
     """1 rad/s over steps of 2 s is 115° from pose to pose; π/12 rad a step take 0.3 s."""
     (tmp_path / "body.toml").write_text("inertia = [1, 2, 3]\nomega = [0, 1, 0]\n")
     for step, said in (
@@ -518,7 +516,9 @@ crank = 60
 
 
 @pytest.mark.slow
-def test_a_motion_under_forces_moves_by_its_own_time(dalembert: Run, tmp_path: Path, browser: Any) -> None:
+def test_a_motion_under_forces_moves_by_its_own_time(
+    dalembert: Dalembert, tmp_path: Path, browser: Any
+) -> None:
     """The rocker drives the crank through dead points, where the run goes on in another coordinate."""
     (tmp_path / "m.toml").write_text(LET_GO)
     names = ("A", "D", "B", "C", "crank", "coupler", "rocker")
@@ -572,7 +572,7 @@ def test_a_motion_under_forces_moves_by_its_own_time(dalembert: Run, tmp_path: P
     assert opened.faults() == []
 
 
-def test_bad_use_is_refused(dalembert: Run, tmp_path: Path) -> None:
+def test_bad_use_is_refused(dalembert: Dalembert, tmp_path: Path) -> None:
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     (tmp_path / "body.toml").write_text("inertia = [1, 2, 3]\nomega = [0, 1, 0]\n")
     for arguments, said in (

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import gc
 import itertools
-import subprocess
 import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,9 +16,9 @@ import pytest
 
 from cli.show import parts
 from cli.show.columns import Column, Table
+from tests.conftest import Dalembert
 from virtualwork.formulas.positions import BLOCK
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 LONG = 2 * BLOCK + 5
 
 

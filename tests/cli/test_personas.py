@@ -6,14 +6,13 @@ import csv
 import json
 import math
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import openpyxl
 import pytest
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
 
 
 def polar(size: float, degrees: float) -> complex:

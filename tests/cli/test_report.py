@@ -7,7 +7,6 @@ import html.parser
 import io
 import re
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,7 @@ import pytest
 
 from cli.examples.command import describe
 from cli.show.report import WIDE
-
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
 
 HEAD = ("--title", "Bericht <7>", "--machine", "Fan & Söhne", "--customer", "C", "--author", "K. T.")
 EXAMPLES = {

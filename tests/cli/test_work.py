@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from subprocess import CompletedProcess
 
 import pytest
 
-Run = Callable[..., "CompletedProcess[str]"]
+from tests.conftest import Dalembert
 
 
-def solve(dalembert: Run, table: str, *options: str) -> dict[str, object]:
+def solve(dalembert: Dalembert, table: str, *options: str) -> dict[str, object]:
     done = dalembert("work", "-", "--json", *options, stdin=table)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)  # type: ignore[no-any-return]
 
 
-def test_units_of_the_columns(dalembert: Run) -> None:
+def test_units_of_the_columns(dalembert: Dalembert) -> None:
     table = "link,omega_rpm,torque_N_mm,vx_mm_s,fx_kN\na,30,?,,\nb,,,500,2\n"
     (step,) = solve(dalembert, table)["steps"]  # type: ignore[misc]
     assert step["unknowns"][0]["value"] == pytest.approx(-1000 / 3.141592653589793, rel=1e-15)
@@ -29,13 +27,13 @@ def test_units_of_the_columns(dalembert: Run) -> None:
     )
 
 
-def test_the_force_acts_where_its_velocity_is_given(dalembert: Run) -> None:
+def test_the_force_acts_where_its_velocity_is_given(dalembert: Dalembert) -> None:
     table = "link,vx_m_s,fvx_m_s,fx_N,omega_rad_s,torque_N_m\na,2,5,10,,\nb,2,,10,,\nc,,,,1,?\n"
     (step,) = solve(dalembert, table)["steps"]  # type: ignore[misc]
     assert step["unknowns"][0]["value"] == -70.0
 
 
-def test_half_a_point_velocity_is_said(dalembert: Run) -> None:
+def test_half_a_point_velocity_is_said(dalembert: Dalembert) -> None:
     table = (
         "link,vx_m_s,vy_m_s,fvx_m_s,fvy_m_s,fx_N,fy_N,omega_rad_s,torque_N_m\na,2,3,5,,1,1,,\nc,,,,,,,1,?\n"
     )
@@ -44,13 +42,13 @@ def test_half_a_point_velocity_is_said(dalembert: Run) -> None:
     assert "fvx is given and fvy is empty" in str(found["warnings"])
 
 
-def test_a_second_force_on_a_link_has_its_own_row(dalembert: Run) -> None:
+def test_a_second_force_on_a_link_has_its_own_row(dalembert: Dalembert) -> None:
     table = "link,mass_kg,fvx_m_s,fx_N,omega_rad_s,torque_N_m\na,1,1,2,,\na,,3,4,,\nb,,,,1,?\n"
     (step,) = solve(dalembert, table)["steps"]  # type: ignore[misc]
     assert step["unknowns"][0]["value"] == -14.0
 
 
-def test_steps_keep_their_names_and_order(dalembert: Run) -> None:
+def test_steps_keep_their_names_and_order(dalembert: Dalembert) -> None:
     table = "step,link,omega_rad_s,torque_N_m\n07,b,2,3\n7,b,1,3\n07,a,1,?\n7,a,1,?\n"
     steps = solve(dalembert, table)["steps"]
     assert [(s["step"], s["unknowns"][0]["value"]) for s in steps] == [("07", -6.0), ("7", -3.0)]  # type: ignore[union-attr]
@@ -66,7 +64,7 @@ FIELDS = """step,link,field,omega_rad_s,torque_N_m,vx_m_s,fx_N
 """
 
 
-def test_several_unknowns(dalembert: Run) -> None:
+def test_several_unknowns(dalembert: Dalembert) -> None:
     (step,) = solve(dalembert, FIELDS)["steps"]  # type: ignore[misc]
     assert [(u["name"], u["link"], u["quantity"], u["value"]) for u in step["unknowns"]] == [
         ("T", "a", "torque_N_m", pytest.approx(-5.0)),
@@ -75,19 +73,19 @@ def test_several_unknowns(dalembert: Run) -> None:
     assert step["sums_W"] == {"p": 0.0, "q": 0.0}
 
 
-def test_an_unknown_force_in_a_given_direction(dalembert: Run) -> None:
+def test_an_unknown_force_in_a_given_direction(dalembert: Dalembert) -> None:
     table = "link,vx_m_s,vy_m_s,fx_N,fy_N,omega_rad_s,torque_N_m\na,3,4,?F*0.6,?F*0.8,,\nb,,,,,1,10\n"
     (step,) = solve(dalembert, table)["steps"]  # type: ignore[misc]
     assert [u["value"] for u in step["unknowns"]] == pytest.approx([-1.2, -1.6], rel=1e-15)
 
 
-def test_a_dead_step_spoils_no_other(dalembert: Run) -> None:
+def test_a_dead_step_spoils_no_other(dalembert: Dalembert) -> None:
     found = solve(dalembert, "step,link,omega_rad_s,torque_N_m\n1,a,1,?\n1,b,1,2\n2,a,0,?\n2,b,1,2\n")
     assert [s["unknowns"][0]["value"] for s in found["steps"]] == [-2.0, None]  # type: ignore[union-attr,attr-defined]
     assert "omega of link a is zero in step 2" in str(found["warnings"])
 
 
-def test_large_tables_read_alike(dalembert: Run, tmp_path: Path) -> None:
+def test_large_tables_read_alike(dalembert: Dalembert, tmp_path: Path) -> None:
     def rows(n: int) -> str:
         return "".join(f"{s},a,{s % 7 + 1},?\n{s},b,1,{s}\n" for s in range(n))
 
@@ -120,7 +118,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_data_is_one_line(dalembert: Run, case: str) -> None:
+def test_bad_data_is_one_line(dalembert: Dalembert, case: str) -> None:
     table, expected = BAD[case]
     done = dalembert("work", "-", stdin=table)
     assert done.returncode == 1
@@ -129,13 +127,13 @@ def test_bad_data_is_one_line(dalembert: Run, case: str) -> None:
     assert expected in done.stderr
 
 
-def test_bad_usage(dalembert: Run) -> None:
+def test_bad_usage(dalembert: Dalembert) -> None:
     done = dalembert("work", "-", "--gravity", "3", stdin="link\n")
     assert done.returncode == 2
     assert dalembert("work", "no such file.csv").returncode == 1
 
 
-def test_pictures_and_files(dalembert: Run, tmp_path: Path) -> None:
+def test_pictures_and_files(dalembert: Dalembert, tmp_path: Path) -> None:
     dalembert("examples", "riul-slider-crank")
     assert dalembert("work", "states.csv", "--plot", "ledger.svg", "-o", "out.json").returncode == 0
     assert (tmp_path / "ledger.svg").read_bytes().startswith(b"<?xml")

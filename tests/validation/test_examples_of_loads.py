@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import subprocess
 import tomllib
 from collections.abc import Callable
 from math import cos, pi, radians, sin
@@ -12,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from cli.examples.command import EXAMPLES, describe, names
+from tests.conftest import Dalembert
 from virtualwork.describe.keys import ENTRIES
 
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
 G = 9.81
 
 

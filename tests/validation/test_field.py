@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from balancing import influence_coefficients, influence_from_amplitudes, least_squares, minimax, place
-
-Dalembert = Callable[..., subprocess.CompletedProcess[str]]
+from tests.conftest import Dalembert
 
 
 def polar(pairs: ArrayLike) -> NDArray[np.complex128]:

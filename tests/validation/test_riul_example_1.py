@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from subprocess import CompletedProcess
 
 import pytest
 
-Run = Callable[..., "CompletedProcess[str]"]
+from tests.conftest import Dalembert
 
 # eq. (1.a)-(1.g) with the printed data; the inertia torque is −0.1·(−800) = +80, and +80·(−50) = −4 000
 POWERS = {
@@ -21,7 +19,7 @@ POWERS = {
 }
 
 
-def test_example_1(dalembert: Run) -> None:
+def test_example_1(dalembert: Dalembert) -> None:
     dalembert("examples", "riul-slider-crank")
     done = dalembert("work", "states.csv", "--gravity", "0,-10", "--json")
     assert done.returncode == 0
