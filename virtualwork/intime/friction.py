@@ -183,6 +183,11 @@ class Rubbing(Equations):
             slips.append([next(x) for _ in range(c)])
         return Values(a, per, p, forces, rate, slip, slips, next(x))
 
+    @property
+    def plain(self) -> bool:  # type: ignore[override]
+        """False: friction is found by iteration."""
+        return False
+
     # --- friction at a state --------------------------------------------------------------------------------------
     def __call__(self, t: float, q: Floats, v: Floats) -> Floats:
         """The accelerations at a state in this mode, and the power."""
