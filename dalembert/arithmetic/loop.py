@@ -77,7 +77,7 @@ class Loop:
     >>> loop.states, loop.constants
     (('x', 'left'), ('of',))
     >>> loop.whole.inputs
-    ('x', 'of', 'left')
+    ('x', 'left', 'of')
     """
 
     body: Tape

@@ -159,6 +159,11 @@ class Solver:
         return found, told
 
     @property
+    def signs(self) -> dict[str, Reals]:
+        """The sign of each closed form of each variant, (v,), by the group's name."""
+        return self._signs[0]
+
+    @property
     def together(self) -> Mask:
         """Which variants are on the tape, (v,)."""
         return self._signs[1]

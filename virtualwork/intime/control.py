@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
 from dalembert.arithmetic.recorded import RECORDED, Number
 from virtualwork.formulas.numbers import EPS
 
@@ -10,6 +16,8 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 6.0
 # steps in a row that the method's stability limits, not its accuracy
 STIFF = 15
 Numbers = list[Number]
+Several = Sequence[Any] | NDArray[np.float64]
+"""A number, or an array over lanes, of each input."""
 
 
 def least(a: Number, b: Number) -> Number:
@@ -71,3 +79,25 @@ def added(x: Number, low: Number, d: Number) -> tuple[Number, Number]:
 def stiffer(count: Number, stiffness: Number, stable: float) -> Number:
     """How many more steps the method's stability has limited than its accuracy."""
     return RECORDED.select(stiffness - stable, count + 1.0, most(count - 1.0, 0.0))
+
+
+def first_steps(
+    span: float,
+    tolerance: Any,
+    scale: Several,
+    q: Several,
+    v: Several,
+    rates: Several,
+) -> tuple[list[Any], Any]:
+    """The largest speeds to begin with, and the length of the first step: floats, or arrays over lanes.
+
+    Over a first step nothing changes by more than a method of order 8 may err.
+    """
+    fastest = [
+        np.maximum(np.abs(x), np.asarray(s) / span if span else 1.0) for x, s in zip(v, scale, strict=True)
+    ]
+    errors = [tolerance * np.asarray(s) + 4 * EPS * np.abs(x) for s, x in zip(scale, q, strict=True)]
+    errors += [tolerance * x for x in fastest]
+    steep = np.max([np.abs(x) / s for x, s in zip((*v, *rates), errors, strict=False)], axis=0)
+    h = np.minimum(span, (0.01 / np.maximum(steep, 1e-300)) ** (1 / 9))
+    return fastest, h

@@ -28,7 +28,7 @@ TRIES = 6
 def share(ratio: Any, tolerance: Any) -> Any:
     """Of the distance of two solutions what the finer one may err by; all of it where rounding has its share.
 
-    >>> share(0.03, 1e-10), share(1e-4, 1e-14)
+    >>> float(share(0.03, 1e-10)), float(share(1e-4, 1e-14))
     (0.3, 1.0)
     """
     return np.where(np.greater(tolerance, SMALL), np.minimum(1.0, SAFETY * np.asarray(ratio)), 1.0)[()]

@@ -189,7 +189,8 @@ class DormandPrince:
 
     def size(self, done: Step, scale: Floats) -> float:
         """A step's error over the one allowed in each of (q, q̇)."""
-        return size(*done.errors, scale)  # type: ignore[no-any-return]
+        third, fifth = done.errors
+        return float(size(list(third), list(fifth), scale))
 
 
 @lru_cache(maxsize=64)

@@ -29,7 +29,8 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Reals, dot, minus
-from virtualwork.intime.equations import Equations, Lost, potential, wasted
+from virtualwork.intime.equations import Equations, Lost
+from virtualwork.intime.powers import potential, wasted
 from virtualwork.intime.watch import Floats, Watch
 
 # iterations of friction and joint forces; each gains a factor of some μ r / l
@@ -184,7 +185,7 @@ class Rubbing(Equations):
         return Values(a, per, p, forces, rate, slip, slips, next(x))
 
     @property
-    def plain(self) -> bool:  # type: ignore[override]
+    def plain(self) -> bool:
         """False: friction is found by iteration."""
         return False
 

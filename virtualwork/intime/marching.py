@@ -7,7 +7,7 @@ one by one: the same formulas, `explicit` and `control`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -22,6 +22,7 @@ from virtualwork.intime.control import (
     GROW,
     SAFETY,
     STIFF,
+    Several,
     added,
     allowed,
     least,
@@ -137,11 +138,11 @@ def march(
 
 def beginning(
     t: Number,
-    q: Sequence[Any],
-    v: Sequence[Any],
-    rates: Sequence[Any],
+    q: Several,
+    v: Several,
+    rates: Several,
     h: Number,
-    fastest: Sequence[Any],
+    fastest: Several,
     work: Number,
 ) -> dict[str, Any]:
     """The state at the first node: q and the others (k, n) or (k,)."""

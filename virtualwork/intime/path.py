@@ -19,6 +19,7 @@ from virtualwork.intime.control import (
     STIFF,
     added,
     allowed,
+    first_steps,
     longer,
     shorter,
     shortest,
@@ -125,15 +126,14 @@ def walk(
         return path
     path.put(t, q, v, rates, work)
     k, span = equations.k, end - t
-    fastest = [max(abs(x), s / span if span else 1.0) for x, s in zip(v, equations.scale, strict=True)]
+    steepest, h = first_steps(span, tolerance, equations.scale, q, v, rates)
+    fastest, h = [float(x) for x in steepest], float(h)
     low_q, low_v = [0.0] * k, [0.0] * k
-    h, grow, stiff = 0.0, GROW, 0.0
+    grow, stiff = GROW, 0.0
     left = left or {}
     power = -1.0 / method.order
     by_code = not stops
     while t < end:
-        if not h:
-            h = first(method.order, span, allowed(tolerance, equations.scale, q, fastest, v, low_v), v, rates)
         if by_code and not (len(path.t) - 1) % ROUNDS and compiled(equations, method) is not None:
             # it goes on as far as nothing happens that has to be looked at step by step
             given = {"end": end, "span": span, "tolerance": tolerance}
@@ -265,12 +265,6 @@ def _marched(
             path.ended = "end" if state["t"][0] >= given["end"] else "stiff" if found.stiff[0] else "lost"
         if path.ended:
             return parts(state)
-
-
-def first(order: int, span: float, errors: Floats, v: Floats, rates: Floats) -> float:
-    """The length of the first step: over it nothing changes by more than a method of this order may err."""
-    steep = max(abs(x) / s for x, s in zip((*v, *rates), errors, strict=False))
-    return min(span, (0.01 / steep) ** (1 / (order + 1)) if steep else span)
 
 
 def _added(x: Floats, low: Floats, d: Floats) -> tuple[Floats, Floats]:

@@ -183,7 +183,7 @@ def simulate(
     until: Mapping[str, float] | None = None,
 ) -> Run:
     """Let go of the inputs; see `Mechanism.simulate`."""
-    m, t = assembly.mechanism, _times(times)
+    m, t = assembly.mechanism, rising(times)
     k = len(m.inputs)
     q = _state("angle", angle, [e.value for e in m.inputs], list(m.at), k)
     v = _state("speed", speed, [e.speed for e in m.inputs], [0.0] * k, k)
@@ -226,7 +226,13 @@ def _own(assembly: Assembly) -> Coordinates:
     return found
 
 
-def _times(times: ArrayLike) -> Reals:
+def rising(times: ArrayLike) -> Reals:
+    """Times that a motion can be asked at.
+
+    Raises
+    ------
+    ValueError
+    """
     t = np.asarray(times, dtype=float).reshape(-1)
     if not len(t) or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
         raise ValueError("times: expected rising finite times, s")
