@@ -12,6 +12,8 @@ names (`topology.Vector`), and another mechanism of the same topology only puts 
 
 from __future__ import annotations
 
+import math
+
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
