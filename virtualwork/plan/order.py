@@ -13,7 +13,6 @@ names (`topology.Vector`), and another mechanism of the same topology only puts 
 from __future__ import annotations
 
 import math
-
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -211,8 +210,8 @@ class _Planner:
                     known = _plus(known, right if there is None else Angle(stands - there), 1.0)
                 elif relation.kind == "guide" and there is not None and unknown.keys() <= self.guess.keys():
                     # gears count whole turns: those of a slider are the guess's
-                    turns = round(complex(stands - there).real / (2 * math.pi))
-                    known = _plus(known, Angle(2 * math.pi * turns), 1.0) if turns else known
+                    whole = round(complex(stands - there).real / (2 * math.pi))
+                    known = _plus(known, Angle(2 * math.pi * whole), 1.0) if whole else known
             rows.append((unknown, known))
         solved: dict[str, tuple[dict[str, float], Angle]] = {}
         for unknown, known in rows:
