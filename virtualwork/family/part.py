@@ -159,31 +159,41 @@ class Solver:
         return found, told
 
     @property
+    def signs(self) -> dict[str, Reals]:
+        """The sign of each closed form of each variant, (v,), by the group's name."""
+        return self._signs[0]
+
+    @property
     def together(self) -> Mask:
         """Which variants are on the tape, (v,)."""
         return self._signs[1]
 
     def values(self, keys: Sequence[Key]) -> list[Any]:
         """Quantities by their keys (`Recording.value`), each (v, n); NaN where a pose is not assembled."""
+        out, alone = self.lanes(keys)
+        for place in np.flatnonzero(alone):
+            self._one(int(place), keys, out)
+        return out
+
+    def lanes(self, keys: Sequence[Key]) -> tuple[list[Any], Mask]:
+        """The quantities of the variants that are on the tape; and which are not, (v,): of those they are NaN."""
         v, n = self.part.shape
         out = [np.full((v, n), np.nan, complex if key[0] in COMPLEX else float) for key in keys]
-        there = self.together if self._takes(keys) else np.zeros(v, dtype=bool)
+        there = self.together if self.takes(keys) else np.zeros(v, dtype=bool)
         places = np.flatnonzero(there)
         each = max(1, LANES // max(n, 1))
         alone = ~there
         for i in range(0, len(places), each):
             rows = places[i : i + each]
             alone[rows[self._on_tape(keys, rows, out)]] = True
-        for place in np.flatnonzero(alone):
-            self._one(int(place), keys, out)
-        return out
+        return out, alone
 
     def slopes(self, key: Key) -> Any | None:
         """The derivatives of a quantity to the dimensions and then the inputs, (v, n, d + k).
 
         None where a variant is not on the tape, or a dimension is an input's own.
         """
-        if not self._takes([key]) or not self.together.all():
+        if not self.takes([key]) or not self.together.all():
             return None
         assert self.written is not None
         v, n = self.part.shape
@@ -197,7 +207,7 @@ class Solver:
             parts.append(columns[0] if len(columns) == 1 else columns[0] + 1j * columns[1])
         return np.stack([np.broadcast_to(part, v * n).reshape(v, n) for part in parts], axis=-1)
 
-    def _takes(self, keys: Sequence[Key]) -> bool:
+    def takes(self, keys: Sequence[Key]) -> bool:
         """Whether the tape has such quantities: friction iterates, redundant statics and twists are of each variant."""
         m, written = self.part.mechanism, self.written
         if written is None:
