@@ -15,7 +15,7 @@ import numpy as np
 from virtualwork.formulas.numbers import EPS, Reals
 
 # the tolerance of a step over the accuracy asked for
-FIRST = 1.0
+FIRST = 0.1
 # what the error of steps half as long is less by, one; of the estimate
 GAIN, SAFETY = 255.0, 10.0
 # the tolerance below which steps have errors of rounding alone

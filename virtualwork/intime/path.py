@@ -69,8 +69,8 @@ class Path:
         self.rates += rows[:, 2 * k + 1 : -1].tolist()
         self.work += rows[:, -1].tolist()
 
-    def at(self, times: Reals) -> tuple[Reals, Reals, Reals]:
-        """q, q̇ (n, k) and the work (n,) at times on the way: a step of the method from the node before each."""
+    def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
+        """q, q̇, q̈ (n, k) and the work (n,) at times on the way: a step of the method from the node before each."""
         t = np.array(self.t)
         # a stiff method does not go back
         if self.backwards and self.method.stable < np.inf:
@@ -89,7 +89,10 @@ class Path:
             q[on] += dq
             v[on] += dv
             work[on] += dw
-        return q, v, work
+        a = np.array(self.rates)[i, : q.shape[1]]
+        if len(on):
+            a[on] = self.equations.many(times[on], q[on], v[on])[:, : q.shape[1]]
+        return q, v, a, work
 
 
 def walk(

@@ -54,8 +54,7 @@ class Leg:
 
     def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
         """The coordinates, their speeds and accelerations, and the work."""
-        q, v, work = self.path.at(times)
-        return q, v, self.path.equations.many(times, q, v)[:, : q.shape[1]], work
+        return self.path.at(times)
 
     def states(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
         """The inputs, their speeds and accelerations, and the work."""
@@ -131,7 +130,7 @@ class Travel:
         """Kinetic energy and that of gravity and springs, (n,) J."""
         out = np.empty(len(times))
         for leg, rows in self._parts(times):
-            q, v, _ = leg.path.at(times[rows])
+            q, v, _, _ = leg.path.at(times[rows])
             out[rows] = leg.path.equations.energies(times[rows], q, v)
         return out
 

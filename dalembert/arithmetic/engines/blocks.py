@@ -65,7 +65,7 @@ class Blocks:
             elif kind != "const":
                 lanes[number] = any(lanes[a] for a in arguments)
         # the part that is the same for all lanes, and which of its values the lanes read
-        self.common = not all(lanes)
+        self.common = [(n, *op) for n, op in enumerate(operations) if not lanes[n]]
         body = [n for n, op in enumerate(operations) if lanes[n] and op[0] != "input"]
         last = {a: n for n in body for a in operations[n][1:]}
         outputs: dict[int, str] = {}
@@ -160,17 +160,14 @@ class Blocks:
 
     def _common(self, inputs: Mapping[str, Reals]) -> list[Any]:
         """The values that are the same for all lanes; None for the others."""
-        found: list[Any] = []
-        for kind, *arguments in self.tape.operations:
+        found: list[Any] = [None] * len(self.tape.operations)
+        for number, kind, *arguments in self.common:
             if kind == "const":
-                found.append(np.float64(arguments[0]))
+                found[number] = np.float64(arguments[0])
             elif kind == "input":
-                column = inputs[arguments[0]]
-                found.append(None if column.ndim else column[()])
-            elif any(found[a] is None for a in arguments):
-                found.append(None)
+                found[number] = inputs[arguments[0]][()]
             else:
-                found.append(performed(kind, [found[a] for a in arguments], NUMPY))
+                found[number] = performed(kind, [found[a] for a in arguments], NUMPY)
         return found
 
 

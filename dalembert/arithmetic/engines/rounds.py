@@ -57,7 +57,9 @@ class Code:
 
     def _vectors(self, of: Reals, lanes: NDArray[np.intp]) -> Reals:
         """Rows of lanes as groups of rows of vectors."""
-        return np.ascontiguousarray(of[:, lanes].reshape(len(of), len(lanes) // self.width, self.width).transpose(1, 0, 2))
+        return np.ascontiguousarray(
+            of[:, lanes].reshape(len(of), len(lanes) // self.width, self.width).transpose(1, 0, 2)
+        )
 
 
 def run(
