@@ -27,7 +27,7 @@ from virtualwork.describe.loads import TorsionSpring
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.asked import FORCES, Key
 from virtualwork.formulas.block import Block, Shared, Table
-from virtualwork.formulas.dynamics import resultant, shaking_loads
+from virtualwork.formulas.dynamics import applied_loads, reduced, resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.kinds import PARTS, WRITTEN
 from virtualwork.formulas.load_case import LoadCase
@@ -103,10 +103,18 @@ class Recording:
         self._forces: tuple[LoadPaths, JointForces, Block] | None = None
 
     # --- solving ------------------------------------------------------------------------------------------------
+    def enters(self, group: Group) -> bool:
+        """Whether the unknowns of a group enter: it has no closed form."""
+        return group.kind == "Newton"
+
+    def unknowns(self, group: Group) -> list[Number]:
+        """The unknowns of a group, angles and then slides, as they enter."""
+        n = len(group.angles) + len(group.slides)
+        return [self.recorder.input(f"x {group.name} {i}") for i in range(n)]
+
     def _close(self, group: Group, st: State) -> None:
-        if group.kind == "Newton":
-            n = len(group.angles) + len(group.slides)
-            x: list[Number] = [self.recorder.input(f"x {group.name} {i}") for i in range(n)]
+        if self.enters(group):
+            x = self.unknowns(group)
             put_unknowns(group, st, x)
             if not self.settled:
                 step = WRITTEN.solve(columns(group, st), gaps(group, st))
@@ -219,7 +227,8 @@ class Recording:
         ("dpoint", body, z, node or None, j, order)  ∂P/∂q_j, complex; order 2 with one input: ∂²P/∂q²
         ("dangle", body, j, order)
         ("dslide", guide, j, order)
-        ("effort", j), ("newton-euler", j)
+        ("effort", j), ("newton-euler", j), ("generalized", j)
+        ("applied", link), ("applied moment", link)  complex; real: of what acts but weight and inertia
         ("force", joint's key, body), ("moment", joint's key, body)
         ("shaking",), ("shaking moment",)            complex; real
         ("closed", groups' names …)                  a finite number where these groups are assembled
@@ -305,6 +314,21 @@ class Recording:
     def _effort(self, j: int) -> Number:
         return self.efforts()[j]
 
+    def _generalized(self, j: int) -> Number:
+        paths, _, block = self.forces
+        return self._negative(generalized_force(paths, block, j))
+
+    def _applied(self, link: str) -> Number:
+        return self._reduced(link)[0]
+
+    def _applied_moment(self, link: str) -> Number:
+        return self._reduced(link)[1]
+
+    def _reduced(self, link: str) -> tuple[Number, Number]:
+        self.solve([f"angle:{link}"], 0)
+        paths, _, block = self.forces
+        return reduced(applied_loads(paths.case.loads, link), block, self.mechanism.rigid[link].center)
+
     def _newton_euler(self, j: int) -> Number:
         self._places()
         _, of, block = self.forces
@@ -349,7 +373,7 @@ class Recording:
         self.solve([key for g in chosen for key in self.plan.writes(g)], 0)
         total: Number = 0.0
         for group in chosen:
-            if group.kind == "Newton":
+            if self.enters(group):
                 unknowns = [self.st.angle[b] for b in group.angles] + [self.st.slide[s] for s in group.slides]
                 total = sum((abs(x) for x in unknowns), total)
             else:
@@ -370,7 +394,7 @@ class Recording:
         return self.st.margin[group]
 
 
-COMPLEX = {"point", "turn", "dpoint", "force", "shaking"}
+COMPLEX = {"point", "turn", "dpoint", "force", "shaking", "applied", "gap"}
 
 
 def names(key: Key) -> tuple[str, ...]:
