@@ -189,6 +189,7 @@ def rounding_bounds(
     --------
     (1 − cos q)/q² near 0 loses digits: at q = 1e-4 the bound says that half of them are left.
 
+    >>> from dalembert.arithmetic.engines import run
     >>> recorder = Recorder()
     >>> q = recorder.input("q")
     >>> tape = recorder.tape({"y": (1.0 - RECORDED.cos(q)) / (q * q)})
