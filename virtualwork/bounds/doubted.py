@@ -22,6 +22,8 @@ from typing import Any
 from dalembert.arithmetic.adjoint import UNIT_ROUNDOFF
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
 from dalembert.arithmetic.varied import made
+from virtualwork.formulas.dynamics import applied_loads, reduced
+from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.lanes import Turning
 from virtualwork.formulas.newton import gaps
 from virtualwork.formulas.recording import Recording
@@ -100,6 +102,9 @@ class Doubted(Recording):
 
     Further keys of `value`
     -----------------------
+    ("generalized", j)            the effort as if every motor sat on the body that its angle is measured from
+    ("applied", link)             complex: what acts on a link but its weight and inertia
+    ("applied moment", link)      about its centre of mass
     ("gap", group's name, loop)   complex: what the unknowns that enter leave open of a loop
     ("balance", row)              what the forces that enter leave of an equation of redundant statics
 
@@ -139,6 +144,21 @@ class Doubted(Recording):
             sum((enter(f"inverse {name} {i} {r}") * left for r, left in rows), x)
             for i, x in enumerate(super().unknowns(group))
         ]
+
+    def _generalized(self, j: int) -> Number:
+        paths, _, block = self.forces
+        return self._negative(generalized_force(paths, block, j))
+
+    def _applied(self, link: str) -> Number:
+        return self._reduced(link)[0]
+
+    def _applied_moment(self, link: str) -> Number:
+        return self._reduced(link)[1]
+
+    def _reduced(self, link: str) -> tuple[Number, Number]:
+        self.solve([f"angle:{link}"], 0)
+        paths, _, block = self.forces
+        return reduced(applied_loads(paths.case.loads, link), block, self.mechanism.rigid[link].center)
 
     def _gap(self, group: str, loop: int) -> Number:
         of = next(g for g in self.plan.groups if g.name == group)

@@ -78,6 +78,8 @@ class ForceErrors:
 
     def reaction(self, joint: str, on: str) -> Reals:
         """Of `Dynamics.reaction`, (n,): the length of the error."""
+        if self._redundant is None:
+            return self.bounds.of(("reaction", joint, on))
         here = [found for found in self.dynamics.joints_named(joint) if on in found.bodies]
         return np.asarray(sum(self.joint_force(found, on) for found in here))
 

@@ -17,12 +17,15 @@ FORCES = {
     "newton-euler",
     "force",
     "moment",
+    "reaction",
     "shaking",
     "shaking moment",
     "generalized",
     "applied",
     "applied moment",
 }
+# what the joints carry
+JOINTS = {"newton-euler", "force", "moment", "reaction"}
 # times that one pose is asked for, and poses, from which on the tape pays
 OFTEN = 50
 MANY_POSES = 1_000_000
@@ -64,6 +67,8 @@ def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:
         if kind.startswith("shaking"):
             force, moment = forces.shaking
             return moment if kind == "shaking moment" else force[:, 0] + 1j * force[:, 1]
+        if kind == "reaction":
+            return forces.at_joint(*of)
         joint = forces.reactions.by_key[of[0]]
         return forces.joint_force(joint, of[1]) if kind == "force" else forces.joint_moment(joint, of[1])
     match kind:

@@ -19,15 +19,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
 from dalembert.arithmetic.recorded import Number, Recorder, bare
 from dalembert.arithmetic.systems import regularity, solved
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
 from virtualwork.describe.loads import TorsionSpring
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import FORCES, Key
+from virtualwork.formulas.asked import FORCES, JOINTS, Key
 from virtualwork.formulas.block import Block, Shared, Table
-from virtualwork.formulas.dynamics import applied_loads, reduced, resultant, shaking_loads
+from virtualwork.formulas.dynamics import resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.kinds import PARTS, WRITTEN
 from virtualwork.formulas.load_case import LoadCase
@@ -227,9 +229,9 @@ class Recording:
         ("dpoint", body, z, node or None, j, order)  ∂P/∂q_j, complex; order 2 with one input: ∂²P/∂q²
         ("dangle", body, j, order)
         ("dslide", guide, j, order)
-        ("effort", j), ("newton-euler", j), ("generalized", j)
-        ("applied", link), ("applied moment", link)  complex; real: of what acts but weight and inertia
+        ("effort", j), ("newton-euler", j)
         ("force", joint's key, body), ("moment", joint's key, body)
+        ("reaction", joint's name, body)             of all joints of that name: a pin, and the guide its point runs in
         ("shaking",), ("shaking moment",)            complex; real
         ("closed", groups' names …)                  a finite number where these groups are assembled
         ("margin", group's name)                     the radicand of a closed form, relative
@@ -247,7 +249,7 @@ class Recording:
             return True
         if self.mechanism.friction:
             return False
-        return kinds.isdisjoint(("newton-euler", "force", "moment")) or not self.forces[0].order.redundant
+        return kinds.isdisjoint(JOINTS) or not self.forces[0].order.redundant
 
     def tape(self, keys: Iterable[Key]) -> Tape:
         """The tape of quantities: outputs are called as `names` says."""
@@ -314,21 +316,6 @@ class Recording:
     def _effort(self, j: int) -> Number:
         return self.efforts()[j]
 
-    def _generalized(self, j: int) -> Number:
-        paths, _, block = self.forces
-        return self._negative(generalized_force(paths, block, j))
-
-    def _applied(self, link: str) -> Number:
-        return self._reduced(link)[0]
-
-    def _applied_moment(self, link: str) -> Number:
-        return self._reduced(link)[1]
-
-    def _reduced(self, link: str) -> tuple[Number, Number]:
-        self.solve([f"angle:{link}"], 0)
-        paths, _, block = self.forces
-        return reduced(applied_loads(paths.case.loads, link), block, self.mechanism.rigid[link].center)
-
     def _newton_euler(self, j: int) -> Number:
         self._places()
         _, of, block = self.forces
@@ -338,6 +325,10 @@ class Recording:
         self._places()
         _, of, block = self.forces
         return of.joint_force(block, of.by_key[joint], body)
+
+    def _reaction(self, joint: str, body: str) -> Number:
+        of = [j for j in self.forces[1].joints if j.name == joint and body in j.bodies]
+        return sum((self.value(("force", j.key, body)) for j in of), 0.0)
 
     def _moment(self, joint: str, body: str) -> Number:
         self._places()
@@ -394,7 +385,7 @@ class Recording:
         return self.st.margin[group]
 
 
-COMPLEX = {"point", "turn", "dpoint", "force", "shaking", "applied", "gap"}
+COMPLEX = {"point", "turn", "dpoint", "force", "reaction", "shaking", "applied", "gap"}
 
 
 def names(key: Key) -> tuple[str, ...]:
@@ -405,6 +396,19 @@ def names(key: Key) -> tuple[str, ...]:
     """
     text = " ".join(repr(part) if isinstance(part, complex) else str(part) for part in key)
     return (f"{text} x", f"{text} y") if key[0] in COMPLEX else (text,)
+
+
+def quantity(rows: Mapping[str, Any], key: Key, n: int, to: str | None = None) -> Any:
+    """A quantity of n lanes from the rows of a run, or its derivative `to` an input: (n,), real or complex.
+
+    What does not hang on the input has no row. A row of the run's own table is not copied.
+    """
+    parts = [rows.get(name if to is None else f"d({name})/d({to})", 0.0) for name in names(key)]
+    if len(parts) == 1:
+        return parts[0] if np.ndim(parts[0]) else np.full(n, parts[0])
+    value = np.empty(n, complex)
+    value.real, value.imag = parts
+    return value
 
 
 class _Setting(Shared):
