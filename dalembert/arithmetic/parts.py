@@ -87,7 +87,7 @@ class _Raised:
 
     def __init__(self, error: Exception) -> None:
         self.kind, self.args = type(error), error.args
-        self.more = error.__reduce__()[2:]
+        self.more: tuple[Any, ...] = tuple(error.__reduce__()[2:])
 
     def again(self) -> Exception:
         """The error."""
