@@ -200,9 +200,9 @@ def run(
 ) -> Result:
     """Solve a planar mechanism: positions, velocities, accelerations, its limits and its assemblies.
 
-    FILE.toml describes ground, links, slots, sliders, gears, input and guess. Without --only the table has a row
-    for each pose and link (what `dalembert work` reads); with --only or --forces a row for each pose. In a pipe
-    --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
+    FILE.toml describes ground, links, slots, sliders, gears, input and guess. The table has a row for each pose: its
+    input, every point and link, or those of --only; with --forces the forces. In a pipe --check, --equilibrium,
+    --flywheel, --counterweights and --newton give their own table in place of the poses.
     """
     from cli.mechanism.read import wanted
     from cli.mechanism.solve import ORDERS, Analysis, load
@@ -297,13 +297,15 @@ def run(
             refuse_long(q.n * (1 if several is None else several.count))
         alone = several is None and html is None and not spreads and own in ([], ["--forces"])
         if alone and show.streams and analysis.is_long:
-            return _long(analysis, forces, states)
+            return _long(analysis, forces, states, show.digits)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not show.json or show.expect is not None or show.output is not None
         times = 1 if several is None or show.streams else several.count
-        analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces, times=times)
+        analysis.check_size(
+            json=show.as_json, table=table, states=states is not None, forces=forces, times=times
+        )
         if several is None:
-            result = _result(analysis, request, states, explain, graph, about)
+            result = _result(analysis, request, states, show.digits, explain, graph, about)
             if spreads:
                 its = Tolerances(analysis, forces, draws or 0, seed, distribution, workers or 1)
                 return with_tolerances(result, its)
@@ -317,7 +319,10 @@ def run(
         from cli.mechanism.many import Many
 
         found = Many(
-            mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
+            mechanism,
+            several,
+            analysis_of,
+            lambda each: _result(each, request, None, False, False, None, about),
         )
         result = _with_page(
             found.result(show.streams, show.as_json, table),
@@ -333,21 +338,22 @@ def run(
         )
 
 
-def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
+def _long(analysis: Analysis, forces: bool, states: Path | None, digits: bool) -> Result:
     """The table of a long sweep, a block of poses at a time."""
     from cli.mechanism import columns
     from cli.mechanism.states import table as link_states
+    from cli.mechanism.states import written
     from cli.mechanism.stream import Stream
     from cli.show.columns import Result
 
-    form = columns.forces if forces else link_states if analysis.only is None else columns.poses
+    form = columns.forces if forces else columns.poses
     stream = Stream(analysis, form, forces)
     every = Stream(replace(analysis, only=None), link_states)
     return Result(
         document=dict,
         tables={},
         blocks=stream.tables,
-        beside={} if states is None else {states: lambda: _csv(every.tables())},
+        beside={} if states is None else {states: lambda: written(every.tables(), digits)},
         late_warnings=stream.warnings,
         failed=lambda: not stream.any_assembled,
         within=lambda: _told(analysis.file),
@@ -358,6 +364,7 @@ def _result(
     analysis: Analysis,
     request: Request,
     states: Path | None,
+    digits: bool,
     explain: bool,
     graph: str | None,
     about: dict[str, str],
@@ -365,6 +372,7 @@ def _result(
     from cli.mechanism import columns, poses, remarks, words
     from cli.mechanism import forces as of_forces
     from cli.mechanism.states import table as link_states
+    from cli.mechanism.states import written
     from cli.mechanism.studies import Studies
     from cli.show.columns import Result, Sheet
 
@@ -376,9 +384,7 @@ def _result(
         picture.check_names(analysis, graph)  # a bad name is an error before anything is written
 
     def of_poses() -> Table:
-        if request.forces:
-            return columns.forces(analysis)
-        return link_states(analysis) if analysis.only is None else columns.poses(analysis)
+        return columns.forces(analysis) if request.forces else columns.poses(analysis)
 
     def document() -> Document:
         listed = poses.document(analysis)
@@ -398,7 +404,7 @@ def _result(
         # every link, whatever --only names
         every = replace(analysis, only=None)
         every.motions = analysis.motions
-        return _csv(iter([link_states(every)]))
+        return written(iter([link_states(every)]), digits)
 
     own = columns.studies(studies)
     # the table of a study asked for alone stands in place of the poses
@@ -408,6 +414,7 @@ def _result(
         document=document,
         tables=tables,
         screen=of_poses if alone else None,
+        expected=(lambda: columns.poses(analysis), lambda: link_states(analysis)),
         notes=lambda: analysis.mechanism.name,
         afterword=lambda: words.afterword(studies, explain=explain),
         figure=figure,
@@ -437,10 +444,3 @@ def _told(file: str) -> Iterator[None]:
         yield
     except MechanismError as error:
         raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
-
-
-def _csv(tables: Iterator[Table]) -> Iterator[bytes]:
-    from cli.show.text import csv_text
-
-    for i, table in enumerate(tables):
-        yield csv_text(table.cells, header=i == 0).encode()
