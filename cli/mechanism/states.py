@@ -7,7 +7,6 @@ several inputs every pose has as many velocity fields (column `field`): a unit o
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,8 +17,6 @@ from cli.mechanism.columns import bounds_of, column, link_error, pose_keys
 from cli.mechanism.poses import LINK, POINT, cells, of_link, pair
 from cli.mechanism.solve import Analysis
 from cli.show.columns import Table
-from cli.show.digits import digits_that_hold
-from cli.show.text import csv_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -230,10 +227,3 @@ def _guided(motion: Motion, guide: int, link: str) -> NDArray[np.float64]:
     carried = motion.at(link, m.through(g)).error_estimate(1)
     turned = slide * (r.angle(link, 1) + omega * r.rotation(link)) + omega * r.slide(guide)
     return np.asarray(carried + turned)
-
-
-def written(tables: Iterable[Table], digits: bool) -> Iterator[bytes]:
-    """Yield the file of tables, one below the other; only the digits that hold, if wanted."""
-    for i, whole in enumerate(tables):
-        table = digits_that_hold(whole)[0] if digits else whole
-        yield csv_text(table.cells, header=i == 0).encode()
