@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cli.errors import DataError
+from cli.read.decoding import LINE
 from cli.read.sources import Source, open_source
 from cli.read.tables import Cells, Numbers, Table, read
 from cli.read.units import parse_number, phasor
@@ -26,6 +27,7 @@ NAMES = {
     "unbalance": "trial_unbalance_kg_m",
     "mass_angle_deg": "trial_angle_deg",
 }
+ANGLE = re.compile(r"(?:phase|(mass_|unbalance_)?angle(?:_(\w+))?)")
 KEYS = ("A", "B", "U", "ALPHA", "A0", "keep_trial", "weight_const")
 WITH = re.compile(
     r"without\b.*|with\s+(?P<mass>[\d.,]+)\s*(?P<unit>[a-z]+)(?:\s*(?:@|at)\s*(?P<angle>[-+\d.,]+)\s*(?:°|deg)?)?"
@@ -48,6 +50,8 @@ def headed(header: list[str]) -> list[str]:
 
     >>> headed(["", "DoubleA", "phase", "mass", "phase", "ref"])
     ['state', 'amplitude_um_pp', 'phase_deg', 'trial_mass_kg', 'trial_angle_deg', 'ref']
+    >>> headed(["state", "amplitude_um", "phase_rad", "mass_g", "angle_rad"])
+    ['state', 'amplitude_um', 'phase_rad', 'trial_mass_g', 'trial_angle_rad']
     """
     out: list[str] = []
     of_mass = False
@@ -56,8 +60,9 @@ def headed(header: list[str]) -> list[str]:
         meant = "state" if not word and k == 0 else NAMES.get(word, word)
         if word.startswith(("mass_", "unbalance_")) and word not in NAMES:
             meant = f"trial_{word}"
-        if word in ("phase", "angle", "angle_deg"):
-            meant = "trial_angle_deg" if of_mass else "phase_deg"
+        if angle := ANGLE.fullmatch(word):
+            of, unit = angle.groups()
+            meant = f"{'trial_angle' if of or of_mass else 'phase'}_{unit or 'deg'}"
         if meant.startswith(("trial_mass", "trial_unbalance", "amplitude")):
             of_mass = not meant.startswith("amplitude")
         out.append(name if meant == word else meant)
@@ -167,8 +172,8 @@ def _sheet_text(rows: list[list[str]]) -> str:
 
 def _keyed(text: str) -> bool:
     """Tell whether the first line that says something is `KEY:` and a list."""
-    for line in text.splitlines():
-        said = line.split("#")[0].strip()
+    for line in LINE.finditer(text):
+        said = line.group().split("#")[0].strip()
         if said and said != "---":
             return re.match(r"[A-Za-z_]\w*\s*[:=]\s*(\[|$|[-+\d.]+\s*@)", said) is not None
     return False
