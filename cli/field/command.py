@@ -242,7 +242,7 @@ def run(
     stored_unit = None if stored is None else stored.unit
     measured = table = None
     if not fit:
-        table = runs_table(runs, phaseless=four_run)
+        table = runs_table(runs)
         fit = stored is None and not four_run and more_than_unknowns(table)
     if table is not None and not fit:
         try:

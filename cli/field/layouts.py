@@ -75,7 +75,9 @@ def is_log(path: str) -> bool:
     if _keyed_text(source) is not None:
         return True
     columns = {each.name.lower() for each in source.headings}
-    return not source.headings[0].name or bool(columns & {"state", *NAMES} - {"plane", "amplitude"})
+    own = any(name.startswith(("mass_", "unbalance_")) for name in columns)
+    own = own and not any(name.startswith(("trial_mass", "trial_unbalance")) for name in columns)
+    return not source.headings[0].name or own or bool(columns & {"state", *NAMES} - {"plane", "amplitude"})
 
 
 class Alpha(NamedTuple):
@@ -120,7 +122,7 @@ def log_table(path: str) -> Layout:
         numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},
         texts=["rotor", "run", "sensor", "state", "trial_plane", "trial_kept", "ref", "use", "date"],
         cells={"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"},
-        blank=["speed", "weight"],
+        blank=["speed", "weight", "amplitude", "phase"],
         headers=headed,
     )
     states = [WITH.fullmatch(state.lower()) for state in table.texts.get("state", ())]

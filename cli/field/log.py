@@ -37,7 +37,12 @@ def read_log(
     table = layout.table
     amplitude, phase = table.require("amplitude", "amplitude"), table.require("phase", "angle")
     table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
-    vibration = phasor(amplitude.values, -phase.values if lagging else phase.values, phase.unit)
+    # a state that a run lacks may be a row with blank cells
+    unread = np.isnan(amplitude.values) & np.isnan(phase.values)
+    for numbers, name in ((amplitude, "amplitude"), (phase, "phase")):
+        table.reject(np.isnan(numbers.values) & ~unread, name, "a number, or amplitude and phase both blank")
+    turn = np.where(unread, 0.0, -phase.values if lagging else phase.values)
+    vibration = np.where(unread, complex(np.nan), phasor(amplitude.values, turn, phase.unit))
     both = [name for name in ("trial_mass", "trial_unbalance") if name in table.cells]
     if len(both) > 1 or not (both or sisters):
         found = f"both {' and '.join(both)}" if both else f"none (the header is: {', '.join(table.header)})"
@@ -76,7 +81,7 @@ def read_log(
     for name in exclude:
         if name not in run_names:
             raise bad("--exclude", f"no run {quote(name)} in {table.file}")
-    share = float(vector_error(np.ones(table.rows), phase.values, phase.unit).max())
+    share = float(vector_error(np.ones(table.rows), turn, phase.unit).max())
     rows = LogRows(
         table, rotor, names, vibration, channel, channels, masses, run, run_names, when, share, mass_share
     )

@@ -280,12 +280,17 @@ class Sorted:
     def parts(self, named: Sequence[str | None] | None) -> Iterator[Part]:
         """Yield rotors of like channels, planes and number of readings, and of like names where these count."""
         rows, rotors = self.rows, len(self.rows.rotors)
-        mine = np.flatnonzero(self.takes_part[self.run])
+        mine = np.flatnonzero(self.takes_part[self.run] & np.isfinite(rows.vibration[self.order]))
         rotor, run, channel = self.rotor[mine], self.run[mine], rows.channel[self.order[mine]]
         lacking = np.flatnonzero(np.bincount(rotor, minlength=rotors) == 0)
         if len(lacking):
             of = self.of(int(lacking[0]))
-            raise DataError(f"{rows.table.file}: {of}every run is excluded: expected runs to fit")
+            left = (
+                "of the runs that are not excluded none was read"
+                if self.takes_part.any()
+                else "every run is excluded"
+            )
+            raise DataError(f"{rows.table.file}: {of}{left}: expected runs to fit")
         again = _again(run * len(rows.channels) + channel)
         lines = _Listed(rotor, run * (int(again.max()) + 1) + again, rotors)
         channels = _Listed(rotor, channel, rotors)

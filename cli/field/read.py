@@ -18,14 +18,14 @@ OF_LOGS = ("date", "ref", "use")  # columns that count where all runs are fitted
 NO = ("no", "n", "false", "0", "", "removed", "off")
 
 
-def runs_table(path: str, *, phaseless: bool) -> Table:
+def runs_table(path: str) -> Table:
     """Read a file as a table of runs."""
     return read(
         path,
         numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},
         texts=["rotor", "run", "sensor", "trial_plane", "trial_kept", *OF_LOGS],
         cells={"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"},
-        blank=["speed", "weight"] + (["phase"] if phaseless else []),
+        blank=["speed", "weight", "amplitude", "phase"],
     )
 
 
@@ -35,11 +35,13 @@ def read_runs(table: Table, *, lagging: bool, phaseless: bool, stored_unit: str 
         if name in table.texts:
             table.warnings.append(f"{table.file}: ignored the column {name}")
     amplitude = table.require("amplitude", "amplitude")
+    table.reject(np.isnan(amplitude.values), "amplitude", "a number")
     table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
     if phaseless:
         vibration = amplitude.values.astype(complex)
     else:
         phase = table.require("phase", "angle")
+        table.reject(np.isnan(phase.values), "phase", "a number")
         vibration = phasor(amplitude.values, -phase.values if lagging else phase.values, phase.unit)
     if "weight" in table.numbers:
         table.reject(table.numbers["weight"].values < 0, "weight", "a weight that is not negative")

@@ -287,16 +287,16 @@ def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
             names=range(len(source.header)),
             index_col=False,
             dtype={
-                index: float
-                if kind == "number" and not may_be_blank
-                else "category"
-                if kind == "text"
-                else object
-                for _, index, _, kind, may_be_blank in plan
+                index: float if kind == "number" and not marker else "category" if kind == "text" else object
+                for _, index, _, kind, _ in plan
             },
             usecols=[index for _, index, *_ in plan] if plan else None,
             keep_default_na=False,
-            na_filter=False,
+            na_values={
+                index: [""]
+                for _, index, _, kind, may_be_blank in plan
+                if kind == "number" and may_be_blank and not marker
+            },
             decimal=decimal,
             engine="c",
             **exact,
@@ -316,19 +316,18 @@ def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
     rows = len(frame)
     marks: dict[tuple[int, str], str] = {}
     for name, index, unit, kind, may_be_blank in plan:
-        if kind == "number" and not may_be_blank:
+        if kind == "number" and not marker:
             values = frame[index].to_numpy()
+            empty = np.isnan(values)
         elif kind == "number":
             text = frame[index].to_numpy(dtype=object)
-            empty = text == ""
-            if marker:
-                marked = frame[index].str.startswith(marker).to_numpy(dtype=bool)
-                marks |= {(int(row), name): text[row].strip() for row in np.flatnonzero(marked)}
-                if source.has_commas([text[marked]]):
-                    return False
-                empty |= marked
+            marked = frame[index].str.startswith(marker).to_numpy(dtype=bool)
+            marks |= {(int(row), name): text[row].strip() for row in np.flatnonzero(marked)}
+            if source.has_commas([text[marked]]):
+                return False
+            empty = (text == "") | marked
             try:
-                values = np.where(empty, "0", text).astype(float)
+                values = np.where(empty, "nan", text).astype(float)
             except ValueError:
                 return False
         elif kind == "text":
@@ -351,10 +350,8 @@ def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
                 return False
             table.cells[name] = Cells(source.header[index], unit, cells, decimal_comma)
             continue
-        if not (np.abs(values) <= LARGEST).all():
+        if not ((np.abs(values) <= LARGEST) | (empty & may_be_blank)).all():
             return False
-        if may_be_blank:
-            values[empty] = np.nan
         table.numbers[name] = Numbers(source.header[index], unit, values)
     table.rows = rows
     table.marks.update(marks)

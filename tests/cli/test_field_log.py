@@ -191,6 +191,28 @@ def standard(masses: Sequence[complex], error: Sequence[complex], sensors: int =
     return "".join(lines)
 
 
+def test_a_state_that_was_not_read_may_be_a_row_of_blank_cells(dalembert: Dalembert) -> None:
+    head, *lines = standard(MASSES, ERRORS, sensors=1).splitlines()
+    blank = "9,1,,," + ",".join(lines[2].split(",")[4:])
+    full, _ = found(dalembert("field", "-", "--json", stdin="\n".join([head, *lines])))
+    same, _ = found(dalembert("field", "-", "--json", stdin="\n".join([head, *lines, blank])))
+    assert same == full
+    half = "9,1,7,," + ",".join(lines[2].split(",")[4:])
+    done = dalembert("field", "-", stdin="\n".join([head, *lines, half]))
+    assert done.returncode == 1
+    assert "amplitude and phase both blank" in done.stderr
+
+
+def test_plain_headers_of_a_run_s_masses_and_radians(dalembert: Dalembert) -> None:
+    plain = (
+        "run,amplitude_um,phase_rad,mass_g,angle_rad\n1,80,0.7,,\n2,99,0.77,10,-1.57\n3,127,1.07,30,-1.05\n"
+    )
+    theirs = plain.replace("mass_g", "trial_mass_g").replace("angle_rad", "trial_angle_rad")
+    one, other = (dalembert("field", "-", stdin=text) for text in (plain, theirs))
+    assert one.returncode == 0, one.stderr
+    assert one.stdout == other.stdout
+
+
 def test_just_enough_runs_give_todays_answer(dalembert: Dalembert) -> None:
     text = standard([0, 10j], [0, 0])
     today, _ = found(dalembert("field", "-", "--json", stdin=text))
@@ -452,12 +474,12 @@ def test_machines_with_runs_planes_and_repeats_of_their_own_are_each_least_squar
     for group in runs.groups:
         assert group.fit is not None
         for i, r in enumerate(group.rotors.tolist()):
-            rows, read, planes_of = known[runs.rotors[r]]
+            rows, all_read, planes_of = known[runs.rotors[r]]
             assert set(group.planes) == planes_of
             for s, channel in enumerate(group.channels):
                 mine = [k for k, (state, _) in enumerate(rows) if state == channel.state]
                 design = np.array([rows[k][1] for k in mine])
-                theirs = np.linalg.lstsq(design, read[mine], rcond=None)[0]
+                theirs = np.linalg.lstsq(design, all_read[mine], rcond=None)[0]
                 assert np.abs(group.fit.unknowns[i, s] - theirs).max() < 1e-10 * np.abs(theirs).max()
                 assert len(mine) == group.fit.present[i, :, s].sum()
                 seen += 1
