@@ -82,7 +82,7 @@ class Lanes:
     def recording(self) -> Recording:
         """The formulas of the branch, for rates that are zero where these are."""
         inputs = self.poses.inputs
-        if inputs.shape[1] == 1 and len(inputs):
+        if inputs.shape[1] == 1 and len(inputs) and not self.branch.settled:
             self.branch.cover(float(np.nanmin(inputs)), float(np.nanmax(inputs)))
         moves = tuple(any(np.any(rate) for rate in rates) for rates in self.poses.rates)
         return recorded(self.branch, moves)
