@@ -193,7 +193,12 @@ class Lanes:
         self.poses.solve(self.branch.plan.writes(of), 0)
         at = int(i)
         if at < len(of.angles):
-            return self.poses.over(lambda _, st: st.angle[of.angles[at]])  # type: ignore[no-any-return]
+            body = of.angles[at]
+            # a closed form leaves the rotation alone
+            found: Reals = self.poses.over(
+                lambda _, st: st.angle[body] if body in st.angle else np.angle(st.turn[body])
+            )
+            return found
         return self.poses.over(lambda _, st: st.slide[of.slides[at - len(of.angles)]])  # type: ignore[no-any-return]
 
     def _angle(self, body: str) -> Reals:
@@ -242,7 +247,7 @@ def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
 
 def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
     """The tape of quantities, pruned once."""
-    key = recording.moves, recording.turning_over, keys
+    key = recording, keys
     with _writing:
         if key not in branch.recordings:
             branch.recordings[key] = recording.tape(keys)

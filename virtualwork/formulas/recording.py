@@ -106,10 +106,18 @@ class Recording:
         self._forces: tuple[LoadPaths, JointForces, Block] | None = None
 
     # --- solving ------------------------------------------------------------------------------------------------
+    def enters(self, group: Group) -> bool:
+        """Whether the unknowns of a group enter: it has no closed form."""
+        return group.kind == "Newton"
+
+    def unknowns(self, group: Group) -> list[Number]:
+        """The unknowns of a group, angles and then slides, as they enter."""
+        n = len(group.angles) + len(group.slides)
+        return [self.recorder.input(f"x {group.name} {i}") for i in range(n)]
+
     def _close(self, group: Group, st: State) -> None:
-        if group.kind == "Newton":
-            n = len(group.angles) + len(group.slides)
-            x: list[Number] = [self.recorder.input(f"x {group.name} {i}") for i in range(n)]
+        if self.enters(group):
+            x = self.unknowns(group)
             put_unknowns(group, st, x)
             if not self.settled:
                 step = WRITTEN.solve(columns(group, st), gaps(group, st))
@@ -356,7 +364,7 @@ class Recording:
         self.solve([key for g in chosen for key in self.plan.writes(g)], 0)
         total: Number = 0.0
         for group in chosen:
-            if group.kind == "Newton":
+            if self.enters(group):
                 unknowns = [self.st.angle[b] for b in group.angles] + [self.st.slide[s] for s in group.slides]
                 total = sum((abs(x) for x in unknowns), total)
             else:
@@ -377,7 +385,7 @@ class Recording:
         return self.st.margin[group]
 
 
-COMPLEX = {"point", "turn", "dpoint", "force", "reaction", "shaking"}
+COMPLEX = {"point", "turn", "dpoint", "force", "reaction", "shaking", "applied", "gap"}
 
 
 def names(key: Key) -> tuple[str, ...]:
