@@ -167,20 +167,13 @@ def test_expected_values_are_found_by_their_input(dalembert: Dalembert, tmp_path
     assert "no (further) row with input_deg 95" in done.stderr
 
 
-<<<<<<< HEAD
 def test_expected_poses_beside_another_table(dalembert: Dalembert, tmp_path: Path) -> None:
-    angle = rows(dalembert("mechanism", "m.toml").stdout)[1]["angle_deg"]
-    (tmp_path / "e.csv").write_text(f"link,angle_deg\ncoupler,{angle}\n")
-    assert dalembert("mechanism", "m.toml", "--newton", "--expect", "e.csv").returncode == 0
-=======
-def test_expected_poses_beside_another_table(dalembert: Run, tmp_path: Path) -> None:
     (row,) = rows(dalembert("mechanism", "m.toml").stdout)
     # as the poses have it, and as the table of link states has it
     for expected in ("coupler_angle_deg\n", "link,angle_deg\ncoupler,"):
         (tmp_path / "e.csv").write_text(f"{expected}{row['coupler_angle_deg']}\n")
         for options in ((), ("--newton",), ("--forces",)):
             assert dalembert("mechanism", "m.toml", *options, "--expect", "e.csv").returncode == 0
->>>>>>> main
     (tmp_path / "e.csv").write_text("quantity,of,value\nmobility,,1\n")
     assert dalembert("mechanism", "m.toml", "--check", "--expect", "e.csv").returncode == 0
     (tmp_path / "e.csv").write_text("quantity,of,value\nmobility,,2\n")
