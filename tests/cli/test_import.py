@@ -482,6 +482,11 @@ def test_limits_of_strokes_and_turns_are_named() -> None:
     assert any("stroke 0.8 of cylinder 1: left out" in note for note in taken(text)[1])
     turning = (FORMATS / "motiongen/elliptical_crank.json").read_text()
     assert not any("max" in note for note in taken(turning)[1])
+    said = taken(
+        turning.replace('"riders": ["J6"]', '"riders": ["J6"], "max": 2').replace("{", '{"springs": [1],', 1)
+    )[1]
+    assert any("max 2 of slot 1: left out" in note for note in said)
+    assert any("springs: left out" in note for note in said)
     said = taken(turning.replace('"max": 360', '"max": 90'))[1]
     assert any("min 0, max 90 of actuator 1: left out" in note for note in said)
 
