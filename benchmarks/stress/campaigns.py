@@ -28,6 +28,8 @@ MODULES = tuple(
         "topology_rates",
         "equilibria",
         "assemblies",
+        "in_time",
+        "tapes",
     )
 )
 
