@@ -58,7 +58,7 @@ def test_output_holds_what_standard_output_shows(dalembert: Dalembert, tmp_path:
     assert (tmp_path / "states.csv").read_text() == (tmp_path / "alone.csv").read_text()
 
 
-def test_without_only_a_pipe_gets_every_pose_of_every_point_and_link(dalembert: Run) -> None:
+def test_without_only_a_pipe_gets_every_pose_of_every_point_and_link(dalembert: Dalembert) -> None:
     (*_, last) = shown = rows(dalembert("mechanism", "m.toml", *SWEEP).stdout)
     assert [row["input_deg"] for row in shown] == [f"{angle:.1f}" for angle in range(0, 361, 10)]
     of_all = rows(dalembert("mechanism", "m.toml", *SWEEP, "--only", "A,B,C,D,crank,coupler,rocker").stdout)
@@ -70,7 +70,7 @@ def test_without_only_a_pipe_gets_every_pose_of_every_point_and_link(dalembert: 
 
 
 @pytest.mark.parametrize("angle", ["60", "0.1", "-80", "123.456789012345", "1e-9", "359.99"])
-def test_degrees_that_are_read_print_back(angle: str, dalembert: Run, tmp_path: Path) -> None:
+def test_degrees_that_are_read_print_back(angle: str, dalembert: Dalembert, tmp_path: Path) -> None:
     (tmp_path / "m.toml").write_text(FOUR_BAR.replace("angle = 40", f"angle = {angle}"))
     (row,) = rows(dalembert("mechanism", "m.toml", "--only", "crank").stdout)
     assert float(row["input_deg"]) == float(angle)
@@ -78,7 +78,7 @@ def test_degrees_that_are_read_print_back(angle: str, dalembert: Run, tmp_path: 
 
 
 @pytest.mark.parametrize("rtol", ["nan", "-1e-3", "inf"])
-def test_a_tolerance_is_a_number_from_0_on(rtol: str, dalembert: Run, tmp_path: Path) -> None:
+def test_a_tolerance_is_a_number_from_0_on(rtol: str, dalembert: Dalembert, tmp_path: Path) -> None:
     (tmp_path / "e.csv").write_text("C_x_m\n1\n")
     done = dalembert("mechanism", "m.toml", "--expect", "e.csv", "--rtol", rtol)
     assert done.returncode == 2
