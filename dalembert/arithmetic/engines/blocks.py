@@ -60,14 +60,9 @@ class Blocks:
         self.tape = tape
         self.varying = [name for name in tape.inputs if name not in uniform]
         operations = tape.operations
-        lanes = [False] * len(operations)
-        for number, (kind, *arguments) in enumerate(operations):
-            if kind == "input":
-                lanes[number] = arguments[0] not in uniform
-            elif kind != "const":
-                lanes[number] = any(lanes[a] for a in arguments)
+        self.of_lanes = lanes = self.lanes_of(tape, uniform)
         # the part that is the same for all lanes, and which of its values the lanes read
-        self.common = not all(lanes)
+        self.common = [(n, *op) for n, op in enumerate(operations) if not lanes[n]]
         body = [n for n, op in enumerate(operations) if lanes[n] and op[0] != "input"]
         last = {a: n for n in body for a in operations[n][1:]}
         outputs: dict[int, str] = {}
@@ -120,6 +115,16 @@ class Blocks:
         self.parts = self._compiled(lines)
         self._own = threading.local()
 
+    def lanes_of(self, tape: Tape, uniform: frozenset[str]) -> list[bool]:
+        """Which operations are not the same for all lanes."""
+        lanes: list[bool] = []
+        for kind, *arguments in tape.operations:
+            if kind == "input":
+                lanes.append(arguments[0] not in uniform)
+            else:
+                lanes.append(kind != "const" and any(lanes[a] for a in arguments))
+        return lanes
+
     def _compiled(self, lines: list[str]) -> list[Callable[..., None]]:
         names = [f"x{k}" for k in range(len(self.varying))] + [f"c{n}" for n in self.read]
         names += [f"o{row}" for row in self.written] + [f"s{k}" for k in range(self.slots)] + ["mask"]
@@ -163,17 +168,14 @@ class Blocks:
 
     def _common(self, inputs: Mapping[str, Reals]) -> list[Any]:
         """The values that are the same for all lanes; None for the others."""
-        found: list[Any] = []
-        for kind, *arguments in self.tape.operations:
+        found: list[Any] = [None] * len(self.tape.operations)
+        for number, kind, *arguments in self.common:
             if kind == "const":
-                found.append(np.float64(arguments[0]))
+                found[number] = np.float64(arguments[0])
             elif kind == "input":
-                column = inputs[arguments[0]]
-                found.append(None if column.ndim else column[()])
-            elif any(found[a] is None for a in arguments):
-                found.append(None)
+                found[number] = inputs[arguments[0]][()]
             else:
-                found.append(performed(kind, [found[a] for a in arguments], NUMPY))
+                found[number] = performed(kind, [found[a] for a in arguments], NUMPY)
         return found
 
 
