@@ -96,7 +96,11 @@ def report(
         sections = [*([Section("Given", given)] if given else []), *first.sections]
         sheets = [replace(first, sections=[*sections, *([check] if check else [])]), *others]
     pages = [
-        Page(sheet.title, [(s.title, list(_printed(s.parts, finish))) for s in sheet.sections], sheet.figure)
+        Page(
+            sheet.title,
+            [(s.title, list(_printed(s.parts, finish)) or ["none"]) for s in sheet.sections],
+            sheet.figure,
+        )
         for sheet in sheets
     ]
     call = " ".join(["dalembert", *map(_quoted, sys.argv[1:])])
