@@ -19,7 +19,7 @@ from cli.read.tolerance import Tolerance
 from cli.read.units import degrees, from_si, phasor, to_si
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Request:
     """What the options ask for."""
 
@@ -40,7 +40,7 @@ class Verdict(NamedTuple):
     residual: float
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Balancing:
     """The corrections as given out, one row per rotor and plane, and what they leave; all in SI."""
 
