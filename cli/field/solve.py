@@ -10,23 +10,17 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+import balancing
 from balancing import (
-    AmplitudeFit,
     Balance,
     DependentPlanes,
     DependentTrials,
     Infeasible,
-    JointFit,
-    LogBalance,
-    Readings,
     condition_number,
     influence_coefficients,
-    influence_from_amplitudes,
     initial_unbalance,
     least_squares,
     minimax,
-    place,
-    spread,
     unseen,
 )
 from cli.errors import DataError
@@ -45,7 +39,7 @@ SHOWN = 5  # of so many rotors the same is said, of the others together
 UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class Solved:
     """A group's result."""
 
@@ -63,8 +57,8 @@ class Solved:
     bound: Real | None
     covariance: Real | None = None
     residual_95: Real | None = None
-    fits: list[AmplitudeFit] = field(default_factory=list)
-    balance: LogBalance | None = None
+    fits: list[balancing.AmplitudeFit] = field(default_factory=list)
+    balance: balancing.LogBalance | None = None
     """Where all runs were fitted at once: what the corrections leave, and how sure it is."""
     unbalance: Complex | None = None
     """(g, p): the rotor's own in its initial state; NaN where the readings do not determine it."""
@@ -254,7 +248,7 @@ class FieldBalancing:
                 f"{unit}: infeasible; the smallest limit that can be met is {error.smallest:.6g} {unit}"
             ) from None
 
-    def _amplitudes(self, group: Group) -> list[AmplitudeFit]:
+    def _amplitudes(self, group: Group) -> list[balancing.AmplitudeFit]:
         """The four-run method, rotor by rotor."""
         if len(group.planes) != 1:
             raise DataError(
@@ -264,7 +258,9 @@ class FieldBalancing:
         fits = []
         for i in range(len(group.rotors)):
             try:
-                fit = influence_from_amplitudes(group.initial[i].real, group.runs[i].real, group.on[i, :, 0])
+                fit = balancing.influence_from_amplitudes(
+                    group.initial[i].real, group.runs[i].real, group.on[i, :, 0]
+                )
             except ValueError as error:
                 raise DataError(f"{self.runs.table.file}: {self.of(group, i)}{error}") from None
             fits.append(fit)
@@ -289,7 +285,7 @@ class FieldBalancing:
         covariances, residuals = [], []
         draws = request.monte_carlo or 4000
         for i in range(len(group.rotors)):
-            readings = Readings(
+            readings = balancing.Readings(
                 group.initial[i],
                 relative,
                 angle,
@@ -306,10 +302,10 @@ class FieldBalancing:
                 if limited:
                     problems = readings.problem_samples(min(request.monte_carlo or 200, 1000))
                     samples = self._limited_samples(solved, problems, w, i)
-                    covariances.append(spread(samples, solved.corrections[i]))
+                    covariances.append(balancing.spread(samples, solved.corrections[i]))
                 elif request.monte_carlo:
                     samples = readings.correction_samples(w, request.ridge, draws) - solved.standing[i]
-                    covariances.append(spread(samples, solved.corrections[i]))
+                    covariances.append(balancing.spread(samples, solved.corrections[i]))
                 else:
                     covariances.append(
                         readings.covariance(total, w, request.ridge, along=solved.corrections[i])
@@ -320,7 +316,7 @@ class FieldBalancing:
             residuals.append(np.quantile(left, 0.95))
         solved.covariance, solved.residual_95 = np.stack(covariances), np.array(residuals)
 
-    def _doubt(self, solved: Solved, fit: JointFit, runout: Complex, limited: bool) -> None:
+    def _doubt(self, solved: Solved, fit: balancing.JointFit, runout: Complex, limited: bool) -> None:
         """Carry the errors of a fit of all runs to the corrections."""
         request, weights = self.request, solved.group.weights
         before = solved.group.before
@@ -336,7 +332,9 @@ class FieldBalancing:
         else:
             errors = fit.scatter()
         still = fit.without(runout)
-        balance = LogBalance(still, solved.total, errors, weights, solved.corrections, request.ridge)
+        balance = balancing.LogBalance(
+            still, solved.total, errors, weights, solved.corrections, request.ridge
+        )
         solved.balance = balance
         if not np.isfinite(errors.along).any():
             return
@@ -350,7 +348,7 @@ class FieldBalancing:
             for i, corrections in enumerate(solved.corrections):
                 draws = balance.problem_samples(i, min(request.monte_carlo or 200, 1000))
                 own = None if weights is None else weights[i]
-                spreads.append(spread(self._limited_samples(solved, draws, own, i), corrections))
+                spreads.append(balancing.spread(self._limited_samples(solved, draws, own, i), corrections))
             solved.covariance = np.stack(spreads)
         else:
             solved.covariance = balance.covariance
@@ -393,7 +391,7 @@ class FieldBalancing:
         """Split a correction onto the places: name, angle in degrees, amount in SI of each that is used."""
         if self.request.places is None or w == 0:
             return []
-        masses = place(complex(w), np.radians(self.request.places)).masses.tolist()
+        masses = balancing.place(complex(w), np.radians(self.request.places)).masses.tolist()
         return [
             (str(k + 1), self.request.places[k] % 360.0, mass) for k, mass in enumerate(masses) if mass > 0
         ]
