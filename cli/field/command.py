@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = "fan-one-plane"
 PANELS = {
-    "What": "influence runout phase_lag rotation signal pulses exclude",
+    "What": "influence runout phase_lag rotation signal pulses exclude workers",
     "How": "method fit robust objective max_mass max_residual from_here ridge reading_error monte_carlo",
     "How: the tolerance, the first trial mass": "grade speed rotor_mass permissible radius suggest_trial planes",
     "Output: where masses go, the next run": "blades positions first predict suggest save_influence",
@@ -160,6 +160,10 @@ def run(
     pulses: Annotated[
         int, typer.Option(min=1, max=10_000, help="Pulses of the mark in a turn, for --signal.")
     ] = 1,
+    workers: Annotated[
+        int,
+        typer.Option(min=1, metavar="N", help="Processes that solve what each of many machines needs alone."),
+    ] = 1,
 ) -> Result:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
@@ -284,7 +288,8 @@ def run(
         places=options.places(positions, blades, first),
         against=against or measured.lags,
     )
-    found = FieldBalancing(measured, request, stored)
+    with options.processes(workers) as executor:
+        found = FieldBalancing(measured, request, stored, executor)
     fits = LogFits(found, Asked(masses_at(predict, measured), suggest, robust)) if fit else None
     return _result(found, fits, save_influence)
 

@@ -16,7 +16,7 @@ from cli.mechanism.tables import beside
 from cli.mechanism.variants import assigned, assignment, in_si, quantity
 from cli.read import options
 from cli.read.files import read_bytes
-from cli.read.units import to_si
+from cli.read.units import read_degrees, to_si
 from cli.show.columns import Column, Result, Table
 from virtualwork.describe.dimensions import Dimension, value
 from virtualwork.describe.errors import DescriptionError
@@ -127,7 +127,7 @@ def _target(m: Mechanism, point: str, path: str, said: list[str]) -> tuple[Any, 
 
 
 def _shown(dimension: Dimension, si: float) -> float:
-    return math.degrees(si) if dimension.unit == "deg" else si
+    return read_degrees(si) if dimension.unit == "deg" else si
 
 
 def _document(found: Fit[Mechanism]) -> Document:

@@ -21,6 +21,7 @@ from cli.show.columns import Result, Table
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from cli.show.columns import Column, Document
@@ -167,15 +168,21 @@ class InTime:
 
     def result(self, about: dict[str, str]) -> Result:
         """The call in every form it can be shown in."""
-        from cli.mechanism.time_picture import draw
-
         a = self.analysis
+
+        def figure() -> Figure:
+            from cli.show.picture import blank
+
+            drawn = blank()
+            self.run.plot(drawn)
+            return drawn
+
         return Result(
             document=self.document,
             tables={"time": self.table},
             notes=lambda: a.mechanism.name,
             afterword=self.words,
-            figure=lambda: draw(self.run, a.mechanism),
+            figure=figure,
             method=METHOD,
             about={"title": a.mechanism.name or "Mechanism"} | about,
             warnings=[*a.warnings, *self.run.warnings],

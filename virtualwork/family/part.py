@@ -23,9 +23,9 @@ from virtualwork.family.branches import LANES, meet_on_the_way, signs
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import FORCES, Key, over_blocks
 from virtualwork.formulas.dynamics import Dynamics
-from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.formulas.numbers import Number, Reals, leave_out
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.recording import COMPLEX, NAMES, NEAR, names
+from virtualwork.formulas.recording import COMPLEX, NAMES, NEAR, quantity
 
 Mask = NDArray[np.bool_]
 # the key of 0 where a pose is assembled
@@ -201,11 +201,7 @@ class Solver:
         tape = self.written.slopes(key, tuple(enters))
         with np.errstate(all="ignore"):
             found = run(tape, {name: self._lanes(name, np.arange(v)) for name in tape.inputs})
-        parts = []
-        for name in enters:
-            columns = [found.get(f"d({part})/d({name})", 0.0) for part in names(key)]
-            parts.append(columns[0] if len(columns) == 1 else columns[0] + 1j * columns[1])
-        return np.stack([np.broadcast_to(part, v * n).reshape(v, n) for part in parts], axis=-1)
+        return np.stack([quantity(found, key, v * n, to=name).reshape(v, n) for name in enters], axis=-1)
 
     def takes(self, keys: Sequence[Key]) -> bool:
         """Whether the tape has such quantities: friction iterates, redundant statics and twists are of each variant."""
@@ -226,23 +222,19 @@ class Solver:
         forces = any(key[0] in FORCES for key in keys)
         margins: list[Key] = [("margin", g.name) for g in written.closed] if forces else []
         asked = [key for key in keys if key != ASSEMBLED]
-        tape = written.tape((*asked, *dict.fromkeys(closed.values()), *margins))
+        whole = list(dict.fromkeys(closed.values()))
+        tape = written.tape((*asked, *whole, *margins))
         with np.errstate(all="ignore"):
             found = run(tape, {name: self._lanes(name, rows) for name in tape.inputs})
-            lanes = {name: np.broadcast_to(found[name], len(rows) * n).reshape(-1, n) for name in tape.names}
+            lanes = {
+                key: quantity(found, key, len(rows) * n).reshape(-1, n) for key in (*asked, *whole, *margins)
+            }
             near = np.zeros(len(rows), dtype=bool)
             for key in margins:
-                near |= (np.abs(lanes[names(key)[0]]) < NEAR).any(axis=1)
+                near |= (np.abs(lanes[key]) < NEAR).any(axis=1)
         for key, values in zip(keys, out, strict=True):
-            here = np.zeros((len(rows), n), values.dtype)
-            if key != ASSEMBLED:
-                where = names(key)
-                here.real = lanes[where[0]]
-                if len(where) == 2:
-                    here.imag = lanes[where[1]]
-            gap = ~np.isfinite(lanes[names(closed[key])[0]])
-            if gap.any():
-                here[gap] = np.nan
+            here = np.zeros((len(rows), n)) if key == ASSEMBLED else lanes[key]
+            leave_out(here, ~np.isfinite(lanes[closed[key]]))
             values[rows] = here
         return near
 

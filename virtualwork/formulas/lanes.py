@@ -21,9 +21,9 @@ from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.linear import SINGULAR
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
-from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.formulas.numbers import Number, Reals, leave_out
 from virtualwork.formulas.poses import Branch, Poses
-from virtualwork.formulas.recording import NAMES, NEAR, Recording, names
+from virtualwork.formulas.recording import NAMES, NEAR, Recording, names, quantity
 from virtualwork.formulas.scene import Scene
 
 # two threads that ask one assembly at once
@@ -148,17 +148,10 @@ class Lanes:
                 careful = careful | np.broadcast_to(near, n)
         nowhere = ~np.isfinite(self.poses.inputs).all(axis=1)
         for key in keys:
-            where = names(key)
-            if len(where) == 2:
-                value = np.empty(n, complex)
-                value.real, value.imag = out[where[0]], out[where[1]]
-            else:
-                value = out[where[0]]
-                # a row of the run's own table needs no copy
-                value = value if np.ndim(value) else np.full(n, value)
+            value = quantity(out, key, n)
             if key in closed:
-                value[~np.isfinite(np.broadcast_to(out[names(closed[key])[0]], n))] = np.nan
-            value[nowhere] = np.nan
+                leave_out(value, ~np.isfinite(np.broadcast_to(out[names(closed[key])[0]], n)))
+            leave_out(value, nowhere)
             if key[0] in FORCES:
                 value += 0.0
             self.known[key] = value
@@ -199,7 +192,12 @@ class Lanes:
         self.poses.solve(self.branch.plan.writes(of), 0)
         at = int(i)
         if at < len(of.angles):
-            return self.poses.over(lambda _, st: st.angle[of.angles[at]])  # type: ignore[no-any-return]
+            body = of.angles[at]
+            # a closed form leaves the rotation alone
+            found: Reals = self.poses.over(
+                lambda _, st: st.angle[body] if body in st.angle else np.angle(st.turn[body])
+            )
+            return found
         return self.poses.over(lambda _, st: st.slide[of.slides[at - len(of.angles)]])  # type: ignore[no-any-return]
 
     def _angle(self, body: str) -> Reals:
@@ -248,7 +246,7 @@ def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
 
 def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
     """The tape of quantities, pruned once."""
-    key = recording.moves, recording.turning_over, keys
+    key = recording, keys
     with _writing:
         if key not in branch.recordings:
             branch.recordings[key] = recording.tape(keys)

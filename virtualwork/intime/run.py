@@ -25,6 +25,8 @@ from virtualwork.intime.watch import Floats
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
+    from matplotlib.figure import FigureBase
+
     from dalembert.page import Page, Shown
     from virtualwork.animation import JointForce
 
@@ -120,6 +122,18 @@ class Run:
         """The motion at the first time, in the coordinates of the beginning: for its joints."""
         first = self.angle[:1], self.speed[:1], self.acceleration[:1], self.t[:1]
         return self.fine.legs[0].coordinates.motion(*first)
+
+    def plot(self, figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw inputs, speeds and energy over time and the mechanism at instants; return the axes.
+
+        The curves are drawn through more times than those asked for. Without a figure it is a new one of pyplot's;
+        without matplotlib (the extra `plot`) an ImportError.
+        """
+        from virtualwork.intime.picture import Course, draw, fine_times
+
+        fine = replace(self, t=fine_times(self.t))
+        course = Course(fine.t, fine.angle, fine.speed, fine.energy, fine.motion)
+        return draw(course, self.assembly.mechanism, figure)
 
     def animate(self, forces: bool = False) -> Page:
         """Return a page that moves: the mechanism by its own clock with play, slider, curves and values.

@@ -12,6 +12,7 @@ names (`topology.Vector`), and another mechanism of the same topology only puts 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -20,7 +21,7 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.plan.graph import decompose
 from virtualwork.plan.guessed import known_by_guess
-from virtualwork.plan.joints import relations
+from virtualwork.plan.joints import Relation, relations
 from virtualwork.plan.steps import (
     Angle,
     Closure,
@@ -177,7 +178,7 @@ class _Planner:
         return "PRP"
 
     # --- angles: sliders, gears and inputs are linear relations ----------------------------------------------
-    def _relations(self, fresh: list[str]) -> list[tuple[Mapping[str, float], Angle]]:
+    def _relations(self, fresh: list[str]) -> list[tuple[Relation, Angle]]:
         """Σ c·θ = const + Σ k·input, for every relation all of whose angles are known once this block is."""
         new = set(fresh)
         found = []
@@ -188,28 +189,29 @@ class _Planner:
                 if relation.gear is not None:
                     known = self.phases.get(relation.gear)
                     right = Angle(known) if known is not None else Angle(gears=((relation.gear, 1.0),))
-                found.append((relation.shares, right))
+                found.append((relation, right))
         return found
 
     def _eliminate(self, fresh: list[str]) -> tuple[list[str], list[Turn]]:
         """Gauss-Jordan on the linear relations: which angles stay free, and what the others are."""
         rows: list[tuple[dict[str, float], Angle]] = []
-        for c, right in self._relations(fresh):
+        for relation, right in self._relations(fresh):
+            c = relation.shares
             known = replace(right, gears=())
             for body, factor in c.items():
                 if body not in fresh:
                     known = _plus(known, self.angles[body], -factor)
             unknown = {body: factor for body, factor in c.items() if body in fresh}
-            if (
-                right.gears
-                # its constant is that of the guess, at once where no link before it has to be placed
-            ):
+            if self.m.gears:
                 there = known.at(self.m.at)
-                if there is None:
-                    known = _plus(known, right, 1.0)
-                else:
-                    stands = sum(factor * self.guess.get(body, 0.0) for body, factor in unknown.items())
-                    known = _plus(known, Angle(stands - there), 1.0)
+                stands = sum(factor * self.guess.get(body, 0.0) for body, factor in unknown.items())
+                if right.gears:
+                    # its constant is that of the guess, at once where no link before it has to be placed
+                    known = _plus(known, right if there is None else Angle(stands - there), 1.0)
+                elif relation.kind == "guide" and there is not None and unknown.keys() <= self.guess.keys():
+                    # gears count whole turns: those of a slider are the guess's
+                    whole = round(complex(stands - there).real / (2 * math.pi))
+                    known = _plus(known, Angle(2 * math.pi * whole), 1.0) if whole else known
             rows.append((unknown, known))
         solved: dict[str, tuple[dict[str, float], Angle]] = {}
         for unknown, known in rows:
