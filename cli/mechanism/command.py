@@ -260,9 +260,9 @@ def run(
         if clash:
             raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
         lonely: dict[str, object] = {"--html": html, "--digits": show.digits, "--workers": workers}
-        alone = [flag for flag, value in lonely.items() if value]
-        if alone and (vary or variants is not None):
-            raise options.bad(alone[0], "expected one mechanism with --time, and no --vary or --variants")
+        single = [flag for flag, value in lonely.items() if value]
+        if single and (vary or variants is not None):
+            raise options.bad(single[0], "expected one mechanism with --time, and no --vary or --variants")
     elif accuracy is not None or until is not None:
         raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
     if html is not None:

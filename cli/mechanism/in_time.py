@@ -68,6 +68,7 @@ class InTime:
     @cached_property
     def run(self) -> Run:
         """The simulation."""
+        from virtualwork import MechanismError
         from virtualwork.intime.run import simulate
 
         a = self.analysis
@@ -75,6 +76,8 @@ class InTime:
         (assembly,) = a.assemblies
         try:
             return simulate(assembly, self.times, accuracy=self.accuracy, until=level)
+        except MechanismError:
+            raise
         except ValueError as error:
             raise DataError(f"{a.file}: {error}") from None
 
