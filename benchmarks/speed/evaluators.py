@@ -103,7 +103,7 @@ def _sweep(
     for engine, aim, over in (("numpy", aims[0], None), ("llvm", aims[1], aims[2])):
         if engine == "llvm" and not compiled_code():
             continue
-        with _engine(engine):
+        with on_engine(engine):
             off = error(evaluator(angles, *rates))
             found = measured(
                 DOMAIN, work, engine, lambda: evaluator(angles, *rates), error=off, aim_ns=aim, **known
@@ -114,7 +114,8 @@ def _sweep(
 
 
 @contextmanager
-def _engine(name: str) -> Iterator[None]:
+def on_engine(name: str) -> Iterator[None]:
+    """Within it every tape runs on this engine."""
     before = os.environ.get("DALEMBERT_ENGINE")
     os.environ["DALEMBERT_ENGINE"] = name
     try:

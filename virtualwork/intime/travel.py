@@ -90,6 +90,20 @@ class Travel:
         """Whether a leg ended for it was stiff."""
         return any(leg.path.ended == "stiff" for leg in self.legs)
 
+    @property
+    def undecided(self) -> float | None:
+        """The first time at which it rests at a change point; None where it never does.
+
+        With a speed the motion is decided there: only one of the branches that meet goes on with it.
+        """
+        for leg in self.legs:
+            path = leg.path
+            rest = 1e-7 * float(np.abs(np.array(path.v)).max())
+            for t, q, v in zip(path.t, path.q, path.v, strict=True):
+                if path.equations.meets(q[0]) and abs(v[0]) <= rest:
+                    return t
+        return None
+
     def backwards(self) -> None:
         """From now on reach every time from the node after it.
 
