@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.speed.evaluators import on_engine
+from benchmarks.speed.evaluators import engine
 from benchmarks.speed.measure import Measurement, measured
 from dalembert.arithmetic.engines import compiled_code
 from virtualwork import Guess, Input, Link, Mechanism
@@ -66,12 +66,12 @@ def accuracies(quick: bool) -> tuple[float, ...]:
 def _engines(
     work: str, call: Callable[[], Any], aims: tuple[float | None, float | None], **known: Any
 ) -> Iterator[Measurement]:
-    for engine, aim in (("numpy", aims[0]), ("llvm", aims[1])):
-        if engine == "llvm" and not compiled_code():
+    for name, aim in (("numpy", aims[0]), ("llvm", aims[1])):
+        if name == "llvm" and not compiled_code():
             continue
-        with on_engine(engine):
+        with engine(name):
             call()
-            yield measured(DOMAIN, work, engine, call, aim_ns=aim, **known)
+            yield measured(DOMAIN, work, name, call, aim_ns=aim, **known)
 
 
 def four_bar() -> Mechanism:

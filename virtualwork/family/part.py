@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.engines import run_grid
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed
@@ -111,7 +111,7 @@ class Solver:
     def assembly(self) -> Assembly | None:
         """That of the mechanism itself; None where its own dimensions cannot be put together."""
         try:
-            found = Assembly.from_guess(self.part.mechanism)
+            found = assembled(self.part.mechanism)
             _ = found.track
         except MechanismError:
             return None
@@ -129,13 +129,17 @@ class Solver:
         ):
             return None
         moves = tuple(any(np.any(rate) for rate in order) for order in self.part.rates)
-        fixed = [d for d in self.part.dimensions if d.where[0] != "inputs"]
-        found = Written(own, fixed, moves, own_signs=True)
+        fixed = tuple(d for d in self.part.dimensions if d.where[0] != "inputs")
+        key = "family", fixed, moves
+        if key not in own.recordings:
+            own.recordings[key] = Written(own, fixed, moves, own_signs=True)
+        found: Written = own.recordings[key]
         return None if found.open_gears else found
 
     @cached_property
     def _given(self) -> dict[str, Reals]:
-        return {d.path: self.part.values[:, i] for i, d in enumerate(self.part.dimensions)}
+        columns = np.ascontiguousarray(self.part.values.T)
+        return {d.path: column for d, column in zip(self.part.dimensions, columns, strict=True)}
 
     @cached_property
     def _signs(self) -> tuple[dict[str, Reals], Mask]:
@@ -178,14 +182,21 @@ class Solver:
     def lanes(self, keys: Sequence[Key]) -> tuple[list[Any], Mask]:
         """The quantities of the variants that are on the tape; and which are not, (v,): of those they are NaN."""
         v, n = self.part.shape
-        out = [np.full((v, n), np.nan, complex if key[0] in COMPLEX else float) for key in keys]
         there = self.together if self.takes(keys) else np.zeros(v, dtype=bool)
-        places = np.flatnonzero(there)
-        each = max(1, LANES // max(n, 1))
         alone = ~there
+        each = max(1, LANES // max(n, 1))
+        if not alone.any() and v <= each:
+            return self._on_tape(keys, slice(None))
+        out = [np.empty((v, n), complex if key[0] in COMPLEX else float) for key in keys]
+        places = np.flatnonzero(there)
         for i in range(0, len(places), each):
             rows = places[i : i + each]
-            alone[rows[self._on_tape(keys, rows, out)]] = True
+            found, near = self._on_tape(keys, rows)
+            alone[rows[near]] = True
+            for to, values in zip(out, found, strict=True):
+                to[rows] = values
+        for to in out:
+            to[alone] = np.nan
         return out, alone
 
     def slopes(self, key: Key) -> Any | None:
@@ -200,7 +211,7 @@ class Solver:
         enters = [d.path for d in self.part.dimensions] + [f"q{j}" for j in range(self.part.inputs.shape[2])]
         tape = self.written.slopes(key, tuple(enters))
         with np.errstate(all="ignore"):
-            found = run(tape, {name: self._lanes(name, np.arange(v)) for name in tape.inputs})
+            found = run_grid(tape, {name: self._entering(name, slice(None)) for name in tape.inputs}, (v, n))
         return np.stack([quantity(found, key, v * n, to=name).reshape(v, n) for name in enters], axis=-1)
 
     def takes(self, keys: Sequence[Key]) -> bool:
@@ -213,10 +224,10 @@ class Solver:
             return False
         return written.recording.takes(keys)
 
-    def _on_tape(self, keys: Sequence[Key], rows: NDArray[np.intp], out: list[Any]) -> Mask:
-        """Work out some variants on the tape; which of them are better described alone."""
+    def _on_tape(self, keys: Sequence[Key], rows: NDArray[np.intp] | slice) -> tuple[list[Any], Mask]:
+        """Work out some variants on the tape; and which of them are better described alone."""
         assert self.written is not None
-        n = self.part.shape[1]
+        v, n = len(self.part.values[rows]), self.part.shape[1]
         written = self.written
         closed = {key: ("closed", *written.recording.hangs_on(key)) for key in keys}
         forces = any(key[0] in FORCES for key in keys)
@@ -225,34 +236,32 @@ class Solver:
         whole = list(dict.fromkeys(closed.values()))
         tape = written.tape((*asked, *whole, *margins))
         with np.errstate(all="ignore"):
-            found = run(tape, {name: self._lanes(name, rows) for name in tape.inputs})
-            lanes = {
-                key: quantity(found, key, len(rows) * n).reshape(-1, n) for key in (*asked, *whole, *margins)
-            }
-            near = np.zeros(len(rows), dtype=bool)
-            for key in margins:
-                near |= (np.abs(lanes[key]) < NEAR).any(axis=1)
-        for key, values in zip(keys, out, strict=True):
-            here = np.zeros((len(rows), n)) if key == ASSEMBLED else lanes[key]
-            leave_out(here, ~np.isfinite(lanes[closed[key]]))
-            values[rows] = here
-        return near
+            found = run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n))
+            lanes = {key: quantity(found, key, v * n).reshape(v, n) for key in (*asked, *whole, *margins)}
+        near = np.zeros(v, dtype=bool)
+        for key in margins:
+            near |= (np.abs(lanes[key]) < NEAR).any(axis=1)
+        gaps = {key: ~np.isfinite(lanes[key]) for key in whole}
+        values = [np.zeros((v, n)) if key == ASSEMBLED else lanes[key] for key in keys]
+        for key, here in zip(keys, values, strict=True):
+            if gaps[closed[key]].any():
+                leave_out(here, gaps[closed[key]])
+        return values, near
 
-    def _lanes(self, name: str, rows: NDArray[np.intp]) -> Any:
-        """An input of the tape for some variants in all their poses."""
-        v, n = self.part.shape
+    def _entering(self, name: str, rows: NDArray[np.intp] | slice) -> Any:
+        """An input of the tape for some variants: a number, or what broadcasts to (v, n)."""
         kind, _, group = name.partition(" ")
         if group and kind == "sign":
             sign = self._signs[0][group][rows]
-            return float(sign[0]) if (sign == sign[0]).all() else np.repeat(sign, n)
+            return float(sign[0]) if (sign == sign[0]).all() else sign[:, None]
         if name in self._given:
-            return np.repeat(self._given[name][rows], n)
+            return self._given[name][rows, None]
         j = int(name[1:])
         value = self.part.inputs[:, :, j] if name[0] == "q" else self.part.rates[NAMES.index(name[0]) - 1][j]
         # what is the same in all lanes is worked out once
-        return (
-            np.broadcast_to(value, (v, n))[rows].ravel() if np.size(value) > 1 else float(np.ravel(value)[0])
-        )
+        if np.size(value) == 1:
+            return float(np.ravel(value)[0])
+        return value[rows] if len(value) > 1 else value
 
     def _one(self, i: int, keys: Sequence[Key], out: list[Any]) -> None:
         """Describe one variant alone."""
@@ -275,6 +284,26 @@ class Solver:
                         values[i] = np.where(poses.assembled, 0.0, np.nan)
                     else:
                         values[i] = over_blocks(poses, key, forces)
+
+
+_assembled: dict[int, Assembly] = {}
+# mechanisms of which a process keeps what it has written down
+MECHANISMS = 8
+
+
+def assembled(mechanism: Description) -> Assembly:
+    """A mechanism put together once, with what has been written down of it.
+
+    Raises
+    ------
+    MechanismError
+    """
+    found = _assembled.get(id(mechanism))
+    if found is None or found.mechanism is not mechanism:
+        while len(_assembled) >= MECHANISMS:
+            _assembled.pop(next(iter(_assembled)), None)
+        found = _assembled[id(mechanism)] = Assembly.from_guess(mechanism)
+    return found
 
 
 _solvers: dict[tuple[str, int], Solver] = {}
