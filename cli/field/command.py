@@ -214,8 +214,8 @@ def run(
     from cli.field.fit import Asked, LogFits, masses_at
     from cli.field.layouts import alpha_of, is_log
     from cli.field.log import read_log
-    from cli.field.log_groups import fit_groups
-    from cli.field.read import NotOneInitialRun, read_runs
+    from cli.field.read import NotOneInitialRun, read_runs, runs_table
+    from cli.field.runs import more_than_unknowns
     from cli.field.sisters import Sisters
     from cli.field.solve import FieldBalancing
     from cli.read.tolerance import tolerance_of
@@ -244,21 +244,22 @@ def run(
         files = [stored_alpha(own)]
     stored = files[0] if files and not fit else None
     stored_unit = None if stored is None else stored.unit
-    measured = None
+    measured = table = None
     if not fit:
+        table = runs_table(runs)
+        fit = stored is None and not four_run and more_than_unknowns(table)
+    if table is not None and not fit:
         try:
-            measured = read_runs(runs, lagging=against, phaseless=four_run, stored_unit=stored_unit)
+            measured = read_runs(table, lagging=against, phaseless=four_run, stored_unit=stored_unit)
         except NotOneInitialRun:
             if stored is not None or four_run:
                 raise
             fit = True
-        else:
-            unknowns_beaten = any(len(group.trials) > len(group.planes) for group in measured.groups)
-            fit = unknowns_beaten and stored is None and not four_run
     lagging = against if phase_lag or rotation is not None else None
-    if measured is None or (fit and not fit_groups(measured, lagging)):
+    if measured is None:
         measured = read_log(
             runs,
+            table,
             lagging=lagging,
             exclude=exclude or [],
             sisters=Sisters(files) if files else None,

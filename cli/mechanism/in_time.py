@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 METHOD = (
     "Motion under forces: the effort at the inputs by virtual work with d'Alembert's forces is M·q̈ + h; let go, it is "
     "zero, and q̈ is integrated in the inputs. Loops are closed at every evaluation. The error is estimated from a "
-    "second solution of another tolerance."
+    "second solution in steps half as long."
 )
 
 
