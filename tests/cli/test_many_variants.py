@@ -58,7 +58,8 @@ def rows_of(text):
 
 
 @pytest.mark.parametrize(
-    "asked", [("--only", "H,rocker"), ("--forces",), ("--forces", "--only", "rocker", "--order", "position")]
+    "asked",
+    [(), ("--forces",), ("--only", "H,rocker"), ("--forces", "--only", "rocker", "--order", "position")],
 )
 def test_rows_of_many_are_those_of_a_few_described_one_by_one(dalembert, table, asked):
     # less than 32 variants are not worth writing the formulas down
