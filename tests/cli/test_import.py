@@ -487,6 +487,22 @@ def test_a_symmetric_double_butterfly_moves_from_where_it_is_drawn() -> None:
     assert np.isnan(motion.point("J6").velocity[7]).all()
 
 
+@pytest.mark.parametrize(("turned", "goes_on"), [(0.3, True), (0.7, False)])
+def test_a_double_butterfly_of_rounded_coordinates(turned: float, goes_on: bool) -> None:
+    """Six decimals: still nearly upright, or with a fold of its own between the two sides, which is not stepped over."""
+    rows = [
+        *("crank ground 0 0", "crank up1 3 3", "crank up2 -3 3", "up1 wing1 3 8", "up2 wing2 -3 8"),
+        *("wing1 wing2 0 10", "wing1 leg1 5 10", "wing2 leg2 -5 10", "leg2 ground -5 -4", "leg1 ground 5 -4"),
+    ]
+    drawn = []
+    for a, b, x, y in (row.split() for row in rows):
+        z = complex(float(x), float(y)) * np.exp(1j * turned)
+        drawn.append(f"{a} {b} R {z.real:.6f} {z.imag:.6f}")
+    (m,), notes = taken("\n".join(drawn))
+    assert m.motion(np.linspace(-0.2, 0.2, 41)).assembled.sum() == (41 if goes_on else 1)
+    assert any("neither side" in note for note in notes) != goes_on
+
+
 def test_limits_of_strokes_and_turns_are_named() -> None:
     text = (FORMATS / "motiongen/cylinder_boom_invented.json").read_text()
     assert any("stroke 0.8 of cylinder 1: left out" in note for note in taken(text)[1])

@@ -30,6 +30,8 @@ FINEST = 1e-7
 SEAM = 2 * FINEST
 # of the largest singular value: what is singular but for rounding
 UPRIGHT = 1e-9
+# the same, but for rounding of drawn coordinates
+NEARLY = 1e-4
 # rad or sizes of the mechanism for a turn of the input: no guess with slower unknowns stands upright
 STEEP = 100.0
 # rad, or sizes of the mechanism: how far beside an upright guess its neighbours are looked for
@@ -94,7 +96,7 @@ class Continuation:
         if jacobian.shape[0] != jacobian.shape[1] or not np.isfinite(jacobian).all():
             return
         u, s, vt = np.linalg.svd(jacobian * unit / self.size)
-        one = s[-1] <= UPRIGHT * s[0] and (len(s) == 1 or s[-2] > SINGULAR * s[0])
+        one = s[-1] <= NEARLY * s[0] and (len(s) == 1 or s[-2] > NEARLY * s[0])
         if not one or abs(u[:, -1] @ along) <= SINGULAR * self.size:
             return
         sides = [self._beside(q, x, way * vt[-1], unit) for way in (1.0, -1.0)]
@@ -102,8 +104,11 @@ class Continuation:
         if len(found) < 2 or not found[0][0] < q < found[1][0]:
             return
         low, high = found
-        for place, (to, at) in ((0, low), (2, high)):
-            rate, det = self._rate(self._state(to, at))
+        beside = [(to, at, *self._rate(self._state(to, at))) for to, at in (low, high)]
+        # of coordinates that were rounded: a fold between the two is not stepped over
+        if s[-1] > UPRIGHT * s[0] and len({np.sign(det) for *_, det in beside} | {np.sign(self.det[0])}) > 1:
+            return
+        for place, (to, at, rate, det) in zip((0, 2), beside, strict=True):
             self.q.insert(place, to)
             self.x.insert(place, at)
             self.rate.insert(place, rate)

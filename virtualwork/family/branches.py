@@ -6,7 +6,7 @@ way to the poses), it is left to be described alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -17,8 +17,9 @@ from dalembert.arithmetic.engines import run_grid
 from virtualwork.branch.guess import informed
 from virtualwork.describe.description import Description
 from virtualwork.family.written import Written
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Reals
-from virtualwork.plan.steps import Group
+from virtualwork.formulas.recording import names
 
 Mask = NDArray[np.bool_]
 # radicand (a squared sine) below which a guess stands at a change point or a limit, or nearly so
@@ -74,9 +75,36 @@ def meet_on_the_way(
     than its neighbours, the dip is followed down.
     """
     found = np.zeros(n, dtype=bool)
+    if written.closed:
+        for here, some, q in _along(m, known, n, low, high):
+            for group in written.closed:
+                radicand = partial(_sampled, written, ("margin", group.name))
+                found[here] |= _meet(radicand, some, q, len(found[here]))
+    return found
+
+
+def stays_within(
+    written: Written,
+    m: Description,
+    known: Mapping[str, Any],
+    key: Key,
+    bound: float,
+    low: Reals,
+    high: Reals,
+) -> Mask:
+    """Of which variants a quantity is no larger than a bound over their inputs from low to high, (n,)."""
+    n = len(low)
+    found = np.ones(n, dtype=bool)
+    for here, some, q in _along(m, known, n, low, high):
+        found[here] = (np.abs(_sampled(written, key, some, q, len(found[here]))) < bound).all(axis=0)
+    return found
+
+
+def _along(
+    m: Description, known: Mapping[str, Any], n: int, low: Reals, high: Reals
+) -> Iterator[tuple[slice, dict[str, Any], Reals]]:
+    """Some variants at a time, what is known of them, and inputs on their way, (samples, variants or 1)."""
     span = float(np.max(high - low, initial=0.0))
-    if not written.closed or span == 0.0:
-        return found
     slide = m.inputs[0].is_slide
     turn = np.inf if slide else 2 * np.pi
     count = int(np.ceil(min(span / (m.size if slide else 1.0), 2 * np.pi) / STEP)) + 2
@@ -87,23 +115,20 @@ def meet_on_the_way(
         some = {name: values if np.ndim(values) == 0 else values[here] for name, values in known.items()}
         # where all share their inputs one list of them will do
         first, last = (end[here][: 1 if alike else None] for end in (low, high))
-        q = np.linspace(first, np.minimum(last, first + turn), count)
-        for group in written.closed:
-            found[here] |= _meet(written, group, some, q, len(found[here]))
-    return found
+        yield here, some, np.linspace(first, np.minimum(last, first + turn), count)
 
 
-def _meet(written: Written, group: Group, known: Mapping[str, Any], q: Reals, n: int) -> Mask:
+def _meet(radicand: Callable[..., Reals], known: Mapping[str, Any], q: Reals, n: int) -> Mask:
     """Which variants may have a change point of a group at inputs (samples, n or 1)."""
     found = np.zeros(n, dtype=bool)
     # about a change point the radicand grows with the square of the distance: at a wider step a dip is higher
     wide = np.unique([*range(0, len(q), WIDER), len(q) - 1])
-    depth = _radicand(written, group, known, q[wide], n)
+    depth = radicand(known, q[wide], n)
     left = np.flatnonzero(~(depth > DIP * WIDER**2).all(axis=0))
     if len(left):
         some = {name: values if np.ndim(values) == 0 else values[left] for name, values in known.items()}
         near = q if q.shape[1] == 1 else q[:, left]
-        found[left] = _meets(some, near, partial(_radicand, written, group), len(left))
+        found[left] = _meets(some, near, radicand, len(left))
     return found
 
 
@@ -112,12 +137,12 @@ def _across(known: Mapping[str, Any]) -> dict[str, Any]:
     return {name: values[None] if np.ndim(values) else values for name, values in known.items()}
 
 
-def _radicand(written: Written, group: Group, known: Mapping[str, Any], q: Reals, n: int) -> Reals:
-    """A group's radicand at inputs (samples, n or 1): (samples, n)."""
-    tape = written.tape([("margin", group.name)])
+def _sampled(written: Written, key: Key, known: Mapping[str, Any], q: Reals, n: int) -> Reals:
+    """A quantity at inputs (samples, n or 1): (samples, n)."""
+    tape = written.tape([key])
     shape = len(q), n
     with np.errstate(all="ignore"):
-        found = run_grid(tape, _across(known) | {"q0": q}, shape)[f"margin {group.name}"]
+        found = run_grid(tape, _across(known) | {"q0": q}, shape)[names(key)[0]]
     return np.broadcast_to(found, len(q) * n).reshape(shape)
 
 

@@ -19,10 +19,11 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed
 from virtualwork.describe.errors import MechanismError
-from virtualwork.family.branches import LANES, meet_on_the_way, signs
+from virtualwork.family.branches import LANES, meet_on_the_way, signs, stays_within
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import FORCES, Key, over_blocks
 from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Number, Reals, leave_out
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import COMPLEX, NAMES, NEAR, quantity
@@ -30,6 +31,8 @@ from virtualwork.formulas.recording import COMPLEX, NAMES, NEAR, quantity
 Mask = NDArray[np.bool_]
 # the key of 0 where a pose is assembled
 ASSEMBLED: Key = ("assembled",)
+# rad: a torsion spring that is twisted by no more all along its way counts no whole turns
+HALF = 2.6
 # variants described one by one whose poses are kept for the next question
 KEPT = 500
 
@@ -155,12 +158,24 @@ class Solver:
                 # what a description refuses
                 told &= self._given[d.path] >= 0
         if len(m.inputs) == 1 and told.any():
-            q = part.inputs[:, :, 0]
-            low = np.broadcast_to(np.minimum(np.nanmin(q, axis=1, initial=np.inf), m.at[0]), v)
-            high = np.broadcast_to(np.maximum(np.nanmax(q, axis=1, initial=-np.inf), m.at[0]), v)
+            low, high = self._span
             known = self._given | {f"sign {name}": sign for name, sign in found.items()}
             told &= ~meet_on_the_way(written, m, known, v, low, high)
         return found, told
+
+    @cached_property
+    def _span(self) -> tuple[Reals, Reals]:
+        """The least and the largest value of the one input of each variant, with that of the guess, (v,) each."""
+        v, at = len(self.part.values), self.part.mechanism.at[0]
+        q = self.part.inputs[:, :, 0]
+        low = np.minimum(np.nanmin(q, axis=1, initial=np.inf), at)
+        high = np.maximum(np.nanmax(q, axis=1, initial=-np.inf), at)
+        return np.broadcast_to(low, v), np.broadcast_to(high, v)
+
+    @property
+    def _known(self) -> dict[str, Reals]:
+        """The dimensions and the signs of each variant."""
+        return self._given | {f"sign {name}": sign for name, sign in self.signs.items()}
 
     @property
     def signs(self) -> dict[str, Reals]:
@@ -182,7 +197,7 @@ class Solver:
     def lanes(self, keys: Sequence[Key]) -> tuple[list[Any], Mask]:
         """The quantities of the variants that are on the tape; and which are not, (v,): of those they are NaN."""
         v, n = self.part.shape
-        there = self.together if self.takes(keys) else np.zeros(v, dtype=bool)
+        there = self._taken(keys) if self.takes(keys) else np.zeros(v, dtype=bool)
         alone = ~there
         each = max(1, LANES // max(n, 1))
         if not alone.any() and v <= each:
@@ -204,7 +219,7 @@ class Solver:
 
         None where a variant is not on the tape, or a dimension is an input's own.
         """
-        if not self.takes([key]) or not self.together.all():
+        if not self.takes([key]) or not self._taken([key]).all():
             return None
         assert self.written is not None
         v, n = self.part.shape
@@ -219,10 +234,30 @@ class Solver:
         m, written = self.part.mechanism, self.written
         if written is None:
             return False
-        forces = any(key[0] in FORCES for key in keys)
-        if forces and (m.torsion_springs or any(f.history for f in m.forces)):
-            return False
+        if any(key[0] in FORCES for key in keys) and not m.friction:
+            # what a table gives is known beforehand where it is over the input
+            loads = written.recording.forces[0].case.loads
+            if any(isinstance(load, Tabled) and load.axis != "input" for load in loads):
+                return False
         return written.recording.takes(keys)
+
+    def _taken(self, keys: Sequence[Key]) -> Mask:
+        """Which variants have quantities on the tape: of forces those whose torsion springs count no whole turns."""
+        if any(key[0] in FORCES for key in keys):
+            return self.together & self._unwound
+        return self.together
+
+    @cached_property
+    def _unwound(self) -> Mask:
+        """Which variants' torsion springs stay within half a turn of free all the way, (v,)."""
+        v, m = self.part.shape[0], self.part.mechanism
+        found = np.ones(v, dtype=bool)
+        if len(m.inputs) > 1 or self.written is None:
+            return found
+        low, high = self._span
+        for number in range(len(m.torsion_springs)):
+            found &= stays_within(self.written, m, self._known, ("twist", number), HALF, low, high)
+        return found
 
     def _on_tape(self, keys: Sequence[Key], rows: NDArray[np.intp] | slice) -> tuple[list[Any], Mask]:
         """Work out some variants on the tape; and which of them are better described alone."""
@@ -256,6 +291,17 @@ class Solver:
             return float(sign[0]) if (sign == sign[0]).all() else sign[:, None]
         if name in self._given:
             return self._given[name][rows, None]
+        if kind == "near":
+            # a torsion spring that counts no whole turns
+            return 0.0
+        if kind == "table":
+            number, part = group.split()
+            loads = self.written.recording.forces[0].case.loads if self.written is not None else ()
+            table = [load for load in loads if isinstance(load, Tabled)][int(number)]
+            q = self.part.inputs[:, :, 0]
+            force = np.asarray(table.over(q.ravel(), True)).reshape(q.shape)
+            value = force.real if part == "x" else force.imag
+            return value[rows] if len(value) > 1 else value
         j = int(name[1:])
         value = self.part.inputs[:, :, j] if name[0] == "q" else self.part.rates[NAMES.index(name[0]) - 1][j]
         # what is the same in all lanes is worked out once
