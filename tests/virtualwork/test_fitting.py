@@ -41,6 +41,19 @@ WATT = Mechanism(
     inputs=Input(link="AB"),
     guess=Guess(at=(0.0,), angles={"BCD": 0.0, "DE": 0.0, "EF": 0.0, "CFG": 0.0}),
 )
+# a crank-rocker with a dyad between its coupler and its rocker: it turns all the way
+TURNING_WATT = Mechanism(
+    ground={"A": (0, 0), "D": (0.1, 0)},
+    links={
+        "crank": Link({"A": (0, 0), "B": (0.04, 0)}),
+        "coupler": Link({"B": (0, 0), "C": (0.12, 0), "P": (0.08, 0.06)}),
+        "rocker": Link({"D": (0, 0), "C": (0.08, 0), "R": (0.12, -0.03)}),
+        "upper": Link({"P": (0, 0), "E": (0.09, 0), "H": (0.05, 0.03)}),
+        "lower": Link({"R": (0, 0), "E": (0.07, 0)}),
+    },
+    inputs=Input(link="crank"),
+    guess=Guess(at=(0.7,), angles={"coupler": 0.35, "rocker": 1.0, "upper": -0.3, "lower": 1.5}),
+)
 CASES = {
     "four-bar": (
         FOUR_BAR,
@@ -52,6 +65,13 @@ CASES = {
         SLIDER_CRANK,
         "H",
         "links.crank.A.x links.rod.B.x links.rod.H.x links.rod.H.y slots.1.angle slots.1.through.y",
+        (0.0, 2 * np.pi),
+    ),
+    "turning Watt": (
+        TURNING_WATT,
+        "H",
+        "links.crank.B.x links.coupler.C.x links.coupler.P.x links.coupler.P.y links.rocker.C.x links.rocker.R.x "
+        "links.rocker.R.y links.upper.E.x links.upper.H.x links.upper.H.y links.lower.E.x ground.D.x",
         (0.0, 2 * np.pi),
     ),
     "Watt": (

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.engines import run
-from virtualwork.branch.guess import informed
+from virtualwork.branch.guess import BESIDE, informed
 from virtualwork.describe.description import Description
-from virtualwork.family.written import Written
+from virtualwork.family.written import CHOICE, Written
 from virtualwork.formulas.numbers import Reals
-from virtualwork.plan.steps import Group
 
 Mask = NDArray[np.bool_]
 # radicand (a squared sine) below which a guess stands at a change point or a limit, or nearly so
@@ -28,12 +27,14 @@ TOLD = 0.5
 STEP, DIP = 2 * np.pi / 90, 0.05
 # what a dip has to go down to for two branches to meet there
 MEETS = 1e-8
+# variants from which samples are worked out one after the other
+ROWS = 512
 # lanes worked on together
 LANES = 1 << 18
 
 
 def signs(
-    written: Written, m: Description, given: Mapping[str, Reals], n: int
+    written: Written, m: Description, given: Mapping[str, Any], n: int
 ) -> tuple[dict[str, Reals], Mask]:
     """The sign of each closed form of each variant, (n,), and which variants tell theirs.
 
@@ -42,23 +43,33 @@ def signs(
     written : Written
         With the signs as inputs.
     m : Description
-    given : mapping of path to array (n,)
+    given : mapping of path to number or array (n,)
     """
-    told = np.ones(n, dtype=bool)
-    known: dict[str, Any] = dict(given) | {f"q{j}": at for j, at in enumerate(m.at)}
-    found: dict[str, Reals] = {}
+    if not all(informed(m, group) for group in written.closed):
+        return {}, np.zeros(n, dtype=bool)
     with np.errstate(all="ignore"):
+        found = run(written.choice, {**given, **_inputs(m)})
+        told, opens = np.ones(n, dtype=bool), {}
         for group in written.closed:
-            if not informed(m, group):
-                return found, np.zeros(n, dtype=bool)
-            tape, name = written.choice(group), f"sign {group.name}"
-            plus, minus = (run(tape, known | {name: sign}) for sign in (1.0, -1.0))
-            a, b = plus["distance"], minus["distance"]
-            told &= (plus["margin"] > CLOSE) & (np.minimum(a, b) < TOLD * np.maximum(a, b))
-            nearer = np.broadcast_to(np.where(a <= b, 1.0, -1.0), n)
-            found[group.name] = nearer
-            known[name] = float(nearer[0]) if (nearer == nearer[0]).all() else nearer
-    return found, told
+            margin, a, b, seen, _ = (np.asarray(found[f"{what} {group.name}"]) for what in CHOICE)
+            stands = margin > 0
+            near, far = np.minimum(a, b), np.maximum(a, b)
+            told &= ~(np.abs(margin) <= CLOSE)
+            told &= np.where(stands, near < TOLD * far, (seen == 0) | ~(np.abs(seen) < CLOSE))
+            opens[group.name] = np.broadcast_to(~stands, n)
+    chosen = {g.name: np.broadcast_to(found[f"sign {g.name}"], n) + 0.0 for g in written.closed}
+    if len(m.inputs) == 1 and any(each.any() for each in opens.values()):
+        # one that is assembled next to the guess is chosen by how it stands there
+        known = given | {f"sign {name}": sign for name, sign in chosen.items()}
+        step = BESIDE * (m.size if m.inputs[0].is_slide else 1.0)
+        for side in (step, -step):
+            for name, depth in _radicands(written, known, np.full((1, n), m.at[0] + side)).items():
+                told &= ~(opens[name] & (depth[0] >= 0))
+    return chosen, told
+
+
+def _inputs(m: Description) -> dict[str, float]:
+    return {f"q{j}": at for j, at in enumerate(m.at)}
 
 
 def meet_on_the_way(
@@ -70,52 +81,66 @@ def meet_on_the_way(
     than its neighbours, the dip is followed down.
     """
     found = np.zeros(n, dtype=bool)
-    span = float(np.max(high - low, initial=0.0))
-    if not written.closed or span == 0.0:
+    if not written.closed or not (high > low).any():
         return found
-    slide = m.inputs[0].is_slide
-    turn = np.inf if slide else 2 * np.pi
-    count = int(np.ceil(min(span / (m.size if slide else 1.0), 2 * np.pi) / STEP)) + 2
+    count = samples(m, float(np.max(high - low)))
     each = max(1, LANES // count)
     for a in range(0, n, each):
         rows = slice(a, min(a + each, n))
-        q = np.linspace(low[rows], np.minimum(high[rows], low[rows] + turn), count)
-        for group in written.closed:
-            depth = _radicand(written, group, known, rows, q)
-            found[rows] |= _meets(written, group, known, rows, q, depth)
+        here = {name: value[rows] if np.ndim(value) else value for name, value in known.items()}
+        q = way(m, low[rows], high[rows], count)
+        for name, depth in _radicands(written, here, q).items():
+            found[rows] |= meets(written, name, here, q, depth)
     return found
 
 
-def _radicand(written: Written, group: Group, known: Mapping[str, Any], rows: slice, q: Reals) -> Reals:
-    """A group's radicand at inputs (samples, rows)."""
-    tape = written.tape([("margin", group.name)])
-    given = {name: known[name][rows] for name in tape.inputs if name != "q0"}
-    depth = np.empty(q.shape)
+def samples(m: Description, span: float) -> int:
+    """How many samples of a way are looked at."""
+    return int(np.ceil(min(span / (m.size if m.inputs[0].is_slide else 1.0), 2 * np.pi) / STEP)) + 2
+
+
+def way(m: Description, low: Any, high: Any, count: int) -> Reals:
+    """The samples of ways from low to high, of a turn at most; (count, n)."""
+    return np.linspace(low, np.minimum(high, low + (np.inf if m.inputs[0].is_slide else 2 * np.pi)), count)
+
+
+def _radicands(written: Written, known: Mapping[str, Any], q: Reals) -> dict[str, Reals]:
+    """The radicand of each closed form at inputs (samples, rows)."""
+    keys = [("margin", group.name) for group in written.closed]
+    tape = written.tape(keys)
+    given = {name: known[name] for name in tape.inputs if name != "q0"}
+    depth = np.empty((len(keys), *q.shape))
     with np.errstate(all="ignore"):
-        for i, sample in enumerate(q):
-            # an input that all variants share is turned once
-            at = float(sample[0]) if (sample == sample[0]).all() else sample
-            depth[i] = run(tape, given | {"q0": at})[f"margin {group.name}"]
-    return depth
+        if q.shape[1] < ROWS:
+            each = {name: np.tile(x, len(q)) if np.ndim(x) else x for name, x in given.items()}
+            out = run(tape, each | {"q0": q.ravel()})
+            for k, name in enumerate(tape.names):
+                depth[k] = np.reshape(out[name], q.shape)
+        else:
+            for i, sample in enumerate(q):
+                # an input that all variants share is turned once
+                at = float(sample[0]) if (sample == sample[0]).all() else sample
+                out = run(tape, given | {"q0": at})
+                for k, name in enumerate(tape.names):
+                    depth[k, i] = out[name]
+    return dict(zip((group.name for group in written.closed), depth, strict=True))
 
 
-def _meets(
-    written: Written, group: Group, known: Mapping[str, Any], rows: slice, q: Reals, depth: Reals
-) -> Mask:
-    """Where a dip of the radicand, which is followed down, goes to zero."""
+def meets(written: Written, group: str, known: Mapping[str, Any], q: Reals, depth: Reals) -> Mask:
+    """Where a dip of a group's radicand (samples, rows), which is followed down, goes to zero."""
     inner = depth[1:-1]
     dips = (inner <= depth[:-2]) & (inner <= depth[2:]) & (inner < DIP) & (inner > 0)
-    meets: Mask = np.asarray((np.abs(depth[[0, -1]]) < MEETS).any(axis=0))
+    found: Mask = np.asarray((np.abs(depth[[0, -1]]) < MEETS).any(axis=0))
     places, lanes = np.nonzero(dips)
     if not len(lanes):
-        return meets
-    here = {name: values[rows][lanes] for name, values in known.items()}
+        return found
+    here = {name: values[lanes] if np.ndim(values) else values for name, values in known.items()}
     centre, half = q[places + 1, lanes], q[1, lanes] - q[0, lanes]
     every = np.arange(len(lanes))
     for _ in range(5):
         near = centre + half * np.linspace(-1, 1, 9)[:, None]
-        below = _radicand(written, group, here, slice(None), near)
+        below = _radicands(written, here, near)[group]
         lowest = np.argmin(below, axis=0)
         centre, half, least = near[lowest, every], half / 4, below[lowest, every]
-    meets[lanes[least < MEETS]] = True
-    return meets
+    found[lanes[least < MEETS]] = True
+    return found

@@ -178,25 +178,6 @@ class Solver:
             self._one(int(place), keys, out)
         return out
 
-    def slopes(self, key: Key) -> Any | None:
-        """The derivatives of a quantity to the dimensions and then the inputs, (v, n, d + k).
-
-        None where a variant is not on the tape, or a dimension is an input's own.
-        """
-        if not self._takes([key]) or not self.together.all():
-            return None
-        assert self.written is not None
-        v, n = self.part.shape
-        enters = [d.path for d in self.part.dimensions] + [f"q{j}" for j in range(self.part.inputs.shape[2])]
-        tape = self.written.slopes(key, tuple(enters))
-        with np.errstate(all="ignore"):
-            found = run(tape, {name: self._lanes(name, np.arange(v)) for name in tape.inputs})
-        parts = []
-        for name in enters:
-            columns = [found.get(f"d({part})/d({name})", 0.0) for part in names(key)]
-            parts.append(columns[0] if len(columns) == 1 else columns[0] + 1j * columns[1])
-        return np.stack([np.broadcast_to(part, v * n).reshape(v, n) for part in parts], axis=-1)
-
     def _takes(self, keys: Sequence[Key]) -> bool:
         """Whether the tape has such quantities: friction iterates, redundant statics and twists are of each variant."""
         m, written = self.part.mechanism, self.written

@@ -14,6 +14,7 @@ import threading
 import warnings
 from collections.abc import Sequence
 from hashlib import sha256
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,12 @@ class Code:
             columns = [c if c.ndim == 0 else np.resize(c, self.width) for c in columns]
         elif out.strides[1] != out.itemsize:
             table = np.empty(out.shape)
-        pointers = (ctypes.c_void_p * max(len(columns), 1))(*(c.ctypes.data for c in columns))
+        # numbers that all lanes share stand side by side: an address of each array's own costs more than the work
+        shared = np.array([c.item() for c in columns if not c.ndim])
+        places = count(shared.ctypes.data, shared.itemsize)
+        pointers = (ctypes.c_void_p * max(len(columns), 1))(
+            *(c.ctypes.data if c.ndim else next(places) for c in columns)
+        )
         self._call(table.shape[1], pointers, table.ctypes.data, table.strides[0] // table.itemsize)
         if table is not out:
             out[:] = table[:, :n]
