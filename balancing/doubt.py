@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.prior import Prior, fit_with_prior, runs_alone
 from balancing.run_log import Errors, JointFit, joint_fit
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
@@ -185,14 +187,25 @@ def phase_sense(fit: JointFit) -> tuple[Real, Real, Real]:
     return told, lead, lag
 
 
-def robust_fit(fit: JointFit, rounds: int = 200) -> JointFit:
+def robust_fit(fit: JointFit, prior: Prior | None = None, deviation: ArrayLike | None = None) -> JointFit:
     """Fit again with Huber's weights, so that a few wrong readings hardly count.
+
+    Parameters
+    ----------
+    fit
+        Of all runs, with `prior` if that is given.
+    prior
+        What was known before the runs: it is not weighted.
+    deviation
+        With a prior √E|ε|² of the readings, (..., r, s) or what broadcasts; None or NaN: as the runs alone scatter, found
+        with Huber's weights too.
 
     Notes
     -----
     Huber, Robust Statistics (1981), section 7.8: weight 1 up to k standard deviations of a component, beyond it k/|r|,
     by repeated weighted fits; k = 1.5, where complex normal errors lose 5 % of efficiency. The standard deviation is the
-    median of |r| over √(2 ln 2), made up for the unknowns fitted.
+    median of |r| over √(2 ln 2), made up for the unknowns fitted. With a prior it is held fixed, and what is least is
+    Σ h(|r|)/σ² + (α - α̂)ᴴ Γ⁻¹ (α - α̂) with h = |r|² up to c = kσ/√2 and 2c|r| - c² beyond.
 
     >>> on = np.arange(8.0)[:, None] * 1j
     >>> read = 5 + 2 * on + 0.01 * np.exp(1j * np.arange(8.0) ** 2)[:, None]
@@ -201,18 +214,33 @@ def robust_fit(fit: JointFit, rounds: int = 200) -> JointFit:
     >>> abs(plain.initial - 5).round(1), abs(robust_fit(plain).initial - 5).round(1)
     (array([1.7]), array([0.]))
     """
+    if prior is None:
+        given = np.ones(fit.readings.shape) if fit.weights is None else fit.weights
+        return _huber(fit, lambda share: joint_fit(fit.readings, fit.masses, given * share))[0]
+    sd = np.asarray(np.nan if deviation is None else deviation, dtype=float)
+    if np.isnan(sd).any():
+        _, of_runs = _huber(fit.alone, lambda share: runs_alone(fit.readings, fit.masses, share))
+        sd = np.where(np.isnan(sd), np.sqrt(2) * of_runs, sd)
+    known = np.broadcast_to(sd, fit.readings.shape)
+    again = partial(fit_with_prior, fit.readings, fit.masses, prior)
+    return _huber(again(known), lambda share: again(known / np.sqrt(share)), known / np.sqrt(2))[0]
+
+
+def _huber(
+    fit: JointFit, again: Callable[[Real], JointFit], known: Real | None = None
+) -> tuple[JointFit, Real]:
+    """Fit with Huber's shares of the weights until nothing changes; with the standard deviations of a component, or `known`."""
     root = 1.0 if fit.weights is None else np.sqrt(fit.weights)
-    given = np.ones(fit.readings.shape) if fit.weights is None else fit.weights
     count = fit.present.sum(axis=(-2, -1))
     grown = np.sqrt(count / np.maximum(fit.degrees_of_freedom, 1))
-    found = fit
-    for _ in range(rounds):
+    found, sd = fit, np.zeros(())
+    for _ in range(200):
         size = np.where(fit.present, np.abs(found.residuals) * root, np.nan)
-        sd = (grown * np.nanmedian(size, axis=(-2, -1)) / MEDIAN)[..., None, None]
+        sd = (grown * np.nanmedian(size, axis=(-2, -1)) / MEDIAN)[..., None, None] if known is None else known
         beyond = fit.present & (size > HUBER * sd) & (sd > 0)
         share = np.where(beyond, HUBER * sd / np.where(beyond, size, 1.0), 1.0)
-        before, found = found, joint_fit(fit.readings, fit.masses, given * share)
+        before, found = found, again(share)
         change = np.abs(found.unknowns - before.unknowns)
         if (change <= 1e-12 * np.abs(found.unknowns).max(axis=-1, keepdims=True)).all():
             break
-    return found
+    return found, sd

@@ -168,7 +168,7 @@ def fit_with_prior(
     present = np.isfinite(y)
     if not present.any(axis=-2).all():
         raise ValueError("a channel has no reading")
-    plain = _runs_alone(y, t, present)
+    plain = runs_alone(y, t)
     if deviation is None:
         deviation = np.nan_to_num(plain.residual_sd)[..., None, None]
     sd = np.swapaxes(
@@ -211,16 +211,25 @@ def fit_with_prior(
     return JointFit(y, t, None, np.asarray(unknowns + 0.0), gain, leverage, foreknown=known)
 
 
-def _runs_alone(y: Complex, t: Complex, present: NDArray[np.bool_]) -> JointFit:
-    """Fit the runs alone, of least norm where they do not determine the unknowns, which are counted."""
+def runs_alone(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None = None) -> JointFit:
+    """Fit the runs alone, of least norm where they do not determine the unknowns, which are counted; as `joint_fit`.
+
+    >>> one = runs_alone([[5], [5.2]], [[0], [0]])
+    >>> one.unknowns.real, int(one.degrees_of_freedom)
+    (array([[5.1, 0. ]]), 1)
+    """
+    y, t = np.asarray(readings, dtype=complex), np.asarray(masses, dtype=complex)
+    present = np.isfinite(y)
+    w = None if weights is None else np.broadcast_to(np.asarray(weights, dtype=float), y.shape)
+    root = np.swapaxes(present * (1.0 if w is None else np.sqrt(w)), -1, -2)
     rows = np.concatenate([np.ones((*t.shape[:-1], 1), dtype=complex), t], axis=-1)[..., None, :, :]
-    scaled, scale = columns_scaled(np.swapaxes(present, -1, -2)[..., None] * rows)
+    scaled, scale = columns_scaled(root[..., None] * rows)
     left, sigma, right = np.linalg.svd(scaled, full_matrices=False)
     seen = sigma > threshold(*scaled.shape[-2:]) * sigma[..., :1]
     left = np.where(seen[..., None, :], left, 0.0)
     back = adjoint(right) / np.where(seen, sigma, 1.0)[..., None, :]
-    gain = scale[..., None] * (back @ adjoint(left))
+    gain = scale[..., None] * (back @ adjoint(left)) * root[..., None, :]
     unknowns = np.matvec(gain, np.swapaxes(np.where(present, y, 0.0), -1, -2))
     leverage = np.swapaxes(np.square(np.abs(left)).sum(axis=-1), -1, -2)
     count = np.asarray(seen.sum(axis=(-2, -1)))
-    return JointFit(y, t, None, np.asarray(unknowns), gain, leverage, count=count)
+    return JointFit(y, t, w, np.asarray(unknowns), gain, leverage, count=count)

@@ -33,8 +33,8 @@ HEAVY = {
 LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
-        ("next_run",),
-        ("amplitudes", "confidence", "doubt", "log_balance", "placement", "prior", "tolerance", "trial"),
+        ("doubt", "next_run"),
+        ("amplitudes", "confidence", "log_balance", "placement", "prior", "tolerance", "trial"),
         ("balance", "correction", "run_log"),
         ("optimality",),
         ("limited", "rounding"),

@@ -132,7 +132,7 @@ def key_of(assembly: Assembly, name: str) -> Key:
     if kind == "reactions" and len(of) == 2:
         forces = recorded(assembly, (True, True, False)).forces[1]
         there = {joint.name: joint for joint in forces.joints if of[1] in joint.bodies}
-        return "force", there[known(of[0], there, f"joint of {of[1]}")].key, of[1]
+        return "reaction", known(of[0], there, f"joint of {of[1]}"), of[1]
     if name == "shaking.force":
         return ("shaking",)
     if name == "shaking.moment":

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from virtualwork.family.fitting import Fit
     from virtualwork.family.target import Target
     from virtualwork.intime.run import Run
+    from virtualwork.intime.variants import Variants
     from virtualwork.study.check import Check
     from virtualwork.study.equilibrium import Equilibria
     from virtualwork.study.newton_table import AllAtOnce
@@ -217,7 +218,7 @@ class Mechanism(Description):
 
         return Evaluator(self.assembly, *wanted)
 
-    def vary(self, numbers: Mapping[str, ArrayLike]) -> Family:
+    def vary(self, numbers: Mapping[str, ArrayLike]) -> Variants:
         """Variants of this mechanism: other numbers at the paths of some dimensions.
 
         Parameters
@@ -240,9 +241,9 @@ class Mechanism(Description):
         >>> arm.vary({"links.arm.mass": [1.0, 2.0, 4.0]}).motion(0.0).effort[:, 0]
         array([10., 20., 40.])
         """
-        from virtualwork.family.family import Family
+        from virtualwork.intime.variants import Variants
 
-        return Family(self, numbers)
+        return Variants(self, numbers)
 
     def fit(
         self,

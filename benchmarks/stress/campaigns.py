@@ -28,6 +28,7 @@ MODULES = tuple(
         "topology_rates",
         "equilibria",
         "assemblies",
+        "tapes",
     )
 )
 

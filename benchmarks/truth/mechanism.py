@@ -14,7 +14,7 @@ import mpmath as mp
 import numpy as np
 
 from virtualwork import GROUND
-from virtualwork.plan.order import direction
+from virtualwork.plan.topology import direction
 
 if TYPE_CHECKING:
     from virtualwork import Guide

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 # poses between the guess and the start
 FOLLOWED = 181
+# a rate of nothing, for an input's of one
+STILL = 1e-9
 
 
 @dataclass
@@ -72,6 +74,15 @@ class Joint:
     guide: int | None = None
     limits: tuple[float, float] | None = None
 
+    def turn_about(self) -> None:
+        """Turn `on` against `link` instead."""
+        self.on, self.link, self.ends, self.rate = (
+            self.link,
+            self.on,
+            (self.ends[1], self.ends[0]),
+            -self.rate,
+        )
+
 
 @dataclass(frozen=True)
 class Branching:
@@ -106,6 +117,7 @@ class Skeleton:
         self.joints: list[Joint] = []
         self._pins()
         self._guides()
+        self._indirect_inputs()
         for joint in self.joints:
             joint.limits = limits if joint.input is not None else None
         self._branch()
@@ -132,7 +144,7 @@ class Skeleton:
             if not e.is_slide and {e.link, e.on} == {on, link} and not any(x.input == j for x in self.joints):
                 joint.input, joint.value = j, self.inputs[j]
                 if e.link == on:
-                    joint.on, joint.link, joint.ends = link, on, (ends[1], ends[0])
+                    joint.turn_about()
         joint.rate = self._omega(joint.link) - self._omega(joint.on)
         self.joints.append(joint)
 
@@ -163,6 +175,24 @@ class Skeleton:
             if driver is not None and m.guide_of(m.inputs[driver]) == k:
                 joint.input = driver
             self.joints.append(joint)
+
+    def _indirect_inputs(self) -> None:
+        """Take as an input's joint one of bodies that turn as its links do: along a guide nothing turns."""
+        alike = {name: name for name in self.parts}
+        for j in self.joints:
+            if j.kind == "slide":
+                alike = {name: alike[j.on] if top == alike[j.link] else top for name, top in alike.items()}
+        self.alike = alike
+        for k, e in enumerate(self.m.inputs):
+            if e.is_slide or any(j.input == k for j in self.joints):
+                continue
+            pair = alike[str(e.link)], alike[e.on]
+            for j in self.joints:
+                if j.kind == "turn" and j.input is None and {alike[j.on], alike[j.link]} == {*pair}:
+                    j.input, j.value = k, self.inputs[k]
+                    if alike[j.on] == pair[0]:
+                        j.turn_about()
+                    break
 
     def _name(self, wanted: str) -> str:
         return _unused(wanted, (j.name for j in self.joints))
@@ -204,7 +234,7 @@ class Skeleton:
             for j in [j for j in taken if parent in (j.on, j.link)]:
                 taken.remove(j)
                 if parent == j.link and j.kind == "turn" and j.input is None:
-                    j.on, j.link, j.ends, j.rate = j.link, j.on, (j.ends[1], j.ends[0]), -j.rate
+                    j.turn_about()
                 child = j.link if parent == j.on else j.on
                 branching = Branching(j, parent, child, 1.0 if child == j.link else -1.0)
                 self.children.setdefault(parent, []).append(branching)
@@ -240,10 +270,22 @@ class Skeleton:
     def driven(self, k: int) -> Joint | None:
         """Return the joint whose coordinate is an input; where none is, the one on which its link hangs in the tree."""
         own = next((j for j in self.joints if j.input == k), None)
+        if own is not None:
+            return own
+        unit = [[float(i == k) for i in range(len(self.inputs))]]
+        motion = self.m.motion(
+            *(np.array([self.inputs]), unit) if len(self.inputs) > 1 else (self.inputs[0], 1.0)
+        )
+
+        def moves(j: Joint) -> bool:
+            on, link = (self.alike[body] for body in (j.on, j.link))
+            rates = (float(motion.link(body).omega[0]) if body != GROUND else 0.0 for body in (on, link))
+            return abs(next(rates) - next(rates)) > STILL
+
         hanging = (
             b.joint for b in self.walk() if b.child == self.m.inputs[k].link and b.joint.kind == "turn"
         )
-        return own or next((j for j in hanging if j.input is None), None)
+        return next((j for j in hanging if j.input is None and moves(j)), None)
 
     def free_input(self, j: int) -> dict[str, float]:
         """Return an input's angle as a sum of the tree's pins, where no joint is it."""

@@ -233,8 +233,6 @@ def run(
     if four_run:
         for flag in (flag for flag, given in of_fit.items() if given):
             raise options.bad(flag, "fits all runs: it does not go with --method four-run")
-    if files and robust:
-        raise options.bad("--robust", "is of the runs alone: it does not go with --influence")
     fit = any(of_fit.values()) or len(files) > 1 or any(one.along is not None for one in files)
     if not four_run and not fit:
         fit = is_log(runs)

@@ -110,7 +110,17 @@ class LogFits:
     def robust(self, solved: Solved) -> tuple[JointFit, Complex]:
         """The robust fits of a group, and their corrections by least squares, (g, p), from where the others start."""
         assert solved.balance is not None
-        fit = robust_fit(solved.balance.fit)
+        assert solved.group.fit is not None
+        fit, before, readings = solved.balance.fit, solved.group.before, solved.group.fit.readings
+        if before is None:
+            fit = robust_fit(fit)
+        else:
+            # where the runs leave nothing over, the readings scatter as those of the sisters did
+            known = 0.0 if before.reading is None else before.reading[0]
+            deviation = np.where(fit.degrees_of_freedom > 0, np.nan, known)[:, None, None]
+            if (error := self.found.request.reading_error) is not None:
+                deviation = float(np.hypot(*error)) * np.abs(np.where(fit.present, readings, 0.0))
+            fit = robust_fit(fit, before.prior, deviation)
         here = fit.initial + np.matvec(fit.influence, solved.standing)
         return fit, least_squares(
             fit.influence, here, solved.group.weights, ridge=self.found.request.ridge

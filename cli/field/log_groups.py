@@ -11,8 +11,8 @@ import numpy as np
 from balancing import JointFit, Undetermined, determined, fit_with_prior, joint_fit, phase_sense
 from cli.errors import DataError
 from cli.field.read import NO, SHOWN, YES
-from cli.field.runs import Channel, Complex, Group, Log, Real, Rows, Runs
-from cli.field.sisters import Known, Sisters
+from cli.field.runs import Before, Channel, Complex, Group, Log, Real, Rows, Runs
+from cli.field.sisters import Sisters
 from cli.read.tables import Table
 
 
@@ -218,7 +218,7 @@ class Logs:
                 lambda: self._errors(fit),
                 fit=fit,
                 logs=[Log(one.rows, sense, one.years) for one, sense in zip(mine, senses, strict=True)],
-                before=None if known is None else known.before,
+                before=known,
             )
         )
 
@@ -239,7 +239,7 @@ class Logs:
         """Return the name under which a rotor's own coefficients are known before; None where it shares those of others."""
         return None if self.sisters is None else self.sisters.key(self.rows.rotors[one.rotor])
 
-    def _fitted(self, readings: Complex, masses: Complex, known: Known | None) -> JointFit:
+    def _fitted(self, readings: Complex, masses: Complex, known: Before | None) -> JointFit:
         """Fit runs, with what is known before."""
         if known is None:
             return joint_fit(readings, masses)
@@ -247,8 +247,8 @@ class Logs:
             size = np.abs(np.where(np.isfinite(readings), readings, 0.0))
             return fit_with_prior(readings, masses, known.prior, float(np.hypot(*self.reading_error)) * size)
         fit = fit_with_prior(readings, masses, known.prior)
-        if known.before.reading is not None and (fit.degrees_of_freedom == 0).any():
-            sd = np.where(fit.degrees_of_freedom > 0, fit.residual_sd, known.before.reading[0])
+        if known.reading is not None and (fit.degrees_of_freedom == 0).any():
+            sd = np.where(fit.degrees_of_freedom > 0, fit.residual_sd, known.reading[0])
             fit = fit_with_prior(readings, masses, known.prior, sd[:, None, None])
         return fit
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing import JointFit
+from balancing import JointFit, Prior
 from cli.read.tables import Table, number_names
 
 Real = NDArray[np.float64]
@@ -69,9 +69,11 @@ class Log:
 
 @dataclass(frozen=True)
 class Before:
-    """What was known of a machine before its runs: coefficients of so many machines."""
+    """What was known of a machine before its runs."""
 
+    prior: Prior
     machines: int
+    """Whose coefficients they are."""
     scatter: float | None
     """Between machines, as a share of the coefficients; None of one machine."""
     reading: tuple[float, float] | None

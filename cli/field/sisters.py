@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from balancing import Prior, pooled_prior, stored_prior
+from balancing import pooled_prior, stored_prior
 from cli.errors import DataError
 from cli.field.files import Stored
 from cli.field.runs import Before, Channel, Complex, Runs
-
-
-class Known(NamedTuple):
-    """What is known of a rotor."""
-
-    prior: Prior
-    before: Before
 
 
 class Sisters:
@@ -31,7 +23,7 @@ class Sisters:
                 raise DataError(
                     f"{one.table.file}: coefficients per {one.unit}, in {files[0].table.file} per {self.unit}: expected one unit"
                 )
-        self._known: dict[tuple[object, ...], Known] = {}
+        self._known: dict[tuple[object, ...], Before] = {}
 
     def _machines(self, rotor: str) -> list[tuple[Stored, str]]:
         """Return the machines that count for a rotor: itself, where the files name it, or all of them."""
@@ -55,14 +47,14 @@ class Sisters:
                 )
         return first
 
-    def known(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> Known:
+    def known(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> Before:
         """Return what is known of a rotor in these channels."""
         key = (self.key(rotor), *channels)
         if key not in self._known:
             self._known[key] = self._pooled(rotor, channels, runs)
         return self._known[key]
 
-    def _pooled(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> Known:
+    def _pooled(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> Before:
         machines, planes = self._machines(rotor), self.planes(rotor)
         each = [one.coefficients(name, channels, planes, runs) for one, name in machines]
         alpha = np.stack([one.alpha for one in each])
@@ -95,4 +87,4 @@ class Sisters:
             sd = float(np.sqrt((weight * np.square(sds)).sum() / weight.sum()))
             scatter = (sd, np.inf if known else float(nus.sum()))
         between = float(prior.scatter)
-        return Known(prior, Before(len(each), between if between == between else None, scatter))
+        return Before(prior, len(each), between if between == between else None, scatter)

@@ -56,6 +56,14 @@ def link_error(analysis: Analysis, motion: Motion, name: str, order: int) -> Rea
     return np.asarray(angle + np.finfo(float).eps * 360)
 
 
+def _point_error(motion: Motion, name: str, order: int) -> Reals:
+    return motion.point(name).error_estimate(order)
+
+
+def _slide_error(motion: Motion, name: str, order: int) -> Reals:
+    return motion.slide(name).error_estimate(order)
+
+
 class _Stack:
     """Columns that grow by the poses of one assembly after the other."""
 
@@ -107,14 +115,12 @@ def poses(analysis: Analysis) -> Table:
         for j in range(len(analysis.mechanism.inputs)):
             stack.input(j)
         for name in analysis.points:
-            estimate = motion.point(name).error_estimate
             for key, values in of_point(motion, name, analysis.order).items():
                 k = next(k for k, keys in enumerate(POINT) if key in keys)
-                stack.put(f"{name}_{key}", values, partial(estimate, k))
+                stack.put(f"{name}_{key}", values, partial(_point_error, motion, name, k))
         for name in analysis.slides:
-            estimate = motion.slide(name).error_estimate
             for key, values in of_slide(motion, name, analysis.order).items():
-                stack.put(f"{name}_{key}", values, partial(estimate, SLIDE.index(key)))
+                stack.put(f"{name}_{key}", values, partial(_slide_error, motion, name, SLIDE.index(key)))
         for name in analysis.links:
             for key, values in of_link(motion, name, analysis.order, analysis.given(name)).items():
                 error = partial(link_error, analysis, motion, name, LINK.index(key))

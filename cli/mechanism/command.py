@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cli.errors import DataError
 from cli.read import options
 from cli.show.output import ShowOptions, command, suffix_among
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from cli.mechanism.solve import Analysis
-    from cli.mechanism.studies import Request
-    from cli.show.columns import Document, Result, Table
+    from cli.show.columns import Result
     from dalembert.page import Page
-    from virtualwork import Mechanism
 
 
 def _print_schema(asked: bool) -> None:
@@ -175,7 +169,7 @@ def run(
         typer.Option(help="Of what is drawn: a limit is three standard deviations, or the end."),
     ] = "normal",
     workers: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Processes that solve what is drawn.")
+        int | None, typer.Option(min=1, metavar="N", help="Processes that solve variants, or what is drawn.")
     ] = None,
     fit: Annotated[
         str | None,
@@ -205,6 +199,7 @@ def run(
     --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
     """
     from cli.mechanism.read import wanted
+    from cli.mechanism.result import result_of, told
     from cli.mechanism.solve import ORDERS, Analysis, load
     from cli.mechanism.studies import Request
     from cli.mechanism.words import METHOD
@@ -236,8 +231,10 @@ def run(
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
         )
     spreads = tolerance or draws is not None
-    if workers is not None and draws is None:
-        raise options.bad("--workers", "expected --draws too: other work is done in one process")
+    if workers is not None and not (draws or vary or variants):
+        raise options.bad(
+            "--workers", "expected --draws, --vary or --variants: one mechanism is one process's"
+        )
     if spreads:
         from cli.mechanism.tolerance import Tolerances
         from cli.mechanism.tolerated import checked, with_tolerances
@@ -252,8 +249,8 @@ def run(
         unfit |= {"--variants": variants, "--time": time, "--only": only, "--order": order, "--html": html}
         unfit |= {"--states": states, "--tolerance": spreads, "--branch": branch, **of_one}
         there = [*own, *(flag for flag, value in unfit.items() if value)]
-        with _told(file):
-            return replace(fitted(file, fit, point, free, change, seed, there), within=lambda: _told(file))
+        with told(file):
+            return replace(fitted(file, fit, point, free, change, seed, there), within=lambda: told(file))
     if time is not None:
         beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
         beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}
@@ -267,7 +264,7 @@ def run(
     if html is not None:
         from cli.mechanism import animation
         from cli.show.page import refuse_long
-    with _told(file):
+    with told(file):
         mechanism, bare, said, about = load(file)
         several = None
         if change or vary or variants is not None:
@@ -287,7 +284,7 @@ def run(
             result = _with_page(
                 motion.result(about), html, lambda: animation.page_in_time(motion, show.units)
             )
-            return replace(result, within=lambda: _told(file))
+            return replace(result, within=lambda: told(file))
         q = wanted(mechanism, at, sweep, inputs, bare)
         rates = None if order is None else ORDERS.index(order)
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)
@@ -303,22 +300,21 @@ def run(
         times = 1 if several is None or show.streams else several.count
         analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces, times=times)
         if several is None:
-            result = _result(analysis, request, states, explain, graph, about)
+            result = result_of(analysis, request, states, explain, graph, about)
             if spreads:
                 its = Tolerances(analysis, forces, draws or 0, seed, distribution, workers or 1)
                 return with_tolerances(result, its)
             return _with_page(result, html, lambda: animation.page([("", analysis)], forces, show.units))
 
-        def analysis_of(variant: Mechanism) -> Analysis:
-            home = at is None and sweep is None and inputs is None
-            its = wanted(variant, at, sweep, inputs, bare) if home and several.moves_inputs else q
-            return Analysis.of(file, variant, its, rates, names, branch)
-
+        from cli.mechanism.asked import Asked
         from cli.mechanism.many import Many
 
-        found = Many(
-            mechanism, several, analysis_of, lambda each: _result(each, request, None, False, None, about)
-        )
+        own_pose = at is None and sweep is None and inputs is None and several.moves_inputs
+        question = Asked(
+            file, mechanism, several.dimensions, None if own_pose else q.part(0, q.n), bare, rates, names,
+            branch, request, about, show.digits,
+        )  # fmt: skip
+        found = Many(question, several, workers or 1)
         result = _with_page(
             found.result(show.streams, show.as_json, table),
             html,
@@ -327,7 +323,7 @@ def run(
         return replace(
             result,
             warnings=[*said, *result.warnings],
-            within=lambda: _told(file),
+            within=lambda: told(file),
             method=METHOD,
             about={"title": mechanism.name or "Mechanism"} | about,
         )
@@ -336,6 +332,7 @@ def run(
 def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
     """The table of a long sweep, a block of poses at a time."""
     from cli.mechanism import columns
+    from cli.mechanism.result import csv_parts, told
     from cli.mechanism.states import table as link_states
     from cli.mechanism.stream import Stream
     from cli.show.columns import Result
@@ -346,78 +343,11 @@ def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
     return Result(
         document=dict,
         tables={},
-        blocks=stream.tables,
-        beside={} if states is None else {states: lambda: _csv(every.tables())},
+        blocks=lambda form: (form(table, i) for i, table in enumerate(stream.tables())),
+        beside={} if states is None else {states: lambda: csv_parts(every.tables())},
         late_warnings=stream.warnings,
         failed=lambda: not stream.any_assembled,
-        within=lambda: _told(analysis.file),
-    )
-
-
-def _result(
-    analysis: Analysis,
-    request: Request,
-    states: Path | None,
-    explain: bool,
-    graph: str | None,
-    about: dict[str, str],
-) -> Result:
-    from cli.mechanism import columns, poses, remarks, words
-    from cli.mechanism import forces as of_forces
-    from cli.mechanism.states import table as link_states
-    from cli.mechanism.studies import Studies
-    from cli.show.columns import Result, Sheet
-
-    studies = Studies(analysis, request)
-    found = studies.document
-    if graph:
-        from cli.mechanism import picture
-
-        picture.check_names(analysis, graph)  # a bad name is an error before anything is written
-
-    def of_poses() -> Table:
-        if request.forces:
-            return columns.forces(analysis)
-        return link_states(analysis) if analysis.only is None else columns.poses(analysis)
-
-    def document() -> Document:
-        listed = poses.document(analysis)
-        if request.forces:
-            listed = [pose | part for pose, part in zip(listed, of_forces.poses(analysis), strict=True)]
-        return {"name": analysis.mechanism.name, "poses": listed, **found}
-
-    def figure() -> Figure:
-        from cli.mechanism import picture
-
-        several = len(analysis.inputs.shown) > 2 and analysis.motions[0].assembled.any()
-        if graph:
-            return picture.draw_curves(analysis, graph)
-        return picture.draw_forces(analysis) if request.forces and several else picture.draw(analysis)
-
-    def beside() -> Iterable[bytes]:
-        # every link, whatever --only names
-        every = replace(analysis, only=None)
-        every.motions = analysis.motions
-        return _csv(iter([link_states(every)]))
-
-    own = columns.studies(studies)
-    # the table of a study asked for alone stands in place of the poses
-    alone = bool(own) and len(request.tables) == 1
-    tables = {**own, "poses": of_poses} if alone else {"poses": of_poses, **own}
-    return Result(
-        document=document,
-        tables=tables,
-        screen=of_poses if alone else None,
-        notes=lambda: analysis.mechanism.name,
-        afterword=lambda: words.afterword(studies, explain=explain),
-        figure=figure,
-        method=words.METHOD,
-        sheets=lambda: [Sheet("", words.sections(studies, tables, explain=explain), figure)],
-        about={"title": analysis.mechanism.name or "Mechanism"} | about,
-        beside={} if states is None else {states: beside},
-        warnings=remarks.warnings(studies),
-        failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),
-        within=lambda: _told(analysis.file),
+        within=lambda: told(analysis.file),
     )
 
 
@@ -426,21 +356,3 @@ def _with_page(result: Result, html: Path | None, page: Callable[[], Page]) -> R
     if html is None:
         return result
     return replace(result, beside={**result.beside, html: lambda: page().html.encode()})
-
-
-@contextmanager
-def _told(file: str) -> Iterator[None]:
-    """Name the file in what is wrong with a mechanism."""
-    from virtualwork import MechanismError
-
-    try:
-        yield
-    except MechanismError as error:
-        raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
-
-
-def _csv(tables: Iterator[Table]) -> Iterator[bytes]:
-    from cli.show.text import csv_text
-
-    for i, table in enumerate(tables):
-        yield csv_text(table.cells, header=i == 0).encode()

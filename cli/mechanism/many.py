@@ -1,149 +1,212 @@
-"""Many variants of one mechanism as one result: every row begins with the variant, and says whether it is assembled."""
+"""Many variants of one mechanism as one result: every row begins with the variant, and says whether it is assembled.
+
+They are solved in parts of fixed size, here or by processes: those that the formulas take together at once, the others, and
+what is more than rows of poses or forces, one by one.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from contextlib import closing, nullcontext
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
+from cli.errors import DataError
+from cli.mechanism.asked import Asked, Said
+from cli.mechanism.families import Families
+from cli.mechanism.solve import Analysis
 from cli.mechanism.variants import Variants
-from cli.show.columns import Column, Result, Table
+from cli.show.columns import Column, Result, Table, Written
 from cli.show.progress import progress
+from dalembert.arithmetic.parts import LostPart, Processes, in_parts
 
 if TYPE_CHECKING:
-    from cli.mechanism.solve import Analysis
-    from cli.show.columns import Cell
-    from virtualwork import Mechanism
+    from numpy.typing import NDArray
 
-# of these kinds of remark each is printed, and of each the first so many variants are named
-REMARKS, NAMED = 10, 5
+    from cli.show.columns import Cell, Form
+
+# variants from which on it pays to write the formulas down; rows of a part solved together; variants and rows of a
+# part solved one by one; variants of a part that are described alone only to say why poses are not assembled
+FEW, TOGETHER, ONE_BY_ONE, EXPLAINED = 32, 1 << 16, (64, 1 << 14), 50
+
+
+class Solved(NamedTuple):
+    """What a part gives: what is written of its table, or its documents."""
+
+    found: Any
+    said: Said
+
+
+def one(asked: Asked, row: NDArray[np.float64], name: str, json: bool, said: Said) -> Any:
+    """A variant's document, or its table with which poses are assembled; None where it cannot be put together."""
+    from virtualwork import MechanismError
+
+    try:
+        analysis = asked.variant(row)
+        result = asked.result(analysis)
+        if json:
+            found: Any = result.document()
+        else:
+            table = next(iter(result.tables.values()))()
+            found = table, _rows_assembled(table, analysis)
+        said.any_assembled |= not result.failed()
+        remarks = result.warnings
+    except MechanismError as error:
+        found, remarks = None, [str(error)]
+    for remark in dict.fromkeys(remarks):
+        said.add(remark, [name])
+    return found
+
+
+def _documents(asked: Asked, first: int, shown: NDArray[np.float64]) -> Solved:
+    """The documents of some variants, which are called from `first` on."""
+    said = Said()
+    return Solved([one(asked, row, str(first + i), True, said) for i, row in enumerate(shown)], said)
+
+
+def rows(asked: Asked, pattern: Table, form: Form, first: int, shown: NDArray[np.float64]) -> Solved:
+    """The rows of some variants, with the columns of a pattern."""
+    said = Said()
+    parts: list[tuple[Table, list[bool] | bool]] = []
+    for i, row in enumerate(shown):
+        found = one(asked, row, str(first + i), False, said)
+        parts.append((_empty(pattern), False) if found is None else (_like(pattern, found[0]), found[1]))
+    tables = [
+        _with_variant(asked, str(first + i), row, *part)
+        for i, (row, part) in enumerate(zip(shown, parts, strict=True))
+    ]
+    table = joined(tables)
+    if not asked.digits:
+        table = replace(table, columns=[replace(c, error=None) for c in table.columns])
+    return Solved(form(table, first - 1), said)
+
+
+def rows_together(asked: Asked, pattern: Table, form: Form, first: int, shown: NDArray[np.float64]) -> Solved:
+    """The same, of variants that are solved at once."""
+    families = _families(asked, shown)
+    table, assembled, alone = families.rows(asked.part(shown))
+    said = Said()
+    v, n = assembled.shape
+    columns: list[list[Any]] = [list(c.values) for c in _like(pattern, table).columns]
+    whole = assembled.ravel().tolist()
+    told = 0
+    for i in np.flatnonzero(alone | ~assembled.all(axis=1)).tolist():
+        here = slice(i * n, (i + 1) * n)
+        if not alone[i]:
+            # its rows are there: only why poses are not is still to be said
+            if told >= EXPLAINED:
+                said.further += 1
+                continue
+            told += 1
+        found = one(asked, shown[i], str(first + i), False, said)
+        if not alone[i]:
+            continue
+        its, there = (_empty(pattern), False) if found is None else found
+        for values, column in zip(columns, _like(pattern, its).columns, strict=True):
+            values[here] = list(column.values)
+        whole[here] = there if isinstance(there, list) else [there] * n
+    said.any_assembled |= any(whole)
+    names = [str(first + i) for i in range(v) for _ in range(n)]
+    given = [Column(d.path, d.unit, np.repeat(c, n)) for d, c in zip(asked.dimensions, shown.T, strict=True)]
+    made = [replace(c, values=values, error=None) for c, values in zip(pattern.columns, columns, strict=True)]
+    front = [Column("variant", "", names), *given, Column("assembled", "", whole)]
+    return Solved(form(Table([*front, *made], _keys(asked, pattern)), first - 1), said)
 
 
 @dataclass
 class Many:
-    """The variants, each solved when its turn comes.
+    """The variants, solved when they are asked for.
 
     Attributes
     ----------
-    analysis_of : callable
-        What is asked, of one mechanism.
-    result_of : callable
-        An analysis as a result.
+    workers : int
+        How many processes.
     """
 
-    mechanism: Mechanism
+    asked: Asked
     variants: Variants
-    analysis_of: Callable[[Mechanism], Analysis]
-    result_of: Callable[[Analysis], Result]
-    remarks: dict[str, dict[str, None]] = field(default_factory=dict)
-    any_assembled: bool = False
+    workers: int = 1
+    said: Said = field(default_factory=Said)
 
-    def _each(self) -> Iterator[tuple[str, tuple[float, ...], Analysis | str]]:
-        """Name, values, and the analysis, or why there is none."""
-        from virtualwork import MechanismError
-
-        rows = enumerate(self.variants.rows(), 1)
-        for number, row in progress(rows, self.variants.count, "variants"):
-            try:
-                found: Analysis | str = self.analysis_of(self.variants.of(self.mechanism, row))
-            except MechanismError as error:
-                found = str(error)
-            yield str(number), row, found
+    def _solved(self, function: Any, each: int) -> Iterator[Any]:
+        """What a function gives of all parts, in their order, each of so many variants."""
+        self.said = Said()
+        count = self.variants.count
+        starts = range(0, count, each)
+        work = ((a + 1, self.variants.part(a, a + each)) for a in starts)
+        pool = Processes(self.workers) if self.workers > 1 and len(starts) > 1 else None
+        try:
+            with pool or nullcontext(), closing(in_parts(function, work, pool, 2 * self.workers)) as parts:  # type: ignore[type-var]
+                for found, said in progress(parts, count, "variants", each):
+                    self.said.join(said)
+                    yield found
+        except LostPart as lost:
+            first, last = (lost.number - 1) * each + 1, min(lost.number * each, count)
+            raise DataError(
+                f"variants {first} to {last}: the process that solved them died, and died again when it was done once more"
+            ) from None
 
     def analyses(self) -> list[tuple[str, Analysis]]:
         """What is asked of each variant whose parts can be put together."""
-        return [(name, found) for name, _, found in self._each() if not isinstance(found, str)]
-
-    def _formed(self, name: str, analysis: Analysis | str, form: Callable[[Result], Any]) -> Any:
-        """A form of a variant's result; None where its parts cannot be put together, which is remembered."""
         from virtualwork import MechanismError
 
-        try:
-            if isinstance(analysis, str):
-                raise MechanismError(analysis)
-            result = self.result_of(analysis)
-            found = form(result)
-            self.any_assembled |= not result.failed()
-            said = result.warnings
-        except MechanismError as error:
-            found, said = None, [str(error)]
-        for remark in said:
-            self.remarks.setdefault(remark, {})[name] = None
+        found = []
+        for i in range(self.variants.count):
+            try:
+                found.append((str(i + 1), self.asked.variant(self.variants.part(i, i + 1)[0])))
+            except MechanismError as error:
+                self.said.add(str(error), [str(i + 1)])
         return found
 
     # --- as tables --------------------------------------------------------------------------------------------
-    def tables(self) -> Iterator[Table]:
-        """The table of each variant; all have the columns of the first that has any."""
-        waiting: list[tuple[str, tuple[float, ...]]] = []
-        pattern: Table | None = None
-        for name, row, analysis in self._each():
-            table = self._formed(name, analysis, lambda result: next(iter(result.tables.values()))())
-            pattern = pattern or table
-            if table is None:
-                waiting.append((name, row))
-            if pattern is not None:
-                yield from (self._with_variant(*each, _empty(pattern), False) for each in waiting)
-                waiting = []
-            if pattern is not None and table is not None:
-                assembled = self._rows_assembled(table, analysis)
-                yield self._with_variant(name, row, _like(pattern, table), assembled)
-        if waiting:
-            nothing = Table([])
-            yield from (self._with_variant(*each, nothing, False) for each in waiting)
+    @cached_property
+    def pattern(self) -> Table | None:
+        """The columns that all tables have: those of the first variant that has any."""
+        for i in range(self.variants.count):
+            found = one(self.asked, self.variants.part(i, i + 1)[0], "", False, Said())
+            if found is not None:
+                table: Table = found[0]
+                return replace(table, columns=[replace(c, error=None) for c in table.columns])
+        return None
 
-    def _rows_assembled(self, table: Table, analysis: Analysis | str) -> list[bool] | bool:
-        """Of each row whether its pose is assembled."""
-        assert not isinstance(analysis, str)
-        length = len(table.columns[0].values)
-        whole = [analysis.assembled(motion).tolist() for motion in analysis.motions]
-        poses = [pose for each in zip(*whole, strict=True) for pose in each]
-        if analysis.several and not any(c.header == "link" for c in table.columns):
-            poses = [pose for each in whole for pose in each]
-        if poses and length % len(poses) == 0:
-            # of a pose one row for each link
-            return [pose for pose in poses for _ in range(length // len(poses))]
-        return any(poses)
-
-    def _with_variant(
-        self, name: str, row: tuple[float, ...], table: Table, assembled: list[bool] | bool
-    ) -> Table:
-        length = len(table.columns[0].values) if table.columns else 1
-        given = [
-            Column(d.path, d.unit, [value] * length)
-            for d, value in zip(self.variants.dimensions, row, strict=True)
-        ]
-        whole: list[Any] = assembled if isinstance(assembled, list) else [assembled] * length
-        front = [Column("variant", "", [name] * length), *given, Column("assembled", "", whole)]
-        return Table([*front, *table.columns], keys=("variant", *(c.header for c in given), *table.keys))
+    def blocks(self, form: Form) -> Iterator[Written]:
+        """What is written of the table, part by part."""
+        count, pattern = self.variants.count, self.pattern
+        poses = 1 if self.asked.inputs is None else self.asked.inputs.n
+        together = (
+            pattern is not None and count >= FEW and self.asked.families(self.variants.part(0, 1)) is not None
+        )
+        size = TOGETHER // poses if together else min(ONE_BY_ONE[0], ONE_BY_ONE[1] // poses)
+        work = partial(rows_together if together else rows, self.asked, pattern or Table([]), form)
+        yield from self._solved(work, max(1, size))
 
     @cached_property
     def table(self) -> Table:
         """All of them, one below the other."""
-        first, *others = self.tables()
-        columns = [
-            Column(c.name, c.unit, [v for part in (first, *others) for v in part.columns[i].values])
-            for i, c in enumerate(first.columns)
-        ]
-        return Table(columns, first.keys)
+        # bounds of rounding errors are worked out when they are asked for, and cannot be sent
+        here = replace(self, workers=1) if self.asked.digits else self
+        tables = [written.data for written in here.blocks(as_table)]
+        self.said = here.said
+        return joined([table for table in tables if isinstance(table, Table)])
 
     # --- as JSON ----------------------------------------------------------------------------------------------
     @cached_property
     def documents(self) -> list[dict[str, Any]]:
         """What the JSON document says of each variant."""
-        found, pattern = [], None
-        for name, row, analysis in self._each():
-            document = self._formed(name, analysis, lambda result: result.document())
-            if document is not None:
-                pattern = pattern or document["poses"]
-            found.append((name, row, document))
+        parts = self._solved(partial(_documents, self.asked), ONE_BY_ONE[0])
+        found = [document for part in parts for document in part]
+        pattern: list[Any] = next((d["poses"] for d in found if d is not None), [])
         return [
-            {"variant": name, "set": self._set(row)}
-            | ({"poses": _blank(pattern or [])} if d is None else {k: v for k, v in d.items() if k != "name"})
-            for name, row, d in found
+            {"variant": str(i + 1), "set": self._set(i)}
+            | ({"poses": _blank(pattern)} if d is None else {k: v for k, v in d.items() if k != "name"})
+            for i, d in enumerate(found)
         ]
 
-    def _set(self, row: tuple[float, ...]) -> dict[str, float]:
+    def _set(self, i: int) -> dict[str, float]:
+        (row,) = self.variants.part(i, i + 1).tolist()
         return {d.header: value for d, value in zip(self.variants.dimensions, row, strict=True)}
 
     # --- in every form ------------------------------------------------------------------------------------------
@@ -153,31 +216,96 @@ class Many:
             return Result(
                 document=dict,
                 tables={},
-                blocks=self.tables,
+                blocks=self.blocks,
                 blocks_name="variants",
-                late_warnings=self.said,
-                failed=lambda: not self.any_assembled,
+                shared=self.workers > 1,
+                late_warnings=lambda: self.said.lines(),
+                failed=lambda: not self.said.any_assembled,
             )
         # what there is to say of them stands in the document too
         _ = (json and self.documents), (table and self.table)
         return Result(
-            document=lambda: {"name": self.mechanism.name, "variants": self.documents},
+            document=lambda: {"name": self.asked.mechanism.name, "variants": self.documents},
             tables={"variants": lambda: self.table},
-            notes=lambda: self.mechanism.name,
-            warnings=self.said(),
-            failed=lambda: not self.any_assembled,
+            notes=lambda: self.asked.mechanism.name,
+            warnings=self.said.lines(),
+            failed=lambda: not self.said.any_assembled,
         )
 
-    def said(self) -> list[str]:
-        """What there is to say of the variants: each remark once, with the variants that it is about."""
-        lines = []
-        for remark, named in list(self.remarks.items())[:REMARKS]:
-            names = list(named)
-            more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-            several = "s" if len(names) > 1 else ""
-            lines.append(f"variant{several} {', '.join(names[:NAMED])}{more}: {remark}")
-        left = {name for names in list(self.remarks.values())[REMARKS:] for name in names}
-        return [*lines, f"{len(left)} further variants have remarks of their own"] if left else lines
+
+_known: dict[str, Families] = {}
+
+
+def _families(asked: Asked, shown: NDArray[np.float64]) -> Families:
+    """The formulas of a question, which a process writes down once."""
+    if asked.name not in _known:
+        found = asked.families(shown[:1])
+        assert found is not None
+        _known.clear()
+        _known[asked.name] = found
+    return _known[asked.name]
+
+
+def as_table(table: Table, number: int) -> Written:
+    """The form of a part that stays a table."""
+    return Written(table, 0)
+
+
+def joined(tables: list[Table]) -> Table:
+    """Tables of the same columns, one below the other."""
+
+    def column(i: int) -> Column:
+        parts = [table.columns[i] for table in tables]
+        errors = [part.error for part in parts]
+        values = [value for part in parts for value in part.values]
+        known = [error for error in errors if error is not None]
+        # a variant that is not assembled has no numbers, and no bounds of them
+        empty = [[0.0] * len(part.values) for part in parts]
+        return replace(
+            parts[0],
+            values=values,
+            error=(
+                lambda: [
+                    bound
+                    for error, none in zip(errors, empty, strict=True)
+                    for bound in (none if error is None else error())
+                ]
+            )
+            if known
+            else None,
+        )
+
+    return replace(tables[0], columns=[column(i) for i in range(len(tables[0].columns))])
+
+
+def _rows_assembled(table: Table, analysis: Analysis) -> list[bool] | bool:
+    """Of each row whether its pose is assembled."""
+    length = len(table.columns[0].values)
+    whole = [analysis.assembled(motion).tolist() for motion in analysis.motions]
+    poses = [pose for each in zip(*whole, strict=True) for pose in each]
+    if analysis.several and not any(c.header == "link" for c in table.columns):
+        poses = [pose for each in whole for pose in each]
+    if poses and length % len(poses) == 0:
+        # of a pose one row for each link
+        return [pose for pose in poses for _ in range(length // len(poses))]
+    return any(poses)
+
+
+def _with_variant(
+    asked: Asked, name: str, row: NDArray[np.float64], table: Table, assembled: list[bool] | bool
+) -> Table:
+    length = len(table.columns[0].values) if table.columns else 1
+    given = [
+        Column(d.path, d.unit, [value] * length)
+        for d, value in zip(asked.dimensions, row.tolist(), strict=True)
+    ]
+    whole: list[Any] = assembled if isinstance(assembled, list) else [assembled] * length
+    front = [Column("variant", "", [name] * length), *given, Column("assembled", "", whole)]
+    return Table([*front, *table.columns], _keys(asked, table))
+
+
+def _keys(asked: Asked, table: Table) -> tuple[str, ...]:
+    return ("variant", *(d.header for d in asked.dimensions), *table.keys)
 
 
 def _like(pattern: Table, table: Table) -> Table:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from cli.errors import DataError
 from cli.mechanism.read import MOST, place_or_angle
@@ -17,6 +18,8 @@ from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.units import Units
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from virtualwork import Mechanism
 
 # values of one dimension in a grid
@@ -30,13 +33,13 @@ class Variants:
     Attributes
     ----------
     dimensions : tuple of Dimension
-    columns : sequence of the values of each dimension as they are shown, SI but degrees
+    columns : sequence of arrays, the values of each dimension as they are shown, SI but degrees
     grid : bool
         Whether the variants are all combinations of the values, the last dimension the fastest; else rows.
     """
 
     dimensions: tuple[Dimension, ...]
-    columns: Sequence[Sequence[float]]
+    columns: Sequence[NDArray[np.float64]]
     grid: bool
 
     @property
@@ -49,13 +52,15 @@ class Variants:
         """Whether the file's own pose is another in each."""
         return any(each.where[0] == "inputs" and each.where[-1] == "value" for each in self.dimensions)
 
-    def rows(self) -> Iterator[tuple[float, ...]]:
-        """The values of each variant, as they are shown."""
-        return itertools.product(*self.columns) if self.grid else zip(*self.columns, strict=True)
-
-    def of(self, mechanism: Mechanism, row: Sequence[float]) -> Mechanism:
-        """A mechanism with the values of a variant."""
-        return with_numbers(mechanism, self.dimensions, row)
+    def part(self, low: int, high: int) -> NDArray[np.float64]:
+        """The values of the variants from low to high, or to the last, as they are shown: (v, d)."""
+        places: Any = np.arange(low, min(high, self.count))
+        each = (
+            np.unravel_index(places, [len(c) for c in self.columns])
+            if self.grid
+            else [places] * len(self.columns)
+        )
+        return np.stack([c[i] for c, i in zip(self.columns, each, strict=True)], axis=1)
 
 
 def with_numbers(m: Mechanism, dimensions: Sequence[Dimension], shown: Sequence[float]) -> Mechanism:
@@ -112,7 +117,7 @@ def asked(
             "50mm:60mm:1mm",
             VALUES,
         )
-    variants = Variants(tuple(found), tuple(found.values()), grid=True)
+    variants = Variants(tuple(found), [np.array(values) for values in found.values()], grid=True)
     if variants.count > MOST:
         raise options.bad("--vary", f"{variants.count:.3g} variants: expected at most {MOST:.0e}")
     return variants
@@ -167,7 +172,7 @@ def _from_table(m: Mechanism, path: str, said: list[str]) -> Variants:
         example = next(iter(every.values())).header
         raise DataError(f"{table.file}: no column names a dimension, such as {example} {table.told}")
     said += table.warnings
-    found: list[tuple[Dimension, list[float]]] = []
+    found: list[tuple[Dimension, NDArray[np.float64]]] = []
     for name, column in table.numbers.items():
         dimension, kind = known[name], cli_dimension(known[name])
         if dimension.unit == "deg" and column.unit == "deg":
@@ -175,5 +180,5 @@ def _from_table(m: Mechanism, path: str, said: list[str]) -> Variants:
         else:
             shown = to_si(column.values, kind, column.unit)
             shown = shown * 180 / math.pi if dimension.unit == "deg" else shown
-        found.append((dimension, shown.tolist()))
+        found.append((dimension, np.asarray(shown, dtype=float)))
     return Variants(tuple(d for d, _ in found), [values for _, values in found], grid=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     Cell = str | float | None
     Values = Sequence[Cell] | NDArray[np.float64]
     Bounds = Sequence[float] | NDArray[np.float64]
+    # a part of a table -> what is written of it
+    Form = Callable[["Table", int], "Written"]
     Json = None | str | float | Sequence["Json"] | Mapping[str, "Json"]
     Document = dict[str, Json]
 
@@ -50,6 +52,14 @@ class Table:
     def cells(self) -> dict[str, Values]:
         """Header -> values."""
         return {column.header: column.values for column in self.columns}
+
+
+class Written(NamedTuple):
+    """What is written of a part of a table: its bytes, or the table as it is shown, or nothing where it has a file."""
+
+    data: bytes | Table
+    unknown: int
+    """Of how many of its numbers --digits knows no digit."""
 
 
 @dataclass(eq=False, repr=False)
@@ -99,8 +109,13 @@ class Result:
     warnings: list[str] = field(default_factory=list)
     failed: Callable[[], bool] = lambda: False
     """Whether nothing that was asked for could be found: status 1, once all is shown."""
-    blocks: Callable[[], Iterator[Table]] | None = None
-    """The table in parts, where it is too long to be held: written as CSV, Parquet or a workbook, and nothing else."""
+    blocks: Callable[[Form], Iterator[Written]] | None = None
+    """The table in parts, where it is too long to be held: written as CSV, Parquet or a workbook, and nothing else.
+
+    Whoever works a part out, perhaps another process, makes what is written of it too.
+    """
+    shared: bool = False
+    """Whether the parts are worked out by several processes."""
     blocks_name: str = "poses"
     """What the table in parts is called."""
     within: Callable[[], AbstractContextManager[None]] = nullcontext

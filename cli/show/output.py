@@ -220,11 +220,11 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
             f"'{options.output}' has no known suffix: expected {', '.join(FORMS)}", param_hint="-o"
         )
     files = named()
-    result = _in_chosen_units(result, options.units)
     if result.blocks is not None:
         check_renamed()
-        _stream(result, result.blocks(), options)
+        _stream(result, options)
         return
+    result = _in_chosen_units(result, options.units)
     first, output = cache(next(iter(result.tables.values()))), options.output
     checked = None
     if options.expect is not None:
@@ -245,7 +245,7 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         [path for path in (output, options.plot, *result.beside, *pages, *tables) if path is not None]
     )
     for path, table_of in tables.items():
-        write(path, _one_table(options.form, iter([table_of()])))
+        write(path, _one_table(options.form, table_of()))
     for path, data in result.beside.items():
         write(path, data())
     for path, page in pages.items():
@@ -259,7 +259,7 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
     elif output is not None and options.form == ".toml" and result.toml is not None:
         write(output, result.toml())
     elif output is not None and options.holds_one:
-        write(output, _one_table(options.form, iter([first()])))
+        write(output, _one_table(options.form, first()))
     elif output is not None:
         (name, _), *others = result.tables.items()
         formed = {name.strip("-"): first()} | {name.strip("-"): table() for name, table in others}
@@ -350,62 +350,42 @@ def _in_chosen_units(result: Result, units: str | None) -> Result:
     def of(table: Callable[[], Table]) -> Callable[[], Table]:
         return lambda: in_units(table(), chosen)
 
-    def of_blocks() -> Iterator[Table]:
-        assert result.blocks is not None
-        return (in_units(table, chosen) for table in result.blocks())
-
     return replace(
         result,
         tables={name: of(table) for name, table in result.tables.items()},
         screen=None if result.screen is None else of(result.screen),
-        blocks=None if result.blocks is None else of_blocks,
     )
 
 
-def _stream(result: Result, blocks: Iterator[Table], options: ShowOptions) -> None:
+def _stream(result: Result, options: ShowOptions) -> None:
     """Write a table that comes in parts."""
-    from cli.show.files import write
+    from cli.show.blocks import stream
 
-    unknown = 0
+    if options.units is not None:
+        from cli.show.in_units import chosen_units
 
-    def tables() -> Iterator[Table]:
-        nonlocal unknown
-        for table in blocks:
-            if options.digits:
-                from cli.show.digits import digits_that_hold
-
-                table, without = digits_that_hold(table)
-                unknown += without
-            yield table
-
+        # a bad unit is an error before anything is worked out
+        chosen_units(options.units)
     refuse_inputs([path for path in (options.output, *result.beside) if path is not None])
     for path, data in result.beside.items():
-        write(path, data())
-    if options.form == ".xlsx" and options.output is not None:
-        from cli.show.parts import workbook
+        from cli.show.files import write
 
-        write(options.output, workbook({result.blocks_name: tables()}))
-    elif options.output is not None:
-        write(options.output, _one_table(options.form, tables()))
-    else:
-        sys.stdout.writelines(part.decode() for part in _one_table(".csv", tables()))
-        sys.stdout.flush()
+        write(path, data())
+    unknown = stream(result, options.form, options.output, options.units, options.digits)
     _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)], options)
     if result.failed():
         raise typer.Exit(1)
 
 
-def _one_table(form: str, blocks: Iterator[Table]) -> Iterator[bytes]:
-    """Yield a file of a single table, which comes in parts."""
+def _one_table(form: str, table: Table) -> bytes | Iterator[bytes]:
+    """Return a file of a single table."""
     from cli.show.text import csv_text
 
     if form == ".parquet":
         from cli.show.parts import parquet
 
-        yield from parquet(blocks)
-        return
-    for i, table in enumerate(blocks):
-        yield csv_text(table.cells, header=i == 0).encode()
+        return parquet([table])
+    return csv_text(table.cells).encode()
 
 
 def _warn(warnings: Iterable[str], options: ShowOptions) -> None:

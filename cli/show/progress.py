@@ -11,14 +11,15 @@ T = TypeVar("T")
 AFTER, EVERY = 2.0, 0.5  # s
 
 
-def progress(items: Iterable[T], count: int, what: str) -> Iterator[T]:
-    """Hand the items on, and say how many of them are done."""
+def progress(items: Iterable[T], count: int, what: str, each: int = 1) -> Iterator[T]:
+    """Hand the items on, and say how many of them are done, where every one counts for so many."""
     if not sys.stderr.isatty():
         yield from items
         return
     start = shown = time.monotonic()
     told = ""
-    for done, item in enumerate(items):
+    for number, item in enumerate(items):
+        done = number * each
         now = time.monotonic()
         if now - start > AFTER and now - shown > EVERY:
             told = f"{done} of {count} {what}, {(now - start) / done * (count - done):.0f} s to go"

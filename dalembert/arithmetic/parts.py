@@ -18,11 +18,27 @@ AHEAD = 64
 
 
 class LostPart(RuntimeError):
-    """A part whose worker died, and died again when it was done once more."""
+    """A part whose worker died, and died again when it was done once more.
+
+    Attributes
+    ----------
+    number : int
+        Of the part, from 1 on.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"part {number}: its worker died, and died again when it was done once more")
+        self.number = number
+
+    def __reduce__(self) -> tuple[type[LostPart], tuple[int]]:
+        return LostPart, (self.number,)
 
 
 def in_parts(
-    function: Callable[..., R], parts: Iterable[tuple[Any, ...]], executor: Executor | None = None
+    function: Callable[..., R],
+    parts: Iterable[tuple[Any, ...]],
+    executor: Executor | None = None,
+    ahead: int = AHEAD,
 ) -> Iterator[R]:
     """Give what a function returns of each part, in their order.
 
@@ -33,6 +49,8 @@ def in_parts(
     parts : iterable of tuple
     executor : concurrent.futures.Executor
         None: the work is done here.
+    ahead : int
+        How many parts are on their way at a time: so many results may wait for one that takes long.
 
     Raises
     ------
@@ -53,7 +71,7 @@ def in_parts(
     try:
         for number, part in enumerate(parts, 1):
             waiting.append((number, part, executor.submit(function, *part)))
-            if len(waiting) >= AHEAD:
+            if len(waiting) >= ahead:
                 yield _result(executor, function, *waiting.popleft())
         while waiting:
             yield _result(executor, function, *waiting.popleft())
@@ -75,7 +93,7 @@ def _result(
     except Exception as error:
         if not _lost(error):
             raise
-        raise LostPart(f"part {number}: its worker died, and died again when it was done once more") from None
+        raise LostPart(number) from None
 
 
 def _lost(error: Exception) -> bool:

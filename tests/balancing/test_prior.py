@@ -14,6 +14,7 @@ from balancing import (
     least_squares,
     pooled_prior,
     region_factor,
+    robust_fit,
     stored_prior,
 )
 
@@ -89,6 +90,61 @@ def test_a_prior_that_knows_nothing_is_the_fit_of_the_runs_and_one_that_knows_al
     assert exact.influence[:, 0] == pytest.approx(alpha[:, 0], abs=1e-12)
     assert exact.initial == pytest.approx(x0, abs=1e-12)
     assert int(exact.degrees_of_freedom) == 0
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_robust_fit_with_a_prior_is_the_least_of_huber_s_function(stated: bool) -> None:
+    from scipy.optimize import minimize
+
+    rng = np.random.default_rng(7)
+    masses, x0, alpha = circular(rng, 9, 2), 30 * circular(rng, 1), circular(rng, 1, 2)
+    readings = x0 + masses @ alpha.T + 0.2 * circular(rng, 9, 1)
+    readings[4] += 8
+    readings[2] = np.nan
+    c = covariance(rng, 1, 2) / 50
+    prior = stored_prior(alpha + 0.1 * circular(rng, 1, 2), c)
+    plain = fit_with_prior(readings, masses, prior, 0.2)
+    found = robust_fit(plain, prior, 0.2 if stated else None)
+    # of the runs alone: 8 readings, 3 unknowns; half of |r|² is below σ² ln 2
+    alone = robust_fit(joint_fit(np.delete(readings, 2, axis=0), np.delete(masses, 2, axis=0)))
+    scatter = np.sqrt(8 / 5 / np.log(2)) * np.median(np.abs(alone.residuals))
+    sigma = 0.2 if stated else float(scatter)
+    inverse = np.linalg.inv(c[0])
+    read = np.isfinite(readings[:, 0])
+
+    def objective(parts: Real) -> float:
+        theta = parts[:3] + 1j * parts[3:]
+        r = np.abs(readings[read, 0] - theta[0] - masses[read] @ theta[1:])
+        k = 1.5 * sigma / np.sqrt(2)
+        off = theta[1:] - prior.mean[0]
+        h = np.where(r <= k, r**2, 2 * k * r - k**2)
+        return float(h.sum() / sigma**2 + (off.conj() @ inverse @ off).real)
+
+    ours = np.concatenate([found.unknowns[0].real, found.unknowns[0].imag])
+    start = np.concatenate([plain.unknowns[0].real, plain.unknowns[0].imag])
+    theirs = minimize(
+        objective, start, method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-13, "maxfev": 40_000}
+    )
+    assert objective(ours) <= theirs.fun * (1 + 1e-12)
+    assert theirs.x == pytest.approx(ours, abs=2e-5)
+    truth = np.concatenate([x0, alpha[0]])
+    assert np.abs(found.unknowns[0] - truth).max() < 0.5 * np.abs(plain.unknowns[0] - truth).max()
+
+
+def test_a_robust_fit_with_a_prior_leaves_good_readings_and_runs_without_scatter_alone() -> None:
+    rng = np.random.default_rng(8)
+    masses, mean = circular(rng, 2, 6, 2), circular(rng, 3, 2)
+    prior = stored_prior(mean, np.broadcast_to(0.01 * np.eye(2), (3, 2, 2)))
+    exact = 9 + masses @ mean.T
+    fit = fit_with_prior(exact, masses, prior)
+    assert robust_fit(fit, prior).unknowns == pytest.approx(fit.unknowns, abs=1e-12)
+    # base runs alone, one of them wrong: the coefficients stay as they were known
+    bases = 30 + 0.1 * circular(rng, 7, 3)
+    bases[5] += 20
+    on = np.zeros((7, 2))
+    found = robust_fit(fit_with_prior(bases, on, prior), prior)
+    assert found.influence == pytest.approx(mean, abs=1e-12)
+    assert np.abs(found.initial - 30).max() < 0.2
 
 
 def test_machines_side_by_side_are_fitted_as_if_alone() -> None:

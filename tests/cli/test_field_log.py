@@ -336,7 +336,6 @@ def test_bad_logs(text: str, words: list[str], dalembert: Dalembert) -> None:
         (["--predict", "B=7g@3"], "no plane B"),
         (["--predict", "7mm@3"], "unknown mass unit"),
         (["--fit", "--method", "four-run"], "--fit"),
-        (["--robust", "--influence", "c.csv"], "--robust"),
     ],
 )
 def test_wrong_usage(options: list[str], word: str, dalembert: Dalembert, tmp_path: Any) -> None:

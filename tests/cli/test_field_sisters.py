@@ -161,6 +161,45 @@ def test_sister_machines_are_pooled_and_their_scatter_is_told(dalembert: Dalembe
     assert own["influence"][0]["magnitude_per_kg"] == pytest.approx(1000 * abs(alphas[2][0, 0]), rel=1e-9)
 
 
+def test_a_robust_fit_with_coefficients_known_before(dalembert: Dalembert, tmp_path: Path) -> None:
+    for seed in range(3):
+        text, _, _ = machine(seed)
+        made = dalembert(
+            "field", "-", "--fit", "--save-influence", str(tmp_path / f"s{seed}.csv"), stdin=text
+        )
+        assert made.returncode == 0, made.stderr
+    sisters = [part for seed in range(3) for part in ("--influence", str(tmp_path / f"s{seed}.csv"))]
+    good, _, _ = machine(9)
+    head, *lines = good.splitlines()
+    # repeated base runs, of which one is wrong
+    again = [f"again{k},{lines[0].split(',', 1)[1]}" for k in range(4)]
+    run, sensor, state, size, *rest = again[1].split(",")
+    wrong = [*lines, again[0], ",".join([run, sensor, state, str(float(size) + 60), *rest]), *again[2:]]
+    fine, _ = document(dalembert("field", "-", "--json", *sisters, stdin="\n".join([head, *lines, *again])))
+    bad, _ = document(
+        dalembert("field", "-", "--json", "--robust", *sisters, stdin="\n".join([head, *wrong]))
+    )
+    robust = np.array(
+        [1000 * polar(one["mass_kg"], one["angle_deg"]) for one in bad["robust"]["corrections"]]
+    )
+    assert np.abs(robust - masses(fine)).max() < 0.2 * np.abs(masses(bad) - masses(fine)).max()
+    stated = dalembert(
+        "field",
+        "-",
+        "--json",
+        "--robust",
+        "--reading-error",
+        "1%,1deg",
+        *sisters,
+        stdin="\n".join([head, *wrong]),
+    )
+    assert document(stated)[0]["robust"]["corrections"]
+    # one run: nothing to weigh
+    single = "\n".join([head, *lines[:2]])
+    one, _ = document(dalembert("field", "-", "--json", "--robust", *sisters, stdin=single))
+    assert one["robust"]["corrections"][0]["mass_kg"] == one["corrections"][0]["mass_kg"]
+
+
 def test_stated_errors_of_trial_runs_are_stored_too(dalembert: Dalembert, tmp_path: Path) -> None:
     text = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,3.4,116,,,\n1,1,1.8,42,A,2,0\n"
     done = dalembert("field", "-", "--reading-error", "2%,2deg", "--save-influence", "c.csv", stdin=text)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
-from virtualwork.plan.order import direction
+from virtualwork.plan.topology import direction
 
 QUARTER = math.pi / 2
 

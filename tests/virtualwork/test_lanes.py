@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.stress.tapes import dimension, every_key, sizes
 from benchmarks.stress.topologies import generate
 from virtualwork import Mechanism
 from virtualwork.describe.errors import DescriptionError, MechanismError
@@ -32,43 +33,17 @@ def sweep(m, share=1.0, n=61):
     return m.at[0] + share * np.linspace(-width / 2, width / 2, n), 3.0, rng.normal(size=n)
 
 
-def every_key(m, motion):
-    """Every quantity that the command can show."""
-    keys = [
-        ("point", body, z, p, order)
-        for body, points in m.bodies.items()
-        if body != "ground"
-        for p, z in points.items()
-        for order in range(3)
-    ]
-    keys += [("angle", body, order) for body in m.links for order in range(3)]
-    keys += [("slide", i, order) for i in range(len(m.guides)) for order in range(3)]
-    keys += [(kind, j) for kind in ("effort", "newton-euler") for j in range(len(m.inputs))]
-    keys += [("force", joint.key, b) for joint in motion.dynamics.reactions.joints for b in joint.bodies]
-    return [*keys, ("shaking",), ("shaking moment",)]
-
-
 def compare(m, monkeypatch, engine, share=1.0) -> None:
     """All quantities both ways, within the bounds of their rounding errors; poses that have none are the same."""
     q, speed, acceleration = sweep(m, share)
     motion = m.motion(q, speed, acceleration)
-    keys = every_key(m, motion)
+    keys = every_key(motion)
     monkeypatch.setenv("DALEMBERT_ENGINE", engine)
     found = Lanes(m.assembly, m.motion(q, speed, acceleration).poses).values(keys)
     monkeypatch.delenv("DALEMBERT_ENGINE")
 
-    # what is zero but for rounding is measured by the largest of its dimension
-    def dimension(key):
-        kind = {"point": "length", "slide": "length", "shaking": "force"}.get(key[0], key[0])
-        return kind, key[-1] if key[0] in ("point", "angle", "slide") else 0
-
-    largest = {}
     truths = [over_blocks(motion.poses, key, motion.dynamics) for key in keys]
-    for key, true in zip(keys, truths, strict=True):
-        size = float(np.nanmax(np.abs(true), initial=0.0))
-        largest[dimension(key)] = max(largest.get(dimension(key), 0.0), size)
-    for kind in ("shaking moment", "effort", "newton-euler"):
-        largest[kind, 0] = max(largest.get((kind, 0), 0.0), largest["force", 0] * m.size)
+    largest = sizes(m, keys, truths)
     # a condition κ makes κ^(order + 1) of a rounding
     condition = np.where(np.isfinite(motion.condition), motion.condition, 1.0)
     for key, value, true in zip(keys, found, truths, strict=True):
@@ -173,3 +148,29 @@ def rocker():
         inputs=Input(link="crank"),
         guess=Guess(0.5, {"coupler": 0.3, "rocker": 1.0}),
     )
+
+
+def test_a_pose_that_does_not_stand_has_neither_component(rocker, monkeypatch) -> None:
+    """Of complex numbers NaN alone is NaN + 0i: x without a value beside y = 0."""
+    motion = rocker.motion([0.5, np.pi], 1.0)
+    evaluator = rocker.evaluator("points.C", "reactions.C.coupler")
+    for engine in (None, "python", "numpy"):
+        if engine:
+            monkeypatch.setenv("DALEMBERT_ENGINE", engine)
+        found = evaluator([0.5, np.pi], 1.0)
+        for value in (found["points.C"], found["reactions.C.coupler"], motion.reaction("C", "coupler")):
+            assert np.isfinite(value[0]).all()
+            assert np.isnan(value[1]).all()
+
+
+def test_an_evaluator_adds_pin_and_guide_at_one_point() -> None:
+    """Of the press, the ram is pinned at B, which runs in a guide: all that others do to it there."""
+    m = Mechanism.from_toml(EXAMPLES["crank-press/press.toml"])
+    q = np.array([0.3, 1.7])
+    found = m.evaluator("reactions.B.ram")(q, 2.0)["reactions.B.ram"]
+    true = m.motion(q, 2.0).reaction("B", "ram")
+    assert np.abs(found - true).max() <= 4e-15 * np.abs(true).max()
+    (pin, guide) = (j for j in m.motion(q, 2.0).dynamics.reactions.joints if "ram" in j.bodies)
+    forces = m.motion(q, 2.0).dynamics
+    both = forces.joint_force(pin, "ram") + forces.joint_force(guide, "ram")
+    assert np.abs(found @ [1, 1j] - both).max() <= 4e-15 * np.abs(true).max()

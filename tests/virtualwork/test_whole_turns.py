@@ -85,3 +85,22 @@ def test_a_link_that_stands_at_half_a_turn_at_the_guess() -> None:
         for off in ([0.0], [0.0, 1e-7, -1e-7]):
             stood = m.motion(at + np.array(off)).link("wheel").angle
             assert np.abs(np.exp(1j * stood) - np.exp(1j * wheel)).max() < 1e-6
+
+
+@pytest.mark.parametrize("turns", [-1, 0, 1, 2])
+def test_a_prism_stands_at_the_whole_turn_of_the_guess_where_a_gear_counts_them(turns: int) -> None:
+    """A block turns as its bar does, and is geared to it: 3 θ is given, and of three places the guess has one."""
+    bar = -2.978
+    block = bar + 2 * np.pi * turns
+    m = Mechanism(
+        {"O": (0, 0)},
+        {"bar": Link({"O": (0, 0)}), "block": Link({"S": (0, 0)})},
+        guides=[Guide("S", "block", "bar", 0j, 0.0, turned=0.0)],
+        gears=[Gear(("block", "bar"), -2.0)],
+        inputs=[Input(slider="S")],
+        guess=Guess(at=(1.0,), angles={"bar": bar, "block": block}),
+    )
+    motion = m.motion([1.0, 2.0])
+    assert motion.link("bar").angle == pytest.approx([bar, bar], abs=1e-14)
+    assert np.exp(1j * motion.link("block").angle) == pytest.approx(np.exp([1j * bar] * 2), abs=1e-14)
+    assert motion.point("S").position[1] == pytest.approx([2 * np.cos(bar), 2 * np.sin(bar)], abs=1e-14)

@@ -100,10 +100,10 @@ class Family:
         FamilyMotion
             Every array has a leading axis of variants.
         """
-        inputs, rates = self._inputs(angle), self._rates(speed, acceleration)
+        inputs, rates = self.inputs(angle), self.rates(speed, acceleration)
         return FamilyMotion(Part(self.mechanism, self.dimensions, self.values, inputs, rates), executor)
 
-    def _own(self, name: str) -> list[Reals]:
+    def own(self, name: str) -> list[Reals]:
         """What the descriptions say of each input: its value, or a rate, (v,)."""
         own = []
         for j in range(len(self.mechanism.inputs)):
@@ -113,11 +113,11 @@ class Family:
             own.append(self.values[:, varied[0]] if varied else np.full(len(self), number))
         return own
 
-    def _inputs(self, angle: ArrayLike | None) -> Reals:
+    def inputs(self, angle: ArrayLike | None) -> Reals:
         """(v or 1, n, k)."""
         k = len(self.mechanism.inputs)
         if angle is None:
-            return np.stack(self._own("value"), axis=-1)[:, None, :]
+            return np.stack(self.own("value"), axis=-1)[:, None, :]
         q = np.asarray(angle, dtype=float)
         if k == 1:
             return q.reshape(1, -1, 1)
@@ -125,12 +125,12 @@ class Family:
             raise ValueError(f"angle: expected shape (n, {k}) for {k} inputs, found {q.shape}")
         return q.reshape(1, -1, k)
 
-    def _rates(self, *given: ArrayLike | None) -> list[list[Number]]:
+    def rates(self, *given: ArrayLike | None) -> list[list[Number]]:
         """Speed, acceleration, jerk of each input: a number, or an array that broadcasts to (v, n)."""
         rates: list[list[Number]] = []
         for rate, name in zip((*given, None), ("speed", "acceleration", "jerk"), strict=True):
             if rate is None:
-                own = self._own(name)
+                own = self.own(name)
                 rates.append([float(r[0]) if (r == r[0]).all() else r[:, None] for r in own])
                 continue
             r = np.asarray(rate, dtype=float)

@@ -253,10 +253,9 @@ class FamilyMotion:
         DescriptionError
             Where the link has no joint of that name.
         """
-        here = [j for j in joints(self.part.mechanism) if j.name == joint and on in j.bodies]
-        if not here:
+        if not any(j.name == joint and on in j.bodies for j in joints(self.part.mechanism)):
             raise DescriptionError(f"link '{on}' has no joint at '{joint}'")
-        return _xy(sum(self.values([("force", j.key, on) for j in here])))
+        return _xy(self.values([("reaction", joint, on)])[0])
 
 
 def _xy(z: Complexes) -> Reals:

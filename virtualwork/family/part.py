@@ -23,9 +23,9 @@ from virtualwork.family.branches import LANES, meet_on_the_way, signs
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import FORCES, Key, over_blocks
 from virtualwork.formulas.dynamics import Dynamics
-from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.formulas.numbers import Number, Reals, leave_out
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.recording import COMPLEX, NAMES, NEAR, names
+from virtualwork.formulas.recording import COMPLEX, NAMES, NEAR, quantity
 
 Mask = NDArray[np.bool_]
 # the key of 0 where a pose is assembled
@@ -159,26 +159,36 @@ class Solver:
         return found, told
 
     @property
+    def signs(self) -> dict[str, Reals]:
+        """The sign of each closed form of each variant, (v,), by the group's name."""
+        return self._signs[0]
+
+    @property
     def together(self) -> Mask:
         """Which variants are on the tape, (v,)."""
         return self._signs[1]
 
     def values(self, keys: Sequence[Key]) -> list[Any]:
         """Quantities by their keys (`Recording.value`), each (v, n); NaN where a pose is not assembled."""
+        out, alone = self.lanes(keys)
+        for place in np.flatnonzero(alone):
+            self._one(int(place), keys, out)
+        return out
+
+    def lanes(self, keys: Sequence[Key]) -> tuple[list[Any], Mask]:
+        """The quantities of the variants that are on the tape; and which are not, (v,): of those they are NaN."""
         v, n = self.part.shape
         out = [np.full((v, n), np.nan, complex if key[0] in COMPLEX else float) for key in keys]
-        there = self.together if self._takes(keys) else np.zeros(v, dtype=bool)
+        there = self.together if self.takes(keys) else np.zeros(v, dtype=bool)
         places = np.flatnonzero(there)
         each = max(1, LANES // max(n, 1))
         alone = ~there
         for i in range(0, len(places), each):
             rows = places[i : i + each]
             alone[rows[self._on_tape(keys, rows, out)]] = True
-        for place in np.flatnonzero(alone):
-            self._one(int(place), keys, out)
-        return out
+        return out, alone
 
-    def _takes(self, keys: Sequence[Key]) -> bool:
+    def takes(self, keys: Sequence[Key]) -> bool:
         """Whether the tape has such quantities: friction iterates, redundant statics and twists are of each variant."""
         m, written = self.part.mechanism, self.written
         if written is None:
@@ -197,23 +207,19 @@ class Solver:
         forces = any(key[0] in FORCES for key in keys)
         margins: list[Key] = [("margin", g.name) for g in written.closed] if forces else []
         asked = [key for key in keys if key != ASSEMBLED]
-        tape = written.tape((*asked, *dict.fromkeys(closed.values()), *margins))
+        whole = list(dict.fromkeys(closed.values()))
+        tape = written.tape((*asked, *whole, *margins))
         with np.errstate(all="ignore"):
             found = run(tape, {name: self._lanes(name, rows) for name in tape.inputs})
-            lanes = {name: np.broadcast_to(found[name], len(rows) * n).reshape(-1, n) for name in tape.names}
+            lanes = {
+                key: quantity(found, key, len(rows) * n).reshape(-1, n) for key in (*asked, *whole, *margins)
+            }
             near = np.zeros(len(rows), dtype=bool)
             for key in margins:
-                near |= (np.abs(lanes[names(key)[0]]) < NEAR).any(axis=1)
+                near |= (np.abs(lanes[key]) < NEAR).any(axis=1)
         for key, values in zip(keys, out, strict=True):
-            here = np.zeros((len(rows), n), values.dtype)
-            if key != ASSEMBLED:
-                where = names(key)
-                here.real = lanes[where[0]]
-                if len(where) == 2:
-                    here.imag = lanes[where[1]]
-            gap = ~np.isfinite(lanes[names(closed[key])[0]])
-            if gap.any():
-                here[gap] = np.nan
+            here = np.zeros((len(rows), n)) if key == ASSEMBLED else lanes[key]
+            leave_out(here, ~np.isfinite(lanes[closed[key]]))
             values[rows] = here
         return near
 

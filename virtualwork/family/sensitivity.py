@@ -19,11 +19,10 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.dimensions import Dimension, named, value
 from virtualwork.describe.errors import DescriptionError, MechanismError
 from virtualwork.family.written import Written
-from virtualwork.formulas.asked import FORCES, Key
+from virtualwork.formulas.asked import FORCES, JOINTS, Key
 from virtualwork.formulas.lanes import Lanes
-from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.recording import COMPLEX, NAMES, names
+from virtualwork.formulas.recording import NAMES, quantity
 
 # what an input's own numbers are called on the tape
 ENTERS = {"value": "q", "speed": "v", "acceleration": "a", "jerk": "j"}
@@ -78,19 +77,11 @@ class Sensitivities:
         rest = [name for name in tape.inputs if name not in given]
         with np.errstate(all="ignore"):
             found = run(tape, given | self._lanes.entering(rest))
-        return [[self._one(found, tape, key, name) for name in enters] for key in keys]
+        return [[quantity(found, key, self.poses.n, to=name) for name in enters] for key in keys]
 
     def values(self, keys: Sequence[Key]) -> list[Any]:
         """The quantities themselves, (n,)."""
         return self._lanes.values(list(keys))
-
-    def _one(self, found: Any, tape: Tape, key: Key, enters: str) -> Any:
-        parts: list[Reals] = []
-        for name in names(key):
-            output = f"d({name})/d({enters})"
-            column = found[output] if output in tape.rows else 0.0
-            parts.append(np.broadcast_to(column, self.poses.n) + 0.0)
-        return parts[0] if key[0] not in COMPLEX else parts[0] + 1j * parts[1]
 
     @staticmethod
     def _enters(dimension: Dimension) -> str:
@@ -125,6 +116,5 @@ class Sensitivities:
         if any(key[0] in FORCES for key in keys):
             if m.friction:
                 raise MechanismError("sensitivity: forces with friction are not differentiated")
-            joints = any(key[0] in ("newton-euler", "force", "moment") for key in keys)
-            if joints and written.recording.forces[0].order.redundant:
+            if any(key[0] in JOINTS for key in keys) and written.recording.forces[0].order.redundant:
                 raise MechanismError("sensitivity: redundant joint forces are not differentiated")

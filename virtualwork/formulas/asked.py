@@ -12,7 +12,9 @@ from virtualwork.formulas.poses import Poses
 # (kind, of what …): see `recording.Recording.value`
 Key = tuple[Any, ...]
 # what the loads have a part in; a pose that is not assembled has none of it
-FORCES = {"effort", "newton-euler", "force", "moment", "shaking", "shaking moment"}
+FORCES = {"effort", "newton-euler", "force", "moment", "reaction", "shaking", "shaking moment"}
+# what the joints carry
+JOINTS = {"newton-euler", "force", "moment", "reaction"}
 # times that one pose is asked for, and poses, from which on the tape pays
 OFTEN = 50
 MANY_POSES = 1_000_000
@@ -50,6 +52,8 @@ def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:
         if kind.startswith("shaking"):
             force, moment = forces.shaking
             return moment if kind == "shaking moment" else force[:, 0] + 1j * force[:, 1]
+        if kind == "reaction":
+            return forces.at_joint(*of)
         joint = forces.reactions.by_key[of[0]]
         return forces.joint_force(joint, of[1]) if kind == "force" else forces.joint_moment(joint, of[1])
     match kind:

@@ -15,7 +15,7 @@ from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort, finished, write_effort
 from virtualwork.formulas.friction import settle
 from virtualwork.formulas.loads import EXTERNAL, OWN, Load
-from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, cross, plus, xy
+from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, cross, leave_out, plus, xy
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.reactions import Reactions
 from virtualwork.formulas.scene import Scene
@@ -153,7 +153,7 @@ class Dynamics:
                 form = partial(self.reactions.joint_force, joint=joint, body=body)
                 (self._forces[key],) = self.reactions.over(form, kind=complex)
             if self.scene.friction:
-                self._forces[key][self.locked] = np.nan
+                leave_out(self._forces[key], self.locked)
         return self._forces[key]
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
@@ -188,13 +188,17 @@ class Dynamics:
 
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2)."""
+        return xy(self.at_joint(joint, on))
+
+    def at_joint(self, joint: str, on: str) -> Complexes:
+        """The same, (n,) complex: of a pin and of a guide, where both are of that name."""
         here = [found for found in self.joints_named(joint) if on in found.bodies]
         if not here:
             raise DescriptionError(f"link '{on}' has no joint at '{joint}'")
         total, *others = (self.joint_force(found, on) for found in here)
         for force in others:
             total = total + force
-        return xy(total)
+        return total
 
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:

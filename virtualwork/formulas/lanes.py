@@ -21,9 +21,9 @@ from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.linear import SINGULAR
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
-from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.formulas.numbers import Number, Reals, leave_out
 from virtualwork.formulas.poses import Branch, Poses
-from virtualwork.formulas.recording import NAMES, NEAR, Recording, names
+from virtualwork.formulas.recording import NAMES, NEAR, Recording, names, quantity
 from virtualwork.formulas.scene import Scene
 
 # two threads that ask one assembly at once
@@ -148,17 +148,10 @@ class Lanes:
                 careful = careful | np.broadcast_to(near, n)
         nowhere = ~np.isfinite(self.poses.inputs).all(axis=1)
         for key in keys:
-            where = names(key)
-            if len(where) == 2:
-                value = np.empty(n, complex)
-                value.real, value.imag = out[where[0]], out[where[1]]
-            else:
-                value = out[where[0]]
-                # a row of the run's own table needs no copy
-                value = value if np.ndim(value) else np.full(n, value)
+            value = quantity(out, key, n)
             if key in closed:
-                value[~np.isfinite(np.broadcast_to(out[names(closed[key])[0]], n))] = np.nan
-            value[nowhere] = np.nan
+                leave_out(value, ~np.isfinite(np.broadcast_to(out[names(closed[key])[0]], n)))
+            leave_out(value, nowhere)
             if key[0] in FORCES:
                 value += 0.0
             self.known[key] = value

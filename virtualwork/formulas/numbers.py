@@ -86,6 +86,18 @@ def times(a: Number, b: Number) -> Number:
     return a if isinstance(b, float) and b == 1.0 else a * b
 
 
+def leave_out(values: NDArray[Any], which: NDArray[np.bool_]) -> None:
+    """Give no number where `which` is true: a complex one is NaN in both its parts, which NaN alone is not.
+
+    >>> z = np.array([1 + 2j, 3j])
+    >>> leave_out(z, np.array([False, True]))
+    >>> xy(z)
+    array([[ 1.,  2.],
+           [nan, nan]])
+    """
+    values[which] = complex(np.nan, np.nan) if values.dtype.kind == "c" else np.nan
+
+
 def xy(z: Complexes) -> Reals:
     """x + iy as rows (x, y), without a copy.
 

@@ -15,7 +15,7 @@ from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort
 from virtualwork.formulas.load_paths import LoadPaths
-from virtualwork.formulas.numbers import Number, dot, minus, plus
+from virtualwork.formulas.numbers import Number, dot, leave_out, minus, plus
 from virtualwork.formulas.positions import BLOCK
 from virtualwork.formulas.scene import Scene
 from virtualwork.plan.joint_forces import Side
@@ -168,5 +168,5 @@ class Reactions(JointForces):
         self.scene.each(self.keys, work)
         if self.scene.lost is not None:
             for out in found:
-                out[self.scene.lost] = np.nan
+                leave_out(out, self.scene.lost)
         return found

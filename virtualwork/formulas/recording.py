@@ -19,13 +19,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
 from dalembert.arithmetic.recorded import Number, Recorder, bare
 from dalembert.arithmetic.systems import regularity, solved
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
 from virtualwork.describe.loads import TorsionSpring
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import FORCES, Key
+from virtualwork.formulas.asked import FORCES, JOINTS, Key
 from virtualwork.formulas.block import Block, Shared, Table
 from virtualwork.formulas.dynamics import resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
@@ -221,6 +223,7 @@ class Recording:
         ("dslide", guide, j, order)
         ("effort", j), ("newton-euler", j)
         ("force", joint's key, body), ("moment", joint's key, body)
+        ("reaction", joint's name, body)             of all joints of that name: a pin, and the guide its point runs in
         ("shaking",), ("shaking moment",)            complex; real
         ("closed", groups' names …)                  a finite number where these groups are assembled
         ("margin", group's name)                     the radicand of a closed form, relative
@@ -238,7 +241,7 @@ class Recording:
             return True
         if self.mechanism.friction:
             return False
-        return kinds.isdisjoint(("newton-euler", "force", "moment")) or not self.forces[0].order.redundant
+        return kinds.isdisjoint(JOINTS) or not self.forces[0].order.redundant
 
     def tape(self, keys: Iterable[Key]) -> Tape:
         """The tape of quantities: outputs are called as `names` says."""
@@ -315,6 +318,10 @@ class Recording:
         _, of, block = self.forces
         return of.joint_force(block, of.by_key[joint], body)
 
+    def _reaction(self, joint: str, body: str) -> Number:
+        of = [j for j in self.forces[1].joints if j.name == joint and body in j.bodies]
+        return sum((self.value(("force", j.key, body)) for j in of), 0.0)
+
     def _moment(self, joint: str, body: str) -> Number:
         self._places()
         _, of, block = self.forces
@@ -370,7 +377,7 @@ class Recording:
         return self.st.margin[group]
 
 
-COMPLEX = {"point", "turn", "dpoint", "force", "shaking"}
+COMPLEX = {"point", "turn", "dpoint", "force", "reaction", "shaking"}
 
 
 def names(key: Key) -> tuple[str, ...]:
@@ -381,6 +388,19 @@ def names(key: Key) -> tuple[str, ...]:
     """
     text = " ".join(repr(part) if isinstance(part, complex) else str(part) for part in key)
     return (f"{text} x", f"{text} y") if key[0] in COMPLEX else (text,)
+
+
+def quantity(rows: Mapping[str, Any], key: Key, n: int, to: str | None = None) -> Any:
+    """A quantity of n lanes from the rows of a run, or its derivative `to` an input: (n,), real or complex.
+
+    What does not hang on the input has no row. A row of the run's own table is not copied.
+    """
+    parts = [rows.get(name if to is None else f"d({name})/d({to})", 0.0) for name in names(key)]
+    if len(parts) == 1:
+        return parts[0] if np.ndim(parts[0]) else np.full(n, parts[0])
+    value = np.empty(n, complex)
+    value.real, value.imag = parts
+    return value
 
 
 class _Setting(Shared):

@@ -16,6 +16,8 @@ from itertools import product
 
 import numpy as np
 
+from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.errors import MechanismError
 from virtualwork.describe.parts import GROUND, Guess, Input
@@ -80,22 +82,34 @@ class Coordinates:
 
     # --- how far from folding -----------------------------------------------------------------------------------
     @cached_property
-    def _margins(self) -> Callable[[Floats], float] | None:
-        """The least radicand of all loops; None where there is none to look at."""
+    def _margins(self) -> Tape | None:
+        """The relative radicands of all loops; None where there is none to look at."""
         a = self.equations.assembly
         names = [g.name for g in a.plan.groups if g.kind not in ("Newton", "PRP")]
         if not names or a.geared or len(names) < len(a.plan.groups):
             return None
         recording = self.equations.recording(False, False, False)
-        function = self.equations.function(recording.tape([("margin", name) for name in names]))
-        return lambda q: min(function(0.0, q, q))
+        return recording.tape([("margin", name) for name in names])
+
+    @cached_property
+    def _margin(self) -> Callable[[float, Floats, Floats], tuple[float, ...]] | None:
+        return None if self._margins is None else self.equations.function(self._margins)
+
+    def stands(self, q: Reals) -> bool:
+        """Whether no loop folds at any of many places, (n, k); False where that takes more than the tape."""
+        if self._margins is None:
+            return True
+        given = {f"q{j}": q[:, j] for j in range(q.shape[1])}
+        if not given.keys() >= set(self._margins.inputs):
+            return False
+        return bool(len(q) == 0 or (run(self._margins, given).table >= FOLDING).all())
 
     def margin(self, q: Floats) -> float:
         """How far every loop is from folding: the least relative radicand, 1 at a right angle."""
-        if self._margins is None:
+        if self._margin is None:
             return 1.0
         try:
-            return self._margins(q)
+            return min(self._margin(0.0, q, q))
         except (ZeroDivisionError, ValueError, OverflowError):
             return 0.0
 

@@ -8,13 +8,14 @@ SIAM Review 46, 2004, eq. 4.2).
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections.abc import Callable, Iterable
 
 from virtualwork.intime.watch import Floats
 
 # rad, or of a slide's size: from how far off is interpolated at most; which share of it is left out
-REACH, INNER = 0.3, 1 / 3
+REACH, INNER = 0.6, 0.2
 # on each side
 NODES = 6
 
@@ -32,7 +33,10 @@ class Crossing:
 
     def __init__(self, at: float, reach: float) -> None:
         self.at, self.inner = at, INNER * reach
-        steps = [INNER + (1 - INNER) * i / (NODES - 1) for i in range(NODES)]
+        # Chebyshev's points in the square of the distance: the extrapolation inwards makes least of what is rounded
+        middle, half = 0.5 * (1 + INNER**2), 0.5 * (1 - INNER**2)
+        turns = (math.pi * (i + 0.5) / NODES for i in range(NODES))
+        steps = [math.sqrt(middle - half * math.cos(turn)) for turn in turns]
         places = [*(-x for x in reversed(steps)), *steps]
         self.nodes = [at + reach * x for x in places]
         self._weights = []

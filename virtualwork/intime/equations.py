@@ -14,30 +14,28 @@ from __future__ import annotations
 import cmath
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.engines import floats, run
-from dalembert.arithmetic.recorded import RECORDED, Number
-from dalembert.arithmetic.systems import solved
 from dalembert.arithmetic.tape import Tape
 from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.errors import MechanismError
-from virtualwork.formulas.block import Block, Setting
+from virtualwork.formulas.block import Setting
 from virtualwork.formulas.effort import effort
 from virtualwork.formulas.load_case import LoadCase
-from virtualwork.formulas.loads import Load, Tabled
+from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.scene import Scene
 from virtualwork.intime.crossing import Crossing, crossings, nearest
+from virtualwork.intime.powers import motion_of, places_and_speeds, potential, wasted
 from virtualwork.intime.tables import Value, ends, kinks, place, reader
 from virtualwork.intime.watch import Floats, Watch
 
@@ -46,6 +44,7 @@ AHEAD = 1.0
 # how near a change point a fold is its own
 NEAR = 0.1
 TURN = 2 * math.pi
+EVERYWHERE = (-math.inf, math.inf)
 
 
 class Lost(ArithmeticError):
@@ -71,6 +70,8 @@ class Equations:
         self._covered = (math.inf, -math.inf)
         self._flips: dict[str, list[float]] = {}
         self._crossings: list[Crossing] = []
+        # starts that were looked at
+        self._begun: set[tuple[float, ...]] = set()
         self._cover(self.mechanism.at[0])
 
     def __call__(self, t: float, q: Floats, v: Floats) -> Floats:
@@ -114,6 +115,8 @@ class Equations:
         MechanismError
             Not assembled there, or an input on which no mass moves; which, and what is missing.
         """
+        if (t, *q, *v) in self._begun:
+            return
         names = [e.name for e in self.mechanism.inputs]
         mass, rest, *_ = self.by_poses(np.array([t]), np.array([q]), np.array([v]))
         if not (np.isfinite(mass).all() and np.isfinite(rest).all()):
@@ -126,6 +129,7 @@ class Equations:
                 f"no mass moves with input '{least}': its acceleration is not determined; "
                 "expected a mass or an inertia on a link that it moves"
             )
+        self._begun.add((t, *q, *v))
 
     def many(self, t: Reals, q: Reals, v: Reals) -> Reals:
         """The same of many states, (n, k + 1); NaN where there are none."""
@@ -187,29 +191,7 @@ class Equations:
     @cached_property
     def _recorded(self) -> tuple[Tape, Tape]:
         """The tapes of accelerations and power, and of the energies."""
-        recording = self.recording(True, True, False)
-        k, names = self.k, [f"effort {j}" for j in range(self.k)]
-        motion = recording.tape([("effort", j) for j in range(k)])
-        free = derivatives(motion, [f"a{j}" for j in range(k)])
-        _, _, block = recording.forces
-        again = recording.recorder
-        inputs = {name: again.input(name) for name in motion.inputs}
-        still = motion.on(inputs | {f"a{j}": 0.0 for j in range(k)}, RECORDED)
-        slopes = free.on(inputs, RECORDED)
-        mass = [[slopes[f"d({name})/d(a{j})"] for j in range(k)] for name in names]
-        right = [-still[name] for name in names]
-        found = [right[0] / mass[0][0]] if k == 1 else solved(mass, right)
-        loads = recording.forces[0].case.loads
-        speeds = [again.input(f"v{j}") for j in range(k)]
-        kinetic: Number = 0.0
-        for i in range(k):
-            for j in range(k):
-                kinetic = kinetic + 0.5 * (speeds[i] * mass[i][j] * speeds[j])
-        outputs = {f"a{j}": value for j, value in enumerate(found)}
-        return (
-            again.tape(outputs | {"power": wasted(loads, block, speeds)}),
-            again.tape({"energy": kinetic + potential(loads, block)}),
-        )
+        return motion_of(self.recording(True, True, False), self.k)
 
     @cached_property
     def _tables(self) -> list[Tabled]:
@@ -227,6 +209,36 @@ class Equations:
         """A tape of such a recording as a function of a state."""
         function, fillers = floats.compiled(tape), [self._filler(name) for name in tape.inputs]
         return lambda t, q, v: function(*(of(t, q, v) for of in fillers))
+
+    # --- for steps that are tapes themselves ----------------------------------------------------------------------
+    @cached_property
+    def plain(self) -> bool:
+        """Whether the tape of the motion hangs on the state alone: on nothing that has to be looked up."""
+        own = {*places_and_speeds(self.k), "t"}
+        return not self._untaped and own.issuperset(self._tape.inputs)
+
+    @property
+    def rates(self) -> Tape:
+        """The tape of accelerations and power; of q and q̇ alone where this is `plain`."""
+        return self._tape
+
+    @property
+    def called(self) -> tuple[tuple[str, ...], Callable[..., Sequence[float]]]:
+        """What a step gives its calls of the rates, by name, and what is called.
+
+        Raises
+        ------
+        Lost
+        """
+        if self._bare:
+            return self._tape.inputs, self._function
+        k = self.k
+        return ("t", *places_and_speeds(k)), lambda t, *y: self(t, list(y[:k]), list(y[k:]))
+
+    @property
+    def _bare(self) -> bool:
+        """Whether the tape can be asked without looking for change points."""
+        return self.plain and self._covered == EVERYWHERE and not self._crossings
 
     @property
     def _tape(self) -> Tape:
@@ -261,6 +273,12 @@ class Equations:
         return np.asarray(stored + 0.5 * np.einsum("ni,nij,nj->n", v, mass, v))
 
     def _run(self, tape: Tape, t: Reals, q: Reals, v: Reals, rows: Any) -> Mapping[str, Any]:
+        if self.plain:
+            columns = {f"q{j}": q[rows, j] for j in range(self.k)} | {
+                f"v{j}": v[rows, j] for j in range(self.k)
+            }
+            with np.errstate(all="ignore"):
+                return run(tape, columns | {"t": t[rows]})
         states = zip(t[rows].tolist(), q[rows].tolist(), v[rows].tolist(), strict=True)
         given = np.array([self._filled(*state, tape=tape) for state in states])
         with np.errstate(all="ignore"):
@@ -352,7 +370,7 @@ class Equations:
             low, high = min(low, q - ahead), max(high, q + ahead)
             self._flips.update({name: at.tolist() for name, at in track.flips.items()})
             self._crossings = crossings(track.crossings, self.scale[0])
-        self._covered = (low, high) if track.active and not track.settled else (-math.inf, math.inf)
+        self._covered = (low, high) if track.active and not track.settled else EVERYWHERE
 
     def _crossing(self, q: float) -> Crossing | None:
         """The change point that an input is close to."""
@@ -365,6 +383,14 @@ class Equations:
             return np.ones(len(q), dtype=bool)
         return np.array([self._crossing(x) is not None for x in q[:, 0].tolist()], dtype=bool)
 
+    def clear(self, q: Reals) -> bool:
+        """Whether no change point is near any of the values of the first input."""
+        low, high = float(q.min()), float(q.max())
+        for end in (low, high):
+            if not self._covered[0] <= end <= self._covered[1]:
+                self._cover(end)
+        return not any(low - c.inner <= c.at <= high + c.inner for c in self._crossings)
+
     def passes(self, q: float) -> bool:
         """Whether a change point is near: there every loop folds, in all coordinates, and goes on."""
         found = nearest(self._crossings, q)
@@ -374,22 +400,3 @@ class Equations:
     def _untaped(self) -> bool:
         a = self.assembly
         return bool(a.geared) or any(g.kind == "Newton" for g in a.plan.groups)
-
-
-def wasted(loads: Iterable[Load], block: Block, speeds: list[Number]) -> Number:
-    """The power of what stores nothing: of applied forces and torques, dampers, drives."""
-    total: Number = 0.0
-    for load in loads:
-        for j, speed in enumerate(speeds):
-            work = load.wasted(block, j)
-            total = total if work is None else total + work * speed
-    return total
-
-
-def potential(loads: Iterable[Load], block: Block) -> Number:
-    """What gravity and springs hold, J."""
-    total: Number = 0.0
-    for load in loads:
-        if load.stores and load.carries:
-            total = total + load.potential(block)
-    return total

@@ -1,20 +1,144 @@
 """Dormand and Prince's explicit Runge-Kutta method of order 8, for q̈ = a(t, q, q̇).
 
-Coefficients in `tableau`. A step runs on Python's floats, for a mechanism has few inputs;
-the same step over arrays, from the node before each time asked for, is the dense output: it has the method's own order.
+Coefficients in `tableau`. A step is written down once, on recorded numbers, with calls of the accelerations between
+its stages: Python's floats run it for one motion, and compiled code (`marching`) for many steps or many motions. On
+arrays the same text is the dense output, from the node before each time asked for: it has the method's own order.
 """
 
 from __future__ import annotations
 
-from operator import mul
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from operator import itemgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from dalembert.arithmetic.engines import floats
+from dalembert.arithmetic.loop import Calls
+from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
+from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.numbers import Reals
-from virtualwork.intime.equations import Equations
+from virtualwork.intime.equations import Equations, Lost
 from virtualwork.intime.step import Step
 from virtualwork.intime.tableau import AT, FIFTH, STAGES, THIRD, WEIGHTS
 from virtualwork.intime.watch import Floats
+
+# below it the square of an error is nothing
+TINY = 1e-300
+# steps up to which Python's floats are faster than numpy's calls
+FEW = 20
+Numbers = list[Number]
+Rates = Callable[[Number, Numbers, Numbers], Numbers]
+"""(t, q, q̇) → the accelerations, and the power."""
+
+
+class Stepped(NamedTuple):
+    """Changes of q and q̇, the work, the rates at the end, two errors of (q, q̇), and what stiffness is told from.
+
+    `steep` is the squared change of the accelerations between two states at one time, `apart` that of the speeds.
+    """
+
+    dq: Numbers
+    dv: Numbers
+    work: Number
+    rates: Numbers
+    third: Numbers
+    fifth: Numbers
+    steep: Number
+    apart: Number
+
+
+def combined(weights: Sequence[float], values: Numbers) -> Number:
+    """Σ w·x, without what has no weight."""
+    total: Number = 0.0
+    for w, x in zip(weights, values, strict=False):
+        if w:
+            total = total + w * x
+    return total
+
+
+def stages(
+    f: Rates, t: Number, q: Numbers, v: Numbers, rates: Numbers, h: Number
+) -> tuple[list[Numbers], list[Numbers], Numbers]:
+    """The speeds and rates of all stages, component by component, and the speeds of the last."""
+    speeds, others, place = [[x] for x in v], [[x] for x in rates], v
+    for c, row in zip(AT, STAGES, strict=True):
+        there = [x + h * combined(row, s) for x, s in zip(q, speeds, strict=True)]
+        place = [x + h * combined(row, s) for x, s in zip(v, others, strict=False)]
+        found = f(t + c * h, there, place)
+        for s, x in zip((*speeds, *others), (*place, *found), strict=True):
+            s.append(x)
+    return speeds, others, place
+
+
+def step(f: Rates, t: Number, q: Numbers, v: Numbers, rates: Numbers, h: Number) -> Stepped:
+    """One step of length h from a state whose rates are known."""
+    k = len(q)
+    speeds, others, last = stages(f, t, q, v, rates, h)
+    dq, dv, work = _ends(speeds, others, h)
+    end = [x + d for x, d in zip(q, dq, strict=True)], [x + d for x, d in zip(v, dv, strict=True)]
+    found = f(t + h, *end)
+    # the last two evaluations stand at one time: how fast the rates change between them is what is stiff
+    apart = sum(((a - b) * (a - b) for a, b in zip(end[1], last, strict=True)), 0.0)
+    steep = sum(((a - s[-1]) * (a - s[-1]) for a, s in zip(found[:k], others, strict=False)), 0.0)
+    every = [[*s, x] for s, x in zip((*speeds, *others[:k]), (*end[1], *found[:k]), strict=True)]
+    third, fifth = ([h * combined(weights, s) for s in every] for weights in (THIRD, FIFTH))
+    return Stepped(dq, dv, work, found, third, fifth, steep, apart)
+
+
+def changes(
+    f: Rates, t: Number, q: Numbers, v: Numbers, rates: Numbers, h: Number
+) -> tuple[Numbers, Numbers, Number]:
+    """The changes of q and q̇ and the work over a step, and nothing else of it."""
+    speeds, others, _ = stages(f, t, q, v, rates, h)
+    return _ends(speeds, others, h)
+
+
+def _ends(speeds: list[Numbers], others: list[Numbers], h: Number) -> tuple[Numbers, Numbers, Number]:
+    *dv, work = [h * combined(WEIGHTS, s) for s in others]
+    return [h * combined(WEIGHTS, s) for s in speeds], dv, work
+
+
+def size(third: Numbers, fifth: Numbers, scale: Numbers) -> Number:
+    """A step's error over the one allowed in each of (q, q̇) (Hairer, Nørsett and Wanner, §II.10, eq. 10.17)."""
+    low, high = (
+        sum(((e / s) * (e / s) for e, s in zip(of, scale, strict=True)), 0.0) for of in (third, fifth)
+    )
+    whole = (high + 0.01 * low) * len(scale)
+    # no error at all is none; what is NaN stays so
+    return high / RECORDED.sqrt(RECORDED.select(whole - TINY, whole, TINY))
+
+
+def names(k: int) -> tuple[list[str], list[str], list[str]]:
+    """What q, q̇ and the rates are called on a tape."""
+    rates = [*(f"a{j}" for j in range(k)), "power"]
+    return [f"q{j}" for j in range(k)], [f"v{j}" for j in range(k)], rates
+
+
+@lru_cache(maxsize=64)
+def written(k: int, passed: tuple[str, ...]) -> Tape:
+    """A step as a tape, with calls of the accelerations of k inputs, which are given what is `passed`."""
+    recorder = Recorder()
+    places, speeds, rates = names(k)
+    calls = Calls(recorder, passed, rates)
+    q, v, a = ([recorder.input(name) for name in of] for of in (places, speeds, rates))
+    done = step(called_by(calls), recorder.input("t"), q, v, a, recorder.input("h"))
+    parts = zip(("dq", "dv", "rate", "third", "fifth"), (*done[:2], *done[3:6]), strict=True)
+    found = {f"{name}{j}": x for name, values in parts for j, x in enumerate(values)}
+    return recorder.tape(
+        found | {"work": done.work, "steep": done.steep, "apart": done.apart} | calls.outputs
+    )
+
+
+def called_by(calls: Calls) -> Rates:
+    """The accelerations as calls."""
+
+    def rates(t: Number, q: Numbers, v: Numbers) -> Numbers:
+        given = {"t": t} | {f"q{j}": x for j, x in enumerate(q)} | {f"v{j}": x for j, x in enumerate(v)}
+        return calls(given)
+
+    return rates
 
 
 class DormandPrince:
@@ -28,52 +152,51 @@ class DormandPrince:
     def step(self, f: Equations, t: float, q: Floats, v: Floats, rates: Floats, h: float) -> Step:
         """One step of length h from a state whose rates are known."""
         k = len(q)
-        speeds, others = [[x] for x in v], [[x] for x in rates]
-        place: tuple[Floats, Floats] = ([], [])
-        for c, row in zip(AT, STAGES, strict=True):
-            place = (
-                [x + h * sum(map(mul, row, s)) for x, s in zip(q, speeds, strict=True)],
-                [x + h * sum(map(mul, row, s)) for x, s in zip(v, others, strict=False)],
-            )
-            found = f(t + c * h, *place)
-            for s, x in zip(speeds, place[1], strict=True):
-                s.append(x)
-            for s, x in zip(others, found, strict=True):
-                s.append(x)
-        dq = [h * sum(map(mul, WEIGHTS, s)) for s in speeds]
-        *dv, work = [h * sum(map(mul, WEIGHTS, s)) for s in others]
-        end = [x + d for x, d in zip(q, dq, strict=True)], [x + d for x, d in zip(v, dv, strict=True)]
-        found = f(t + h, *end)
-        # the last two evaluations stand at one time: how fast the rates change between them is what is stiff
-        apart = sum((a - b) ** 2 for a, b in zip(end[1], place[1], strict=True))
-        steep = sum((a - s[-1]) ** 2 for a, s in zip(found[:k], others, strict=False))
+        passed, rate = f.called
+        function, chosen = _function(k, passed)
+        out = function(rate, *chosen((t, h, *q, *v, *rates)))
+        dq, dv, end = out[:k], out[k : 2 * k], out[2 * k : 3 * k + 1]
+        third, fifth = out[3 * k + 1 : 5 * k + 1], out[5 * k + 1 : 7 * k + 1]
+        work, steep, apart = out[7 * k + 1 :]
         stiffness = abs(h) * (steep / apart) ** 0.5 if apart > 0 else 0.0
-        for s, x in zip(speeds, end[1], strict=True):
-            s.append(x)
-        for s, x in zip(others, found, strict=True):
-            s.append(x)
-        errors = (
-            [h * sum(map(mul, weights, s)) for s in (*speeds, *others[:k])] for weights in (THIRD, FIFTH)
-        )
-        return Step(dq, dv, work, found, tuple(errors), stiffness)
+        return Step(list(dq), list(dv), work, list(end), (third, fifth), stiffness)
 
     def steps(
         self, f: Equations, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals
     ) -> tuple[Reals, Reals, Reals]:
         """Changes of q and q̇ (n, k) and the work (n,) over a step from each of n states, each of its own length."""
+        if len(t) <= FEW:
+            return self._one_by_one(f, t, q, v, rates, h)
+
+        def many(t: Number, q: Numbers, v: Numbers) -> Numbers:
+            return list(f.many(t, np.stack(q, axis=1), np.stack(v, axis=1)).T)
+
+        dq, dv, work = changes(many, t, list(q.T), list(v.T), list(rates.T), h)
+        return np.stack(dq, axis=1), np.stack(dv, axis=1), np.asarray(work)
+
+    def _one_by_one(
+        self, f: Equations, t: Reals, q: Reals, v: Reals, rates: Reals, h: Reals
+    ) -> tuple[Reals, Reals, Reals]:
+        out = np.full((len(t), 2 * q.shape[1] + 1), np.nan)
+        for row, *state in zip(out, *(x.tolist() for x in (t, q, v, rates, h)), strict=True):
+            try:
+                done = self.step(f, *state)
+            except (Lost, ZeroDivisionError, ValueError, OverflowError):
+                continue
+            row[:] = *done.dq, *done.dv, done.work
         k = q.shape[1]
-        length = h[:, None]
-        y = np.concatenate([q, v], axis=1)
-        slopes = np.empty((len(STAGES) + 1, len(q), 2 * k + 1))
-        slopes[0] = np.concatenate([v, rates], axis=1)
-        for i, (c, row) in enumerate(zip(AT, STAGES, strict=True)):
-            place = y + length * np.tensordot(row, slopes[: i + 1, :, : 2 * k], 1)
-            slopes[i + 1, :, :k] = place[:, k:]
-            slopes[i + 1, :, k:] = f.many(t + c * h, place[:, :k], place[:, k:])
-        change = length * np.tensordot(WEIGHTS, slopes, 1)
-        return change[:, :k], change[:, k : 2 * k], change[:, 2 * k]
+        return out[:, :k], out[:, k : 2 * k], out[:, 2 * k]
 
     def size(self, done: Step, scale: Floats) -> float:
         """A step's error over the one allowed in each of (q, q̇)."""
-        third, fifth = (sum((e / s) ** 2 for e, s in zip(of, scale, strict=True)) for of in done.errors)
-        return fifth / ((fifth + 0.01 * third) * len(scale)) ** 0.5 if fifth else 0.0
+        third, fifth = done.errors
+        return float(size(list(third), list(fifth), scale))
+
+
+@lru_cache(maxsize=64)
+def _function(k: int, passed: tuple[str, ...]) -> tuple[Callable[..., Any], Callable[[Any], Any]]:
+    """A step on floats, and what of (t, h, q, q̇, rates) it is given."""
+    tape, (places, speeds, rates) = written(k, passed), names(k)
+    every = ["t", "h", *places, *speeds, *rates]
+    wanted = [every.index(name) for name in tape.inputs if name in every]
+    return floats.compiled(tape, passed, tuple(rates)), itemgetter(*wanted)

@@ -29,7 +29,8 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Reals, dot, minus
-from virtualwork.intime.equations import Equations, Lost, potential, wasted
+from virtualwork.intime.equations import Equations, Lost
+from virtualwork.intime.powers import potential, wasted
 from virtualwork.intime.watch import Floats, Watch
 
 # iterations of friction and joint forces; each gains a factor of some μ r / l
@@ -182,6 +183,11 @@ class Rubbing(Equations):
             slip.append(next(x))
             slips.append([next(x) for _ in range(c)])
         return Values(a, per, p, forces, rate, slip, slips, next(x))
+
+    @property
+    def plain(self) -> bool:
+        """False: friction is found by iteration."""
+        return False
 
     # --- friction at a state --------------------------------------------------------------------------------------
     def __call__(self, t: float, q: Floats, v: Floats) -> Floats:

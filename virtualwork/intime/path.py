@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from dalembert.arithmetic.engines import rounds
+from dalembert.arithmetic.loop import Loop
 from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.intime.control import (
+    GROW,
+    SAFETY,
+    SHRINK,
+    STIFF,
+    added,
+    allowed,
+    first_steps,
+    longer,
+    shorter,
+    shortest,
+    stiffer,
+    tried,
+)
 from virtualwork.intime.equations import Equations, Lost
+from virtualwork.intime.explicit import DormandPrince, names
+from virtualwork.intime.marching import ROUNDS, beginning, loop, march, over
 from virtualwork.intime.step import Method, Step
-from virtualwork.intime.watch import Floats, Watch
+from virtualwork.intime.watch import Check, Floats, Watch
 
 # steps of one simulation
 MOST = 200_000
-# of a step's error, by its power law: how much of the allowed one is aimed at
-SAFETY, SHRINK, GROW = 0.9, 0.2, 6.0
-# steps in a row that the method's stability limits, not its accuracy
-STIFF = 15
 
 
 @dataclass
@@ -44,6 +58,14 @@ class Path:
         self.rates.append(rates)
         self.work.append(work)
 
+    def extend(self, rows: Reals, k: int) -> None:
+        """Add nodes: a row (t, q, q̇, rates, work) each."""
+        self.t += rows[:, 0].tolist()
+        self.q += rows[:, 1 : k + 1].tolist()
+        self.v += rows[:, k + 1 : 2 * k + 1].tolist()
+        self.rates += rows[:, 2 * k + 1 : -1].tolist()
+        self.work += rows[:, -1].tolist()
+
     def at(self, times: Reals) -> tuple[Reals, Reals, Reals]:
         """q, q̇ (n, k) and the work (n,) at times on the way: a step of the method from the node before each."""
         t = np.array(self.t)
@@ -52,8 +74,11 @@ class Path:
         work, h = np.array(self.work)[i], times - t[i]
         on = np.flatnonzero(h > 0)
         if len(on):
-            rates = np.array(self.rates)[i[on]]
-            dq, dv, dw = self.method.steps(self.equations, t[i[on]], q[on], v[on], rates, h[on])
+            state = t[i[on]], q[on], v[on], np.array(self.rates)[i[on]], h[on]
+            if compiled(self.equations, self.method) is not None:
+                dq, dv, dw = over(self.equations.k, self.equations.rates, {}, *state)
+            else:
+                dq, dv, dw = self.method.steps(self.equations, *state)
             q[on] += dq
             v[on] += dv
             work[on] += dw
@@ -68,7 +93,7 @@ def walk(
     tolerance: float,
     watches: Sequence[Watch] = (),
     stops: Sequence[float] = (),
-    check: Callable[[float, Floats, Floats], str] | None = None,
+    check: Check | None = None,
     budget: int = MOST,
     left: Mapping[str, float] | None = None,
 ) -> Path:
@@ -81,7 +106,7 @@ def walk(
         Of the error of each step: of an input, relative to its `scale`; of a speed, to the largest met so far.
     stops : rising times
         No step passes them.
-    check : callable
+    check : Check
         Asked at every node; the path ends where it says why.
     left : mapping of a watch's name to its level
         Levels at which the path begins, and which the first step does not meet again.
@@ -101,50 +126,58 @@ def walk(
         return path
     path.put(t, q, v, rates, work)
     k, span = equations.k, end - t
-    fastest = [max(abs(x), s / span if span else 1.0) for x, s in zip(v, equations.scale, strict=True)]
+    steepest, h = first_steps(span, tolerance, equations.scale, q, v, rates)
+    fastest, h = [float(x) for x in steepest], float(h)
     low_q, low_v = [0.0] * k, [0.0] * k
-    h, grow, stiff = 0.0, GROW, 0
+    grow, stiff = GROW, 0.0
     left = left or {}
     power = -1.0 / method.order
+    by_code = not stops
     while t < end:
+        if by_code and not (len(path.t) - 1) % ROUNDS and compiled(equations, method) is not None:
+            # it goes on as far as nothing happens that has to be looked at step by step
+            given = {"end": end, "span": span, "tolerance": tolerance}
+            state = beginning(t, q, v, rates, h, fastest, work) | {"grow": grow, "stiff": stiff}
+            for names_of, low in (("lq", low_q), ("lv", low_v)):
+                state |= {f"{names_of}{j}": x for j, x in enumerate(low)}
+            (t, h, grow, stiff, work), q, v, low_q, low_v, rates, fastest = _marched(
+                path, given, state, watches, check, budget, left
+            )
+            left, by_code = {}, False
+            if path.ended:
+                return path
+            continue
         if len(path.t) > budget:
             path.ended = "budget"
             return path
-        allowed = [tolerance * s + 4 * EPS * abs(x) for x, s in zip(q, equations.scale, strict=True)]
-        if not h:
-            slow = [tolerance * x for x in fastest]
-            steep = max(abs(x) / s for x, s in zip((*v, *rates), (*allowed, *slow), strict=False))
-            h = min(span, (0.01 / steep) ** (1 / (method.order + 1)) if steep else span)
         i = bisect_right(stops, t)
         stop = min(stops[i], end) if i < len(stops) else end
-        wanted, whole = h, stop - t
-        # no sliver is left before a stop
-        h = whole if h > 0.99 * whole else min(h, max(0.5 * whole, 0.5 * h))
-        if h < 16 * EPS * max(abs(t), span * 1e-3):
+        before, whole = h, stop - t
+        h = tried(h, whole)
+        if h < shortest(t, span):
             path.ended = "lost"
             return path
         node = Node(equations, method, t, q, v, rates)
         try:
             done = method.step(equations, t, q, v, rates, h)
-        except Lost:
+        except (Lost, ZeroDivisionError, ValueError, OverflowError):
+            # of the rates, or of their tape
             path.rejected += 1
-            h, grow = 0.25 * h, 1.0
+            h, grow = shorter(h, SHRINK), 1.0
             continue
-        ends = (max(f, abs(x + d)) for f, x, d in zip(fastest, v, done.dv, strict=True))
-        error = method.size(done, [*allowed, *(tolerance * x for x in ends)])
-        if not error <= 1.0:
+        error = method.size(done, allowed(tolerance, equations.scale, q, fastest, v, done.dv))
+        wanted = SAFETY * error**power if error else GROW
+        if not error < 1.0:
             path.rejected += 1
-            h, grow = h * (max(SHRINK, SAFETY * error**power) if error < math.inf else SHRINK), 1.0
+            h, grow = shorter(h, wanted), 1.0
             continue
-        following = max(
-            wanted if h < wanted else 0.0, h * min(grow, SAFETY * error**power if error else grow)
-        )
+        following = longer(h, wanted, before, grow)
         found = node.met(watches, h, done, left) if watches else None
         met, left, grow = None, {}, GROW
         if found is not None:
             met, level, h, done = found
             left = {met.name: level}
-        stiff = stiff + 1 if done.stiffness > method.stable else max(0, stiff - 1)
+        stiff = stiffer(stiff, done.stiffness, method.stable)
         t = stop if h == whole else t + h
         q, low_q = _added(q, low_q, done.dq)
         v, low_v = _added(v, low_v, done.dv)
@@ -159,18 +192,85 @@ def walk(
             path.ended = path.ended or "stiff"
             return path
     path.ended = "end"
+    if isinstance(method, DormandPrince) and equations.plain:
+        rounds.on_floats(loop(k, equations.rates), len(path.t) + path.rejected)
     return path
 
 
+def compiled(equations: Equations, method: Method) -> Loop | None:
+    """The loop of steps, where compiled code does it."""
+    if not isinstance(method, DormandPrince) or not equations.plain:
+        return None
+    found = loop(equations.k, equations.rates)
+    return None if rounds.ready(found) is None else found
+
+
+def _marched(
+    path: Path,
+    given: dict[str, float],
+    state: dict[str, Any],
+    watches: Sequence[Watch],
+    check: Check | None,
+    budget: int,
+    left: Mapping[str, float],
+) -> tuple[Floats, ...]:
+    """Go on by compiled code: to the end, to where `check` ends it, or to the last node before a watch is met."""
+    equations = path.equations
+    k = equations.k
+    given |= {f"scale{j}": x for j, x in enumerate(equations.scale)}
+    singles = ("t", "h", "grow", "stiff", "work")
+    several = [[f"{name}{j}" for j in range(k)] for name in ("q", "v", "lq", "lv", "a", "f")]
+    several[4] = names(k)[2]
+
+    def parts(of: Mapping[str, Any]) -> tuple[Floats, ...]:
+        return tuple([float(np.ravel(of[name])[0]) for name in group] for group in (singles, *several))
+
+    while True:
+        before = state
+        found = march(k, equations.rates, given, state)
+        state, table = found.state, np.array(list(found.nodes.values()))[:, :, 0].T
+        taken = np.diff(table[:, 0], prepend=np.ravel(before["t"])[0]) > 0
+        if not equations.clear(table[:, 1]):
+            # change points are near: step by step
+            return parts(before)
+        path.rejected += len(taken) - int(taken.sum())
+        rows = table[taken]
+        if not watches and (check is None or check.quiet(rows[:, 1 : k + 1])):
+            path.extend(rows, k)
+            rows = rows[:0]
+        for t, *row in rows.tolist():
+            q, v, rates, work = row[:k], row[k : 2 * k], row[2 * k : 3 * k + 1], row[-1]
+            if watches:
+                h = t - path.t[-1]
+                node = Node(equations, path.method, path.t[-1], path.q[-1], path.v[-1], path.rates[-1])
+                dq, dv = ([x - y for x, y in zip(a, b, strict=True)] for a, b in ((q, node.q), (v, node.v)))
+                if node.met(watches, h, Step(dq, dv, 0.0, rates, (), 0.0), left):
+                    return (
+                        [node.t, h, 1.0, 0.0, path.work[-1]],
+                        node.q,
+                        node.v,
+                        [0.0] * k,
+                        [0.0] * k,
+                        node.rates,
+                        parts(before)[-1],
+                    )
+                left = {}
+            path.put(t, q, v, rates, work)
+            path.ended = check(t, q, v) if check is not None else ""
+            if path.ended:
+                return parts(state)
+        if len(path.t) > budget:
+            path.ended = "budget"
+        elif not state["left"][0] > 0:
+            path.ended = "end" if state["t"][0] >= given["end"] else "stiff" if found.stiff[0] else "lost"
+        if path.ended:
+            return parts(state)
+
+
 def _added(x: Floats, low: Floats, d: Floats) -> tuple[Floats, Floats]:
-    """x + d with what rounding left over before (Kahan)."""
-    high, rest = [], []
-    for a, b, c in zip(x, low, d, strict=True):
-        c += b
-        total = a + c
-        high.append(total)
-        rest.append(c - (total - a))
-    return high, rest
+    """x + d of every input, and what rounding leaves."""
+    high, rest = zip(*(added(*of) for of in zip(x, low, d, strict=True)), strict=True)
+    return list(high), list(rest)
 
 
 @dataclass
@@ -239,7 +339,7 @@ class Node:
                 if not abs(change) > enough or h + change <= 0:
                     break
                 h += change
-        except Lost:
+        except (Lost, ZeroDivisionError, ValueError, OverflowError):
             return None
         return h, done
 

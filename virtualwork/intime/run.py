@@ -1,10 +1,4 @@
-"""A simulation: two ways through time of different tolerance, the answer of the finer, and how far they lie apart.
-
-The errors of the steps add up, and the motion itself makes them grow. How large the error of the answer is, at each
-time, is seen from two solutions: with tolerances a ratio r apart the finer's error is about r times the coarser's,
-and their distance is the coarser's. The estimate is ten times that, at most the distance itself, for the errors of the
-steps do not add up in just the same way. The tolerance is chosen so that the estimate meets the accuracy asked for.
-"""
+"""A simulation: two ways through time of different tolerance, the answer of the finer, and how far they lie apart."""
 
 from __future__ import annotations
 
@@ -18,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.parts import Input
-from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
+from virtualwork.intime.estimate import APART, FIRST, LEAST, TRIES, UNKNOWN, finer, share, spread
 from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.path import MOST
@@ -32,17 +27,6 @@ from virtualwork.motion import Motion
 if TYPE_CHECKING:
     from dalembert.page import Page, Shown
     from virtualwork.animation import JointForce
-
-# the tolerance of a step over the accuracy asked for, at first; between two solutions
-FIRST, APART = 0.1, 0.03
-# of the estimate
-SAFETY = 10.0
-# below which no tolerance makes a difference; below which rounding has its share in what two solutions differ by
-LEAST, SMALL = 1e-15, 1e-13
-# an error of the inputs beyond which nothing is known of what hangs on them
-UNKNOWN = 0.1
-# solutions at most, until the estimate meets the accuracy
-TRIES = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +50,7 @@ class Run:
     t: Reals
     fine: Travel = field(repr=False)
     coarse: Travel = field(repr=False)
-    ratio: float = field(repr=False)
+    share: float = field(repr=False)
     warnings: tuple[str, ...] = ()
 
     @cached_property
@@ -120,8 +104,8 @@ class Run:
 
     def spread(self, fine: Reals, coarse: Reals) -> Reals:
         """The error of a quantity from its values in the two solutions: the largest so far, and its rounding."""
-        apart = np.abs(fine - coarse) * min(1.0, SAFETY * self.ratio)
-        return np.asarray(np.maximum.accumulate(apart, axis=0) + 4 * EPS * np.abs(fine))
+        rows = np.reshape(fine, (len(fine), -1)), np.reshape(coarse, (len(coarse), -1))
+        return spread(*rows, self.share).reshape(np.shape(fine))
 
     @cached_property
     def motion(self) -> Any:
@@ -199,18 +183,17 @@ def simulate(
     until: Mapping[str, float] | None = None,
 ) -> Run:
     """Let go of the inputs; see `Mechanism.simulate`."""
-    m, t = assembly.mechanism, _times(times)
+    m, t = assembly.mechanism, rising(times)
     k = len(m.inputs)
     q = _state("angle", angle, [e.value for e in m.inputs], list(m.at), k)
     v = _state("speed", speed, [e.speed for e in m.inputs], [0.0] * k, k)
     if not 0 < accuracy < 1:
         raise ValueError(f"accuracy: found {accuracy:g}, expected a number between 0 and 1")
-    equations = (Rubbing if m.friction else Equations)(assembly)
+    own = _own(assembly)
+    equations = own.equations
     equations.refuse(float(t[0]), q, v)
     scale = np.array(equations.scale)
     levels = _levels(m.inputs, until)
-    own = Coordinates(equations, m.inputs)
-
     method: Method = DormandPrince()
 
     def at(tolerance: float) -> Travel:
@@ -224,17 +207,32 @@ def simulate(
     coarse, fine, ratio = at(tolerance / APART), at(tolerance), APART
     for tries in range(TRIES):
         shown = _reached(t, fine)
-        # two solutions within rounding of each other tell no more than that
-        found = Run(assembly, shown, fine, coarse, ratio if tolerance > SMALL else 1.0)
+        found = Run(assembly, shown, fine, coarse, float(share(ratio, tolerance)))
         worst = float((found.error_estimate / scale).max())
         if worst <= accuracy or tolerance <= LEAST or tries == TRIES - 1:
             break
-        finer = max(LEAST, tolerance * min(0.3, max(1e-4, 0.3 * accuracy / worst)))
-        coarse, fine, ratio, tolerance = fine, at(finer), finer / tolerance, finer
+        then = float(finer(tolerance, accuracy, worst))
+        coarse, fine, ratio, tolerance = fine, at(then), then / tolerance, then
     return replace(found, warnings=(*equations.warnings, *_said(found, accuracy, worst, until, t)))
 
 
-def _times(times: ArrayLike) -> Reals:
+def _own(assembly: Assembly) -> Coordinates:
+    """The inputs as coordinates and their equations, written down once."""
+    found: Coordinates | None = assembly.recordings.get("in time")
+    if found is None:
+        m = assembly.mechanism
+        found = Coordinates((Rubbing if m.friction else Equations)(assembly), m.inputs)
+        assembly.recordings["in time"] = found
+    return found
+
+
+def rising(times: ArrayLike) -> Reals:
+    """Times that a motion can be asked at.
+
+    Raises
+    ------
+    ValueError
+    """
     t = np.asarray(times, dtype=float).reshape(-1)
     if not len(t) or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
         raise ValueError("times: expected rising finite times, s")

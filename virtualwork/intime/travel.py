@@ -153,6 +153,10 @@ class Monitor:
         was, self.folding = self.folding, self.coordinates.folds(q)
         return "folding" if self.folding and not was else ""
 
+    def quiet(self, q: Reals) -> bool:
+        """Whether nothing folds at any of many places, and none has to be followed."""
+        return not (self.follows or self.folding) and self.coordinates.stands(q)
+
     def inputs(self, q: Floats, v: Floats) -> Floats:
         """The inputs at a state, with the whole turns of those at the last node."""
         state = [np.array([x]) for x in (q, v, v, self.near)]

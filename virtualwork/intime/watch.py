@@ -6,10 +6,21 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
-from virtualwork.formulas.numbers import EPS
+from virtualwork.formulas.numbers import EPS, Reals
 
 Floats = list[float]
+
+
+class Check(Protocol):
+    """What is asked at every node of a way through time."""
+
+    def __call__(self, t: float, q: Floats, v: Floats) -> str:
+        """Why the way ends here; empty where it goes on."""
+
+    def quiet(self, q: Reals) -> bool:
+        """Whether it has nothing to say at any of many places, (n, k), nor has to see them."""
 
 
 @dataclass

@@ -5,6 +5,9 @@ decomposition (A. L. Dulmage, N. S. Mendelsohn, Can. J. Math. 10 (1958) 517) is 
 order, are the Assur groups: each is solved when what it hangs on is known. Angles tied by sliders, gears and
 inputs are linear relations and are eliminated before anything else; what remains of a block is its loop closure
 R_1 e^{iθ1} + R_2 e^{iθ2} + ... = 0 (Ibrahim eq. 1.3.1; Nicoletti, lecture 7) in its own few angles and slides.
+
+All of this hangs on which points are the same, not on where they lie: the vectors R are written down in the points'
+names (`topology.Vector`), and another mechanism of the same topology only puts its own numbers in.
 """
 
 from __future__ import annotations
@@ -12,14 +15,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from dalembert.arithmetic.varied import Varied, rotation
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.plan.graph import decompose
 from virtualwork.plan.guessed import known_by_guess
-from virtualwork.plan.joints import relations
+from virtualwork.plan.joints import Relation, relations
 from virtualwork.plan.steps import (
     Angle,
     Closure,
@@ -35,22 +37,9 @@ from virtualwork.plan.steps import (
     Variable,
     combined,
 )
+from virtualwork.plan.topology import Topology, Vector
 
 Key = TypeVar("Key", int, str)
-
-
-def direction(angle: float) -> complex:
-    """e^{i·angle}, exact at the quarter turns, so that a guide at 90° is not tilted by a rounding.
-
-    >>> direction(math.pi / 2)
-    1j
-    """
-    if isinstance(angle, Varied):
-        return rotation(angle)
-    quarter = angle / (math.pi / 2)
-    if abs(quarter - round(quarter)) <= 1e-15 * max(1.0, abs(quarter)):
-        return (1 + 0j, 1j, -1 + 0j, -1j)[round(quarter) % 4]
-    return rotation(angle)  # type: ignore[no-any-return]
 
 
 def plan(m: Description, *, merged: bool = False, phases: Mapping[int, float] | None = None) -> Plan:
@@ -69,14 +58,21 @@ def plan(m: Description, *, merged: bool = False, phases: Mapping[int, float] | 
     MobilityError
         A free degree of freedom, too many inputs.
     """
-    return _Planner(m, merged, phases or {}).run()
+    return Topology.of(m, merged, phases or {}).filled(planned)
+
+
+def planned(topology: Topology) -> Plan:
+    """The order of solution of a topology, its vectors in the names of points."""
+    return _Planner(topology).run()
 
 
 class _Planner:
     """Walks the blocks in order and writes the steps."""
 
-    def __init__(self, m: Description, merged: bool, phases: Mapping[int, float]) -> None:
-        self.m, self.merged, self.phases = m, merged, phases
+    def __init__(self, topology: Topology) -> None:
+        self.m = m = topology.first
+        self.merged, self.phases = topology.merged, topology.phases
+        self.points, self.throughs = topology.vectors()
         self.guess = known_by_guess(m)[0] if m.gears else {}
         self.relations = list(relations(m))
         self.driven = {m.guide_of(e): j for j, e in enumerate(m.inputs) if e.is_slide}
@@ -85,7 +81,7 @@ class _Planner:
         self.anchors: dict[str, Path] = {GROUND: (None, ())}
         self.nodes: set[str] = set()
         self.slides_known: set[int] = set()
-        self.directions = {i: direction(g.angle) for i, g in enumerate(m.guides)}
+        self.directions: dict[int, Any] = {i: Vector.of((i, "direction")) for i in range(len(m.guides))}
         self.guide_nodes: dict[int, str] = {}
         self.used: set[tuple[str, str]] = (
             set()
@@ -100,14 +96,14 @@ class _Planner:
 
     def run(self) -> Plan:
         self.blocks = decompose(self.m)
-        for body_point, z in self.m.ground.items():
+        for body_point, z in self.points[GROUND].items():
             self._place(body_point, GROUND, z)
         pending = list(self.blocks.order)
         if self.merged:
             pending = [tuple(v for block in pending for v in block)]
         for block in pending:
             self._block(block)
-        for body, points in self.m.bodies.items():
+        for body, points in self.points.items():
             for name, z in points.items():
                 self._place(name, body, z)
         for i in range(len(self.m.guides)):
@@ -117,7 +113,7 @@ class _Planner:
         )
 
     # --- points -------------------------------------------------------------------------------------------
-    def _place(self, node: str, body: str, z: complex) -> str:
+    def _place(self, node: str, body: str, z: Any) -> str:
         if node not in self.nodes and body in self.anchors:
             base, terms = self.anchors[body]
             self.steps.append(Place(node, base, _longer(terms, Term(z, body))))
@@ -129,7 +125,7 @@ class _Planner:
         """The point of guide i's link that runs in it: `link.point`."""
         g = self.m.guides[i]
         self.guide_nodes[i] = g.point
-        return self._place(g.point, g.link, self.m.bodies[g.link][g.point])
+        return self._place(g.point, g.link, self.points[g.link][g.point])
 
     # --- one block ----------------------------------------------------------------------------------------
     def _block(self, block: tuple[Variable, ...]) -> None:
@@ -182,7 +178,7 @@ class _Planner:
         return "PRP"
 
     # --- angles: sliders, gears and inputs are linear relations ----------------------------------------------
-    def _relations(self, fresh: list[str]) -> list[tuple[Mapping[str, float], Angle]]:
+    def _relations(self, fresh: list[str]) -> list[tuple[Relation, Angle]]:
         """Σ c·θ = const + Σ k·input, for every relation all of whose angles are known once this block is."""
         new = set(fresh)
         found = []
@@ -193,28 +189,29 @@ class _Planner:
                 if relation.gear is not None:
                     known = self.phases.get(relation.gear)
                     right = Angle(known) if known is not None else Angle(gears=((relation.gear, 1.0),))
-                found.append((relation.shares, right))
+                found.append((relation, right))
         return found
 
     def _eliminate(self, fresh: list[str]) -> tuple[list[str], list[Turn]]:
         """Gauss-Jordan on the linear relations: which angles stay free, and what the others are."""
         rows: list[tuple[dict[str, float], Angle]] = []
-        for c, right in self._relations(fresh):
+        for relation, right in self._relations(fresh):
+            c = relation.shares
             known = replace(right, gears=())
             for body, factor in c.items():
                 if body not in fresh:
                     known = _plus(known, self.angles[body], -factor)
             unknown = {body: factor for body, factor in c.items() if body in fresh}
-            if (
-                right.gears
-                # its constant is that of the guess, at once where no link before it has to be placed
-            ):
+            if self.m.gears:
                 there = known.at(self.m.at)
-                if there is None:
-                    known = _plus(known, right, 1.0)
-                else:
-                    stands = sum(factor * self.guess.get(body, 0.0) for body, factor in unknown.items())
-                    known = _plus(known, Angle(stands - there), 1.0)
+                stands = sum(factor * self.guess.get(body, 0.0) for body, factor in unknown.items())
+                if right.gears:
+                    # its constant is that of the guess, at once where no link before it has to be placed
+                    known = _plus(known, right if there is None else Angle(stands - there), 1.0)
+                elif relation.kind == "guide" and there is not None and unknown.keys() <= self.guess.keys():
+                    # gears count whole turns: those of a slider are the guess's
+                    whole = round(complex(stands - there).real / (2 * math.pi))
+                    known = _plus(known, Angle(2 * math.pi * whole), 1.0) if whole else known
             rows.append((unknown, known))
         solved: dict[str, tuple[dict[str, float], Angle]] = {}
         for unknown, known in rows:
@@ -266,19 +263,17 @@ class _Planner:
                         progress = True
             for body in [b for b in self.anchors if b not in self.settled]:
                 self.settled.add(body)
-                for name, z in self.m.bodies[body].items():
+                for name, z in self.points[body].items():
                     if name in self.m.pins:
                         self._place(name, body, z)
 
-    def _chain(self, body: str, z: complex, anchors: Mapping[str, Path]) -> Path:
+    def _chain(self, body: str, z: Any, anchors: Mapping[str, Path]) -> Path:
         base, terms = anchors[body]
         return base, _longer(terms, Term(z, body))
 
-    def _attach(
-        self, body: str, placed: Collection[str], chain: Callable[[str, complex], Path]
-    ) -> Path | None:
+    def _attach(self, body: str, placed: Collection[str], chain: Callable[[str, Any], Path]) -> Path | None:
         """The first joint that ties a body to the placed ones: pins first, then guides whose slide is known."""
-        points = self.m.bodies[body]
+        points = self.points[body]
         for name, z in points.items():
             if name in self.nodes:
                 self.used.add((name, body))
@@ -292,18 +287,18 @@ class _Planner:
         return None
 
     def _by_guide(
-        self, i: int, body: str, placed: Collection[str], chain: Callable[[str, complex], Path]
+        self, i: int, body: str, placed: Collection[str], chain: Callable[[str, Any], Path]
     ) -> Path | None:
         g, d = self.m.guides[i], self.directions[i]
         if g.link == body and g.on in placed:
-            base, terms = chain(g.on, self.m.through(self.m.guides[i]))
+            base, terms = chain(g.on, self.throughs[i])
             found = (
                 base,
-                combined((*terms, Term(d, g.on, i), Term(-self.m.bodies[body][g.point], body))),
+                combined((*terms, Term(d, g.on, i), Term(-self.points[body][g.point], body))),
             )
         elif g.on == body and g.link in placed:
-            base, terms = chain(g.link, self.m.bodies[g.link][g.point])
-            found = base, combined((*terms, Term(-self.m.through(self.m.guides[i]), body), Term(-d, body, i)))
+            base, terms = chain(g.link, self.points[g.link][g.point])
+            found = base, combined((*terms, Term(-self.throughs[i], body), Term(-d, body, i)))
         else:
             return None
         self.used.add((f"guide {i}", ""))
@@ -318,17 +313,17 @@ class _Planner:
         last = {str(e.link) for e in self.m.inputs} if self.merged else set()
         # placed bodies matter where they meet what moves, or one that was placed since the last loops were closed
         fresh = moving | (set(anchors) - self.joined)
-        pins = {name for body in fresh for name in self.m.bodies[body]}
-        queue = [body for body in anchors if not pins.isdisjoint(self.m.bodies[body])]
+        pins = {name for body in fresh for name in self.points[body]}
+        queue = [body for body in anchors if not pins.isdisjoint(self.points[body])]
         self.joined.update(anchors, moving)
         guides = [i for i in range(len(self.m.guides)) if (f"guide {i}", "") not in self.used]
 
-        def chain(body: str, z: complex) -> Path:
+        def chain(body: str, z: Any) -> Path:
             return self._chain(body, z, anchors)
 
         def join(body: str, name: str) -> None:
             """Enter a body at pin `name`, or close the loop there where it already stands."""
-            z = self.m.bodies[body][name]
+            z = self.points[body][name]
             if (name, body) in self.used:
                 return
             if body in anchors:
@@ -355,7 +350,7 @@ class _Planner:
                 if body in visited:
                     continue
                 visited.add(body)
-                for name, z in self.m.bodies[body].items():
+                for name, z in self.points[body].items():
                     if name not in self.m.pins:
                         continue
                     if name not in nodes:
@@ -381,9 +376,9 @@ class _Planner:
         for i in guides:
             g = self.m.guides[i]
             if g.link in anchors and g.on in anchors and (f"guide {i}", "") not in self.used:
-                base, terms = chain(g.on, self.m.through(self.m.guides[i]))
+                base, terms = chain(g.on, self.throughs[i])
                 line = base, combined((*terms, Term(self.directions[i], g.on, i)))
-                pin = chain(g.link, self.m.bodies[g.link][g.point])
+                pin = chain(g.link, self.points[g.link][g.point])
                 self.used.add((f"guide {i}", ""))
                 # the loop's force is that on a body which moves: of a fixed pin in a slot, on the slot's
                 if g.link == GROUND:

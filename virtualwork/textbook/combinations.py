@@ -13,7 +13,7 @@ import numpy as np
 
 from virtualwork.formulas.closed_forms import angle_and_slide, two_columns
 from virtualwork.formulas.kinds import MANY
-from virtualwork.plan.order import direction
+from virtualwork.plan.topology import direction
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

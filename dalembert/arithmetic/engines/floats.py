@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from functools import lru_cache
 
+from dalembert.arithmetic.loop import called
 from dalembert.arithmetic.tape import SIGNS, Tape
 
 LONGEST = 2000  # operations of one function: Python's own compiler slows down on longer ones
@@ -13,11 +14,22 @@ DEEPEST = 12  # operations of one expression
 
 
 @lru_cache(maxsize=256)
-def compiled(tape: Tape) -> Callable[..., tuple[float, ...]]:
+def compiled(
+    tape: Tape, passed: tuple[str, ...] = (), found: tuple[str, ...] = ()
+) -> Callable[..., tuple[float, ...]]:
     """The tape as a function of floats: inputs in the order of `tape.inputs`, outputs in that of `tape.outputs`.
 
     It raises where Python's own arithmetic does: ZeroDivisionError, ValueError (a root), OverflowError.
+
+    Parameters
+    ----------
+    tape : Tape
+    passed, found : names, optional
+        Of the body of a `loop.Loop`: what each call is given and finds. The function that is called comes first among
+        the arguments then, and what calls are given is no output.
     """
+    inputs = [name for name in tape.inputs if called(name) is None]
+    places = dict(tape.outputs)
     uses = [0] * len(tape.operations)
     for kind, *arguments in tape.operations:
         if kind not in ("const", "input"):
@@ -29,12 +41,22 @@ def compiled(tape: Tape) -> Callable[..., tuple[float, ...]]:
     text: list[str] = []
     depth: list[int] = []
     lines: list[str] = []
+    calls = 0
     for number, (kind, *arguments) in enumerate(tape.operations):
         if kind == "const":
             text.append(repr(arguments[0]) if math.isfinite(arguments[0]) else f"float('{arguments[0]}')")
             depth.append(0)
         elif kind == "input":
-            text.append(f"x{tape.inputs.index(arguments[0])}")
+            of = called(arguments[0])
+            if of is None:
+                text.append(f"x{inputs.index(arguments[0])}")
+            else:
+                text.append(f"c{of[0]}_{found.index(of[1])}")
+                if of[0] == calls:
+                    given = ", ".join(text[places[f"call {calls} {name}"]] for name in passed)
+                    to = "".join(f"c{calls}_{i}, " for i in range(len(found)))
+                    lines.append(f"{to}= f({given})")
+                    calls += 1
             depth.append(0)
         else:
             expression = SIGNS[kind].format(*(text[a] for a in arguments))
@@ -46,10 +68,10 @@ def compiled(tape: Tape) -> Callable[..., tuple[float, ...]]:
                 lines.append(f"v{number} = {expression}")
                 text.append(f"v{number}")
                 depth.append(0)
-    inputs = ", ".join(f"x{k}" for k in range(len(tape.inputs)))
-    results = "".join(f"{text[number]}, " for _, number in tape.outputs)
+    names = ", ".join([*(["f"] if passed else []), *(f"x{k}" for k in range(len(inputs)))])
+    results = "".join(f"{text[number]}, " for name, number in tape.outputs if called(name) is None)
     source = (
-        f"def tape({inputs}):\n" + "".join(f"    {line}\n" for line in lines) + f"    return ({results})\n"
+        f"def tape({names}):\n" + "".join(f"    {line}\n" for line in lines) + f"    return ({results})\n"
     )
     room: dict[str, object] = {name: getattr(math, name) for name in ("sin", "cos", "atan2", "sqrt")}
     exec(compile(source, "<tape>", "exec"), room)

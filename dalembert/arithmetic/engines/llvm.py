@@ -12,7 +12,7 @@ import os
 import sys
 import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from hashlib import sha256
 from itertools import count
 from pathlib import Path
@@ -82,6 +82,32 @@ def run(tape: Tape, columns: Sequence[Reals], out: Reals) -> bool:
 
 
 def _code(tape: Tape, uniform: frozenset[str]) -> Code | None:
+    from dalembert.arithmetic.engines.lowered import lowered
+
+    name = "|".join([tape.key, ",".join(sorted(uniform))])
+    found = loaded(name, "tape", lambda width: lowered(tape, uniform, width))
+    return None if found is None else Code(*found)
+
+
+def loaded(name: str, symbol: str, written: Callable[[int], Any]) -> tuple[int, Any, int] | None:
+    """Code from disk, or compiled now and kept there: the vectors' width, what holds it in memory, and its address.
+
+    Parameters
+    ----------
+    name : str
+        What it is code of, the same in every process.
+    symbol : str
+        The function that is wanted.
+    written : callable
+        Its module for vectors of a width.
+
+    Returns
+    -------
+    tuple, or None
+        None where this machine is not for compiled code.
+    """
+    if _unusable:
+        return None
     try:
         import llvmlite
         import llvmlite.binding as binding
@@ -99,22 +125,20 @@ def _code(tape: Tape, uniform: frozenset[str]) -> Code | None:
         machine = binding.Target.from_default_triple().create_target_machine(
             cpu=cpu, features=told, opt=2, jit=True
         )
-        name = "|".join(
-            [FORMAT, llvmlite.__version__, cpu, told, sys.platform, tape.key, ",".join(sorted(uniform))]
-        )
-        path = folder() / (sha256(name.encode()).hexdigest() + ".o")
+        whole = "|".join([FORMAT, llvmlite.__version__, cpu, told, sys.platform, name])
+        path = folder() / (sha256(whole.encode()).hexdigest() + ".o")
         code = _read(path)
         if code is None:
-            code = _made(binding, machine, tape, uniform, width)
+            code = _made(binding, machine, written(width))
             _keep(path, code)
         empty = binding.parse_assembly("")
         engine = binding.create_mcjit_compiler(empty, machine)
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
-        address = engine.get_function_address("tape")
+        address = engine.get_function_address(symbol)
         if not address:
             raise RuntimeError("the compiled function is not found")
-        return Code(width, engine, address)
+        return width, engine, address
     except Exception as error:
         # whatever LLVM and the system say: the work is done by numpy, and said so once
         _unusable.append(str(error))
@@ -137,11 +161,9 @@ def _name_system_functions(binding: Any) -> None:
         binding.add_symbol(f"dalembert_exact_{name}", ctypes.cast(function, ctypes.c_void_p).value)
 
 
-def _made(binding: Any, machine: Any, tape: Tape, uniform: frozenset[str], width: int) -> bytes:
-    """The object code of a tape."""
-    from dalembert.arithmetic.engines.lowered import lowered
-
-    module = binding.parse_assembly(str(lowered(tape, uniform, width)))
+def _made(binding: Any, machine: Any, written: Any) -> bytes:
+    """The object code of a module."""
+    module = binding.parse_assembly(str(written))
     module.verify()
     options = binding.create_pipeline_tuning_options(speed_level=1)
     binding.create_pass_builder(machine, options).getModulePassManager().run(

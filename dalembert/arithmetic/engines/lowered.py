@@ -6,6 +6,8 @@ uniform; output k begins at outputs + k·stride. n is at least one vector; the l
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import llvmlite.ir as ir
 
 from dalembert.arithmetic.engines.vectors import Vectors
@@ -36,7 +38,14 @@ def lowered(tape: Tape, uniform: frozenset[str], width: int) -> ir.Module:
     b.position_at_end(loop)
     i = b.phi(v.long)
     i.add_incoming(ir.Constant(v.long, 0), entry)
-    values = _body(tape, v, b, columns, once, i)
+    place = dict(zip(tape.inputs, columns, strict=True))
+
+    def enter(name: str, _: list[ir.Value]) -> ir.Value:
+        if name in once:
+            return once[name]
+        return b.load(b.bitcast(b.gep(place[name], [i]), v.vector.as_pointer()), align=8)
+
+    values = body(tape, v, b, enter)
     for (_, number), row in zip(tape.outputs, rows, strict=True):
         b.store(values[number], b.bitcast(b.gep(row, [i]), v.vector.as_pointer()), align=8)
     following = b.add(i, ir.Constant(v.long, width))
@@ -60,10 +69,10 @@ def _everywhere(b: ir.IRBuilder, v: Vectors, value: ir.Value) -> ir.Value:
     )
 
 
-def _body(
-    tape: Tape, v: Vectors, b: ir.IRBuilder, columns: list[ir.Value], once: dict[str, ir.Value], i: ir.Value
+def body(
+    tape: Tape, v: Vectors, b: ir.IRBuilder, enter: Callable[[str, list[ir.Value]], ir.Value]
 ) -> list[ir.Value]:
-    """The values of all operations at lanes i, i + 1, …"""
+    """The values of all operations; `enter` gives an input by its name and the values of all operations before it."""
     uses = [0] * len(tape.operations)
     for kind, *arguments in tape.operations:
         if kind not in ("const", "input"):
@@ -84,13 +93,7 @@ def _body(
             values.append(v.constant(arguments[0]))
             continue
         if kind == "input":
-            name = arguments[0]
-            place = columns[tape.inputs.index(name)]
-            values.append(
-                once[name]
-                if name in once
-                else b.load(b.bitcast(b.gep(place, [i]), v.vector.as_pointer()), align=8)
-            )
+            values.append(enter(arguments[0], values))
             continue
         given = [values[a] for a in arguments]
         if kind in ("add", "sub"):

@@ -1,0 +1,169 @@
+"""The rows of many variants at once, from the formulas with the dimensions as inputs: each as if described alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+
+from cli.mechanism import columns
+from cli.mechanism.read import Inputs
+from cli.mechanism.solve import Analysis
+from cli.mechanism.tolerance import shown
+from virtualwork.family.motion import FamilyMotion
+from virtualwork.family.part import ASSEMBLED, Part, Solver
+from virtualwork.formulas.asked import Key
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cli.show.columns import Table
+    from virtualwork.motion import Motion
+    from virtualwork.plan.joints import Joint
+
+
+class Rows(NamedTuple):
+    """The rows of the variants of a part.
+
+    Attributes
+    ----------
+    table : Table
+        One variant below the other; of no meaning where a variant is left alone.
+    assembled : array (v, n)
+    alone : array (v,)
+        Which variants are to be described alone.
+    """
+
+    table: Table
+    assembled: NDArray[np.bool_]
+    alone: NDArray[np.bool_]
+
+
+class Flat(FamilyMotion):
+    """Variants × poses as the poses of one motion, one variant after the other: what columns ask of a `Motion`."""
+
+    def __init__(self, solver: Solver, known: dict[Key, Any]) -> None:
+        super().__init__(solver.part)
+        self._flat, self._solver = known, solver
+
+    def values(self, keys: Sequence[Key]) -> list[Any]:
+        """Quantities by their keys, each (v n,)."""
+        return [self._flat[key] for key in keys]
+
+    @property
+    def n(self) -> int:
+        """How many poses, of all variants together."""
+        v, n = self.part.shape
+        return v * n
+
+    @property
+    def dynamics(self) -> FlatForces:
+        """The forces."""
+        assert self._solver.written is not None
+        return FlatForces(self, self._solver.written.recording.forces[0])
+
+
+@dataclass(frozen=True)
+class FlatForces:
+    """The forces of a `Flat`, as columns ask a motion for them; `reactions` knows the order of the joints."""
+
+    motion: Flat
+    reactions: Any
+
+    def _of(self, *keys: Key) -> Any:
+        return np.stack(self.motion.values(keys), axis=1)
+
+    @property
+    def effort(self) -> Any:
+        """By virtual work, (v n, k)."""
+        return self._of(*(("effort", j) for j in range(len(self.motion.part.mechanism.inputs))))
+
+    @property
+    def newton_euler(self) -> Any:
+        """By the joint forces, (v n, k)."""
+        return self._of(*(("newton-euler", j) for j in range(len(self.motion.part.mechanism.inputs))))
+
+    def joint_force(self, joint: Joint, body: str) -> Any:
+        """Complex, (v n,)."""
+        return self.motion.values([("force", joint.key, body)])[0]
+
+    def joint_moment(self, joint: Joint, body: str) -> Any:
+        """(v n,): only guides have one, as nothing rubs."""
+        if joint.guide is None:
+            return np.zeros(self.motion.n)
+        return self.motion.values([("moment", joint.key, body)])[0]
+
+    @property
+    def shaking(self) -> tuple[Any, Any]:
+        """(v n, 2) and (v n,)."""
+        force, moment = self.motion.values([("shaking",), ("shaking moment",)])
+        return np.stack([force.real, force.imag], axis=1), moment
+
+
+@dataclass(frozen=True)
+class Families:
+    """What is asked of an analysis, of many variants at once.
+
+    Attributes
+    ----------
+    analysis : Analysis
+        Of the mechanism that they are variants of.
+    forces : bool
+    solver : Solver
+        Of some variants: its formulas are those of all.
+    """
+
+    analysis: Analysis
+    forces: bool
+    solver: Solver
+
+    @cached_property
+    def keys(self) -> list[Key]:
+        """The quantities that the table is of."""
+        motion = cast("Motion", Flat(self.solver, {}))
+        self.analysis.motions = (motion,)
+        return list(dict.fromkeys(number.key for number in shown(self.analysis, self.forces)))
+
+    @property
+    def pays(self) -> bool:
+        """Whether the formulas take all that is asked."""
+        if self.forces and not self.solver.takes([("effort", 0), ("newton-euler", 0)]):
+            return False
+        return self.solver.takes(self.keys)
+
+    def rows(self, part: Part) -> Rows:
+        """The rows of some variants."""
+        solver = Solver(part, self.solver)
+        v, n = part.shape
+        (there, *values), alone = solver.lanes([ASSEMBLED, *self.keys])
+        assembled = np.isfinite(there)
+        for d, numbers in zip(part.dimensions, part.values.T, strict=True):
+            # of a link without mass there may be something to say
+            if self.forces and d.kind in ("mass", "inertia"):
+                alone |= numbers == 0
+        if self.forces:
+            for found in values:
+                alone |= (assembled & ~np.isfinite(found)).any(axis=1)
+        flat = {
+            key: found.ravel() for key, found in zip((ASSEMBLED, *self.keys), (there, *values), strict=True)
+        }
+        motion = Flat(solver, flat)
+        analysis = replace(self.analysis, inputs=self._inputs(part), warnings=[])
+        analysis.assemblies = self.analysis.assemblies
+        analysis.motions = (cast("Motion", motion),)
+        table = columns.forces(analysis) if self.forces else columns.poses(analysis)
+        whole = analysis.assembled(analysis.motions[0]).reshape(v, n)
+        return Rows(table, whole, alone)
+
+    def _inputs(self, part: Part) -> Inputs:
+        """The inputs of all variants, one after the other."""
+        v, n = part.shape
+        own = self.analysis.inputs
+        values = np.broadcast_to(part.inputs, (v, n, part.inputs.shape[2])).reshape(v * n, -1)
+        if len(part.inputs) == 1:
+            return Inputs(values, np.tile(own.shown, (v, 1)), steps=list(own.steps) * v)
+        slides = [e.is_slide for e in part.mechanism.inputs]
+        return Inputs(values, np.where(slides, values, np.degrees(values)), steps=list(own.steps) * v)

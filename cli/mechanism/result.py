@@ -1,0 +1,104 @@
+"""One mechanism's result: poses, forces and studies as tables, JSON, words and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cli.errors import DataError
+from cli.mechanism import columns, poses, remarks, words
+from cli.mechanism import forces as of_forces
+from cli.mechanism.solve import Analysis
+from cli.mechanism.states import table as link_states
+from cli.mechanism.studies import Request, Studies
+from cli.show.columns import Result, Sheet
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cli.show.columns import Document, Table
+
+
+def result_of(
+    analysis: Analysis,
+    request: Request,
+    states: Path | None,
+    explain: bool,
+    graph: str | None,
+    about: dict[str, str],
+) -> Result:
+    """What is asked of a mechanism, in every form it can be shown in."""
+    studies = Studies(analysis, request)
+    found = studies.document
+    if graph:
+        from cli.mechanism import picture
+
+        # a bad name is an error before anything is written
+        picture.check_names(analysis, graph)
+
+    def of_poses() -> Table:
+        if request.forces:
+            return columns.forces(analysis)
+        return link_states(analysis) if analysis.only is None else columns.poses(analysis)
+
+    def document() -> Document:
+        listed = poses.document(analysis)
+        if request.forces:
+            listed = [pose | part for pose, part in zip(listed, of_forces.poses(analysis), strict=True)]
+        return {"name": analysis.mechanism.name, "poses": listed, **found}
+
+    def figure() -> Figure:
+        from cli.mechanism import picture
+
+        several = len(analysis.inputs.shown) > 2 and analysis.motions[0].assembled.any()
+        if graph:
+            return picture.draw_curves(analysis, graph)
+        return picture.draw_forces(analysis) if request.forces and several else picture.draw(analysis)
+
+    def beside() -> Iterable[bytes]:
+        # every link, whatever --only names
+        every = replace(analysis, only=None)
+        every.motions = analysis.motions
+        return csv_parts([link_states(every)])
+
+    own = columns.studies(studies)
+    # the table of a study asked for alone stands in place of the poses
+    alone = bool(own) and len(request.tables) == 1
+    tables = {**own, "poses": of_poses} if alone else {"poses": of_poses, **own}
+    return Result(
+        document=document,
+        tables=tables,
+        screen=of_poses if alone else None,
+        notes=lambda: analysis.mechanism.name,
+        afterword=lambda: words.afterword(studies, explain=explain),
+        figure=figure,
+        method=words.METHOD,
+        sheets=lambda: [Sheet("", words.sections(studies, tables, explain=explain), figure)],
+        about={"title": analysis.mechanism.name or "Mechanism"} | about,
+        beside={} if states is None else {states: beside},
+        warnings=remarks.warnings(studies),
+        failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),
+        within=lambda: told(analysis.file),
+    )
+
+
+@contextmanager
+def told(file: str) -> Iterator[None]:
+    """Name the file in what is wrong with a mechanism."""
+    from virtualwork import MechanismError
+
+    try:
+        yield
+    except MechanismError as error:
+        raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
+
+
+def csv_parts(tables: Iterable[Table]) -> Iterator[bytes]:
+    """Tables that are one, as CSV."""
+    from cli.show.text import csv_text
+
+    for i, table in enumerate(tables):
+        yield csv_text(table.cells, header=i == 0).encode()

@@ -1,0 +1,120 @@
+"""A table that comes in parts: what is made of each part where it is worked out, and how they are put together."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cli.errors import DataError
+from cli.show.columns import Table, Written
+
+if TYPE_CHECKING:
+    from cli.show.columns import Result
+
+
+@dataclass(frozen=True)
+class Form:
+    """What is written of a part of a table: a worker is handed it, and does it.
+
+    Attributes
+    ----------
+    suffix : str
+        Of the file; CSV's parts are their bytes, others' the tables as they are shown.
+    folder : Path, optional
+        Where each part of Parquet gets a file of its own.
+    """
+
+    suffix: str
+    units: str | None = None
+    digits: bool = False
+    folder: Path | None = None
+
+    def __call__(self, table: Table, number: int) -> Written:
+        """Make it of the part of this number, from 0 on."""
+        unknown = 0
+        if self.units is not None:
+            from cli.show.in_units import chosen_units, in_units
+
+            table = in_units(table, chosen_units(self.units))
+        if self.digits:
+            from cli.show.digits import digits_that_hold
+
+            table, unknown = digits_that_hold(table)
+        if self.suffix == ".csv":
+            from cli.show.text import csv_text
+
+            return Written(csv_text(table.cells, header=number == 0).encode(), unknown)
+        if self.folder is not None:
+            from cli.show.parts import parquet
+
+            (self.folder / f"part-{number:06d}.parquet").write_bytes(b"".join(parquet([table])))
+            return Written(b"", unknown)
+        # bounds of errors have done their work, and cannot be sent
+        return Written(replace(table, columns=[replace(c, error=None) for c in table.columns]), unknown)
+
+
+def stream(result: Result, suffix: str, output: Path | None, units: str | None, digits: bool) -> int:
+    """Write a table that comes in parts, to standard output where no file is given.
+
+    Returns
+    -------
+    int
+        Of how many numbers --digits knows no digit.
+    """
+    from cli.show.files import write
+    from cli.show.parts import parquet, workbook
+
+    assert result.blocks is not None
+    unknown = 0
+
+    def made(form: Form, blocks: Callable[[Form], Iterator[Written]]) -> Iterator[bytes | Table]:
+        nonlocal unknown
+        # what is left of the work is called off when the writing ends
+        with closing(blocks(form)) as parts:  # type: ignore[type-var]
+            for data, without in parts:
+                unknown += without
+                yield data
+
+    if suffix == ".parquet" and result.shared and output is not None:
+        with folder(output) as parts:
+            for _ in made(Form(suffix, units, digits, parts), result.blocks):
+                pass
+        return unknown
+    found = made(Form(suffix, units, digits), result.blocks)
+    if suffix == ".csv":
+        text = (data for data in found if isinstance(data, bytes))
+        if output is not None:
+            write(output, text)
+        else:
+            sys.stdout.writelines(part.decode() for part in text)
+            sys.stdout.flush()
+    elif output is not None:
+        tables = (data for data in found if isinstance(data, Table))
+        write(output, parquet(tables) if suffix == ".parquet" else workbook({result.blocks_name: tables}))
+    return unknown
+
+
+@contextmanager
+def folder(path: Path) -> Iterator[Path]:
+    """A folder of Parquet files that stands in its place when all are written, and not before."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        try:
+            if path.is_dir() and any(not each.match("part-*.parquet") for each in path.iterdir()):
+                raise DataError(f"{path}: a folder with other files: expected a name that is free")
+            partial.mkdir()
+            yield partial
+            if path.is_dir():
+                shutil.rmtree(path)
+            path.unlink(missing_ok=True)
+            os.replace(partial, path)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
+    except OSError as error:
+        raise DataError(f"{path}: cannot write: {error.strerror or error}") from None

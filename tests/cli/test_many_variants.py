@@ -1,0 +1,189 @@
+"""Many variants at once and in several processes: the rows of each described alone, whoever works them out."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+
+from cli.errors import DataError
+from cli.mechanism.asked import Asked
+from cli.mechanism.many import Many, as_table
+from cli.mechanism.read import wanted
+from cli.mechanism.studies import Request
+from cli.mechanism.variants import Variants
+from virtualwork import Mechanism
+from virtualwork.describe.dimensions import dimensions
+
+FOUR_BAR = """
+name = "four-bar"
+gravity = [0, -9.81]
+ground = { A = [0, 0], D = [0.1, 0] }
+input = { link = "crank", speed = 10 }
+guess = { at = "40 deg", coupler = "20 deg", rocker = "57 deg" }
+[links]
+crank = { points = { A = [0, 0], B = [0.04, 0] }, mass = 0.5 }
+coupler = { points = { B = [0, 0], C = [0.12, 0], H = [0.05, 0.03] }, mass = 0.25 }
+rocker = { points = { D = [0, 0], C = [0.08, 0] } }
+"""
+PATHS = ("links.crank.B.x", "ground.D.x", "links.coupler.C.x")
+
+
+@pytest.fixture
+def table(tmp_path):
+    """Write the four-bar and rows of a table of its variants: whole turns, limits, change points, out of reach."""
+    rng = np.random.default_rng(3)
+    rows = np.array([0.04, 0.1, 0.12]) + 0.03 * rng.normal(size=(40, 3))
+    # a parallelogram, which goes through change points; one that no crank turns; one far out of reach
+    rows[7], rows[20], rows[33] = (0.08, 0.12, 0.12), (0.1, 0.1, 0.12), (0.04, 0.5, 0.12)
+    (tmp_path / "m.toml").write_text(FOUR_BAR)
+
+    def write(name, low, high):
+        head = ",".join(f"{path}_m" for path in PATHS)
+        lines = [",".join(map(repr, row)) for row in rows[low:high].tolist()]
+        (tmp_path / name).write_text("\n".join([head, *lines]) + "\n")
+        return name
+
+    return write
+
+
+def rows_of(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+@pytest.mark.parametrize(
+    "asked", [("--only", "H,rocker"), ("--forces",), ("--forces", "--only", "rocker", "--order", "position")]
+)
+def test_rows_of_many_are_those_of_a_few_described_one_by_one(dalembert, table, asked):
+    # less than 32 variants are not worth writing the formulas down
+    call = ("mechanism", "m.toml", "--sweep", "0deg:720deg:24deg", *asked, "--variants")
+    many = dalembert(*call, table("all.csv", 0, 40))
+    few = [dalembert(*call, table(f"{low}.csv", low, low + 20)) for low in (0, 20)]
+    found, expected = rows_of(many.stdout), [row for part in few for row in rows_of(part.stdout)]
+    assert len(found) == len(expected) == 40 * 31
+    assert {row["assembled"] for row in found} == {"true", "false"}
+    scale = {key: max(abs(float(row[key] or 0)) for row in found) for key in found[0] if key != "assembled"}
+    apart = 0
+    for i, (mine, its) in enumerate(zip(found, expected, strict=True)):
+        assert mine.keys() == its.keys()
+        for key, cell in its.items():
+            if key == "variant":
+                assert int(mine[key]) == i // 31 + 1
+            elif key in ("assembled", "step") or not cell or not mine[key]:
+                assert mine[key] == cell, (i, key)
+            elif not key.startswith("difference"):
+                difference = float(mine[key]) - float(cell)
+                if key.endswith("_deg"):
+                    difference = math.remainder(difference, 360)
+                assert abs(difference) <= 1e-9 * scale[key], (i, key)
+                apart += mine[key] != cell
+    # the formulas were written down: not every digit is that of the other way
+    assert apart
+
+
+def test_remarks_are_those_of_each_described_alone(dalembert, table):
+    call = ("mechanism", "m.toml", "--sweep", "0deg:360deg:24deg", "--only", "H", "--variants")
+    many = dalembert(*call, table("all.csv", 0, 40)).stderr.splitlines()
+    few = dalembert(*call, table("few.csv", 0, 31)).stderr.splitlines()
+    assert len(few) == len(many) == 11
+    assert many[:10] == few[:10]
+    assert "cannot be assembled" in many[0]
+    further = [int(lines[10].split()[1]) for lines in (few, many)]
+    assert 0 < further[0] < further[1]
+
+
+@pytest.mark.parametrize("asked", [("--only", "H"), ("--check",)])
+def test_no_byte_hangs_on_the_number_of_workers(dalembert, table, tmp_path, asked):
+    call = (
+        "mechanism",
+        "m.toml",
+        "--sweep",
+        "0deg:360deg:24deg",
+        *asked,
+        "--variants",
+        table("v.csv", 0, 40),
+    )
+    alone = dalembert(*call, "-o", "alone.csv")
+    for form in ("csv", "parquet"):
+        shared = dalembert(*call, "--workers", "2", "-o", f"shared.{form}")
+        assert shared.returncode == alone.returncode == 0
+        assert shared.stderr == alone.stderr
+    assert (tmp_path / "shared.csv").read_bytes() == (tmp_path / "alone.csv").read_bytes()
+
+
+def test_workers_write_parquet_into_a_folder_that_reads_as_one_table(dalembert, tmp_path):
+    (tmp_path / "m.toml").write_text(FOUR_BAR)
+    # 4000 variants in 37 poses are three parts
+    vary = ("--vary", "links.crank.B.x=0.035:0.045/3999", "--sweep", "0deg:360deg:10deg", "--only", "C")
+    call = ("mechanism", "m.toml", *vary, "--units", "mm,deg")
+    for options in (("-o", "one.parquet"), ("--workers", "2", "-o", "parts.parquet")):
+        done = dalembert(*call, *options)
+        assert (done.returncode, done.stderr) == (0, "")
+    assert len(list((tmp_path / "parts.parquet").iterdir())) == 3
+    one, parts = (pyarrow.parquet.read_table(tmp_path / f"{name}.parquet") for name in ("one", "parts"))
+    assert one.num_rows == 4000 * 37
+    assert "C_x_mm" in one.column_names
+    assert parts.equals(one)
+    # written again in its place, and never over what is not its own
+    assert dalembert(*call, "--workers", "2", "-o", "parts.parquet").returncode == 0
+    (tmp_path / "parts.parquet" / "notes.txt").write_text("mine")
+    refused = dalembert(*call, "--workers", "2", "-o", "parts.parquet")
+    assert refused.returncode == 1
+    assert "a folder with other files" in refused.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["m.toml", "one.parquet", "parts.parquet"]
+
+
+def test_json_of_several_workers_is_that_of_one(dalembert, table):
+    call = ("mechanism", "m.toml", "--at", "40deg", "--json", "--variants", table("v.csv", 0, 40))
+    alone, shared = dalembert(*call), dalembert(*call, "--workers", "2")
+    assert shared.stdout == alone.stdout
+    assert [v["variant"] for v in json.loads(shared.stdout)["variants"]] == [str(i) for i in range(1, 41)]
+
+
+class Sent:
+    """What becomes of an expression that is sent to a worker in the place of a form."""
+
+    def __init__(self, text):
+        self.text = text
+
+    def __reduce__(self):
+        return eval, (self.text,)
+
+
+def question(v):
+    """Variants of the four-bar at one pose, one by one."""
+    m = Mechanism.from_toml_text(FOUR_BAR)
+    varied = Variants((dimensions(m)["ground.D.x"],), [np.linspace(0.1, 0.11, v)], grid=True)
+    q = wanted(m, ["40deg"], None, None).part(0, 1)
+    return Many(Asked("m.toml", m, varied.dimensions, q, {}, 0, None, None, Request(), {}, False), varied, 2)
+
+
+def test_a_part_whose_worker_died_is_done_again(tmp_path):
+    flag = tmp_path / "died"
+    dies_once = f"(p := __import__('pathlib').Path({str(flag)!r})).exists() or (p.touch(), __import__('os')._exit(1)) and None"
+    form = Sent(f"(None, {dies_once}, __import__('cli.mechanism.many', fromlist=['as_table']).as_table)[2]")
+    found = [row for part in question(130).blocks(form) for row in part.data.columns[0].values]
+    assert flag.exists()
+    expected = [row for part in question(130).blocks(as_table) for row in part.data.columns[0].values]
+    assert found == expected
+    assert len(set(found)) == 130
+
+
+@pytest.mark.slow
+def test_variants_that_kill_their_worker_twice_are_named():
+    with pytest.raises(DataError, match="variants 1 to 64: the process that solved them died"):
+        list(question(130).blocks(Sent("__import__('os')._exit(1)")))
+
+
+def test_workers_without_work_are_refused(dalembert, tmp_path):
+    (tmp_path / "m.toml").write_text(FOUR_BAR)
+    found = dalembert("mechanism", "m.toml", "--workers", "2")
+    assert found.returncode == 2
+    assert "expected --draws, --vary or --variants" in " ".join(found.stderr.split())
+    assert os.listdir(tmp_path) == ["m.toml"]

@@ -1,0 +1,122 @@
+"""Variants let go together against the same let go singly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from virtualwork import Friction, Guess, Input, Link, Mechanism
+from virtualwork.intime.variants import Runs, Variants
+
+G = 9.81
+
+
+def four_bar(driver: str = "crank", **more: object) -> Mechanism:
+    """A crank-rocker with masses."""
+    at = {"crank": math.radians(60), "rocker": math.radians(98.95026226818)}
+    others = {"crank": 1.05, "coupler": 0.47, "rocker": 1.73}
+    return Mechanism(
+        {"A": 0j, "D": 0.4 + 0j},
+        {
+            "crank": Link({"A": 0j, "B": 0.1 + 0j}, mass=1, center=0.05 + 0j, inertia=0.1),
+            "coupler": Link({"B": 0j, "C": 0.35 + 0j}, mass=2, center=0.175 + 0j, inertia=0.02),
+            "rocker": Link({"D": 0j, "C": 0.25 + 0j}, mass=1.5, center=0.125 + 0j, inertia=0.008),
+        },
+        inputs=Input(link=driver, value=at[driver]),
+        guess=Guess(at[driver], {name: a for name, a in others.items() if name != driver}),
+        gravity=-1j * G,
+        **more,  # type: ignore[arg-type]
+    )
+
+
+def pendulum(**more: object) -> Mechanism:
+    return Mechanism(
+        {"O": 0j},
+        {"bob": Link({"O": 0j, "P": 1 + 0j}, mass=1, center=1 + 0j)},
+        inputs=Input(link="bob", value=0.0),
+        gravity=-1j * G,
+        **more,  # type: ignore[arg-type]
+    )
+
+
+def same_as_singly(family: Variants, runs: Runs, apart: float, **start: object) -> None:
+    """Every variant moves as it does alone, and says the same of its error."""
+    for i in range(len(family)):
+        one = type(family.mechanism).simulate(family[i], runs.t, **start)  # type: ignore[attr-defined]
+        for of in ("angle", "speed", "acceleration"):
+            alone = getattr(one, of)
+            assert np.abs(getattr(runs, of)[i] - alone).max() <= apart * (1 + np.abs(alone).max())
+        assert np.abs(runs.energy[i] - one.energy).max() < 100 * apart
+        assert runs.error_estimate[i] == pytest.approx(one.error_estimate, rel=1e-3, abs=1e-13)
+        assert runs.warnings.get(i, ()) == one.warnings
+
+
+@pytest.mark.parametrize("engine", ["numpy", "llvm"])
+def test_lanes_move_as_single_mechanisms(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if engine == "llvm":
+        pytest.importorskip("llvmlite")
+    family = four_bar().vary(
+        {"links.crank.B.x": np.linspace(0.09, 0.11, 5), "links.coupler.mass": [1, 2, 3, 4, 5]}
+    )
+    with monkeypatch.context() as m:
+        # the single ones on floats
+        m.setenv("DALEMBERT_ENGINE", engine)
+        runs = family.simulate(np.linspace(0, 1, 7))
+    same_as_singly(family, runs, 1e-12)
+    assert np.abs(runs.energy_drift).max() < 1e-9
+    assert np.abs(runs.motion.effort).max() < 1e-9
+    rocker = four_bar().vary({"links.crank.B.x": [family.values[2, 0]], "links.coupler.mass": [3.0]})
+    assert rocker.simulate(runs.t).motion.link("rocker").omega == pytest.approx(
+        runs.motion.link("rocker").omega[2:3], abs=1e-10
+    )
+
+
+def test_lanes_of_two_inputs_that_start_differently() -> None:
+    m = Mechanism(
+        {"O": 0j},
+        {
+            "upper": Link({"O": 0j, "P": 1 + 0j}, mass=1, center=1 + 0j),
+            "lower": Link({"P": 0j, "Q": 1 + 0j}, mass=1, center=1 + 0j),
+        },
+        inputs=[Input(link="upper", value=0.0), Input(link="lower", value=-0.5)],
+        gravity=-1j * G,
+    )
+    start = np.array([[0.0, -0.5], [0.1, 0.3], [-1.0, -0.2]])
+    runs = m.vary({"links.lower.mass": [1.0, 1.0, 2.0]}).simulate([0, 0.5, 1.0], angle=start)
+    for i, mass in enumerate((1.0, 1.0, 2.0)):
+        lower = replace(m.links["lower"], mass=mass)
+        one = replace(m, links={**m.links, "lower": lower}).simulate(runs.t, angle=start[i])
+        assert runs.angle[i] == pytest.approx(one.angle, abs=1e-12)
+
+
+def test_dead_points_and_friction_are_left_to_single_runs() -> None:
+    family = four_bar("rocker").vary({"links.coupler.mass": [1.0, 2.0]})
+    same_as_singly(family, family.simulate([0, 0.5, 1.0], speed=3.0), 1e-15, speed=3.0)
+    rubbing = pendulum(friction=[Friction("O", 0.3, 0.1)]).vary({"links.bob.mass": [1.0, 2.0]})
+    same_as_singly(rubbing, rubbing.simulate([0, 1.0, 8.0]), 1e-15)
+
+
+def test_a_variant_that_cannot_move_says_so_and_the_others_do() -> None:
+    family = pendulum().vary({"links.bob.mass": [1.0, 0.0, 2.0]})
+    runs = family.simulate([0, 1.0])
+    assert "no mass moves with input 'bob'" in runs.warnings[1][0]
+    assert np.isnan(runs.angle[1]).all()
+    assert runs.angle[0] == pytest.approx(runs.angle[2], abs=1e-12)
+    assert list(runs.warnings) == [1]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"times": [1, 0]}, "times: expected rising"),
+        ({"times": [0, 1], "accuracy": 1.0}, "accuracy: found 1"),
+        ({"times": [0, 1], "angle": [1.0, 2.0, 3.0]}, "angle: expected a number"),
+        ({"times": [0, 1], "speed": math.nan}, "speed: expected a number"),
+    ],
+)
+def test_wrong_questions(wrong: dict[str, object], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        pendulum().vary({"links.bob.mass": [1.0, 2.0]}).simulate(**wrong)  # type: ignore[arg-type]

@@ -1,0 +1,379 @@
+"""Variants of a mechanism that are let go together: lanes of one loop of steps, each with steps of its own.
+
+The formulas are recorded once with the varied dimensions as inputs of the tape. What a lane cannot do is done singly,
+as `Mechanism.simulate` does it: loops that fold, change points on the way, stiff dampers, friction, tables, variants
+whose branch is not told by a comparison.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.tape import Tape
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe.errors import MechanismError
+from virtualwork.family.family import Family
+from virtualwork.family.motion import FamilyMotion
+from virtualwork.family.part import Part, Solver
+from virtualwork.family.written import Written
+from virtualwork.formulas.numbers import Reals
+from virtualwork.intime.control import first_steps
+from virtualwork.intime.coordinates import FOLDING
+from virtualwork.intime.estimate import APART, FIRST, LEAST, TRIES, finer, share, spread
+from virtualwork.intime.explicit import names
+from virtualwork.intime.marching import beginning, march, over
+from virtualwork.intime.powers import motion_of, places_and_speeds
+from virtualwork.intime.run import Run, rising, simulate
+
+Mask = NDArray[np.bool_]
+# steps of one variant; beyond them it is done singly
+MOST = 20_000
+# rounds between two looks, at first and later
+SOON, LATER = 16, 128
+
+
+class Variants(Family):
+    """Variants of a mechanism that can be let go; `Mechanism.vary` makes them."""
+
+    # what is written down once: the formulas, and the tapes of accelerations and energies
+    alike: Solver | None = None
+    tapes: tuple[Tape, Tape] | None = None
+
+    def simulate(
+        self,
+        times: ArrayLike,
+        angle: ArrayLike | None = None,
+        speed: ArrayLike | None = None,
+        accuracy: float = 1e-9,
+    ) -> Runs:
+        """Let go of the inputs of every variant; see `Mechanism.simulate`.
+
+        Parameters
+        ----------
+        times : array (n,)
+            Rising, s; the motions start at the first.
+        angle, speed : float, array (k,) or (v, k), optional
+            The inputs at the first time, rad or m, and their speeds. Default: each description's own.
+        accuracy : float
+            The wanted error of the inputs at every time, relative to one radian or the mechanism's size.
+
+        Returns
+        -------
+        Runs
+
+        Raises
+        ------
+        ValueError
+            Times that do not rise; an accuracy that is none.
+
+        Examples
+        --------
+        Three pendulums that fall from the side:
+
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> bob = Link({"O": 0j, "P": 1}, mass=1, center=1)
+        >>> pendulum = Mechanism({"O": 0j}, {"bob": bob}, inputs=Input(link="bob"), gravity=-9.81j)
+        >>> runs = pendulum.vary({"links.bob.P.x": [0.5, 1.0, 2.0], "links.bob.center.x": [0.5, 1.0, 2.0]}).simulate(
+        ...     [0, 0.2], angle=0.0)
+        >>> runs.angle[:, -1, 0].round(6)
+        array([-0.390401, -0.195949, -0.098069])
+        """
+        t = rising(times)
+        if not 0 < accuracy < 1:
+            raise ValueError(f"accuracy: found {accuracy:g}, expected a number between 0 and 1")
+        k = len(self.mechanism.inputs)
+        q, v = (
+            np.stack(self.own(name), axis=-1) if given is None else _starts(what, given, len(self), k)
+            for what, name, given in (("angle", "value", angle), ("speed", "speed", speed))
+        )
+        runs = Runs(
+            self, t, np.full((4, len(self), len(t), k), np.nan), np.full((2, len(self), len(t)), np.nan)
+        )
+        alone = np.ones(len(self), dtype=bool)
+        lanes = _Lanes.of(self, t, q, v)
+        if lanes is not None:
+            alone = lanes.fill(runs, accuracy) | lanes.meet()
+        for i in np.flatnonzero(alone):
+            try:
+                own = simulate(Assembly.from_guess(self[int(i)]), t, q[i], v[i], accuracy)
+            except MechanismError as error:
+                runs.warnings[int(i)] = (str(error),)
+                continue
+            runs.put(int(i), own)
+        return runs
+
+
+def _starts(name: str, given: ArrayLike, v: int, k: int) -> Reals:
+    value = np.asarray(given, dtype=float)
+    if not np.isfinite(value).all() or value.shape not in ((), (k,), (v, k)):
+        raise ValueError(
+            f"{name}: expected a number, or shape ({k},) or ({v}, {k}), all finite; found {value.shape}"
+        )
+    return np.array(np.broadcast_to(value, (v, k)))
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """What `Variants.simulate` has found: every array has a leading axis of variants.
+
+    Attributes
+    ----------
+    t : array (n,)
+        The times, s.
+    warnings : dict of a variant's place to what must be said of it
+        After the end of a motion that ends before the last time, and where a variant cannot be put together, is NaN.
+    """
+
+    family: Family
+    t: Reals
+    inputs: Reals = field(repr=False)
+    energies: Reals = field(repr=False)
+    warnings: dict[int, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def angle(self) -> Reals:
+        """(v, n, k): the inputs, rad or m."""
+        return np.asarray(self.inputs[0])
+
+    @property
+    def speed(self) -> Reals:
+        """(v, n, k): their speeds."""
+        return np.asarray(self.inputs[1])
+
+    @property
+    def acceleration(self) -> Reals:
+        """(v, n, k): their accelerations."""
+        return np.asarray(self.inputs[2])
+
+    @property
+    def error_estimate(self) -> Reals:
+        """(v, n, k): how far the inputs may be from the truth, rad or m."""
+        return np.asarray(self.inputs[3])
+
+    @property
+    def energy(self) -> Reals:
+        """(v, n): kinetic energy and that of gravity and springs, J."""
+        return np.asarray(self.energies[0])
+
+    @property
+    def energy_drift(self) -> Reals:
+        """(v, n): the change of energy since the first time that the work of the loads does not explain, J."""
+        return np.asarray(self.energy - self.energy[:, :1] - self.energies[1])
+
+    @cached_property
+    def motion(self) -> FamilyMotion:
+        """The motion of every variant through all times: points, links, slides, joint forces."""
+        f = self.family
+        rates = [[of[:, :, j] for j in range(of.shape[2])] for of in (self.speed, self.acceleration)]
+        return FamilyMotion(
+            Part(f.mechanism, f.dimensions, f.values, self.angle, [*rates, [0.0] * len(rates[0])])
+        )
+
+    def put(self, i: int, own: Run) -> None:
+        """Take over a variant that was let go singly."""
+        self.inputs[:, i], self.energies[:, i] = np.nan, np.nan
+        there = np.searchsorted(self.t, own.t)
+        there, rows = (
+            x[self.t[np.minimum(there, len(self.t) - 1)] == own.t] for x in (there, np.arange(len(own.t)))
+        )
+        for of, values in zip(
+            self.inputs, (own.angle, own.speed, own.acceleration, own.error_estimate), strict=False
+        ):
+            of[i, there] = values[rows]
+        self.energies[0, i, there] = own.energy[rows]
+        self.energies[1, i, there] = (own.energy - own.energy[0] - own.energy_drift)[rows]
+        if own.warnings:
+            self.warnings[i] = own.warnings
+
+
+@dataclass
+class _Lanes:
+    """Variants on the tape: what enters it, (v,) each, and where they start."""
+
+    family: Variants
+    solver: Solver
+    written: Written
+    rates: Tape
+    energy: Tape
+    given: dict[str, Reals]
+    together: Mask
+    t: Reals
+    q: Reals
+    v: Reals
+    scale: Reals
+
+    def __post_init__(self) -> None:
+        # the first input's least and largest value so far
+        self.low, self.high = self.q[:, 0].copy(), self.q[:, 0].copy()
+
+    @classmethod
+    def of(cls, family: Variants, t: Reals, q: Reals, v: Reals) -> _Lanes | None:
+        """The lanes of a family; None where its motion is not on one tape."""
+        m = family.mechanism
+        k = q.shape[1]
+        if m.friction:
+            return None
+        part = Part(m, family.dimensions, family.values, q[:, None], [[1.0] * k, [1.0] * k, [0.0] * k])
+        solver = Solver(part, family.alike)
+        if solver.written is None or not solver.together.any():
+            return None
+        family.alike = solver
+        given = {d.path: family.values[:, i] for i, d in enumerate(family.dimensions)}
+        given |= {f"sign {name}": sign for name, sign in solver.signs.items()}
+        if family.tapes is None:
+            try:
+                family.tapes = motion_of(solver.written.recording, k)
+            except ZeroDivisionError:
+                # no mass moves: each says so
+                return None
+        rates, energy = family.tapes
+        if not {*places_and_speeds(k), *given}.issuperset(rates.inputs):
+            return None
+        scale = np.ones((len(q), k))
+        slides = [j for j, e in enumerate(m.inputs) if e.is_slide]
+        if slides:
+            scale[:, slides] = np.array([family[i].size for i in range(len(q))])[:, None]
+        return cls(family, solver, solver.written, rates, energy, given, solver.together, t, q, v, scale)
+
+    @property
+    def k(self) -> int:
+        """Inputs."""
+        return int(self.q.shape[1])
+
+    def some(self, rows: Any) -> dict[str, Reals]:
+        """What enters the tapes in some variants."""
+        return {name: x[rows] for name, x in self.given.items()}
+
+    # --- one way through time ---------------------------------------------------------------------------------------
+    def fill(self, runs: Runs, accuracy: float) -> Mask:
+        """Let go of all that can be; which variants must be done singly, (v,)."""
+        alone = ~self.together
+        rows = np.flatnonzero(self.together)
+        tolerance = np.full(len(rows), max(LEAST, FIRST * accuracy))
+        ratio = np.full(len(rows), APART)
+        twice = self.way(np.concatenate([rows, rows]), np.concatenate([tolerance / APART, tolerance]), alone)
+        coarse, fine = (
+            {name: x[half] for name, x in twice.items()} for half in np.split(np.arange(2 * len(rows)), 2)
+        )
+        for tries in range(TRIES):
+            error = spread(fine["q"], coarse["q"], share(ratio, tolerance)[:, None, None])
+            worst = (error / self.scale[rows, None]).max(axis=(1, 2), initial=0.0)
+            more = ~(worst <= accuracy) & (tolerance > LEAST) & ~alone[rows]
+            ends = ~alone[rows] & (~more | (tries == TRIES - 1))
+            self._put(runs, rows[ends], {name: x[ends] for name, x in fine.items()}, error[ends])
+            for i, x in zip(rows[ends], worst[ends], strict=True):
+                if not x <= accuracy:
+                    # how it must be said is known there
+                    alone[i] = True
+            if not more.any() or tries == TRIES - 1:
+                return alone
+            rows, ratio = rows[more], tolerance[more]
+            tolerance = finer(tolerance[more], accuracy, worst[more])
+            ratio = tolerance / ratio
+            coarse, fine = {name: x[more] for name, x in fine.items()}, self.way(rows, tolerance, alone)
+        return alone
+
+    def meet(self) -> Mask:
+        """Which variants may have a change point on their way, (v,)."""
+        if self.k > 1:
+            return np.zeros(len(self.q), dtype=bool)
+        f, ends = self.family, np.stack([self.low, self.high], axis=1)[:, :, None]
+        rates: list[list[Any]] = [[1.0], [1.0], [0.0]]
+        return ~Solver(Part(f.mechanism, f.dimensions, f.values, ends, rates), self.solver).together
+
+    def _put(self, runs: Runs, rows: NDArray[np.intp], found: Mapping[str, Reals], error: Reals) -> None:
+        n = len(self.t)
+        given = {name: np.repeat(x, n) for name, x in self.some(rows).items()}
+        given |= dict(
+            zip(
+                places_and_speeds(self.k),
+                np.concatenate([found["q"], found["v"]], axis=2).reshape(-1, 2 * self.k).T,
+                strict=True,
+            )
+        )
+        with np.errstate(all="ignore"):
+            slopes, energy = (run(tape, given) for tape in (self.rates, self.energy))
+        for j in range(self.k):
+            runs.inputs[2, rows, :, j] = np.broadcast_to(slopes[f"a{j}"], len(rows) * n).reshape(-1, n)
+        for of, values in zip((0, 1, 3), (found["q"], found["v"], error), strict=True):
+            runs.inputs[of, rows] = values
+        runs.energies[0, rows] = np.broadcast_to(energy["energy"], len(rows) * n).reshape(-1, n)
+        runs.energies[1, rows] = found["work"]
+
+    def way(self, rows: NDArray[np.intp], tolerance: Reals, alone: Mask) -> dict[str, Reals]:
+        """q, q̇ (lanes, n, k) and the work (lanes, n) at all times; marks in `alone` what has to be done singly."""
+        k, t = self.k, self.t
+        span = float(t[-1] - t[0])
+        given: dict[str, Any] = self.some(rows)
+        given |= {f"scale{j}": self.scale[rows, j] for j in range(k)}
+        given |= {"tolerance": tolerance, "end": float(t[-1]), "span": span}
+        places, speeds, rates = names(k)
+        q, v = self.q[rows].T, self.v[rows].T
+        with np.errstate(all="ignore"):
+            begin = run(self.rates, given | dict(zip((*places, *speeds), (*q, *v), strict=True)))
+            slopes = np.stack([np.broadcast_to(begin[name], len(rows)) for name in rates])
+        fastest, h = first_steps(span, tolerance, self.scale[rows].T, q, v, slopes)
+        state = beginning(float(t[0]), q, v, slopes, h, fastest, 0.0)
+        state["left"] = np.where(np.isfinite(slopes).all(axis=0) & (span > 0), 1.0, 0.0)
+        nodes = [
+            {
+                name: np.broadcast_to(state[name], len(rows))[None]
+                for name in ("t", *places, *speeds, *rates, "work")
+            }
+        ]
+        taken = 0
+        while state["left"].max() > 0 and taken < MOST:
+            found = march(k, self.rates, given, state, SOON if taken < 4 * SOON else LATER)
+            state = found.state
+            nodes.append(found.nodes)
+            taken += len(found.nodes["t"])
+        whole = {name: np.concatenate([part[name] for part in nodes]) for name in nodes[0]}
+        alone[rows[~(np.ravel(whole["t"][-1]) >= t[-1])]] = True
+        alone[rows[self._folds(rows, whole)]] = True
+        return self._at(rows, whole)
+
+    def _folds(self, rows: NDArray[np.intp], nodes: Mapping[str, Reals]) -> Mask:
+        """In which lanes a loop folds on the way."""
+        closed = [g.name for g in self.written.closed]
+        n = len(nodes["t"])
+        folds = np.zeros(len(rows), dtype=bool)
+        if closed:
+            tape = self.written.tape([("margin", name) for name in closed])
+            given = {name: np.tile(x, n) for name, x in self.some(rows).items()}
+            given |= {f"q{j}": nodes[f"q{j}"].ravel() for j in range(self.k)}
+            with np.errstate(all="ignore"):
+                found = run(tape, given)
+            for name in tape.names:
+                margin = np.broadcast_to(found[name], n * len(rows)).reshape(n, -1)
+                folds |= ~(margin >= FOLDING).all(axis=0)
+        q = nodes["q0"]
+        self.low[rows] = np.fmin(self.low[rows], q.min(axis=0))
+        self.high[rows] = np.fmax(self.high[rows], q.max(axis=0))
+        return folds
+
+    def _at(self, rows: NDArray[np.intp], nodes: Mapping[str, Reals]) -> dict[str, Reals]:
+        """The states at all times, from the node before each."""
+        k, t = self.k, self.t
+        places, speeds, rates = names(k)
+        before = np.stack([(nodes["t"] <= x).sum(axis=0) - 1 for x in t], axis=1)
+        # of rounds that took no step the last node is the same
+        lanes = np.arange(len(rows))[:, None]
+        state = {name: x[np.maximum(before, 0), lanes] for name, x in nodes.items()}
+        q, v, slopes = (np.stack([state[name] for name in of], axis=-1) for of in (places, speeds, rates))
+        work, h = state["work"].copy(), t - state["t"]
+        lane, on = np.nonzero(h > 0)
+        if len(lane):
+            given = self.some(rows[lane])
+            here = (state["t"][lane, on], q[lane, on], v[lane, on], slopes[lane, on], h[lane, on])
+            dq, dv, dw = over(k, self.rates, given, *here)
+            q[lane, on] += dq
+            v[lane, on] += dv
+            work[lane, on] += dw
+        return {"q": q, "v": v, "work": work}

@@ -1,0 +1,179 @@
+"""The topology of a mechanism: what its order of solution hangs on, and the plan kept for it.
+
+Which links meet, which points of a link lie at the same place, how angles are tied: no length is in it. A plan is made
+once for a topology, with its vectors written down in the names of the points (`Vector`); a mechanism puts its numbers in.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+from dalembert.arithmetic.recorded import Constant
+from dalembert.arithmetic.varied import Varied, rotation
+from virtualwork.describe.description import Description
+from virtualwork.plan.steps import Closure, Group, Place, Plan, Step, Term
+
+# a point of a body; the number of a guide and what of it: where its line runs, which way
+Slot = tuple[str, str] | tuple[int, str]
+KEPT = 256
+
+
+def direction(angle: float) -> complex:
+    """e^{i·angle}, exact at the quarter turns, so that a guide at 90° is not tilted by a rounding.
+
+    >>> direction(math.pi / 2)
+    1j
+    """
+    if isinstance(angle, Varied):
+        return rotation(angle)
+    quarter = angle / (math.pi / 2)
+    if abs(quarter - round(quarter)) <= 1e-15 * max(1.0, abs(quarter)):
+        return (1 + 0j, 1j, -1 + 0j, -1j)[round(quarter) % 4]
+    return rotation(angle)  # type: ignore[no-any-return]
+
+
+class Vector:
+    """A sum of a body's points, each so many times, as the order of solution adds them up.
+
+    >>> a, b = Vector.of(("arm", "A")), Vector.of(("arm", "B"))
+    >>> a + -b == 0, a + -b + -a + b == 0
+    (False, True)
+    """
+
+    __slots__ = ("parts",)
+
+    def __init__(self, parts: Mapping[Slot, int]) -> None:
+        self.parts = parts
+
+    @classmethod
+    def of(cls, slot: Slot | None) -> Vector:
+        """One of them; None is the origin."""
+        return cls({} if slot is None else {slot: 1})
+
+    def __add__(self, other: Any) -> Vector:
+        if other == 0:
+            return self
+        sums = dict(self.parts)
+        for slot, times in other.parts.items():
+            total = sums.get(slot, 0) + times
+            if total:
+                sums[slot] = total
+            else:
+                del sums[slot]
+        return Vector(sums)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Vector:
+        return Vector({slot: -times for slot, times in self.parts.items()})
+
+    def __eq__(self, other: object) -> bool:
+        return self.parts == other.parts if isinstance(other, Vector) else not self.parts and other == 0
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.parts.items()))
+
+
+@dataclass(frozen=True)
+class Topology:
+    """What a plan hangs on.
+
+    Attributes
+    ----------
+    bodies : tuple of (body, tuple of (point, slot))
+        The slot is that of the first point of the body at the same place; None at the origin.
+    guides : tuple
+        What each joins, the slot through which its line runs, and the angle that a slider ties.
+    inputs : tuple
+        What is driven.
+    first : Description
+        The one that the plan is made from.
+    """
+
+    bodies: tuple[tuple[str, tuple[tuple[str, Slot | None], ...]], ...]
+    guides: tuple[tuple[Any, ...], ...]
+    inputs: tuple[tuple[Any, ...], ...]
+    merged: bool
+    first: Description = field(compare=False, repr=False)
+    phases: Mapping[int, float] = field(compare=False, repr=False)
+
+    @classmethod
+    def of(cls, m: Description, merged: bool, phases: Mapping[int, float]) -> Topology:
+        """The topology of a mechanism."""
+        # of each body: the first that lies at a place
+        places: dict[str, dict[complex, Slot]] = {body: {} for body in m.bodies}
+        bodies = tuple(
+            (
+                body,
+                tuple(
+                    (p, None if z == 0 else places[body].setdefault(z, (body, p))) for p, z in points.items()
+                ),
+            )
+            for body, points in m.bodies.items()
+        )
+        guides = []
+        for i, g in enumerate(m.guides):
+            z = m.through(g)
+            line = None if z == 0 else places[g.on].setdefault(z, (i, "through"))
+            guides.append((g.point, g.link, g.on, line, None if g.turned is None else (g.angle, g.turned)))
+        inputs = tuple((e.link, e.on, e.slider) for e in m.inputs)
+        return cls(bodies, tuple(guides), inputs, merged, m, phases)
+
+    def vectors(self) -> tuple[dict[str, dict[str, Any]], list[Any]]:
+        """The points of each body and a point of each guide's line, in names."""
+        points = {body: {p: Vector.of(slot) for p, slot in given} for body, given in self.bodies}
+        return points, [Vector.of(line) for _, _, _, line, _ in self.guides]
+
+    def plan(self, make: Callable[[Topology], Plan]) -> Plan:
+        """The order of solution in names: made once, but where a gear's constant, or a constant that varies, is in it."""
+        tied = [angle for *_, angles in self.guides if angles for angle in angles]
+        if self.first.gears or any(isinstance(angle, Constant) for angle in tied):
+            return make(self)
+        return _kept(self, make)
+
+    def filled(self, make: Callable[[Topology], Plan]) -> Plan:
+        """The order of solution with the numbers of its mechanism."""
+        m, plan = self.first, self.plan(make)
+        directions = {i: direction(g.angle) for i, g in enumerate(m.guides)}
+        numbers: dict[Any, complex] = {}
+
+        def number(z: Any) -> complex:
+            if z not in numbers:
+                total: complex = 0j
+                for (of, name), times in z.parts.items():
+                    if isinstance(of, str):
+                        value = m.bodies[of][name]
+                    else:
+                        value = m.through(m.guides[of]) if name == "through" else directions[of]
+                    total = total + (value if times == 1 else -value if times == -1 else times * value)
+                numbers[z] = total
+            return numbers[z]
+
+        def terms(of: tuple[Term, ...]) -> tuple[Term, ...]:
+            return tuple([Term(number(t.z), t.body, t.slide) for t in of])
+
+        def step(of: Step) -> Step:
+            if isinstance(of, Place):
+                return Place(of.node, of.base, terms(of.terms))
+            if isinstance(of, Group):
+                loops = [
+                    Closure(c.start, c.end, terms(c.terms), c.joint, c.body, c.guide) for c in of.closures
+                ]
+                return replace(of, closures=tuple(loops))
+            return of
+
+        return replace(
+            plan,
+            steps=tuple(map(step, plan.steps)),
+            anchors={body: (base, terms(own)) for body, (base, own) in plan.anchors.items()},
+            directions=directions,
+        )
+
+
+@lru_cache(maxsize=KEPT)
+def _kept(topology: Topology, make: Callable[[Topology], Plan]) -> Plan:
+    return make(topology)
