@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from virtualwork.evaluator import Evaluator
     from virtualwork.family.design import Design
-    from virtualwork.family.family import Family
     from virtualwork.family.fitting import Fit
     from virtualwork.family.target import Target
     from virtualwork.intime.run import Run
@@ -330,10 +329,8 @@ class Mechanism(Description):
         >>> from virtualwork import Input, Link
         >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": 1})}, inputs=Input("arm"))
         >>> at = arm.design(["links.arm.P.x"], "points.P")
-        >>> at([2.0], [0.0]), at.slopes([2.0], [0.0])[:, 0]
-        (array([[2.],
-               [0.]]), array([[1., 0.],
-               [0., 2.]]))
+        >>> at([2.0], [0.0]).tolist(), (at.slopes([2.0], [0.0])[:, 0] + 0.0).tolist()
+        ([[2.0], [0.0]], [[1.0, 0.0], [0.0, 2.0]])
         """
         from virtualwork.describe.dimensions import named
         from virtualwork.family.design import Design, place_key

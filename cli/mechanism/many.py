@@ -139,7 +139,7 @@ class Many:
         work = ((a + 1, self.variants.part(a, a + each)) for a in starts)
         pool = Processes(self.workers) if self.workers > 1 and len(starts) > 1 else None
         try:
-            with pool or nullcontext(), closing(in_parts(function, work, pool, 2 * self.workers)) as parts:  # type: ignore[type-var]
+            with pool or nullcontext(), closing(in_parts(function, work, pool, 2 * self.workers)) as parts:
                 for found, said in progress(parts, count, "variants", each):
                     self.said.join(said)
                     yield found

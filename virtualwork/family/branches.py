@@ -60,7 +60,7 @@ def signs(
     chosen = {g.name: np.broadcast_to(found[f"sign {g.name}"], n) + 0.0 for g in written.closed}
     if len(m.inputs) == 1 and any(each.any() for each in opens.values()):
         # one that is assembled next to the guess is chosen by how it stands there
-        known = given | {f"sign {name}": sign for name, sign in chosen.items()}
+        known = {**given} | {f"sign {name}": sign for name, sign in chosen.items()}
         step = BESIDE * (m.size if m.inputs[0].is_slide else 1.0)
         for side in (step, -step):
             for name, depth in _radicands(written, known, np.full((1, n), m.at[0] + side)).items():

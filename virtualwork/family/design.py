@@ -46,9 +46,6 @@ class Design:
             raise DescriptionError(f"found {len(mechanism.inputs)} inputs, expected one")
         self.mechanism, self.dimensions, self.keys = mechanism, tuple(dimensions), tuple(keys)
         self.evaluations = 0
-        self._begin()
-
-    def _begin(self) -> None:
         own = np.zeros((1, len(self.dimensions)))
         self._first = Solver(Part(self.mechanism, self.dimensions, own, np.zeros((1, 1, 1)), AT_REST))
         self._paths = [d.path for d in self.dimensions]
@@ -56,13 +53,9 @@ class Design:
         self._lanes: tuple[Reals, Reals] | None = None
         self._held: dict[str, float] | None = None
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __reduce__(self) -> tuple[type[Design], tuple[object, ...]]:
         # what is written down does not travel
-        return {k: v for k, v in self.__dict__.items() if k[0] != "_"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._begin()
+        return Design, (self.mechanism, self.dimensions, self.keys)
 
     def __repr__(self) -> str:
         return f"Design({self.mechanism.name!r}: {', '.join(self._paths)})"
@@ -185,7 +178,10 @@ class Design:
         for i, group in enumerate(looked):
             depth = table[rows + i, n:]
             # NaN is not greater either
-            if not depth.min() > DIP and meets(written, group.name, known, lanes[n:, None], depth[:, None])[0]:
+            if (
+                not depth.min() > DIP
+                and meets(written, group.name, known, lanes[n:, None], depth[:, None])[0]
+            ):
                 return None
         return np.where(np.isfinite(table[:rows, :n]), table[:rows, :n], np.nan)
 

@@ -18,8 +18,8 @@ from dalembert.arithmetic.parts import in_parts
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, named, value
 from virtualwork.describe.errors import DescriptionError, MechanismError
-from virtualwork.family.design import Design, place_key
 from virtualwork.family.descent import AWAY, Descent
+from virtualwork.family.design import Design, place_key
 from virtualwork.family.part import ASSEMBLED
 from virtualwork.family.starts import COARSE, along, in_turn, shares
 from virtualwork.family.target import Aim, Reached, Target
@@ -35,7 +35,7 @@ D = TypeVar("D", bound=Description)
 
 # of the starts, the first by distance are put in order; the first of those are refined in rounds, so many by so many
 # steps, the best of each round further in the next
-ORDERED, ROUNDS = 64, ((48, 15), (12, 100), (1, 300))
+ORDERED, ROUNDS = 64, ((48, 15), (8, 100), (1, 300))
 # of the mechanism's size, or rad: a fit as near as this is not looked for again
 MET = 1e-12
 # poses of the look over the whole range
@@ -177,7 +177,7 @@ class _Problem(Generic[D]):
     """What is looked for: shares of the way from a lower to an upper bound, and the inputs that are free."""
 
     def __init__(self, m: D, targets: Sequence[Target], free: Mapping[str, tuple[float, float]]) -> None:
-        self.m = m
+        self.m, self.targets, self.free = m, targets, free
         if len(m.inputs) != 1:
             raise DescriptionError(f"found {len(m.inputs)} inputs, expected one for a fit")
         self.aims = [Aim.read(m, target) for target in targets]
@@ -193,10 +193,14 @@ class _Problem(Generic[D]):
         """Mechanisms worked out over a target so far."""
         return sum(design.evaluations for design in self.designs)
 
+    def own(self) -> _Problem[D]:
+        """The same with designs of its own: what is worked out on one does not meet another on another thread."""
+        return _Problem(self.m, self.targets, self.free)
+
     def values(self, x: Reals) -> Reals:
         """The dimensions (d,) of shares."""
         # the product may pass the bound by a rounding
-        return np.clip(self.low + x * (self.high - self.low), self.low, self.high)
+        return np.asarray(np.clip(self.low + x * (self.high - self.low), self.low, self.high))
 
     def residuals(self, x: Reals, inputs: Sequence[Reals]) -> Reals:
         """How far every row of every target is off, weighted: of the mechanism's size, or rad."""
@@ -208,7 +212,8 @@ class _Problem(Generic[D]):
     def hold(self, x: Reals | None) -> bool:
         """Hold every loop on the branch that it has at some shares; None: let it go."""
         values = None if x is None else self.values(x)
-        return all([design.hold(values) for design in self.designs])
+        held = [design.hold(values) for design in self.designs]
+        return all(held)
 
     # --- starts -----------------------------------------------------------------------------------------------------
     def begun(self, starts: Reals) -> list[tuple[Reals, tuple[Reals, ...]]]:
@@ -259,7 +264,11 @@ class _Problem(Generic[D]):
         met: list[_Refined] = []
         for count, steps in ROUNDS:
             found: list[_Refined] = []
-            work = ((self, *start, steps) for start in begun[: max(count, 2 * best if best > 1 else 1)])
+            # each part has what it needs for itself, on threads too
+            work = (
+                (self.own() if executor else self, *start, steps)
+                for start in begun[: max(count, 2 * best if best > 1 else 1)]
+            )
             with closing(in_parts(_refined, work, executor)) as refined:
                 for each in refined:
                     evaluations += each.evaluations
@@ -308,9 +317,7 @@ class _Problem(Generic[D]):
         largest = float(np.abs(off).max())
         return _Refined(found, tuple(at), float(off @ off) / 2, largest, self.evaluations - before)
 
-    def _descended(
-        self, x: Reals, inputs: Sequence[Reals], steps: int
-    ) -> tuple[Reals, Sequence[Reals]]:
+    def _descended(self, x: Reals, inputs: Sequence[Reals], steps: int) -> tuple[Reals, Sequence[Reals]]:
         from scipy.optimize import least_squares
 
         width = self.high - self.low
@@ -334,22 +341,23 @@ class _Problem(Generic[D]):
         """A solution as it is handed out; None where it cannot be assembled at every row."""
         values = self.values(found.x)
         reached: list[Reached] = []
-        turning = not self.m.inputs[0].is_slide
-        inputs = [
-            in_turn(q) if aim.inputs is None and turning else q
-            for aim, q in zip(self.aims, found.inputs, strict=True)
-        ]
-        for aim, design, q in zip(self.aims, self.designs, inputs, strict=True):
+        inputs: list[Reals] = []
+        for aim, design, q in zip(self.aims, self.designs, found.inputs, strict=True):
             table = design(values, q)
+            if aim.inputs is None and not self.m.inputs[0].is_slide:
+                # the same poses within a turn, where a turn brings them back
+                within = in_turn(q, self.m.at[0])
+                same = design(values, within)
+                if np.abs(aim.apart(same) - aim.apart(table)).max() < MET:
+                    q, table = within, same
             if not np.isfinite(table).all():
                 return None
             reached += aim.reached(table, q)
+            inputs.append(q)
         numbers = zip((d.path for d in self.dimensions), values.tolist(), strict=True)
         mechanism = changed(self.m, dict(numbers))
         remarks = tuple(self._remarks(values, inputs))
-        return Fit(
-            mechanism, self.m, self.dimensions, values, tuple(reached), starts, evaluations, remarks
-        )
+        return Fit(mechanism, self.m, self.dimensions, values, tuple(reached), starts, evaluations, remarks)
 
     def _remarks(self, values: Reals, inputs: Sequence[Reals]) -> list[str]:
         """What is to be said of a solution."""

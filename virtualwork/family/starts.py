@@ -72,20 +72,20 @@ def _in_order(away: Reals, cyclic: bool) -> tuple[float, NDArray[np.intp]]:
     return cost, firsts[first] + np.array(places[::-1])
 
 
-def in_turn(q: Reals) -> Reals:
-    """Inputs that mean the same poses, one after the other within a turn, where that can be: the shorter way round.
+def in_turn(q: Reals, at: float) -> Reals:
+    """Inputs a whole turn or more from others, one after the other within a turn, where that can be, and next to `at`.
 
-    >>> in_turn(np.array([6.2, 0.1, 0.2])) - 2 * np.pi
+    >>> in_turn(np.array([6.2, 0.1, 0.2]), 0.0)
     array([-0.08318531,  0.1       ,  0.2       ])
     """
     turn = 2 * np.pi
     steps = np.diff(q)
-    if (steps >= 0).all() or (steps <= 0).all():
-        return q
-    ways = []
-    for sense in (1.0, -1.0):
-        # a step back of a rounding is none around the turn
-        on = (sense * steps + EQUAL) % turn - EQUAL
-        ways.append((on.sum(), q[0] + sense * np.concatenate([[0.0], np.cumsum(on)])))
-    travel, found = min(ways, key=lambda way: way[0])
-    return found if travel <= turn else q
+    if not ((steps >= 0).all() or (steps <= 0).all()):
+        ways = []
+        for sense in (1.0, -1.0):
+            # a step back of a rounding is none around the turn
+            on = (sense * steps + EQUAL) % turn - EQUAL
+            ways.append((on.sum(), q[0] + sense * np.concatenate([[0.0], np.cumsum(on)])))
+        travel, found = min(ways, key=lambda way: way[0])
+        q = found if travel <= turn else q
+    return np.asarray(q - turn * np.round((q[0] - at) / turn))

@@ -137,7 +137,7 @@ class Aim:
         return cls(tuple(keys.values()), tuple(keys), np.vstack(wanted), np.vstack(scale), flags, q)
 
     def __len__(self) -> int:
-        return self.wanted.shape[1]
+        return int(self.wanted.shape[1])
 
     def apart(self, found: Reals) -> Reals:
         """How far it is off, weighted, (rows, ..., n): lengths in sizes of the mechanism, angles in rad."""
@@ -155,7 +155,7 @@ class Aim:
         apart = found - beside(wanted)
         if self.angle.any():
             apart = np.where(beside(self.angle), _round_turn(apart), apart)
-        return apart * beside(scale)
+        return np.asarray(apart * beside(scale))
 
     def reached(self, found: Reals, inputs: Reals) -> tuple[Reached, ...]:
         """What a design does, (rows, n)."""
