@@ -27,14 +27,20 @@ from numpy.typing import ArrayLike, NDArray
 from balancing.phase import angle_of
 from balancing.rotor import BLOCK
 from dalembert.arithmetic.exact import UNIT, exact_sum, two_product, two_sum
+from dalembert.arithmetic.parts import in_parts
 from dalembert.arithmetic.records import numbers, record, table
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     import pandas as pd
     from matplotlib.figure import FigureBase
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+# rotors of a part that goes to another process
+PART = 1 << 14
 
 
 class CoincidentPlanes(ValueError):
@@ -300,7 +306,12 @@ class Correction:
         return f"<Correction of {many}: unbalance {numbers(self.unbalance)} kg·m>"
 
 
-def correct(moment: ArrayLike, z: ArrayLike = 0.0, planes: ArrayLike = (0.0,)) -> Correction:
+def correct(
+    moment: ArrayLike,
+    z: ArrayLike = 0.0,
+    planes: ArrayLike = (0.0,),
+    executor: Executor | None = None,
+) -> Correction:
     """Find the corrections that balance rotors whose unbalances are known.
 
     Parameters
@@ -312,6 +323,8 @@ def correct(moment: ArrayLike, z: ArrayLike = 0.0, planes: ArrayLike = (0.0,)) -
     planes
         Axial positions of the correction planes, (p,) or (..., p), m: one plane for static balancing, two for
         dynamic balancing; with more, the corrections of least Σ|W|².
+    executor
+        Works out parts of the rotors, `PART` each, with the same numbers.
 
     Returns
     -------
@@ -357,7 +370,17 @@ def correct(moment: ArrayLike, z: ArrayLike = 0.0, planes: ArrayLike = (0.0,)) -
         together = fix._distances[1] == 0
         if together.any():
             raise CoincidentPlanes(np.broadcast_to(together, lead))
+    if executor is not None and fix.moment.ndim == 2:
+        rows = (slice(i, i + PART) for i in range(0, len(fix.moment), PART))
+        parts = ((fix.moment[i], fix.z[i], fix.planes[i]) for i in rows)
+        # what is worked out when it is first asked for
+        found = np.concatenate(list(in_parts(_unbalance, parts, executor)))
+        object.__setattr__(fix, "unbalance", found)
     return fix
+
+
+def _unbalance(moment: Complex, z: Real, planes: Real) -> Complex:
+    return Correction(moment, z, planes).unbalance
 
 
 def _parts(z: Complex) -> Real:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.drawing.amounts import prefixed
 from dalembert.drawing.labels import Label, place
-from dalembert.drawing.polar import FOUND, GIVEN, SHARE, SUM, Look, Vector, dial, handle
+from dalembert.drawing.polar import FOUND, GIVEN, ROOM, SHARE, SUM, Look, Vector, dial, handle
 from dalembert.drawing.sheet import sheet
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ MOST = 4
 """So many rotors of a batch are drawn."""
 NAMED = 16
 """So many vectors of a dial are named."""
+RIM_ROOM = 2.3
+"""How far a dial with places reaches: for what stands on the rim about the vectors."""
 SENSE = "angles counter-clockwise as seen against +z"
 WHOLE = Look("0.55", 4.0)
 TOGETHER = Look("tab:red", 1.8)
@@ -192,7 +194,7 @@ def vibration(
                 continue
             named = f"plane {mine[0][0]}: " if len(pairs) > 1 else ""
             masses = [mass * factor for mass in rotor.split[k]]
-            found = dial(axes, f"{named}{title}", vectors, 1.95)
+            found = dial(axes, f"{named}{title}", vectors, RIM_ROOM)
             labels.append((axes, found + _rim(axes, rotor.places, masses, amount, abs(mine[0][2]))))
     handles = [
         handle(
@@ -225,7 +227,7 @@ def readings(
     title = ", ".join(filter(None, ("readings, and what was fitted", amplitude)))
     labels = dial(axes, title, vectors)
     _history(axes, read * scale, fitted * scale)
-    axes.set_rlim(0, 1.12 * (_largest(initial * scale, read * scale, fitted * scale) or 1.0))
+    axes.set_rlim(0, ROOM * (_largest(initial * scale, read * scale, fitted * scale) or 1.0))
     _key(figure, [handle(GIVEN, "vibration without masses, fitted"), _reading()], SENSE, 2)
     place([(axes, labels)])
     return axes
@@ -245,7 +247,7 @@ def places(
         vectors = [Vector(target * factor, WHOLE), Vector(total * factor, TOGETHER)]
         scale = _largest(target * factor, total * factor)
         title = f"{title}material to {'remove' if remove else 'add'}, {unit}"
-        found = dial(axes, title, vectors, 1.95)
+        found = dial(axes, title, vectors, RIM_ROOM)
         labels.append(
             (axes, found + _rim(axes, angles, [m * factor for m in masses], unit, scale, remove=remove))
         )
@@ -298,7 +300,7 @@ def _measured(axes: PolarAxes, title: str, rotor: Vibration, scale: float) -> li
     vectors += [Vector(r, FOUND, name) for r, name in zip(after, left, strict=True)]
     _history(axes, rotor.read * scale, rotor.fitted * scale)
     found = dial(axes, title, vectors)
-    axes.set_rlim(0, 1.12 * (_largest(before, after, rotor.read * scale, rotor.fitted * scale) or 1.0))
+    axes.set_rlim(0, ROOM * (_largest(before, after, rotor.read * scale, rotor.fitted * scale) or 1.0))
     return found
 
 

@@ -332,10 +332,14 @@ def determined(masses: ArrayLike, present: ArrayLike) -> NDArray[np.bool_]:
     array([ True, False])
     """
     t, read = np.asarray(masses, dtype=complex), np.asarray(present, dtype=bool)
-    rows = np.swapaxes(read, -1, -2)[..., None] * _rows(t)[..., None, :, :]
+    rows = _rows(t)[..., None, :, :]
+    channels = (*np.broadcast_shapes(t.shape[:-2], read.shape[:-2]), read.shape[-1])
     if rows.shape[-2] < rows.shape[-1]:
-        return np.zeros(rows.shape[:-2], dtype=bool)
-    return _seen(factors(rows)[1], rows.shape[-2])
+        return np.zeros(channels, dtype=bool)
+    if not read.all():
+        # where nothing is missing one QR serves all channels
+        rows = np.swapaxes(read, -1, -2)[..., None] * rows
+    return np.broadcast_to(_seen(factors(rows)[1], rows.shape[-2]), channels)
 
 
 def _rows(masses: Complex) -> Complex:

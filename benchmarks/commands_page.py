@@ -35,7 +35,7 @@ def page() -> Iterator[str]:
         yield from ("", f"## dalembert {name}", "", line)
         yield from ("", *inspect.cleandoc(command.help or "").replace("*", r"\*").splitlines())
         panels = command.panels_of(context)
-        solves = "Head of the report" in panels
+        solves = any(param.name == "json" for param in command.get_params(context))
         shared |= {heading: records for heading, records in panels.items() if solves and heading in PANELS}
         for heading, records in panels.items():
             if solves and heading in PANELS and heading != "What":

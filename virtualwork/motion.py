@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from dalembert.page import Page
-    from virtualwork.bounds.motion import MotionErrors
+    from virtualwork.bounds.quantities import Bounds
     from virtualwork.drawing import Drawing
     from virtualwork.family.sensitivity import Sensitivities
     from virtualwork.forces import Forces
@@ -187,11 +187,11 @@ class Motion:
         return over_blocks(self.poses, key, self.dynamics if key[0] in FORCES else None)
 
     @cached_property
-    def rounding(self) -> MotionErrors:
+    def rounding(self) -> Bounds:
         """Bounds of the rounding errors of this motion, each formed when first asked for."""
-        from virtualwork.bounds.motion import MotionErrors
+        from virtualwork.bounds.quantities import Bounds
 
-        return MotionErrors(self.poses)
+        return Bounds(self.poses)
 
     # --- forces -----------------------------------------------------------------------------------------------
     @cached_property

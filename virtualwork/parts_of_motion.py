@@ -9,7 +9,7 @@ from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Complexes, Reals, xy
 
 if TYPE_CHECKING:
-    from virtualwork.bounds.motion import MotionErrors
+    from virtualwork.bounds.quantities import Bounds
 
 
 class Whole(Protocol):
@@ -24,7 +24,7 @@ class Whole(Protocol):
         """How many poses."""
 
     @property
-    def rounding(self) -> MotionErrors:
+    def rounding(self) -> Bounds:
         """Bounds of its rounding errors."""
 
     def value(self, key: Key) -> Any:
@@ -90,7 +90,7 @@ class PointMotion:
         >>> bool(abs(point.position[0, 1] - math.sqrt(0.75)) <= point.error_estimate()[0] < 1e-15)
         True
         """
-        return self.motion.rounding.point(self.body, self.place, self.node, order)
+        return self.motion.rounding.of(("point", self.body, self.place, self.node, order))
 
     def sensitivity(self, path: str, order: int = 0) -> Reals:
         """Return the derivative (n, 2) of the position (order 0), velocity (1), ... to a number of the description.
@@ -168,7 +168,7 @@ class LinkMotion:
 
         The dimensions and the input are taken as exact. See `virtualwork.bounds`.
         """
-        return self.motion.rounding.angle(self.body, order)
+        return self.motion.rounding.of(("angle", self.body, order))
 
     def sensitivity(self, path: str, order: int = 0) -> Reals:
         """Return the derivative (n,) of the angle (order 0, rad), ω (1), α (2) to a number of the description.
@@ -219,7 +219,7 @@ class SlideMotion:
 
         The dimensions and the input are taken as exact. See `virtualwork.bounds`.
         """
-        return self.motion.rounding.slide(self.guide, order)
+        return self.motion.rounding.of(("slide", self.guide, order))
 
     def sensitivity(self, path: str, order: int = 0) -> Reals:
         """Return the derivative (n,) of the slide (order 0, m), its speed (1), ... to a number of the description."""

@@ -28,6 +28,7 @@ MODULES = tuple(
         "topology_rates",
         "equilibria",
         "assemblies",
+        "in_time",
         "tapes",
     )
 )

@@ -71,7 +71,8 @@ def compare(motion: Motion, i: int = 0, *, singular: bool = False) -> Pairs:
 def _size(apart: Any) -> float:
     """An error; what is left of the 50 digits is none."""
     size = float(abs(apart))
-    return 0.0 if size < 1e-35 else size
+    # next to a singular triad the truth itself keeps some 35 of them
+    return 0.0 if size < 1e-33 else size
 
 
 @cache

@@ -108,7 +108,7 @@ def _vector(size: str, phase: str) -> Any:
 def _wrapped(rng: np.random.Generator) -> Pairs:
     """Single-plane balancing from a written table to the columns of the command."""
     from cli.field.columns import corrections
-    from cli.field.read import read_runs
+    from cli.field.read import read_runs, runs_table
     from cli.field.request import Request
     from cli.field.solve import FieldBalancing
 
@@ -124,7 +124,8 @@ def _wrapped(rng: np.random.Generator) -> Pairs:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "runs.csv"
         path.write_text("\n".join(rows) + "\n")
-        runs = read_runs(str(path), lagging=False, phaseless=False, stored_unit=None)
+        table = runs_table(str(path))
+        runs = read_runs(table, lagging=False, phaseless=False, stored_unit=None)
         columns = {c.header: c for c in corrections(FieldBalancing(runs, Request()), []).columns}
     size, angle = (float(str(columns[name].values[0])) for name in ("mass_g", "angle_deg"))
     bound = {name: column.error() for name, column in columns.items() if column.error is not None}

@@ -15,12 +15,12 @@ DIGITS, ORDER, STEPS = 42, 44, 40
 Series = list[Any]
 
 
-def state(seconds: int, a: str = "0", b: str = "-0.5", g: str = "9.81") -> Series:
-    """Angles and their rates a number of seconds after rest, to some 35 digits."""
+def state(seconds: int, a: str = "0", b: str = "-0.5", g: str = "9.81", steps: int = STEPS) -> Series:
+    """Angles and their rates a number of seconds after rest, to some 35 digits; quick motions need more steps a second."""
     with mp.workdps(DIGITS):
         y = [mpf(a), mpf(b), mpf(0), mpf(0)]
-        for _ in range(seconds * STEPS):
-            y = [mp.polyval(x[::-1], mpf(1) / STEPS) for x in _series(y, mpf(g))]
+        for _ in range(seconds * steps):
+            y = [mp.polyval(x[::-1], mpf(1) / steps) for x in _series(y, mpf(g))]
         return y
 
 

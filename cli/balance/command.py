@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 EXAMPLE = "riul-rotor"
 PANELS = {
     "What": "plane planes gravity",
-    "How": "remove round_mass round_angle",
+    "How": "remove round_mass round_angle workers",
     "How: the tolerance": "grade speed rotor_mass permissible bearings center_z",
 }
 
@@ -70,6 +70,7 @@ def run(
     bearings: Annotated[
         str | None, typer.Option(metavar="Z1:Z2", help="The bearing planes, where the tolerance holds.")
     ] = None,
+    workers: Annotated[int, typer.Option(min=1, metavar="N", help="Processes that solve many rotors.")] = 1,
 ) -> Result:
     """Balance rotors from a table of known eccentric masses, in one, two or more planes.
 
@@ -99,7 +100,8 @@ def run(
     )
     chosen = from_table(planes) if planes is not None else from_options(plane or [])
     rotors = read_rotors(table, gravity, needs_z=chosen.several)
-    found = Balancing(rotors, chosen, request)
+    with options.processes(workers) as executor:
+        found = Balancing(rotors, chosen, request, executor)
 
     def figure() -> Figure:
         from cli.balance.picture import draw

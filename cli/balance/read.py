@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError
-from cli.read.tables import Table, number_names, read
+from cli.read.tables import Table, read
 from cli.read.units import phasor, to_si
 
 Real = NDArray[np.float64]
@@ -68,7 +68,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
             size = size / gravity
     angle = table.require("angle", "angle")
     z = table.require("z", "length") if needs_z else table.numbers.get("z")
-    names, rotor = number_names(table.texts.get("rotor") or ["1"] * table.rows)
+    names, rotor = table.numbered("rotor", "1")
     radius_unit = radius.unit if radius is not None else None
     return Rotors(
         table,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from cli.read.planes import Planes
 from cli.read.rounding import EPS, vector_error
 from cli.read.tolerance import Tolerance
 from cli.read.units import degrees, from_si, phasor, to_si
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +50,7 @@ class Balancing:
     rotors: Rotors
     planes: Planes
     request: Request
+    executor: Executor | None = None
     solved: list[tuple[NDArray[np.intp], NDArray[np.intp], Correction]] = field(default_factory=list)
     """Of rotors of like size their numbers, the rows of their planes, their corrections."""
 
@@ -69,7 +73,7 @@ class Balancing:
             u = np.where(masses >= 0, rotors.moment[masses], 0)
             at = np.where(masses >= 0, z[masses], 0)
             try:
-                fix = correct(u, at, plane_z[self.plane_of_row[rows]])
+                fix = correct(u, at, plane_z[self.plane_of_row[rows]], self.executor)
             except CoincidentPlanes as error:
                 name = rotors.names[group[int(np.argmax(error.rotors))]]
                 raise DataError(f"rotor {quote(name)}: {error}") from None

@@ -3,33 +3,68 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.errors import DataError, nearest
-from cli.show.files import write
+from cli.show.reported import reported
+
+if TYPE_CHECKING:
+    from cli.show.columns import Result, Section
 
 EXAMPLES = files("cli") / "examples"
 ABOUT = "example.toml"
 EXPECTED = "expected.csv"
 
 
+METHOD = (
+    "Every example is run by the project's own tests, and compared with its expected.csv where it has one: the same check "
+    "is `--expect expected.csv` behind its command."
+)
+
+
+@reported
 def run(
     name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="The example to write here.")] = None,
-) -> None:
+) -> Result:
     """List the worked examples; with NAME, write its input files into the current folder and show its command."""
-    if name is None:
-        about = {folder: describe(folder) for folder in names()}
-        width = max(map(len, about))
-        for folder, described in about.items():
-            print(f"{folder.ljust(width)}  {described['line']}")
-        return
-    if name not in names():
+    from cli.show.columns import Result, Sheet
+
+    listed = names() if name is None else [name]
+    if name is not None and name not in names():
         raise DataError(f"no example '{name}': expected one of {', '.join(names())}{nearest(name, names())}")
-    described = describe(name)
+    about = {folder: describe(folder) for folder in listed}
+    files = {} if name is None else _here(name)
+    width = max(map(len, about))
+    lines = [f"{folder.ljust(width)}  {said['line']}" for folder, said in about.items()]
+    if name is not None:
+        lines = [f"wrote {here}{kept}" for here, (_, kept) in files.items()]
+        lines += [f"source: {about[name]['source']}", "run:", f"  {about[name]['command']}"]
+    return Result(
+        document=dict,
+        tables={},
+        notes=lambda: "".join(f"{line}\n" for line in lines),
+        beside={here: partial(bytes, data) for here, (data, _) in files.items()},
+        sheets=lambda: [Sheet("", [_section(folder, said, files) for folder, said in about.items()])],
+        method=METHOD,
+        about={"title": "Worked examples" if name is None else f"Worked example: {name}"},
+    )
+
+
+def _here(name: str) -> dict[Path, tuple[bytes, str]]:
+    """Return the files of an example by the names that they get here, each with a remark on its name.
+
+    Raises
+    ------
+    DataError
+        A file of the user's own has that name.
+    """
+    found = {}
     for file in sorted(EXAMPLES.joinpath(name).iterdir(), key=lambda file: file.name):
         if file.name == ABOUT:
             continue
@@ -40,10 +75,21 @@ def run(
         known = _is_an_examples(here) or (here.is_file() and here.read_bytes() == data)
         if here.exists() and not known:
             raise DataError(f"{here}: there is another file of this name here: nothing was overwritten")
-        write(here, data)
-        kept = "" if here.name == file.name else f" ({file.name} is another example's)"
-        print(f"wrote {here}{kept}")
-    print(f"source: {described['source']}\nrun:\n  {described['command']}")
+        found[here] = data, "" if here.name == file.name else f" ({file.name} is another example's)"
+    return found
+
+
+def _section(name: str, said: Mapping[str, str], files: Mapping[Path, tuple[bytes, str]]) -> Section:
+    """Return what a report says of an example, and its files."""
+    from cli.show.columns import Section
+    from cli.show.report import CODE, LINES
+
+    parts = [said["line"], f"source: {said['source']}", CODE + said["command"]]
+    for here, (data, _) in files.items():
+        lines = data.decode().splitlines()
+        more = f"\n… and {len(lines) - LINES} further lines" if len(lines) > LINES else ""
+        parts += [f"{here}:", CODE + "\n".join(lines[:LINES]) + more]
+    return Section(name, parts)
 
 
 def _is_an_examples(here: Path) -> bool:

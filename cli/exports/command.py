@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.errors import DataError, one_line
-from cli.read.files import refuse_inputs
-from cli.show.files import write
+from cli.errors import DataError
+from cli.show.reported import reported
 
-SUFFIXES = (".dxf", ".svg", ".csv", ".urdf", ".sdf", ".xml")
+if TYPE_CHECKING:
+    from cli.show.columns import Result, Sheet
+
+FORMATS = {
+    ".dxf": "drawing (DXF), and curves over the travel of the input",
+    ".svg": "drawing (SVG), and curves over the travel of the input",
+    ".csv": "table of the input and of every moving point over its travel",
+    ".urdf": "robot (URDF) with closed loops",
+    ".sdf": "robot (SDF) with closed loops",
+    ".xml": "robot (MJCF, of MuJoCo) with closed loops",
+}
+
+METHOD = (
+    "The pose is closed by the mechanism's own solution, joint by joint, to rounding; what is written holds it with 17 "
+    "digits where the format has room for them."
+)
 
 
+@reported
 def run(
     file: Annotated[str, typer.Argument(metavar="FILE.toml", help="The mechanism; - is standard input.")],
     output: Annotated[
@@ -30,7 +44,7 @@ def run(
             help="The start pose, such as 60deg or crank=60deg,arm=30deg; else the file's own.",
         ),
     ] = None,
-) -> None:
+) -> Result:
     """Write a mechanism for other programs: a drawing (DXF, SVG), curves (CSV), a robot (URDF, SDF, MJCF).
 
     A drawing shows the pose of the file's own input, and the curves over the travel of the input; a robot starts in that
@@ -39,22 +53,37 @@ def run(
     from cli.exports.written import written
     from cli.mechanism.read import wanted
     from cli.mechanism.solve import load
+    from cli.show.columns import Result
     from virtualwork import MechanismError
 
     suffix = output.suffix.lower()
-    if suffix not in SUFFIXES:
+    if suffix not in FORMATS:
         raise typer.BadParameter(
-            f"'{output}': expected a name that ends in {', '.join(SUFFIXES)}", param_hint="-o"
+            f"'{output}': expected a name that ends in {', '.join(FORMATS)}", param_hint="-o"
         )
     given = load(file)
     m, bare = given.mechanism, given.bare
     inputs = tuple(wanted(m, None if at is None else [at], None, None, bare).values[0].tolist())
-    refuse_inputs([output])
     name = "standard input" if file == "-" else Path(file).name
     try:
         data, notes = written(m, inputs, suffix, name, bare)
     except MechanismError as error:
         raise DataError(f"{file}: {error}") from None
-    for note in notes:
-        print(f"note: {one_line(note)}", file=sys.stderr)
-    write(output, data)
+
+    def sheets() -> list[Sheet]:
+        from cli.mechanism.posed import posed
+        from cli.show.columns import Section
+
+        whole = [] if notes else ["Nothing is left out."]
+        first = Section("Written", [f"{output.name}: {FORMATS[suffix]}, {len(data)} bytes", *whole])
+        return [posed("", m, inputs, bare, first)]
+
+    return Result(
+        document=dict,
+        tables={},
+        beside={output: lambda: data},
+        warnings=notes,
+        sheets=sheets,
+        method=METHOD,
+        about={"title": m.name or "Mechanism"} | given.about,
+    )

@@ -78,24 +78,34 @@ def channels(found: FieldBalancing, of: Sequence[Channel]) -> list[Column]:
 
 def prediction(found: FieldBalancing) -> Table:
     """The vibration before, and as predicted with the corrections: a row for each rotor and sensor."""
-    rows = [
-        (rotor, channel, before, after)
-        for rotor, solved, i in found.each()
-        for channel, before, after in zip(
-            solved.group.channels, solved.initial[i].tolist(), solved.residual[i].tolist(), strict=True
+    kinds: dict[Channel, int] = {}
+    parts = [
+        (
+            np.repeat(solved.group.rotors, len(solved.group.channels)),
+            np.tile([kinds.setdefault(of, len(kinds)) for of in solved.group.channels], len(solved.initial)),
+            solved.initial.ravel(),
+            solved.residual.ravel(),
         )
+        for solved in found.solved
     ]
-    rotors, of, before, after = (list(column) for column in zip(*rows, strict=True))
+    rotor, kind, before, after = (np.concatenate(part) for part in zip(*parts, strict=True))
+    order = np.argsort(rotor, kind="stable")
+    before, after, known = before[order], after[order], list(kinds)
     unit = found.runs.amplitude_unit
     columns = [
-        *([Column("rotor", "", rotors)] if found.several else []),
-        *channels(found, of),
-        Column("before_amplitude", unit, [abs(v) for v in before]),
-        Column("predicted_amplitude", unit, [abs(v) for v in after]),
+        *(
+            [Column("rotor", "", [found.runs.rotors[r] for r in rotor[order].tolist()])]
+            if found.several
+            else []
+        ),
+        *channels(found, [known[k] for k in kind[order].tolist()]),
+        Column("before_amplitude", unit, np.abs(before)),
+        Column("predicted_amplitude", unit, np.abs(after)),
     ]
     if not found.request.four_run:
-        columns.insert(-1, Column("before_phase", "deg", [degrees(v) for v in before]))
-        columns.append(Column("predicted_phase", "deg", [degrees(v) if v else None for v in after]))
+        columns.insert(-1, Column("before_phase", "deg", degrees(before)))
+        phase = np.where(after == 0, np.nan, degrees(after))
+        columns.append(Column("predicted_phase", "deg", phase))
     return Table(columns, keys=("rotor", "sensor", "state", "speed_rpm"))
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = "fan-one-plane"
 PANELS = {
-    "What": "influence runout phase_lag rotation signal pulses exclude",
+    "What": "influence runout phase_lag rotation signal pulses exclude workers",
     "How": "method fit robust objective max_mass max_residual from_here ridge reading_error monte_carlo",
     "How: the tolerance, the first trial mass": "grade speed rotor_mass permissible radius suggest_trial planes",
     "Output: where masses go, the next run": "blades positions first predict suggest save_influence",
@@ -160,6 +160,10 @@ def run(
     pulses: Annotated[
         int, typer.Option(min=1, max=10_000, help="Pulses of the mark in a turn, for --signal.")
     ] = 1,
+    workers: Annotated[
+        int,
+        typer.Option(min=1, metavar="N", help="Processes that solve what each of many machines needs alone."),
+    ] = 1,
 ) -> Result:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
@@ -210,8 +214,8 @@ def run(
     from cli.field.fit import Asked, LogFits, masses_at
     from cli.field.layouts import alpha_of, is_log
     from cli.field.log import read_log
-    from cli.field.log_groups import fit_groups
-    from cli.field.read import NotOneInitialRun, read_runs
+    from cli.field.read import NotOneInitialRun, read_runs, runs_table
+    from cli.field.runs import more_than_unknowns
     from cli.field.sisters import Sisters
     from cli.field.solve import FieldBalancing
     from cli.read.tolerance import tolerance_of
@@ -240,21 +244,22 @@ def run(
         files = [stored_alpha(own)]
     stored = files[0] if files and not fit else None
     stored_unit = None if stored is None else stored.unit
-    measured = None
+    measured = table = None
     if not fit:
+        table = runs_table(runs)
+        fit = stored is None and not four_run and more_than_unknowns(table)
+    if table is not None and not fit:
         try:
-            measured = read_runs(runs, lagging=against, phaseless=four_run, stored_unit=stored_unit)
+            measured = read_runs(table, lagging=against, phaseless=four_run, stored_unit=stored_unit)
         except NotOneInitialRun:
             if stored is not None or four_run:
                 raise
             fit = True
-        else:
-            unknowns_beaten = any(len(group.trials) > len(group.planes) for group in measured.groups)
-            fit = unknowns_beaten and stored is None and not four_run
     lagging = against if phase_lag or rotation is not None else None
-    if measured is None or (fit and not fit_groups(measured, lagging)):
+    if measured is None:
         measured = read_log(
             runs,
+            table,
             lagging=lagging,
             exclude=exclude or [],
             sisters=Sisters(files) if files else None,
@@ -284,7 +289,8 @@ def run(
         places=options.places(positions, blades, first),
         against=against or measured.lags,
     )
-    found = FieldBalancing(measured, request, stored)
+    with options.processes(workers) as executor:
+        found = FieldBalancing(measured, request, stored, executor)
     fits = LogFits(found, Asked(masses_at(predict, measured), suggest, robust)) if fit else None
     return _result(found, fits, save_influence)
 

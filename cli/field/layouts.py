@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cli.errors import DataError
+from cli.read.decoding import LINE
 from cli.read.sources import Source, open_source
 from cli.read.tables import Cells, Numbers, Table, read
 from cli.read.units import parse_number, phasor
@@ -26,6 +27,7 @@ NAMES = {
     "unbalance": "trial_unbalance_kg_m",
     "mass_angle_deg": "trial_angle_deg",
 }
+ANGLE = re.compile(r"(?:phase|(mass_|unbalance_)?angle(?:_(\w+))?)")
 KEYS = ("A", "B", "U", "ALPHA", "A0", "keep_trial", "weight_const")
 WITH = re.compile(
     r"without\b.*|with\s+(?P<mass>[\d.,]+)\s*(?P<unit>[a-z]+)(?:\s*(?:@|at)\s*(?P<angle>[-+\d.,]+)\s*(?:°|deg)?)?"
@@ -48,6 +50,8 @@ def headed(header: list[str]) -> list[str]:
 
     >>> headed(["", "DoubleA", "phase", "mass", "phase", "ref"])
     ['state', 'amplitude_um_pp', 'phase_deg', 'trial_mass_kg', 'trial_angle_deg', 'ref']
+    >>> headed(["state", "amplitude_um", "phase_rad", "mass_g", "angle_rad"])
+    ['state', 'amplitude_um', 'phase_rad', 'trial_mass_g', 'trial_angle_rad']
     """
     out: list[str] = []
     of_mass = False
@@ -56,8 +60,9 @@ def headed(header: list[str]) -> list[str]:
         meant = "state" if not word and k == 0 else NAMES.get(word, word)
         if word.startswith(("mass_", "unbalance_")) and word not in NAMES:
             meant = f"trial_{word}"
-        if word in ("phase", "angle", "angle_deg"):
-            meant = "trial_angle_deg" if of_mass else "phase_deg"
+        if angle := ANGLE.fullmatch(word):
+            of, unit = angle.groups()
+            meant = f"{'trial_angle' if of or of_mass else 'phase'}_{unit or 'deg'}"
         if meant.startswith(("trial_mass", "trial_unbalance", "amplitude")):
             of_mass = not meant.startswith("amplitude")
         out.append(name if meant == word else meant)
@@ -70,7 +75,9 @@ def is_log(path: str) -> bool:
     if _keyed_text(source) is not None:
         return True
     columns = {each.name.lower() for each in source.headings}
-    return not source.headings[0].name or bool(columns & {"state", *NAMES} - {"plane", "amplitude"})
+    own = any(name.startswith(("mass_", "unbalance_")) for name in columns)
+    own = own and not any(name.startswith(("trial_mass", "trial_unbalance")) for name in columns)
+    return not source.headings[0].name or own or bool(columns & {"state", *NAMES} - {"plane", "amplitude"})
 
 
 class Alpha(NamedTuple):
@@ -115,7 +122,7 @@ def log_table(path: str) -> Layout:
         numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},
         texts=["rotor", "run", "sensor", "state", "trial_plane", "trial_kept", "ref", "use", "date"],
         cells={"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"},
-        blank=["speed", "weight"],
+        blank=["speed", "weight", "amplitude", "phase"],
         headers=headed,
     )
     states = [WITH.fullmatch(state.lower()) for state in table.texts.get("state", ())]
@@ -167,8 +174,8 @@ def _sheet_text(rows: list[list[str]]) -> str:
 
 def _keyed(text: str) -> bool:
     """Tell whether the first line that says something is `KEY:` and a list."""
-    for line in text.splitlines():
-        said = line.split("#")[0].strip()
+    for line in LINE.finditer(text):
+        said = line.group().split("#")[0].strip()
         if said and said != "---":
             return re.match(r"[A-Za-z_]\w*\s*[:=]\s*(\[|$|[-+\d.]+\s*@)", said) is not None
     return False

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from cli.errors import DataError, quote
 from cli.field.dates import YEAR, years
-from cli.field.layouts import log_table
-from cli.field.log_groups import LogRows, Logs
+from cli.field.layouts import Layout, log_table
+from cli.field.log_groups import Logs
+from cli.field.log_rows import LogRows, Masses, numbered
 from cli.field.read import NEAR_SPEED
-from cli.field.runs import Channel, Rows, Runs
+from cli.field.runs import Channel, Real, Rows, Runs
 from cli.field.sisters import Sisters
 from cli.read.options import bad
 from cli.read.rounding import vector_error
-from cli.read.tables import Cells, Table, number_names
-from cli.read.units import UNITS, phasor, to_si
+from cli.read.tables import Cells, Table
+from cli.read.units import LARGEST, UNITS, phasor, to_si
 
 
 def read_log(
     path: str,
+    table: Table | None = None,
     *,
     lagging: bool | None,
     exclude: Sequence[str] = (),
@@ -29,19 +31,24 @@ def read_log(
 ) -> Runs:
     """Read a log whose runs are all to be fitted together; `lagging` None: in the sense of the phase that fits better.
 
-    `sisters` is what is known of the coefficients; `reading_error` the errors with which its weight is found.
+    `table` is the file where it is a table of runs that is read already; `sisters` is what is known of the coefficients; `reading_error` the errors with which its weight is found.
     """
-    layout = log_table(path)
+    layout = log_table(path) if table is None else Layout(table)
     table = layout.table
     amplitude, phase = table.require("amplitude", "amplitude"), table.require("phase", "angle")
     table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
-    vibration = phasor(amplitude.values, -phase.values if lagging else phase.values, phase.unit)
+    # a state that a run lacks may be a row with blank cells
+    unread = np.isnan(amplitude.values) & np.isnan(phase.values)
+    for numbers, name in ((amplitude, "amplitude"), (phase, "phase")):
+        table.reject(np.isnan(numbers.values) & ~unread, name, "a number, or amplitude and phase both blank")
+    turn = np.where(unread, 0.0, -phase.values if lagging else phase.values)
+    vibration = np.where(unread, complex(np.nan), phasor(amplitude.values, turn, phase.unit))
     both = [name for name in ("trial_mass", "trial_unbalance") if name in table.cells]
     if len(both) > 1 or not (both or sisters):
         found = f"both {' and '.join(both)}" if both else f"none (the header is: {', '.join(table.header)})"
         raise DataError(f"{table.file}: expected one column of masses, found {found}")
     size = table.cells[both[0]] if both else Cells("", sisters.unit if sisters else "kg", [""] * table.rows)
-    names, rotor = number_names(table.texts.get("rotor") or ["1"] * table.rows)
+    names, rotor = table.numbered("rotor", "1")
     speed = table.numbers.get("speed")
     runs = Runs(
         table,
@@ -60,75 +67,87 @@ def read_log(
         )
     masses, mass_share = _masses(table, size, runs.per)
     if "ref" in table.texts:
-        masses = _on_top(table, rotor, masses)
+        masses = Masses.of(_on_top(table, rotor, masses.by_row()))
     if "use" in table.texts:
         table.warnings.append(
             f"{table.file}: the column use is the keeper's own mark: every row takes part in the fit"
         )
-    rows = LogRows(
-        table,
-        rotor,
-        names,
-        list(vibration.tolist()),
-        _channels(table, rotor),
-        masses,
-        table.texts.get("run") or [],
-        years(table),
-        float(vector_error(np.ones(table.rows), phase.values, phase.unit).max()),
-        mass_share,
-    )
-    if not rows.run:
-        rows.run = _run_names(rows)
+    channels, channel = _channels(table, rotor)
+    when = years(table)
+    if "run" in table.texts:
+        run_names, run = table.numbered("run")
+    else:
+        run_names, run = _run_names(rotor, channel, when, masses)
     for name in exclude:
-        if name not in rows.run:
+        if name not in run_names:
             raise bad("--exclude", f"no run {quote(name)} in {table.file}")
-    by_rotor: list[list[int]] = [[] for _ in names]
-    for i, r in enumerate(rotor.tolist()):
-        by_rotor[r].append(i)
-    Logs(rows, runs, lagging, set(exclude), sisters, reading_error).read(by_rotor)
+    share = float(vector_error(np.ones(table.rows), turn, phase.unit).max())
+    rows = LogRows(
+        table, rotor, names, vibration, channel, channels, masses, run, run_names, when, share, mass_share
+    )
+    Logs(rows, runs, lagging, set(exclude), sisters, reading_error).read()
     runs.warnings = [*table.warnings, *runs.warnings]
     return runs
 
 
-def _masses(table: Table, size: Cells, per: str) -> tuple[list[dict[str, complex] | None], float]:
+def _masses(table: Table, size: Cells, per: str) -> tuple[Masses, float]:
     """Read the masses of each row, several joined by ';', and by what share of it one may be off as it is rounded."""
     angle = table.cells.get("trial_angle")
-    plane = table.texts.get("trial_plane") or [""] * table.rows
-    turns = angle.values if angle is not None else [""] * table.rows
-    sizes: list[float] = []
-    angles: list[float] = []
-    where: list[tuple[int, str]] = []
-    out: list[dict[str, complex] | None] = [None] * table.rows
-    for i, (name, cell, turn) in enumerate(zip(plane, size.values, turns, strict=True)):
-        if not cell:
-            if name:
-                raise table.error(i, size.header, cell, f"the mass in plane {name}")
-            continue
-        names = [part.strip() for part in name.split(";")] if name else ["1"]
-        parts, around = cell.split(";"), turn.split(";") if turn else [""] * len(names)
-        if not len(parts) == len(around) == len(names):
-            raise table.error(
-                i, size.header, cell, f"{len(names)} masses and angles joined by ';', as the planes"
-            )
-        out[i] = {}
-        for one, part, at in zip(names, parts, around, strict=True):
-            where.append((i, one))
-            sizes.append(_number(table, size, i, part, "a mass"))
-            if sizes[-1] < 0:
-                raise table.error(i, size.header, cell, "a mass that is not negative")
-            if not at.strip() and sizes[-1]:
-                header = angle.header if angle is not None else "trial_angle_deg"
-                raise table.error(i, header, turn, "the angle of the mass")
-            angles.append(
-                _number(table, angle, i, at, "the angle of the mass") if at.strip() and angle else 0.0
-            )
+    names, code = table.numbered("trial_plane")
+    planes: dict[str, int] = {}
+    plane = np.array([planes.setdefault(name or "1", len(planes)) for name in names])[code]
+    told = np.array([bool(cell) for cell in size.values])
+    # one mass in a row, its numbers in order: all these rows together, and the others one by one
+    plain = told & np.array([";" not in name for name in names])[code]
+    sizes, angles = size.parsed, None if angle is None else angle.parsed
+    if sizes is None or angles is None:
+        plain[:] = False
+        sizes = angles = np.zeros(table.rows)
+    plain &= (sizes >= 0) & (sizes <= LARGEST) & (np.abs(angles) <= LARGEST)
+    named = np.array([bool(name) for name in names])[code]
+    others = [
+        (i, planes.setdefault(name, len(planes)), mass, turn)
+        for i in np.flatnonzero(~plain & (told | named)).tolist()
+        for name, mass, turn in _of_row(table, i, names[code[i]], size, angle)
+    ]
+    row, where, more, turns = (
+        np.array(part) for part in (zip(*others, strict=True) if others else ((), (), (), ()))
+    )
+    row = np.concatenate([np.flatnonzero(plain), row.astype(np.intp)])
+    where = np.concatenate([plane[plain], where.astype(np.intp)])
+    around = np.concatenate([angles[plain], turns])
     unit = angle.unit if angle is not None else "deg"
-    on = phasor(np.asarray(to_si(np.array(sizes), per, size.unit)), np.array(angles), unit)
-    for (i, name), mass in zip(where, on.tolist(), strict=True):
-        mine = out[i]
-        assert mine is not None
-        mine[name] = mine.get(name, 0) + mass
-    return out, float(vector_error(np.ones(len(angles)), angles, unit).max(initial=0.0))
+    on = phasor(np.asarray(to_si(np.concatenate([sizes[plain], more]), per, size.unit)), around, unit)
+    # several in one plane of a run are one
+    _, first, entry = np.unique(row * max(len(planes), 1) + where, return_index=True, return_inverse=True)
+    value = np.zeros(len(first), dtype=complex)
+    np.add.at(value, entry, on)
+    share = float(vector_error(np.ones(len(around)), around, unit).max(initial=0.0))
+    return Masses(list(planes), row[first], where[first], value, told), share
+
+
+def _of_row(
+    table: Table, i: int, name: str, size: Cells, angle: Cells | None
+) -> Iterator[tuple[str, float, float]]:
+    """Yield plane, size and angle of each mass of a row, as the file has them."""
+    cell, turn = size.values[i], "" if angle is None else angle.values[i]
+    if not cell:
+        raise table.error(i, size.header, cell, f"the mass in plane {name}")
+    names = [part.strip() for part in name.split(";")] if name else ["1"]
+    parts, around = cell.split(";"), turn.split(";") if turn else [""] * len(names)
+    if not len(parts) == len(around) == len(names):
+        raise table.error(
+            i, size.header, cell, f"{len(names)} masses and angles joined by ';', as the planes"
+        )
+    for one, part, at in zip(names, parts, around, strict=True):
+        mass = _number(table, size, i, part, "a mass")
+        if mass < 0:
+            raise table.error(i, size.header, cell, "a mass that is not negative")
+        if not at.strip() and mass:
+            header = angle.header if angle is not None else "trial_angle_deg"
+            raise table.error(i, header, turn, "the angle of the mass")
+        given = at.strip() and angle is not None
+        yield one, mass, _number(table, angle, i, at, "the angle of the mass") if given and angle else 0.0
 
 
 def _number(table: Table, cells: Cells, row: int, text: str, expected: str) -> float:
@@ -175,67 +194,57 @@ def _on_top(
     return out
 
 
-def _channels(table: Table, rotor: Rows) -> list[Channel]:
-    """Return the channel of each row; speeds within 5 % of the slowest of their kind are one."""
-    sensor = table.texts.get("sensor") or ["1"] * table.rows
-    state: Sequence[str | None] = table.texts.get("state") or [None] * table.rows
+def _channels(table: Table, rotor: Rows) -> tuple[list[Channel], Rows]:
+    """Return the channels, and that of each row; speeds within 5 % of the slowest of their kind are one."""
+    sensors, sensor = table.numbered("sensor", "1")
+    states, state = table.numbered("state")
+    kind, first = numbered(sensor * len(states) + state)
+    named = "state" in table.texts
+    kinds = [(sensors[sensor[i]], states[state[i]] if named else None) for i in first.tolist()]
     speed = table.numbers.get("speed")
     if speed is None:
-        known: dict[tuple[str, str | None], Channel] = {}
-        return [
-            known.setdefault(key, Channel(key[0], None, state=key[1]))
-            for key in zip(sensor, state, strict=True)
-        ]
-    si = to_si(speed.values, "speed", speed.unit)
-    out = [Channel("", None)] * table.rows
-    order = sorted(range(table.rows), key=lambda i: (rotor[i], sensor[i], state[i] or "", speed.values[i]))
-    members: list[int] = []
-
-    def close() -> None:
-        given, in_si = speed.values[members], si[members]
-        same = given[0] == given[-1] or given[0] != given[0]
-        mean = (given[0], in_si[0]) if same else (float(given.mean()), float(in_si.mean()))
-        first = members[0]
-        none = given[0] != given[0]
-        channel = Channel(
-            sensor[first],
-            None if none else float(mean[1]),
-            None if none else float(mean[0]),
-            state=state[first],
-        )
-        for i in members:
-            out[i] = channel
-
-    for i in order:
-        if members:
-            first = members[0]
-            kind = (rotor[first], sensor[first], state[first]) == (rotor[i], sensor[i], state[i])
-            fast = speed.values[i] > speed.values[first] * (1 + NEAR_SPEED)
-            blank = (speed.values[i] != speed.values[i]) != (speed.values[first] != speed.values[first])
-            if not kind or fast or blank:
-                close()
-                members = []
-        members.append(i)
-    if members:
-        close()
-    return out
+        return [Channel(one, None, state=of) for one, of in kinds], kind
+    given, si = speed.values, to_si(speed.values, "speed", speed.unit)
+    of_rotor = numbered(rotor * len(kinds) + kind)[0]
+    value = np.where(np.isnan(given), -np.inf, given)
+    near, left, many = np.zeros(table.rows, dtype=np.intp), np.arange(table.rows), int(of_rotor.max()) + 1
+    while len(left):
+        slowest = np.full(many, np.inf)
+        np.minimum.at(slowest, of_rotor[left], value[left])
+        slowest = np.maximum(slowest, slowest * (1 + NEAR_SPEED))
+        inside = value[left] <= slowest[of_rotor[left]]
+        near[left[~inside]] += many
+        left = left[~inside]
+    number, first = numbered(near + of_rotor)
+    count = np.bincount(number)
+    means = [np.bincount(number, of) / count for of in (given, np.asarray(si))]
+    alike = np.ones(len(first), dtype=bool)
+    np.logical_and.at(alike, number, value == value[first[number]])
+    out: dict[Channel, int] = {}
+    code = []
+    for k, i in enumerate(first.tolist()):
+        one, of = kinds[kind[i]]
+        mean = (given[i], si[i]) if alike[k] else (means[0][k], means[1][k])
+        none = given[i] != given[i]
+        channel = Channel(one, None if none else float(mean[1]), None if none else float(mean[0]), state=of)
+        code.append(out.setdefault(channel, len(out)))
+    return list(out), np.array(code)[number]
 
 
-def _run_names(rows: LogRows) -> list[str]:
+def _run_names(rotor: Rows, channel: Rows, when: Real | None, masses: Masses) -> tuple[list[str], Rows]:
     """Tell runs apart where no column does: a new one begins where masses or day change, or a channel comes again."""
-    out: list[str] = []
+    out: list[int] = []
     count: dict[int, int] = {}
     before: tuple[int, float, dict[str, complex]] | None = None
-    seen: set[Channel] = set()
-    none = [np.nan] * rows.table.rows
-    days = none if rows.years is None else np.floor(rows.years * YEAR + 1e-6).tolist()
-    for r, channel, day, masses in zip(rows.rotor.tolist(), rows.channel, days, rows.masses, strict=True):
+    seen: set[int] = set()
+    days = [np.nan] * len(rotor) if when is None else np.floor(when * YEAR + 1e-6).tolist()
+    for r, of, day, put in zip(rotor.tolist(), channel.tolist(), days, masses.by_row(), strict=True):
         # of an unknown day: that of the row before
         on_day = day if day == day or before is None else before[1]
-        on = (r, on_day, {plane: mass for plane, mass in (masses or {}).items() if mass})
-        if on != before or channel in seen:
+        on = (r, on_day, {plane: mass for plane, mass in (put or {}).items() if mass})
+        if on != before or of in seen:
             count[r] = count.get(r, 0) + 1
             before, seen = on, set()
-        seen.add(channel)
-        out.append(str(count[r]))
-    return out
+        seen.add(of)
+        out.append(count[r] - 1)
+    return [str(k + 1) for k in range(max(out) + 1)], np.array(out)

@@ -8,30 +8,40 @@ import numpy as np
 
 from cli.errors import DataError, quote
 from cli.field.runs import Channel, Complex, Group, Real, Rows, Runs, Trial, alike, apart
-from cli.read.tables import Cells, number_names, read
-from cli.read.units import SMALLEST, UNITS, phasor, to_si
+from cli.read.tables import Cells, Table, read
+from cli.read.units import LARGEST, SMALLEST, UNITS, phasor, to_si
 
 YES = ("yes", "y", "true", "1", "kept", "on")
 SHOWN = 5  # of so many contradictions the figures are shown
 NEAR_SPEED = 0.05  # among several speeds one is recognised within this share
+OF_LOGS = ("date", "ref", "use")  # columns that count where all runs are fitted
 NO = ("no", "n", "false", "0", "", "removed", "off")
 
 
-def read_runs(path: str, *, lagging: bool, phaseless: bool, stored_unit: str | None) -> Runs:
-    """Read a table of runs; `stored_unit` is the unit of stored coefficients that stand for the trials."""
-    table = read(
+def runs_table(path: str) -> Table:
+    """Read a file as a table of runs."""
+    return read(
         path,
         numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},
-        texts=["rotor", "run", "sensor", "trial_plane", "trial_kept"],
+        texts=["rotor", "run", "sensor", "trial_plane", "trial_kept", *OF_LOGS],
         cells={"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"},
-        blank=["speed", "weight"] + (["phase"] if phaseless else []),
+        blank=["speed", "weight", "amplitude", "phase"],
     )
+
+
+def read_runs(table: Table, *, lagging: bool, phaseless: bool, stored_unit: str | None) -> Runs:
+    """Read a table of runs; `stored_unit` is the unit of stored coefficients that stand for the trials."""
+    for name in OF_LOGS:
+        if name in table.texts:
+            table.warnings.append(f"{table.file}: ignored the column {name}")
     amplitude = table.require("amplitude", "amplitude")
+    table.reject(np.isnan(amplitude.values), "amplitude", "a number")
     table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
     if phaseless:
         vibration = amplitude.values.astype(complex)
     else:
         phase = table.require("phase", "angle")
+        table.reject(np.isnan(phase.values), "phase", "a number")
         vibration = phasor(amplitude.values, -phase.values if lagging else phase.values, phase.unit)
     if "weight" in table.numbers:
         table.reject(table.numbers["weight"].values < 0, "weight", "a weight that is not negative")
@@ -46,7 +56,7 @@ def read_runs(path: str, *, lagging: bool, phaseless: bool, stored_unit: str | N
             f"or stored coefficients by --influence {table.told}"
         )
     size = table.cells[both[0]] if both else None
-    names, rotor = number_names(table.texts.get("rotor") or ["1"] * table.rows)
+    names, rotor = table.numbered("rotor", "1")
     unit = stored_unit or (size.unit if size else "kg")
     runs = Runs(
         table,
@@ -343,12 +353,13 @@ class _Reader:
         return np.asarray(to_si(size, self.runs.per, self.size.unit)), turn, angle.unit
 
     def _numbers(self, cells: Cells, rows: Rows, place: int, expected: str) -> Real:
-        texts = [cells.values[row] for row in rows.tolist()]
         # planes are named alike in all these rows
         names = self.plane[rows[0]].count(";") + 1
-        whole = cells.numbers(texts) if names == 1 else None
-        if whole is not None:
-            return whole
+        if names == 1 and cells.parsed is not None:
+            whole = cells.parsed[rows]
+            if (np.abs(whole) <= LARGEST).all():
+                return whole
+        texts = [cells.values[row] for row in rows.tolist()]
         values = np.empty(len(rows))
         for i, (row, text) in enumerate(zip(rows.tolist(), texts, strict=True)):
             parts = text.split(";") if ";" in text or place else [text]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import JointFit, Prior
-from cli.read.tables import Table, number_names
+from cli.read.tables import Table
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -112,7 +112,7 @@ class Group:
     """The initial run."""
     fit: JointFit | None = None
     """Where all runs were fitted at once: `initial` is fitted then, and there are no trial runs."""
-    logs: list[Log] = field(default_factory=list)
+    logs: Sequence[Log] = ()
     before: Before | None = None
     """Where coefficients known before take part in the fit."""
 
@@ -183,6 +183,36 @@ def apart(one: float | None, other: float) -> float:
     return abs(one - other) / max(abs(one), abs(other))
 
 
+def more_than_unknowns(table: Table) -> bool:
+    """Tell whether a rotor has more runs than unknowns: the initial vibration and a coefficient of each plane."""
+    sizes = [table.cells[name] for name in ("trial_mass", "trial_unbalance") if name in table.cells]
+    if "run" not in table.texts or len(sizes) != 1:
+        return False
+    _, rotor = table.numbered("rotor", "1")
+    _, run = table.numbered("run")
+    names, plane = table.numbered("trial_plane")
+    if "trial_plane" not in table.texts:
+        names, plane = ["", "1"], np.array([bool(cell) for cell in sizes[0].values]).astype(np.intp)
+    planes: dict[str, int] = {}
+    each = [
+        [planes.setdefault(part.strip(), len(planes)) for part in name.split(";") if part.strip()]
+        for name in names
+    ]
+
+    def count(codes: Rows, of: Rows) -> Rows:
+        """Count what differs, rotor by rotor."""
+        many = int(codes.max(initial=0)) + 1
+        return np.bincount(np.unique(of * many + codes) // many, minlength=int(rotor.max()) + 1)
+
+    most = max(map(len, each))
+    several = np.array([one + one[-1:] * (most - len(one)) if one else [-1] * most for one in each])[plane]
+    told = several[:, 0] >= 0 if most else np.zeros(table.rows, dtype=bool)
+    if not told.any():
+        return False
+    known = count(several[told].ravel(), np.repeat(rotor[told], most))
+    return bool(((count(run, rotor) > 1 + known) & (known > 0)).any())
+
+
 def alike(table: Table, rotor: Rows) -> Iterator[tuple[Rows, Rows]]:
     """Yield rotors whose rows name the same runs, sensors, speeds and planes: their numbers, and rows (g, n)."""
     order = np.argsort(rotor, kind="stable")
@@ -191,23 +221,21 @@ def alike(table: Table, rotor: Rows) -> Iterator[tuple[Rows, Rows]]:
     if len(count) == 1:
         yield np.zeros(1, dtype=np.intp), order[None]
         return
-    codes = [
-        number_names(table.texts[name])[1] if name in table.texts else np.zeros(table.rows, dtype=np.intp)
-        for name in ("run", "sensor", "trial_plane", "trial_kept")
-    ]
-    speed = table.numbers.get("speed")
-    codes.append(
-        np.unique(np.nan_to_num(speed.values, nan=-1.0), return_inverse=True)[1].astype(np.intp)
-        if speed is not None
-        else np.zeros(table.rows, dtype=np.intp)
-    )
-    signature = np.stack(codes, axis=1)
+    kind = np.zeros(table.rows, dtype=np.intp)
+    for name in ("run", "sensor", "trial_plane", "trial_kept"):
+        names, code = table.numbered(name)
+        kind = np.unique(kind * len(names) + code, return_inverse=True)[1] if len(names) > 1 else kind
+    if (speed := table.numbers.get("speed")) is not None:
+        speeds, code = np.unique(np.nan_to_num(speed.values, nan=-1.0), return_inverse=True)
+        kind = np.unique(kind * len(speeds) + code, return_inverse=True)[1]
+    most = int(kind.max()) + 1
     for size in np.unique(count):
         rotors = np.flatnonzero(count == size)
         rows = order[start[rotors, None] + np.arange(size)]
-        flat = np.ascontiguousarray(signature[rows].reshape(len(rotors), -1))
-        as_bytes = flat.view(np.dtype((np.void, flat.dtype.itemsize * flat.shape[1]))).ravel()
-        _, first, inverse = np.unique(as_bytes, return_index=True, return_inverse=True)
-        for label in np.argsort(first):
-            same = inverse == label
+        label = np.zeros(len(rotors), dtype=np.intp)
+        for of_place in kind[rows].T:
+            label = np.unique(label * most + of_place, return_inverse=True)[1]
+        by_label = np.argsort(label, kind="stable")
+        groups = np.split(by_label, np.cumsum(np.bincount(label))[:-1])
+        for same in sorted(groups, key=lambda group: int(group[0])):
             yield rotors[same], rows[same]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,20 +24,25 @@ from balancing import (
     influence_from_amplitudes,
     initial_unbalance,
     least_squares,
-    minimax,
     place,
     spread,
     unseen,
 )
 from cli.errors import DataError
 from cli.field.files import Stored
+from cli.field.one_rotor import Sought, confidence, least_maximum, limited_samples, within_limits
 from cli.field.refusals import planes_say, trials_say
 from cli.field.request import Request
 from cli.field.runs import Complex, Group, Real, Runs
 from cli.read.options import bad
 from cli.read.units import Scaled, from_si
+from dalembert.arithmetic.parts import in_parts
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 Value = TypeVar("Value", np.float64, np.complex128)
+Result = TypeVar("Result")
 
 SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
 MANY = 200  # rotors whose uncertainties are worked out unasked
@@ -78,8 +83,10 @@ class Solved:
 class FieldBalancing:
     """The corrections of every rotor of a table of runs."""
 
-    def __init__(self, runs: Runs, request: Request, stored: Stored | None = None) -> None:
-        self.runs, self.request, self.stored = runs, request, stored
+    def __init__(
+        self, runs: Runs, request: Request, stored: Stored | None = None, executor: Executor | None = None
+    ) -> None:
+        self.runs, self.request, self.stored, self.executor = runs, request, stored, executor
         self.warnings: list[str] = []
         self.several = len(runs.rotors) > 1
         self.solved = [self._solve(group) for group in runs.groups]
@@ -190,10 +197,7 @@ class FieldBalancing:
         if fix is not None:
             return fix.corrections, None, condition
         if request.objective == "minimax":
-            proven = [
-                self._one(group, planes, i, lambda i=i: self._minimax(alpha[i], here[i], limit, weights, i))  # type: ignore[misc]
-                for i in range(len(here))
-            ]
+            proven = self._one_by_one(least_maximum, group, planes, alpha, here, limit, range(len(here)))
             return (
                 np.stack([fix.corrections for fix in proven]),
                 np.array([fix.bound for fix in proven], dtype=float),
@@ -213,34 +217,36 @@ class FieldBalancing:
             left = np.flatnonzero(beyond)
         except DependentPlanes:
             pass
-        for i in left.tolist():
-            w = None if weights is None else weights[i]
-            corrections[i] = self._one(
-                group,
-                planes,
-                i,
-                lambda i=i, w=w: least_squares(alpha[i], here[i], w, max_mass=limit, max_residual=ceiling),  # type: ignore[misc]
-            ).corrections
+        rest = left.tolist()
+        found = self._one_by_one(within_limits, group, planes, alpha, here, limit, rest)
+        for i, one in zip(rest, found, strict=True):
+            corrections[i] = one.corrections
         return corrections, None, condition
 
-    def _minimax(
-        self, alpha: Complex, here: Complex, limit: Real | None, weights: Real | None, i: int
-    ) -> Balance:
-        """Minimax corrections of one rotor; Infeasible where even they leave more than --max-residual."""
-        fix = minimax(alpha, here, limit, weights=None if weights is None else weights[i])
-        ceiling = self.request.max_residual
-        if ceiling is not None and float(fix.residual_max) > ceiling * (1 + 1e-9):
-            least = (
-                float(minimax(alpha, here, limit).residual_max) if weights is not None else fix.residual_max
-            )
-            if least > ceiling * (1 + 1e-9):
-                raise Infeasible(float(least))
-            self.warn(
-                "with these weights a residual is beyond --max-residual, which without them could be met"
-            )
-        return fix
+    def _one_by_one(
+        self,
+        solve: Callable[..., tuple[Balance, bool]],
+        group: Group,
+        planes: list[str],
+        alpha: Complex,
+        here: Complex,
+        limit: Real | None,
+        rotors: Sequence[int],
+    ) -> list[Balance]:
+        """Solve for rotors, each by itself."""
+        ceiling, weights = self.request.max_residual, group.weights
+        parts = ((alpha[i], here[i], limit, ceiling, None if weights is None else weights[i]) for i in rotors)
+        results, found = in_parts(solve, parts, self.executor), []
+        for i in rotors:
+            fix, beyond = self._one(group, planes, i, lambda: next(results))
+            if beyond:
+                self.warn(
+                    "with these weights a residual is beyond --max-residual, which without them could be met"
+                )
+            found.append(fix)
+        return found
 
-    def _one(self, group: Group, planes: list[str], i: int, solve: Callable[[], Balance]) -> Balance:
+    def _one(self, group: Group, planes: list[str], i: int, solve: Callable[[], Result]) -> Result:
         """Solve for one rotor; what cannot be done is said with its name."""
         try:
             return solve()
@@ -285,10 +291,9 @@ class FieldBalancing:
     def _confidence(self, solved: Solved, runout: Complex, limited: bool) -> None:
         """Propagate the reading errors, rotor by rotor."""
         relative, angle = self.request.reading_error or (0.0, 0.0)
-        group, request = solved.group, self.request
-        covariances, residuals = [], []
-        draws = request.monte_carlo or 4000
-        for i in range(len(group.rotors)):
+        group, sought = solved.group, self._sought(solved)
+
+        def task(i: int) -> tuple[object, ...]:
             readings = Readings(
                 group.initial[i],
                 relative,
@@ -301,24 +306,15 @@ class FieldBalancing:
                 degrees_of_freedom=group.repeats,
             )
             w = None if group.weights is None else group.weights[i]
-            total = solved.total[i]
-            try:
-                if limited:
-                    problems = readings.problem_samples(min(request.monte_carlo or 200, 1000))
-                    samples = self._limited_samples(solved, problems, w, i)
-                    covariances.append(spread(samples, solved.corrections[i]))
-                elif request.monte_carlo:
-                    samples = readings.correction_samples(w, request.ridge, draws) - solved.standing[i]
-                    covariances.append(spread(samples, solved.corrections[i]))
-                else:
-                    covariances.append(
-                        readings.covariance(total, w, request.ridge, along=solved.corrections[i])
-                    )
-            except ValueError:
-                covariances.append(np.full((len(solved.planes), 2, 2), np.nan))
-            left = np.abs(readings.residual_samples(total, draws)).max(axis=1)
-            residuals.append(np.quantile(left, 0.95))
-        solved.covariance, solved.residual_95 = np.stack(covariances), np.array(residuals)
+            return readings, solved.corrections[i], solved.standing[i], w, sought, limited
+
+        found = list(in_parts(confidence, map(task, range(len(group.rotors))), self.executor))
+        solved.covariance = np.stack([covariance for covariance, _ in found])
+        solved.residual_95 = np.array([left for _, left in found])
+
+    def _sought(self, solved: Solved) -> Sought:
+        request = self.request
+        return Sought(request.objective, self.limits(solved.planes), request.ridge, request.monte_carlo)
 
     def _doubt(self, solved: Solved, fit: JointFit, runout: Complex, limited: bool) -> None:
         """Carry the errors of a fit of all runs to the corrections."""
@@ -350,25 +346,11 @@ class FieldBalancing:
             for i, corrections in enumerate(solved.corrections):
                 draws = balance.problem_samples(i, min(request.monte_carlo or 200, 1000))
                 own = None if weights is None else weights[i]
-                spreads.append(spread(self._limited_samples(solved, draws, own, i), corrections))
+                samples = limited_samples(draws, solved.standing[i], own, self._sought(solved))
+                spreads.append(spread(samples, corrections))
             solved.covariance = np.stack(spreads)
         else:
             solved.covariance = balance.covariance
-
-    def _limited_samples(
-        self, solved: Solved, problems: Iterable[tuple[Complex, Complex]], weights: Real | None, i: int = 0
-    ) -> Complex:
-        """Draw corrections under limits or of the minimax problem: no formula, each draw is solved."""
-        limit, request = self.limits(solved.planes), self.request
-        samples = []
-        for alpha, v in problems:
-            standing = solved.standing[i]
-            here = v + alpha @ standing
-            if request.objective == "minimax":
-                samples.append(minimax(alpha, here, limit, weights=weights).corrections)
-            else:
-                samples.append(least_squares(alpha, here, weights, max_mass=limit).corrections)
-        return np.stack(samples)
 
     def warn(self, text: str) -> None:
         """Say what was done otherwise than a reader might think, once."""

@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
-import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.errors import DataError, one_line
+from cli.errors import DataError
 from cli.imports.words import KINDS
-from cli.read.files import read_bytes, refuse_inputs
-from cli.show.files import write
+from cli.read.files import read_bytes
+from cli.show.reported import reported
+
+if TYPE_CHECKING:
+    from cli.show.columns import Result, Sheet
 
 Kind = StrEnum("Kind", {name.replace("-", "_"): name for name in KINDS})  # type: ignore[misc]
 
 
+METHOD = (
+    "Lengths are differences of the file's own decimals, rounded once. What was taken over is put together anew and compared "
+    "with the drawing, point by point."
+)
+
+
+@reported
 def run(
     file: Annotated[
         str, typer.Argument(metavar="FILE", help="The other program's file or link; - is standard input.")
@@ -28,7 +37,7 @@ def run(
     kind: Annotated[
         Kind | None, typer.Option("--from", help="The program it is from; else told by the content.")
     ] = None,
-) -> None:
+) -> Result:
     """Read a mechanism of another program: PMKS text and links, PMKS+ links, MotionGen, Linkage, linkage_sim, planar robots (URDF, SDF, MJCF).
 
     What is written is a file for `dalembert mechanism`. The links' axes are parallel to the ground's in the drawn pose,
@@ -38,6 +47,7 @@ def run(
     from cli.imports.assembled import described
     from cli.imports.drawn import settle
     from cli.imports.told import read
+    from cli.show.columns import Result
 
     if output is not None and output.suffix.lower() != ".toml":
         raise typer.BadParameter(f"'{output}': expected a name that ends in .toml", param_hint="-o")
@@ -54,10 +64,8 @@ def run(
         for k, part in enumerate(parts, 1):
             part.name = part.name if len(parts) == 1 else f"{part.name} {k}".strip()
             found.append((described(part, f"imported from {told}"), part.notes))
-    for note in lost:
-        _say(note)
     if not found:
-        raise DataError(f"{name}: no mechanism: nothing in it is driven by an input")
+        raise DataError("; ".join([f"{name}: no mechanism: nothing in it is driven by an input", *lost]))
     if len(found) > 1 and output is None:
         raise typer.BadParameter(
             f"{name} holds {len(found)} mechanisms: expected a file, which becomes FILE-1.toml …",
@@ -68,17 +76,33 @@ def run(
         paths = [output]
         if len(found) > 1:
             paths = [output.with_name(f"{output.stem}-{k}{output.suffix}") for k in range(1, len(found) + 1)]
-        refuse_inputs(paths)
-    for k, (made, notes) in enumerate(found):
-        for note in notes:
-            _say(note if len(found) == 1 else f"{paths[k].name}: {note}")
-        if paths:
-            write(paths[k], made.encode())
-        else:
-            sys.stdout.write(made)
-    if len(paths) > 1:
-        print(f"wrote {', '.join(map(str, paths))}", file=sys.stderr)
+    said = [
+        note if len(found) == 1 else f"{path.name}: {note}"
+        for path, (_, notes) in zip(paths or [Path()], found, strict=True)
+        for note in notes
+    ]
 
+    def sheets() -> list[Sheet]:
+        from cli.imports.pages import pages
 
-def _say(note: str) -> None:
-    print(f"note: {one_line(note)}", file=sys.stderr)
+        taken = [f"{name}: {KINDS[told].partition(' (')[0]}, {len(data)} bytes"]
+        titles = [path.name for path in paths] if len(found) > 1 else [""]
+        return [
+            sheet
+            for title, (made, its) in zip(titles, found, strict=True)
+            for sheet in pages(title, taken if lost or its else [*taken, "All of it is taken over."], made)
+        ]
+
+    return Result(
+        document=dict,
+        tables={},
+        notes=lambda: (
+            f"wrote {', '.join(map(str, paths))}\n" if len(paths) > 1 else "" if paths else found[0][0]
+        ),
+        beside={path: made.encode for path, (made, _) in zip(paths, found, strict=False)},
+        warnings=[*lost, *said],
+        sheets=sheets,
+        shows_input=True,
+        method=METHOD,
+        about={"title": drawings[0].name or "Mechanism taken over"},
+    )

@@ -216,9 +216,9 @@ def run(
 ) -> Result:
     """Solve a planar mechanism: positions, velocities, accelerations, its limits and its assemblies.
 
-    FILE.toml describes ground, links, slots, sliders, gears, input and guess. Without --only the table has a row
-    for each pose and link (what `dalembert work` reads); with --only or --forces a row for each pose. In a pipe
-    --check, --equilibrium, --flywheel, --counterweights and --newton give their own table in place of the poses.
+    FILE.toml describes ground, links, slots, sliders, gears, input and guess. The table has a row for each pose: its
+    input, every point and link, or those of --only; with --forces the forces. In a pipe --check, --equilibrium,
+    --flywheel, --counterweights and --newton give their own table in place of the poses.
     """
     from cli.mechanism.read import wanted
     from cli.mechanism.result import result_of, told
@@ -318,13 +318,15 @@ def run(
             refuse_long(q.n * (1 if several is None else several.count))
         alone = several is None and html is None and not spreads and own in ([], ["--forces"])
         if alone and show.streams and analysis.is_long:
-            return _long(analysis, forces, states)
+            return _long(analysis, forces, states, show.digits)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not show.json or show.expect is not None or show.output is not None
         times = 1 if several is None or show.streams else several.count
-        analysis.check_size(json=show.as_json, table=table or states is not None, forces=forces, times=times)
+        analysis.check_size(
+            json=show.as_json, table=table, states=states is not None, forces=forces, times=times
+        )
         if several is None:
-            result = result_of(analysis, request, states, explain, graph, about)
+            result = result_of(analysis, request, states, explain, graph, about, show.digits)
             if spreads:
                 its = Tolerances(analysis, forces, draws or 0, seed, distribution, workers or 1)
                 return with_tolerances(result, its)
@@ -353,7 +355,7 @@ def run(
         )
 
 
-def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
+def _long(analysis: Analysis, forces: bool, states: Path | None, digits: bool) -> Result:
     """The table of a long sweep, a block of poses at a time."""
     from cli.mechanism import columns
     from cli.mechanism.result import csv_parts, told
@@ -361,14 +363,14 @@ def _long(analysis: Analysis, forces: bool, states: Path | None) -> Result:
     from cli.mechanism.stream import Stream
     from cli.show.columns import Result
 
-    form = columns.forces if forces else link_states if analysis.only is None else columns.poses
+    form = columns.forces if forces else columns.poses
     stream = Stream(analysis, form, forces)
     every = Stream(replace(analysis, only=None), link_states)
     return Result(
         document=dict,
         tables={},
         blocks=lambda form: (form(table, i) for i, table in enumerate(stream.tables())),
-        beside={} if states is None else {states: lambda: csv_parts(every.tables())},
+        beside={} if states is None else {states: lambda: csv_parts(every.tables(), digits)},
         late_warnings=stream.warnings,
         failed=lambda: not stream.any_assembled,
         within=lambda: told(analysis.file),

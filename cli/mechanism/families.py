@@ -123,9 +123,13 @@ class Families:
     @cached_property
     def keys(self) -> list[Key]:
         """The quantities that the table is of."""
-        motion = cast("Motion", Flat(self.solver, {}))
-        self.analysis.motions = (motion,)
-        return list(dict.fromkeys(number.key for number in shown(self.analysis, self.forces)))
+        self.analysis.motions = (cast("Motion", Flat(self.solver, {})),)
+        asked = [number.key for number in shown(self.analysis, self.forces)]
+        if self.forces and self.analysis.only is not None:
+            # whether they are assembled is asked of the names alone
+            places = replace(self.analysis, order=0)
+            asked += [number.key for number in shown(places, False)]
+        return list(dict.fromkeys(asked))
 
     @property
     def pays(self) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -19,9 +18,9 @@ from cli.mechanism.tables import beside
 from cli.mechanism.variants import assigned, assignment, in_si, quantity
 from cli.read import options
 from cli.read.files import read_bytes
+from cli.read.units import read_degrees
 from cli.show.columns import Column, Result, Table
 from cli.show.picture import blank
-from dalembert.arithmetic.parts import Processes
 from virtualwork.describe.dimensions import Dimension, value
 from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.units import Units
@@ -80,7 +79,7 @@ def fitted(
     bounds = _bounds(m, asked.free or (), bare)
     aims = targets(m, asked.tables or (), names, weight, said)
     try:
-        with Processes(workers) if workers > 1 else nullcontext() as pool:
+        with options.processes(workers) as pool:
             found = m.fit(
                 aims,
                 free=bounds,
@@ -163,7 +162,7 @@ def _bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[
 
 
 def _shown(dimension: Dimension, si: float) -> float:
-    return math.degrees(si) if dimension.unit == "deg" else si
+    return read_degrees(si) if dimension.unit == "deg" else si
 
 
 def _parameters(found: Fit[Mechanism]) -> dict[str, float]:

@@ -21,6 +21,7 @@ from cli.show.columns import Result, Table
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from cli.show.columns import Document
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 METHOD = (
     "Motion under forces: the effort at the inputs by virtual work with d'Alembert's forces is M·q̈ + h; let go, it is "
     "zero, and q̈ is integrated in the inputs. Loops are closed at every evaluation. The error is estimated from a "
-    "second solution of another tolerance."
+    "second solution in steps half as long."
 )
 
 
@@ -213,15 +214,21 @@ class InTime:
 
     def result(self, about: dict[str, str]) -> Result:
         """The call in every form it can be shown in."""
-        from cli.mechanism.time_picture import draw
-
         a = self.analysis
+
+        def figure() -> Figure:
+            from cli.show.picture import blank
+
+            drawn = blank()
+            self.run.plot(drawn)
+            return drawn
+
         return Result(
             document=self.document,
             tables={"time": self.table},
             notes=lambda: a.mechanism.name,
             afterword=self.words,
-            figure=lambda: draw(self.run, a.mechanism),
+            figure=figure,
             method=METHOD,
             about={"title": a.mechanism.name or "Mechanism"} | about,
             warnings=[*a.warnings, *self.run.warnings],

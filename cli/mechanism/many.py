@@ -7,7 +7,7 @@ what is more than rows of poses or forces, one by one.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing, nullcontext
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,9 +19,10 @@ from cli.mechanism.asked import Asked, Said
 from cli.mechanism.families import Families
 from cli.mechanism.solve import Analysis
 from cli.mechanism.variants import Variants
+from cli.read.options import processes
 from cli.show.columns import Column, Result, Table, Written
 from cli.show.progress import progress
-from dalembert.arithmetic.parts import LostPart, Processes, in_parts
+from dalembert.arithmetic.parts import LostPart, in_parts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -137,17 +138,18 @@ class Many:
         count = self.variants.count
         starts = range(0, count, each)
         work = ((a + 1, self.variants.part(a, a + each)) for a in starts)
-        pool = Processes(self.workers) if self.workers > 1 and len(starts) > 1 else None
-        try:
-            with pool or nullcontext(), closing(in_parts(function, work, pool, 2 * self.workers)) as parts:
-                for found, said in progress(parts, count, "variants", each):
-                    self.said.join(said)
-                    yield found
-        except LostPart as lost:
-            first, last = (lost.number - 1) * each + 1, min(lost.number * each, count)
-            raise DataError(
-                f"variants {first} to {last}: the process that solved them died, and died again when it was done once more"
-            ) from None
+        workers = min(self.workers, len(starts))
+        with processes(workers) as pool:
+            try:
+                with closing(in_parts(function, work, pool, 2 * workers)) as parts:
+                    for found, said in progress(parts, count, "variants", each):
+                        self.said.join(said)
+                        yield found
+            except LostPart as lost:
+                first, last = (lost.number - 1) * each + 1, min(lost.number * each, count)
+                raise DataError(
+                    f"variants {first} to {last}: the process that solved them died, and died again when it was done once more"
+                ) from None
 
     def analyses(self) -> list[tuple[str, Analysis]]:
         """What is asked of each variant whose parts can be put together."""

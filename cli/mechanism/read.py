@@ -12,7 +12,7 @@ import numpy as np
 
 from cli.errors import DataError, nearest
 from cli.read import options
-from cli.read.units import UNITS, is_number, parse_number, parse_quantity, to_si
+from cli.read.units import UNITS, is_number, parse_number, parse_quantity, read_degrees, to_si
 from virtualwork.describe.units import scaled, unit
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def _home(m: Mechanism) -> list[float]:
 
 
 def _shown(m: Mechanism, j: int, value: float) -> float:
-    return value if m.inputs[j].is_slide else math.degrees(value)
+    return value if m.inputs[j].is_slide else read_degrees(value)
 
 
 def _inputs(m: Mechanism, shown: NDArray[np.float64]) -> Inputs:
@@ -157,14 +157,14 @@ def place_or_angle(text: str, kind: str, flag: str, bare: Mapping[str, str]) -> 
         if named in ("deg", "°"):
             return parse_number(text)
         si = scaled(text.strip(), factor[0] if factor else 1.0)
-        return si if kind == "length" else math.degrees(si)
+        return si if kind == "length" else read_degrees(si)
     try:
         value, given = parse_quantity(text, kind)
     except ValueError as error:
         raise options.bad(flag, error) from None
     if kind == "length":
         return float(to_si(value, "length", given))
-    return value if given == "deg" else math.degrees(value)
+    return value if given == "deg" else read_degrees(value)
 
 
 def _named(m: Mechanism, text: str, flag: str) -> dict[int, str]:

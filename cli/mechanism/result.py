@@ -29,6 +29,7 @@ def result_of(
     explain: bool,
     graph: str | None,
     about: dict[str, str],
+    digits: bool = False,
 ) -> Result:
     """What is asked of a mechanism, in every form it can be shown in."""
     studies = Studies(analysis, request)
@@ -40,9 +41,7 @@ def result_of(
         picture.check_names(analysis, graph)
 
     def of_poses() -> Table:
-        if request.forces:
-            return columns.forces(analysis)
-        return link_states(analysis) if analysis.only is None else columns.poses(analysis)
+        return columns.forces(analysis) if request.forces else columns.poses(analysis)
 
     def document() -> Document:
         listed = poses.document(analysis)
@@ -62,7 +61,7 @@ def result_of(
         # every link, whatever --only names
         every = replace(analysis, only=None)
         every.motions = analysis.motions
-        return csv_parts([link_states(every)])
+        return csv_parts([link_states(every)], digits)
 
     own = columns.studies(studies)
     # the table of a study asked for alone stands in place of the poses
@@ -72,6 +71,7 @@ def result_of(
         document=document,
         tables=tables,
         screen=of_poses if alone else None,
+        expected=(lambda: columns.poses(analysis), lambda: link_states(analysis)),
         notes=lambda: analysis.mechanism.name,
         afterword=lambda: words.afterword(studies, explain=explain),
         figure=figure,
@@ -96,9 +96,11 @@ def told(file: str) -> Iterator[None]:
         raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
 
 
-def csv_parts(tables: Iterable[Table]) -> Iterator[bytes]:
-    """Tables that are one, as CSV."""
+def csv_parts(tables: Iterable[Table], digits: bool) -> Iterator[bytes]:
+    """Tables that are one, as CSV; only the digits that hold, if wanted."""
+    from cli.show.digits import digits_that_hold
     from cli.show.text import csv_text
 
-    for i, table in enumerate(tables):
+    for i, whole in enumerate(tables):
+        table = digits_that_hold(whole)[0] if digits else whole
         yield csv_text(table.cells, header=i == 0).encode()

@@ -178,18 +178,17 @@ class Analysis:
                     f"{self.file}: --only: no link or point is named '{name}'{nearest(name, known)}"
                 )
 
-    def bytes_each(self, *, json: bool, table: bool, forces: bool) -> float:
+    def bytes_each(self, *, json: bool, table: bool, states: bool, forces: bool) -> float:
         """What the answer for one pose takes at most, as measured."""
         rates = self.order + 1
         numbers = rates * (len(self.links) + 2 * len(self.points) + len(self.slides))
         if forces:
             numbers += 5 + 6 * len(self.points)
-        wide = self.only is not None or forces
-        return 300 + 110 * numbers * json + table * (100 * numbers if wide else 1200 * len(self.links))
+        return 300 + 110 * numbers * json + 100 * numbers * table + 1200 * len(self.mechanism.links) * states
 
-    def check_size(self, *, json: bool, table: bool, forces: bool, times: int = 1) -> None:
+    def check_size(self, *, json: bool, table: bool, states: bool, forces: bool, times: int = 1) -> None:
         """Refuse what would take more memory than there is, before it is begun; `times` so many variants."""
-        each = self.bytes_each(json=json, table=table, forces=forces) * len(self.assemblies)
+        each = self.bytes_each(json=json, table=table, states=states, forces=forces) * len(self.assemblies)
         poses, room = self.inputs.n * times, memory()
         if poses * each > room:
             raise DataError(

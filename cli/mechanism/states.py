@@ -225,5 +225,7 @@ def _guided(motion: Motion, guide: int, link: str) -> NDArray[np.float64]:
         return motion.at(link, g.point).error_estimate(1)
     slide, omega = np.abs(motion.poses.slide_derivative(guide, 0)), np.abs(motion.link(link).omega)
     carried = motion.at(link, m.through(g)).error_estimate(1)
-    turned = slide * (r.angle(link, 1) + omega * r.rotation(link)) + omega * r.slide(guide)
+    turned = slide * (r.of(("angle", link, 1)) + omega * r.of(("turn", link))) + omega * r.of(
+        ("slide", guide, 0)
+    )
     return np.asarray(carried + turned)

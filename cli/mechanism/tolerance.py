@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -14,8 +13,8 @@ from cli.mechanism import columns
 from cli.mechanism.forces import effort_name, rows_of
 from cli.mechanism.poses import LINK, POINT, SLIDE, cells
 from cli.mechanism.solve import Analysis
+from cli.read.options import processes
 from cli.show.columns import Column, Table
-from dalembert.arithmetic.parts import Processes
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, spread, summary
 from virtualwork.formulas.asked import Key
@@ -160,7 +159,7 @@ class Tolerances:
         parts: dict[str, list[Drawn]] = {number.header: [] for number in self.numbers}
         whole = np.ones(self.draws, dtype=bool)
         rates = q.speed, q.acceleration
-        with Processes(self.workers) if self.workers > 1 else nullcontext() as pool:
+        with processes(self.workers) as pool:
             for rows, values, assembled in drawn(m, numbers, motion.inputs, rates, self.keys, pool):
                 whole &= assembled.all(axis=1)
                 found = dict(zip(self.keys, values, strict=True))

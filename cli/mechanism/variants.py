@@ -12,7 +12,7 @@ import numpy as np
 from cli.errors import DataError
 from cli.mechanism.read import MOST, place_or_angle
 from cli.read import options
-from cli.read.units import UNITS, is_number, to_si
+from cli.read.units import UNITS, is_number, read_degrees, to_si
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, named
 from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.units import Units
@@ -142,7 +142,7 @@ def quantity(dimension: Dimension, text: str, flag: str, bare: Mapping[str, str]
         si = Units({}).number(text.strip(), dimension.kind, dimension.path)
     except DescriptionError as error:
         raise options.bad(flag, error) from None
-    return math.degrees(si) if dimension.unit == "deg" else si
+    return read_degrees(si) if dimension.unit == "deg" else si
 
 
 def cli_dimension(of: Dimension) -> str:

@@ -12,6 +12,7 @@ from cli.errors import DataError
 LOOKED_AT = 20
 
 LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
+_CONTROLS = bytes([*range(9), *range(14, 32), 127])
 _QUOTED = re.compile(r'"[^"]*"')
 
 
@@ -31,7 +32,8 @@ def decoded(file: str, data: bytes, warnings: list[str]) -> str:
         except UnicodeDecodeError:
             raise DataError(f"{file}: this is not text: expected CSV in UTF-8") from None
         codec = "cp1252"
-    if re.search(r"[\0-\x08\x0e-\x1f\x7f]", text):
+    raw = text.encode()
+    if len(raw.translate(None, _CONTROLS)) != len(raw):
         raise DataError(f"{file}: this is not text (control characters): expected CSV in UTF-8")
     if codec != "utf-8-sig":
         warnings.append(

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import typer
 
+from cli.errors import DataError
 from cli.read.units import SMALLEST, UNITS, parse_number, parse_quantity, to_si
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 STATES = 250_000  # what a gigabyte holds, integrated and shown
 PLACES = 10_000  # holes or blades on one rotor
@@ -170,3 +176,19 @@ def grid(
     if steps > most:
         raise bad(flag, f"'{text}': {steps:.3g} {what}: expected at most {most}")
     return [start + (stop - start) * i / steps for i in range(steps + 1)]
+
+
+@contextmanager
+def processes(workers: int) -> Iterator[Executor | None]:
+    """So many worker processes, for `with`; None for one."""
+    if workers < 2:
+        yield None
+        return
+    from dalembert.arithmetic.parts import LostPart
+    from dalembert.arithmetic.processes import Processes
+
+    try:
+        with Processes(workers) as pool:
+            yield pool
+    except LostPart as lost:
+        raise DataError(str(lost)) from None

@@ -18,7 +18,7 @@ import numpy as np
 
 from cli.errors import DataError, quote
 from cli.read.headers import Heading, find_columns, offers, spellings
-from cli.read.sources import LARGE, Source, open_source
+from cli.read.sources import Source, open_source
 from cli.read.units import LARGEST, parse_number
 
 if TYPE_CHECKING:
@@ -48,16 +48,21 @@ class Cells:
         """Read a number out of a cell; ValueError where it is none, or has not the decimal mark of the file."""
         return parse_number(_pointed(text) if self.decimal_comma else text)
 
-    def numbers(self, texts: list[str]) -> NDArray[np.float64] | None:
-        """Read numbers out of many cells at once; None where one is none, or has to be looked at by itself."""
-        together = "".join(texts)
-        if self.decimal_comma or not together.isascii() or "_" in together:
+    @cached_property
+    def parsed(self) -> NDArray[np.float64] | None:
+        """The numbers of all cells, NaN where one is blank; None where one is none, or has to be looked at by itself."""
+        together = "\0".join(self.values)
+        if not together.isascii() or "_" in together:
             return None
+        texts = self.values
+        if self.decimal_comma:
+            if "." in together:
+                return None
+            texts = together.replace(",", ".").split("\0")
         try:
-            values = np.fromiter(map(float, texts), float, len(texts))
+            return np.fromiter((float(text or "nan") for text in texts), float, len(texts))
         except ValueError:
             return None
-        return values if (np.abs(values) <= LARGEST).all() else None
 
 
 @dataclass(eq=False)
@@ -75,6 +80,17 @@ class Table:
     told: str = ""
     """What is said of the file where a column is missed: its header, and which columns may be meant."""
     _source: Source | None = None
+    _numbered: dict[str, tuple[list[str], NDArray[np.intp]]] = field(default_factory=dict)
+
+    def numbered(self, name: str, otherwise: str = "") -> tuple[list[str], NDArray[np.intp]]:
+        """Number the texts of a column in the order in which they first stand; without the column all are `otherwise`."""
+        if name not in self.texts:
+            return [otherwise], np.zeros(self.rows, dtype=np.intp)
+        if name not in self._numbered:
+            first: dict[str, int] = {}
+            codes = [first.setdefault(text, len(first)) for text in self.texts[name]]
+            self._numbered[name] = list(first), np.array(codes, dtype=np.intp)
+        return self._numbered[name]
 
     @cached_property
     def _written(self) -> list[list[str]]:
@@ -271,16 +287,16 @@ def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
             names=range(len(source.header)),
             index_col=False,
             dtype={
-                index: float
-                if kind == "number" and not may_be_blank
-                else "category"
-                if kind == "text"
-                else str
-                for _, index, _, kind, may_be_blank in plan
+                index: float if kind == "number" and not marker else "category" if kind == "text" else object
+                for _, index, _, kind, _ in plan
             },
             usecols=[index for _, index, *_ in plan] if plan else None,
             keep_default_na=False,
-            na_filter=False,
+            na_values={
+                index: [""]
+                for _, index, _, kind, may_be_blank in plan
+                if kind == "number" and may_be_blank and not marker
+            },
             decimal=decimal,
             engine="c",
             **exact,
@@ -300,49 +316,43 @@ def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
     rows = len(frame)
     marks: dict[tuple[int, str], str] = {}
     for name, index, unit, kind, may_be_blank in plan:
-        if kind == "number" and not may_be_blank:
+        if kind == "number" and not marker:
             values = frame[index].to_numpy()
+            empty = np.isnan(values)
         elif kind == "number":
             text = frame[index].to_numpy(dtype=object)
-            empty = text == ""
-            if marker:
-                marked = frame[index].str.startswith(marker).to_numpy(dtype=bool)
-                marks |= {(int(row), name): text[row].strip() for row in np.flatnonzero(marked)}
-                if source.has_commas([text[marked]]):
-                    return False
-                empty |= marked
+            marked = frame[index].str.startswith(marker).to_numpy(dtype=bool)
+            marks |= {(int(row), name): text[row].strip() for row in np.flatnonzero(marked)}
+            if source.has_commas([text[marked]]):
+                return False
+            empty = (text == "") | marked
             try:
-                values = np.where(empty, "0", text).astype(float)
+                values = np.where(empty, "nan", text).astype(float)
             except ValueError:
                 return False
         elif kind == "text":
             column = frame[index].cat
-            named = np.array([str(category).strip() for category in column.categories], dtype=object)
-            table.texts[name] = named[column.codes].tolist()
+            # two that differ in blanks are one
+            stripped = [str(category).strip() for category in column.categories]
+            codes = column.codes.to_numpy().astype(np.intp)
+            first = np.zeros(len(stripped), dtype=np.intp)
+            first[codes[::-1]] = np.arange(rows)[::-1]
+            unique: dict[str, int] = {}
+            of_code = np.zeros(len(stripped), dtype=np.intp)
+            for k in np.argsort(first, kind="stable").tolist():
+                of_code[k] = unique.setdefault(stripped[k], len(unique))
+            table.texts[name] = np.array(stripped, dtype=object)[codes].tolist()
+            table._numbered[name] = list(unique), of_code[codes]
             continue
         else:
-            cells = frame[index].str.strip().tolist()
+            cells = [cell.strip() for cell in frame[index].tolist()]
             if source.has_commas([cells]) and not decimal_comma:
                 return False
             table.cells[name] = Cells(source.header[index], unit, cells, decimal_comma)
             continue
-        if not (np.abs(values) <= LARGEST).all():
+        if not ((np.abs(values) <= LARGEST) | (empty & may_be_blank)).all():
             return False
-        if may_be_blank:
-            values[empty] = np.nan
         table.numbers[name] = Numbers(source.header[index], unit, values)
     table.rows = rows
     table.marks.update(marks)
     return True
-
-
-def number_names(names: list[str]) -> tuple[list[str], NDArray[np.intp]]:
-    """Number names in the order in which they first stand."""
-    if len(names) >= LARGE:
-        import pandas as pd
-
-        codes, unique = pd.factorize(np.array(names, dtype=object))
-        return unique.tolist(), codes.astype(np.intp)
-    first: dict[str, int] = {}
-    codes = np.array([first.setdefault(name, len(first)) for name in names], dtype=np.intp)
-    return list(first), codes

@@ -281,6 +281,17 @@ def phasor(magnitude: NDArray[np.float64], angle: NDArray[np.float64], unit: str
     return z
 
 
+def read_degrees(angle: float) -> float:
+    """Return an angle that was read, rad, in degrees: one that was written in degrees comes out as it was written.
+
+    >>> math.degrees(math.radians(60.0)), read_degrees(math.radians(60.0))
+    (59.99999999999999, 60.0)
+    """
+    shown = math.degrees(angle)
+    short = float(f"{shown:.15g}")
+    return short if abs(math.radians(short) - angle) <= math.ulp(angle) else shown
+
+
 @overload
 def degrees(z: NDArray[np.complex128]) -> NDArray[np.float64]: ...
 @overload

@@ -91,6 +91,8 @@ class Result:
     """Which further tables go beside a file that holds one table, as FILE-name.csv."""
     screen: Callable[[], Table] | None = None
     """The terminal's table, where another layout reads better than that of the CSV."""
+    expected: Sequence[Callable[[], Table]] = ()
+    """Further tables whose columns a file of expected values may have."""
     notes: Callable[[], str] = lambda: ""
     """What the terminal shows above the table."""
     afterword: Callable[[], str] = lambda: ""

@@ -16,7 +16,7 @@ from cli.read.tables import read
 from cli.read.units import column_dimensions, parse_number
 
 if TYPE_CHECKING:
-    from cli.show.columns import Cell, Values
+    from cli.show.columns import Cell, Table, Values
 
     Columns = Mapping[str, Values]
 
@@ -30,21 +30,16 @@ class Comparison:
     passed: bool
 
 
-def compare(
-    columns: Columns,
-    keys: Sequence[str],
-    file: str,
-    rtol: float,
-    other: Callable[[], Columns] | None = None,
-) -> Comparison:
+def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], Table]] = ()) -> Comparison:
     """Compare a result with a file of expected values, cell by cell.
 
     Rows are matched by the key columns that the file has, else by their order. A number holds where its
     relative error is at most `rtol`, an angle where it is off by at most `rtol` radians, modulo a turn; an
     expected zero is measured against the largest value in its column. Empty cells expect nothing. An input is a
-    key where no `step` is given: its row is the nearest within `rtol`. `other` is the result's other table, for a
-    file with columns of that one.
+    key where no `step` is given: its row is the nearest within `rtol`. `others` are the result's further tables, for
+    a file with columns of one of them.
     """
+    columns = table.cells
     expected = read(file, texts=None)
     spelled = {name.lower(): name for name in columns}
     expected.texts = {
@@ -52,8 +47,10 @@ def compare(
         for name, cells in expected.texts.items()
     }
     header = list(expected.texts)
-    if other is not None and not columns.keys() >= set(header) and (table := other()).keys() >= set(header):
-        columns = table
+    if not columns.keys() >= set(header):
+        table = next((it for other in others if (it := other()).cells.keys() >= set(header)), table)
+        columns = table.cells
+    keys = table.keys
     for name in header:
         if name not in columns:
             raise DataError(

@@ -46,6 +46,12 @@ def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
     return check
 
 
+def _tolerance(value: float) -> float:
+    if not 0 <= value < float("inf"):
+        raise typer.BadParameter(f"{value}: expected a number from 0 on, such as 1e-6")
+    return value
+
+
 # each method that dataclass makes costs a tenth of a millisecond at every start
 @dataclass(eq=False, repr=False)
 class ShowOptions:
@@ -84,7 +90,10 @@ class ShowOptions:
     rtol: Annotated[
         float,
         typer.Option(
-            "--rtol", metavar="NUMBER", min=0.0, help="Relative tolerance of --expect (for angles: radians)."
+            "--rtol",
+            metavar="NUMBER",
+            help="Relative tolerance of --expect (for angles: radians).",
+            callback=_tolerance,
         ),
     ] = 1e-3
     text: Annotated[bool, typer.Option("--text", help="Print the aligned table even into a pipe.")] = False
@@ -160,7 +169,17 @@ def command(find: Callable[..., Result]) -> Callable[..., None]:
 
     Where the function has a parameter `show`, it is given them.
     """
+    return with_options(find, None, show)
+
+
+def with_options(
+    find: Callable[..., Result],
+    chosen: Sequence[str] | None,
+    hand_on: Callable[[Result, ShowOptions, Mapping[str, str]], None],
+) -> Callable[..., None]:
+    """Make a command that takes these of the shared options too, None for all, and hands on what it has found."""
     own, shared = (_parameters(of) for of in (find, ShowOptions))
+    shared = {name: p for name, p in shared.items() if chosen is None or name in chosen}
 
     @wraps(find)
     def run(**given: object) -> None:
@@ -179,7 +198,7 @@ def command(find: Callable[..., Result]) -> Callable[..., None]:
             given["show"] = options
         result = find(**given)
         with result.within():
-            show(result, options, asked)
+            hand_on(result, options, asked)
 
     parameters = [*(p for name, p in own.items() if name != "show"), *shared.values()]
     run.__signature__ = signature(find).replace(parameters=parameters, return_annotation=None)  # type: ignore[attr-defined]
@@ -219,7 +238,6 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         raise typer.BadParameter(
             f"'{options.output}' has no known suffix: expected {', '.join(FORMS)}", param_hint="-o"
         )
-    files = named()
     if result.blocks is not None:
         check_renamed()
         _stream(result, options)
@@ -230,16 +248,14 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
     if options.expect is not None:
         from cli.show.expect import compare
 
-        table = first()
-        screen = result.screen
-        other = None if screen is None else lambda: screen().cells
-        checked = compare(table.cells, table.keys, str(options.expect), options.rtol, other)
+        further = [*([] if result.screen is None else [result.screen]), *result.expected]
+        checked = compare(first(), str(options.expect), options.rtol, further)
         verdict = f"{table_text(checked.columns)}\n{checked.summary}"
     check_renamed()
     if options.digits:
         result, cut = _with_digits_that_hold(result, first)
         first = cache(lambda: cut)
-    pages = _report_files(result, options, asked, files, checked)
+    pages = reported(result, options, asked, checked)
     tables = _tables_beside(result, options)
     refuse_inputs(
         [path for path in (output, options.plot, *result.beside, *pages, *tables) if path is not None]
@@ -296,6 +312,18 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         raise typer.Exit(1)
 
 
+def reported(
+    result: Result, options: ShowOptions, asked: Mapping[str, str], checked: Comparison | None = None
+) -> dict[Path, bytes]:
+    """Return the files of --report."""
+    if options.report is None:
+        return {}
+    from cli.show.report_forms import pages
+
+    read = named()
+    return pages(options.report, result, options.head, asked, read, options.units, options.digits, checked)
+
+
 def _tables_beside(result: Result, options: ShowOptions) -> dict[Path, Callable[[], Table]]:
     """Return the tables that go beside a file of one table, each in a file of its own."""
     output = options.output
@@ -305,38 +333,6 @@ def _tables_beside(result: Result, options: ShowOptions) -> dict[Path, Callable[
         output.with_name(f"{output.stem}-{name}{output.suffix}"): result.tables[name]
         for name in result.companions
     }
-
-
-def _report_files(
-    result: Result,
-    options: ShowOptions,
-    asked: Mapping[str, str],
-    files: Sequence[str],
-    checked: Comparison | None,
-) -> dict[Path, bytes]:
-    """Return the files of --report."""
-    if options.report is None:
-        return {}
-    from cli.show.columns import Column, Section, Table
-    from cli.show.report import report
-    from cli.show.report_forms import formed
-
-    def finish(table: Table) -> Table:
-        if options.units is not None:
-            from cli.show.in_units import chosen_units, in_units
-
-            table = in_units(table, chosen_units(options.units))
-        if options.digits:
-            from cli.show.digits import digits_that_hold
-
-            table, _ = digits_that_hold(table)
-        return table
-
-    check = None
-    if checked is not None:
-        compared = Table([Column(name, "", values) for name, values in checked.columns.items()])
-        check = Section("Compared with what was expected", [compared, checked.summary])
-    return formed(options.report, report(result, options.head, asked, files, finish, check))
 
 
 def _in_chosen_units(result: Result, units: str | None) -> Result:
@@ -354,6 +350,7 @@ def _in_chosen_units(result: Result, units: str | None) -> Result:
         result,
         tables={name: of(table) for name, table in result.tables.items()},
         screen=None if result.screen is None else of(result.screen),
+        expected=[of(table) for table in result.expected],
     )
 
 

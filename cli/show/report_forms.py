@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cli.errors import DataError
+from cli.show.columns import Column, Section, Table
 from cli.show.handed_on import markdown
 from cli.show.picture import drawn
-from cli.show.report import CODE, Grid, Page, Part, Report
+from cli.show.report import CODE, Grid, Page, Part, Report, report
 from cli.show.text import BAD, GOOD
+
+if TYPE_CHECKING:
+    from cli.show.columns import Result
+    from cli.show.expect import Comparison
 
 _STYLE = """
 :root { color-scheme: light }
@@ -33,6 +39,36 @@ section + section { break-before: page }
 """
 _MARKS = {**dict.fromkeys(GOOD, "good"), **dict.fromkeys(BAD, "bad")}
 _NO_PICTURE = "(No picture: matplotlib is not installed.)"
+
+
+def pages(
+    path: Path,
+    result: Result,
+    head: Mapping[str, str],
+    asked: Mapping[str, str],
+    files: Sequence[str],
+    units: str | None = None,
+    digits: bool = False,
+    checked: Comparison | None = None,
+) -> dict[Path, bytes]:
+    """Return the files of a result's report; `files` were read, `units` and `digits` are those of the tables."""
+
+    def finish(table: Table) -> Table:
+        if units is not None:
+            from cli.show.in_units import chosen_units, in_units
+
+            table = in_units(table, chosen_units(units))
+        if digits:
+            from cli.show.digits import digits_that_hold
+
+            table, _ = digits_that_hold(table)
+        return table
+
+    check = None
+    if checked is not None:
+        compared = Table([Column(name, "", values) for name, values in checked.columns.items()])
+        check = Section("Compared with what was expected", [compared, checked.summary])
+    return formed(path, report(result, head, asked, files, finish, check))
 
 
 def formed(path: Path, report: Report) -> dict[Path, bytes]:

@@ -63,6 +63,8 @@ class Loop:
         Its inputs that a call does not give are those of the same name of the lane.
     kept : names of states
         Written down after every round.
+    fed : names, optional
+        Inputs of the body of which every round has its own.
 
     Examples
     --------
@@ -83,6 +85,7 @@ class Loop:
     body: Tape
     inner: Tape
     kept: tuple[str, ...]
+    fed: tuple[str, ...] = ()
 
     @cached_property
     def states(self) -> tuple[str, ...]:
@@ -97,7 +100,11 @@ class Loop:
     @cached_property
     def constants(self) -> tuple[str, ...]:
         """What a lane is given once."""
-        own = [name for name in self.body.inputs if called(name) is None and name not in self.states]
+        own = [
+            name
+            for name in self.body.inputs
+            if called(name) is None and name not in (*self.states, *self.fed)
+        ]
         return tuple(dict.fromkeys([*own, *(name for name in self.inner.inputs if name not in self.passed)]))
 
     @cached_property
@@ -110,7 +117,7 @@ class Loop:
     def whole(self) -> Tape:
         """The body with what it calls written out, for engines that know no calls."""
         recorder = Recorder()
-        given = {name: recorder.input(name) for name in (*self.states, *self.constants)}
+        given = {name: recorder.input(name) for name in (*self.states, *self.fed, *self.constants)}
         places = dict(self.body.outputs)
         found: dict[int, Mapping[str, Number]] = {}
         values: list[Number] = []

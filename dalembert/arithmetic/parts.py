@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
-from multiprocessing import get_context
-from types import TracebackType
-from typing import Any, TypeVar
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
 
 R = TypeVar("R")
 # parts that are on their way at a time
@@ -67,21 +68,62 @@ def in_parts(
     if executor is None:
         yield from (function(*part) for part in parts)
         return
-    waiting: deque[tuple[int, tuple[Any, ...], Future[R]]] = deque()
+    calls = partial(_answered, function)
+    waiting: deque[tuple[int, tuple[Any, ...], Future[R | _Raised]]] = deque()
     try:
         for number, part in enumerate(parts, 1):
-            waiting.append((number, part, executor.submit(function, *part)))
+            waiting.append((number, part, executor.submit(calls, *part)))
             if len(waiting) >= ahead:
-                yield _result(executor, function, *waiting.popleft())
+                yield _result(executor, calls, *waiting.popleft())
         while waiting:
-            yield _result(executor, function, *waiting.popleft())
+            yield _result(executor, calls, *waiting.popleft())
     finally:
         for _, _, future in waiting:
             future.cancel()
 
 
+class _Raised:
+    """An error of the work itself: it comes back whole, whatever its class asks for to be made."""
+
+    def __init__(self, error: Exception) -> None:
+        self.kind, self.args = type(error), error.args
+        self.more: tuple[Any, ...] = tuple(error.__reduce__()[2:])
+
+    def again(self) -> Exception:
+        """The error."""
+        error = self.kind.__new__(self.kind, *self.args)
+        error.args = self.args
+        for state in self.more:
+            error.__setstate__(state)
+        return error
+
+
+def _answered(function: Callable[..., R], *part: Any) -> R | _Raised:
+    try:
+        return function(*part)
+    except Exception as error:
+        return _Raised(error)
+
+
 def _result(
-    executor: Executor, function: Callable[..., R], number: int, part: tuple[Any, ...], future: Future[R]
+    executor: Executor,
+    calls: Callable[..., R | _Raised],
+    number: int,
+    part: tuple[Any, ...],
+    future: Future[R | _Raised],
+) -> R:
+    found = _sent(executor, calls, number, part, future)
+    if isinstance(found, _Raised):
+        raise found.again()
+    return found
+
+
+def _sent(
+    executor: Executor,
+    calls: Callable[..., R],
+    number: int,
+    part: tuple[Any, ...],
+    future: Future[R],
 ) -> R:
     try:
         return future.result()
@@ -89,7 +131,7 @@ def _result(
         if not _lost(error):
             raise
     try:
-        return executor.submit(function, *part).result()
+        return executor.submit(calls, *part).result()
     except Exception as error:
         if not _lost(error):
             raise
@@ -98,54 +140,9 @@ def _result(
 
 def _lost(error: Exception) -> bool:
     """Whether it is the worker that failed; those of a cluster have exceptions of their own."""
+    from concurrent.futures import BrokenExecutor, CancelledError
+
     return isinstance(error, (BrokenExecutor, CancelledError, ConnectionError)) or type(error).__name__ in (
         "KilledWorker",
         "WorkerCrashedError",
     )
-
-
-class Processes(Executor):
-    """Worker processes on this machine: when one dies, new ones take over.
-
-    Parameters
-    ----------
-    workers : int
-    """
-
-    def __init__(self, workers: int) -> None:
-        self.workers = workers
-        self._pool = self._new()
-
-    def _new(self) -> ProcessPoolExecutor:
-        # each starts afresh: a copy of this process would copy what its threads hold
-        return ProcessPoolExecutor(self.workers, get_context("spawn"), initializer=_ignore_interrupts)
-
-    def submit(self, fn: Callable[..., R], /, *args: Any, **kwargs: Any) -> Future[R]:
-        """Send a call to a worker."""
-        try:
-            return self._pool.submit(fn, *args, **kwargs)
-        except BrokenExecutor:
-            self._pool = self._new()
-            return self._pool.submit(fn, *args, **kwargs)
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Let the workers go."""
-        self._pool.shutdown(wait, cancel_futures=cancel_futures)
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> bool | None:
-        if kind is None:
-            self.shutdown()
-            return None
-        # whatever stopped the work, Ctrl-C too: what is begun is let finish, for a worker that is killed while it is sent
-        # something leaves its sender waiting, and nothing else is begun
-        self.shutdown(cancel_futures=True)
-        return None
-
-
-def _ignore_interrupts() -> None:
-    """Ctrl-C is for the process that asked."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -105,7 +105,18 @@ class Real:
     @property
     def settled(self) -> int:
         """The number of the operation that has the value itself, sign and all."""
-        return self.recorder.node("neg", self.number) if self.negative else self.number
+        if not self.negative:
+            return self.number
+        # −(a − b) = b − a, and a constant factor has its sign for nothing
+        kind, *of = self.recorder._operations[self.number]
+        if kind == "sub":
+            return self.recorder.node("sub", of[1], of[0])
+        if kind == "mul":
+            for factor, other in (of, of[::-1]):
+                which, *value = self.recorder._operations[factor]
+                if which == "const":
+                    return self.recorder.node("mul", self.recorder.node("const", -value[0]), other)
+        return self.recorder.node("neg", self.number)
 
     @property
     def real(self) -> Real:
@@ -335,6 +346,13 @@ class Recorded:
         if a.number == b.number and a.negative == b.negative:
             return positive
         return Real(recorder, recorder.node("select", test.settled, a.settled, b.settled))
+
+    @staticmethod
+    def unsigned(x: Number) -> Number:
+        """The number itself, its zero without a sign: what is recorded has the sign of a zero anyhow."""
+        if not isinstance(x, Real):
+            return x + 0.0
+        return Real(x.recorder, x.recorder.node("add", x.settled, lifted(x.recorder, 0.0).number))
 
     @staticmethod
     def join(real: Number, imag: Number) -> Number:

@@ -26,6 +26,8 @@ DASHES: tuple[tuple[float, ...], ...] = (
     (3, 1.2),
     (8, 1.5, 1.3, 1.5, 1.3, 1.5),
 )
+LONGEST = 28
+"""So many characters the names of three and more equal curves may have."""
 EQUAL = 1e-9
 """Curves that differ nowhere by more, of the largest value of all, are one."""
 
@@ -80,7 +82,7 @@ def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, sc
         if dash:
             line.set_dashes(dash)
         good = np.flatnonzero(np.isfinite(values))
-        text = " = ".join(name for name in names if name)
+        text = _equal_ones([name for name in names if name])
         if text and len(good):
             ends.append(_end(axes, text, x[good[-1]], values[good[-1]] * factor, color, dash))
     axes.set_ylabel(", ".join(filter(None, (what, unit))))
@@ -93,6 +95,16 @@ def panel(axes: Axes, x: Real, curves: Sequence[Curve], what: str, unit: str, sc
     else:
         axes.set_ylim(low, high)
     return Ends(axes, ends)
+
+
+def _equal_ones(names: Sequence[str]) -> str:
+    """Say that curves are equal, as many of them by name as have room.
+
+    >>> _equal_ones(["A", "B"]), _equal_ones(["O (pin on arm 1)", "O (pin on arm 2)", "C", "D"])
+    ('A = B', 'O (pin on arm 1) = 3 others')
+    """
+    text = " = ".join(names)
+    return text if len(names) < 3 or len(text) <= LONGEST else f"{names[0]} = {len(names) - 1} others"
 
 
 def _equal(a: Real, b: Real, largest: float) -> bool:

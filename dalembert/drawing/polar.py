@@ -17,6 +17,10 @@ SHORT = 0.03
 """A vector shorter than this share of the dial is a dot."""
 
 
+ROOM = 1.3
+"""How far a dial reaches beyond its longest vector: for a name at the tip."""
+
+
 class Look(NamedTuple):
     """How vectors of a kind look: told apart by colour, by dash and by width."""
 
@@ -39,7 +43,7 @@ class Vector(NamedTuple):
     name: str = ""
 
 
-def dial(axes: PolarAxes, title: str, vectors: Sequence[Vector], room: float = 1.12) -> list[Label]:
+def dial(axes: PolarAxes, title: str, vectors: Sequence[Vector], room: float = ROOM) -> list[Label]:
     """Draw vectors on polar axes, in the order given, and return the labels of their tips, to be placed."""
     from matplotlib.ticker import MaxNLocator, ScalarFormatter
 

@@ -80,7 +80,7 @@ def errors_and_bounds(tape: Tape, given: dict[str, np.ndarray], engine: str) -> 
             exact = tape.on({k: mpmath.mpf(float(x[lane])) for k, x in given.items()}, Digits())  # type: ignore[arg-type]
             for row, name in enumerate(tape.names):
                 errors[row, lane] = abs(mpmath.mpf(float(values.table[row][lane])) - exact[name])
-    return errors, np.asarray(bounds.table)
+    return errors, np.array([bounds[f"error({name})"] for name in tape.names])
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -67,6 +67,26 @@ def test_engines_agree_for_any_count_of_lanes(n: int, uniform: str) -> None:
             np.testing.assert_allclose(table, tables[0], rtol=1e-12, atol=1e-14)
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_parts_of_a_complex_number_lie_one_beside_the_other(engine: str) -> None:
+    recorder = Recorder()
+    q, r = recorder.input("q"), recorder.input("r")
+    x, y = r * RECORDED.cos(q), r * RECORDED.sin(q)
+    tape = recorder.tape({"sum": x + y, "x": x, "y": y, "size": r, "dx": -y, "dy": x})
+    for n in (1, 3, 8, 1030, 20_000):
+        inputs = {"q": np.linspace(0, 7, n), "r": 2.0}
+        plain = run(tape, inputs, engine)
+        found = run(tape, inputs, engine, pairs=("x", "dx"))
+        for name in tape.names:
+            np.testing.assert_array_equal(found[name], plain[name])
+        for pair in (("x", "y"), ("dx", "dy")):
+            z = found.complex(*pair)
+            assert z.dtype == complex
+            assert np.shares_memory(z, found[pair[0]])
+            np.testing.assert_array_equal(z, plain.complex(*pair))
+            assert not np.shares_memory(plain.complex(*pair), plain[pair[0]])
+
+
 def test_one_lane_of_floats_is_pythons_own_arithmetic() -> None:
     tape = random_tape(5)
     assert (

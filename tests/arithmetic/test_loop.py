@@ -69,6 +69,24 @@ def test_the_body_on_floats_calls_a_function() -> None:
     assert left > 0
 
 
+@pytest.mark.parametrize("engine", ["numpy", "llvm"])
+def test_every_round_is_fed_its_own(engine: str) -> None:
+    """Horner's rule in three lanes: a round for each coefficient."""
+    if engine == "llvm":
+        pytest.importorskip("llvmlite")
+    inner, outer = Recorder(), Recorder()
+    product = inner.tape({"y": inner.input("p") * inner.input("x")})
+    calls = Calls(outer, ["p"], ["y"])
+    (y,) = calls({"p": outer.input("p")})
+    body = outer.tape({"p": y + outer.input("c"), "left": outer.input("left")} | calls.outputs)
+    rows = np.array([[1.0, 2.0, 0.5], [0.0, -1.0, 2.0], [3.0, 4.0, -5.0]])
+    x = np.array([2.0, 3.0, -1.0])
+    state, _ = rounds.run(
+        Loop(body, product, ("p",), ("c",)), {"x": x}, {"p": 0.0, "left": 1.0}, 3, engine, {"c": rows}
+    )
+    assert (state["p"] == rows[0] * x**2 + rows[1] * x + rows[2]).all()
+
+
 def test_what_is_called_is_counted_and_written_out() -> None:
     loop = newton()
     assert loop.cost == loop.body.cost + loop.inner.cost

@@ -131,3 +131,13 @@ def test_functions_of_plain_numbers_are_pythons() -> None:
     assert RECORDED.atan2(1.0, -1.0) == math.atan2(1.0, -1.0)
     assert isinstance(RECORDED.join(1.0, 2.0), complex)
     assert isinstance(Recorder().input("x") * 2, Real)
+
+
+def test_a_minus_costs_nothing_where_the_difference_turns_round_or_a_constant_takes_it() -> None:
+    recorder = Recorder()
+    a, b = recorder.input("a"), recorder.input("b")
+    tape = recorder.tape({"difference": -(a - b), "product": -(3.0 * a), "both": -(a * b)})
+    done = sorted(kind for kind, *_ in tape.operations if kind not in ("input", "const"))
+    assert done == ["mul", "mul", "neg", "sub"]
+    found = tape.on({"a": 2.0, "b": 7.0}, RECORDED)
+    assert found == {"difference": 5.0, "product": -6.0, "both": -14.0}

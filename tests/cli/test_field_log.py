@@ -191,6 +191,28 @@ def standard(masses: Sequence[complex], error: Sequence[complex], sensors: int =
     return "".join(lines)
 
 
+def test_a_state_that_was_not_read_may_be_a_row_of_blank_cells(dalembert: Dalembert) -> None:
+    head, *lines = standard(MASSES, ERRORS, sensors=1).splitlines()
+    blank = "9,1,,," + ",".join(lines[2].split(",")[4:])
+    full, _ = found(dalembert("field", "-", "--json", stdin="\n".join([head, *lines])))
+    same, _ = found(dalembert("field", "-", "--json", stdin="\n".join([head, *lines, blank])))
+    assert same == full
+    half = "9,1,7,," + ",".join(lines[2].split(",")[4:])
+    done = dalembert("field", "-", stdin="\n".join([head, *lines, half]))
+    assert done.returncode == 1
+    assert "amplitude and phase both blank" in done.stderr
+
+
+def test_plain_headers_of_a_run_s_masses_and_radians(dalembert: Dalembert) -> None:
+    plain = (
+        "run,amplitude_um,phase_rad,mass_g,angle_rad\n1,80,0.7,,\n2,99,0.77,10,-1.57\n3,127,1.07,30,-1.05\n"
+    )
+    theirs = plain.replace("mass_g", "trial_mass_g").replace("angle_rad", "trial_angle_rad")
+    one, other = (dalembert("field", "-", stdin=text) for text in (plain, theirs))
+    assert one.returncode == 0, one.stderr
+    assert one.stdout == other.stdout
+
+
 def test_just_enough_runs_give_todays_answer(dalembert: Dalembert) -> None:
     text = standard([0, 10j], [0, 0])
     today, _ = found(dalembert("field", "-", "--json", stdin=text))
@@ -408,6 +430,60 @@ def test_many_machines_with_runs_of_their_own(dalembert: Dalembert) -> None:
     assert done.returncode == 0, done.stderr
     for rotor in json.loads(done.stdout)["rotors"]:
         assert correction(rotor) * 1000 == pytest.approx(truth[rotor["rotor"]], rel=1e-11)
+
+
+def test_machines_with_runs_planes_and_repeats_of_their_own_are_each_least_squares(tmp_path: Any) -> None:
+    from cli.field.log import read_log
+
+    rng = np.random.default_rng(11)
+    known, lines = {}, []
+    for m in range(12):
+        planes = [f"P{m % 2}", "Q"][: 1 + m % 3 // 2]
+        on = [np.zeros(len(planes), complex)]
+        on += [
+            rng.uniform(2, 9, len(planes)) * np.exp(1j * rng.uniform(0, 6, len(planes)))
+            for _ in range(3 + m % 4)
+        ]
+        rows, read = [], []
+        for j, masses in enumerate(on):
+            # some runs were read twice in one state, some not at all in the other
+            for state in ["hot"] * (1 + (j + m) % 2) + ["cold"] * ((j + 2 * m) % 7 != 3):
+                v = complex(*rng.normal(0, 30, 2))
+                cells = (
+                    ";".join(planes),
+                    *(
+                        ";".join(f"{f(w):.17g}" for w in masses)
+                        for f in (abs, lambda w: np.degrees(np.angle(w)))
+                    ),
+                )
+                put = ",".join(cells) if j else ",,"
+                lines.append(f"m{m},m{m}-{j},{state},{abs(v):.17g},{np.degrees(np.angle(v)):.17g},{put}\n")
+                rows.append((state, [1, *masses]))
+                read.append(v)
+        known[f"m{m}"] = rows, np.array(read), set(planes)
+    order = rng.permutation(len(lines))
+    # runs of a machine stay in their order, machines are mixed
+    mixed = sorted(order.tolist(), key=lambda i: (lines[i].split("-")[1].split(",")[0].zfill(2), i))
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "rotor,run,state,amplitude_um,phase_deg,trial_plane,trial_mass_kg,trial_angle_deg\n"
+        + "".join(lines[i] for i in mixed)
+    )
+    runs = read_log(str(path), lagging=False)
+    seen = 0
+    for group in runs.groups:
+        assert group.fit is not None
+        for i, r in enumerate(group.rotors.tolist()):
+            rows, all_read, planes_of = known[runs.rotors[r]]
+            assert set(group.planes) == planes_of
+            for s, channel in enumerate(group.channels):
+                mine = [k for k, (state, _) in enumerate(rows) if state == channel.state]
+                design = np.array([rows[k][1] for k in mine])
+                theirs = np.linalg.lstsq(design, all_read[mine], rcond=None)[0]
+                assert np.abs(group.fit.unknowns[i, s] - theirs).max() < 1e-10 * np.abs(theirs).max()
+                assert len(mine) == group.fit.present[i, :, s].sum()
+                seen += 1
+    assert seen == 24
 
 
 def test_a_table_with_runs_to_spare_may_repeat_the_base_run_and_lack_a_reading(dalembert: Dalembert) -> None:

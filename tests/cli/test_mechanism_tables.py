@@ -56,7 +56,35 @@ def test_output_holds_what_standard_output_shows(dalembert: Run, tmp_path: Path)
     assert dalembert(*call, "-o", "forces.csv", "--states", "states.csv").stdout == ""
     assert (tmp_path / "forces.csv").read_text() == shown
     # the link states beside them are those of a call without --forces
-    assert (tmp_path / "states.csv").read_text() == dalembert("mechanism", "m.toml", *SWEEP).stdout
+    dalembert("mechanism", "m.toml", *SWEEP, "--states", "alone.csv")
+    assert (tmp_path / "states.csv").read_text() == (tmp_path / "alone.csv").read_text()
+
+
+def test_without_only_a_pipe_gets_every_pose_of_every_point_and_link(dalembert: Run) -> None:
+    (*_, last) = shown = rows(dalembert("mechanism", "m.toml", *SWEEP).stdout)
+    assert [row["input_deg"] for row in shown] == [f"{angle:.1f}" for angle in range(0, 361, 10)]
+    of_all = rows(dalembert("mechanism", "m.toml", *SWEEP, "--only", "A,B,C,D,crank,coupler,rocker").stdout)
+    assert {name.split("_")[0] for name in last} == {"step", "input", *"ABCD", "crank", "coupler", "rocker"}
+    assert shown == of_all
+    pose = json.loads(dalembert("mechanism", "m.toml", *SWEEP, "--json").stdout)["poses"][-1]
+    assert float(last["C_x_m"]) == pose["points"]["C"]["x_m"]
+    assert float(last["coupler_angle_deg"]) == pose["links"]["coupler"]["angle_deg"]
+
+
+@pytest.mark.parametrize("angle", ["60", "0.1", "-80", "123.456789012345", "1e-9", "359.99"])
+def test_degrees_that_are_read_print_back(angle: str, dalembert: Run, tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_text(FOUR_BAR.replace("angle = 40", f"angle = {angle}"))
+    (row,) = rows(dalembert("mechanism", "m.toml", "--only", "crank").stdout)
+    assert float(row["input_deg"]) == float(angle)
+    assert float(row["crank_angle_deg"]) == float(angle) % 360
+
+
+@pytest.mark.parametrize("rtol", ["nan", "-1e-3", "inf"])
+def test_a_tolerance_is_a_number_from_0_on(rtol: str, dalembert: Run, tmp_path: Path) -> None:
+    (tmp_path / "e.csv").write_text("C_x_m\n1\n")
+    done = dalembert("mechanism", "m.toml", "--expect", "e.csv", "--rtol", rtol)
+    assert done.returncode == 2
+    assert "expected a number from 0 on" in done.stderr
 
 
 def test_states_beside_json(dalembert: Run, tmp_path: Path) -> None:
@@ -140,9 +168,12 @@ def test_expected_values_are_found_by_their_input(dalembert: Run, tmp_path: Path
 
 
 def test_expected_poses_beside_another_table(dalembert: Run, tmp_path: Path) -> None:
-    angle = rows(dalembert("mechanism", "m.toml").stdout)[1]["angle_deg"]
-    (tmp_path / "e.csv").write_text(f"link,angle_deg\ncoupler,{angle}\n")
-    assert dalembert("mechanism", "m.toml", "--newton", "--expect", "e.csv").returncode == 0
+    (row,) = rows(dalembert("mechanism", "m.toml").stdout)
+    # as the poses have it, and as the table of link states has it
+    for expected in ("coupler_angle_deg\n", "link,angle_deg\ncoupler,"):
+        (tmp_path / "e.csv").write_text(f"{expected}{row['coupler_angle_deg']}\n")
+        for options in ((), ("--newton",), ("--forces",)):
+            assert dalembert("mechanism", "m.toml", *options, "--expect", "e.csv").returncode == 0
     (tmp_path / "e.csv").write_text("quantity,of,value\nmobility,,1\n")
     assert dalembert("mechanism", "m.toml", "--check", "--expect", "e.csv").returncode == 0
     (tmp_path / "e.csv").write_text("quantity,of,value\nmobility,,2\n")

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cli.examples.command import describe
+from cli.examples.command import describe, names
 from cli.show.report import WIDE
 
 Dalembert = Callable[..., subprocess.CompletedProcess[str]]
@@ -105,6 +105,65 @@ def test_every_command_has_a_report(command: str, dalembert: Dalembert, tmp_path
     numbers = {f"{float(c):.6g}" for row in columns for c in row if re.fullmatch(r"-?\d+\.\d+(e.*)?", c)}
     sizes = {n for n in numbers if abs(float(n)) > 1e-9}
     assert len(sizes & page.cells) >= min(len(sizes), 20) * 0.8
+
+
+FOUR_BAR = """ground, input, R, 0, 0
+input, coupler, R, -2, 0
+coupler, rocker, R, 5, 6
+ground, rocker, R, 4, 0
+coupler, R, 7, 7
+"""
+WRITERS = {
+    "import": ("import", "bar.txt", "-o", "bar.toml"),
+    "export": ("export", "klann.toml", "--at", "90deg", "-o", "leg.urdf"),
+    "an example": ("examples", "klann"),
+    "the examples": ("examples",),
+}
+
+
+@pytest.mark.parametrize("form", ["html", "md"])
+@pytest.mark.parametrize("what", WRITERS)
+def test_what_is_written_for_others_has_a_report(
+    what: str, form: str, dalembert: Dalembert, tmp_path: Path
+) -> None:
+    dalembert("examples", "klann")
+    (tmp_path / "bar.txt").write_text(FOUR_BAR)
+    done = dalembert(*WRITERS[what], "--report", f"r.{form}", *HEAD)
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / f"r.{form}").read_text(encoding="utf-8")
+    if form == "md":
+        assert text.startswith("# Bericht \\<7\\>\n\n- machine: Fan & Söhne\n- customer: C\n- date: 20")
+        assert (tmp_path / "r.svg").is_file() == (what in ("import", "export"))
+        return
+    page = read(tmp_path / "r.html")
+    assert page.texts["h1"] == ["Bericht <7>"]
+    assert re.match(rf"dalembert \d\S*: dalembert {WRITERS[what][0]}", page.texts["p"][-1])
+    assert text.count("<svg ") == (what in ("import", "export"))
+    rows = {row[0]: row for table in page.tables for row in table}
+    if what == "import":
+        # the drawn pose, and the file that was made
+        assert rows["J3"][-2:] == ["5", "6"]
+        assert rows["coupler"][1] == "0"
+        assert (tmp_path / "bar.toml").read_text().strip() in "".join(page.texts["pre"])
+        assert "numbers are taken as metres" in page.texts["p"][0]
+    elif what == "export":
+        assert rows["B"][-2:] == ["0", "210"]  # the crank of 120 mm, upright on its pin at (0, 90)
+        assert rows["crank"][1] == "90"
+        assert any("leg.urdf: robot (URDF)" in said for said in page.texts["p"])
+    else:
+        named = [name for name in page.texts["h3"] if name != "Given"]
+        assert named == (["klann"] if what == "an example" else names())
+        assert describe("klann")["command"] in page.texts["pre"]
+
+
+def test_a_report_is_not_written_over_what_was_read(dalembert: Dalembert, tmp_path: Path) -> None:
+    (tmp_path / "bar.md").write_text(FOUR_BAR)
+    done = dalembert("import", "bar.md", "-o", "bar.toml", "--report", "bar.md")
+    assert done.returncode == 2
+    assert "is an input" in done.stderr
+    assert not (tmp_path / "bar.toml").exists()
+    assert (tmp_path / "bar.md").read_text() == FOUR_BAR
+    assert dalembert("import", "bar.md", "--machine", "M").returncode == 2
 
 
 @pytest.mark.parametrize("command", EXAMPLES)

@@ -111,7 +111,7 @@ def test_a_variant_that_cannot_be_assembled_is_a_row_that_says_so(dalembert, fil
     assert document["variants"][1]["poses"][0]["points"]["H"]["x_m"] is None
     none = dalembert("mechanism", "m.toml", "--vary", "ground.D.x=300mm:400mm:100mm", "--at", "40")
     assert none.returncode == 1
-    assert len(rows(none.stdout)) == 2 * 3
+    assert len(rows(none.stdout)) == 2
 
 
 def test_a_variant_that_newton_cannot_put_together_is_a_row_too(dalembert, tmp_path):

@@ -14,7 +14,7 @@ from matplotlib.projections.polar import PolarAxes
 
 from balancing import LogBalance, correct, joint_fit, least_squares, place
 from rigidbody3d import Body, FreeBody, Shaft, Top, compose, integrate
-from virtualwork import DescriptionError, Mechanism
+from virtualwork import DescriptionError, LinkStates, Mechanism, UnitLoad, balance
 from virtualwork.picture.quantities import quantities
 
 MOMENT = np.array([9 * 0.030, 6 * 0.050]) * np.exp(1j * np.radians([60, 210]))
@@ -24,6 +24,18 @@ ROD = Body.of("rod", 4.0, length=1.0).turned([[0.5, 0, np.sqrt(0.75)], [0, 1, 0]
 PARTS = Body.of("cylinder", [3.0, -0.5], [[0, 0, 0.1], [0.03, 0, 0.1]], radius=[0.1, 0.02], length=0.2)
 KLANN = Mechanism.from_toml(str(files("cli") / "examples/klann/klann.toml"))
 ENGINE = Mechanism.from_toml(str(files("cli") / "examples/engine/engine.toml"))
+PENDULUM = Mechanism.from_toml(str(files("cli") / "examples/double-pendulum/double-pendulum.toml"))
+SLIDER_CRANK = LinkStates(
+    velocity=[0, 300 + 200j, -500],
+    omega=[20, -50, 0],
+    mass=[0, 3, 2],
+    inertia=[0, 0.1, 0],
+    acceleration=[0, 900 - 600j, 900],
+    alpha=[0, -800, 0],
+    force=[0, 0, 5000],
+    gravity=-10j,
+)
+TWICE = LinkStates(velocity=[[1, 2, 3], [2, 3, 4]], omega=[2, 0, 0], force=[0, 0, 5])
 SWEEP = np.linspace(0, 4 * np.pi, 73)
 PLOTS: dict[str, Callable[[Figure], object]] = {
     "correct": lambda f: correct(MOMENT, [0.020, 0.065], [0, 0.090]).plot(figure=f),
@@ -39,6 +51,9 @@ PLOTS: dict[str, Callable[[Figure], object]] = {
     "motion": lambda f: KLANN.motion(SWEEP, speed=2.0).plot(figure=f),
     "curves": lambda f: KLANN.motion(SWEEP, speed=2.0).plot_curves("H.x", "H.y", "leg.omega", figure=f),
     "forces": lambda f: ENGINE.motion(SWEEP).dynamics.plot(figure=f),
+    "in time": lambda f: PENDULUM.simulate(np.linspace(0, 1, 9), accuracy=1e-6).plot(figure=f),
+    "work": lambda f: balance(SLIDER_CRANK, [UnitLoad(torque=[1, 0, 0])]).plot(["crank", "rod", "slider"], f),
+    "work at instants": lambda f: balance(TWICE, [UnitLoad(torque=[1, 0, 0])]).plot(figure=f),
     "body": lambda f: compose(PARTS).plot(["disc", "hole"], {"ω": [0, 1, 1]}, figure=f),
     "tensor": lambda f: Body(1.0, [0, 0, 0], np.diag([1.0, 2, 2.5])).plot(figure=f),
     "shaft": lambda f: Shaft(ROD, (-0.5, 0.5), 10.0, gravity=[0, -9.81, 0]).plot(figure=f),
@@ -75,6 +90,53 @@ def test_without_a_figure_it_is_one_of_pyplots(monkeypatch: pytest.MonkeyPatch) 
 def tips(axes: PolarAxes) -> list[complex]:
     """Return where the arrows of a dial end."""
     return [r * np.exp(1j * a) for a, r in (text.xy for text in axes.texts if not text.get_text())]
+
+
+def test_bars_are_the_powers_of_the_loads() -> None:
+    """Riul's example 1: 103 kN·m at 20 rad/s against the others, which are 0.9 − 0.45 − 0.006 − 0.004 − 2.5 MW."""
+    (axes,) = balance(SLIDER_CRANK, [UnitLoad(torque=[1, 0, 0])]).plot(["crank", "rod", "slider"], Figure())
+    named = [label.get_text() for label in axes.get_yticklabels()]
+    bars = dict(zip(named, (bar.get_width() for bar in axes.patches), strict=True))
+    assert axes.get_xlabel().startswith("virtual power, MW")
+    expected = {
+        "slider: applied force": -2.5,
+        "rod: weight": -0.006,
+        "rod: inertia force": -0.45,
+        "slider: inertia force": 0.9,
+        "rod: inertia torque": -0.004,
+        "crank: unknown": 2.06,
+    }
+    assert bars == pytest.approx(expected, rel=1e-9)
+
+
+def test_two_velocity_fields_have_bars_of_their_own() -> None:
+    """Two unknown torques of 3 and −2 N·m against forces of −3 N and 2 N at 1 m/s in each one's own field."""
+    states = LinkStates(velocity=[[1, 0], [0, 1]], omega=[[1, 0], [0, 1]], force=[-3, 2])
+    found = balance(states, [UnitLoad(torque=[1, 0]), UnitLoad(torque=[0, 1])])
+    (axes,) = found.plot(figure=Figure())
+    named = [label.get_text() for label in axes.get_yticklabels()]
+    bars = dict(zip(named, (bar.get_width() for bar in axes.patches), strict=True))
+    assert bars == pytest.approx(
+        {
+            "1: applied force (field 1)": -3.0,
+            "1: unknown (field 1)": 3.0,
+            "2: unknown (field 1)": 0.0,
+            "2: applied force (field 2)": 2.0,
+            "1: unknown (field 2)": 0.0,
+            "2: unknown (field 2)": -2.0,
+        }
+    )
+
+
+def test_a_motion_in_time_is_drawn_through_more_times_than_asked_for() -> None:
+    """The curves pass through the run's own states, and lie within their tolerance of a finer run between."""
+    run = PENDULUM.simulate(np.linspace(0, 1, 5), accuracy=1e-9)
+    fine = PENDULUM.simulate(np.linspace(0, 1, 41), accuracy=1e-9)
+    angle, *_ = run.plot(Figure())
+    for line, own, other in zip(angle.lines, run.angle.T, fine.angle.T, strict=True):
+        t, drawn = line.get_data()
+        assert np.interp(run.t, t, drawn) == pytest.approx(np.degrees(own), abs=1e-6)
+        assert np.interp(fine.t, t, drawn) == pytest.approx(np.degrees(other), abs=1e-3)
 
 
 def test_arrows_are_the_results_own_numbers() -> None:

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from dalembert.arithmetic.parts import Processes
+from dalembert.arithmetic.processes import Processes
 from virtualwork import Force, Gear, Guess, Input, Link, Mechanism, Motor, Spring, Torque
 from virtualwork.describe.dimensions import changed, dimensions, value
 from virtualwork.describe.errors import DescriptionError, MechanismError

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dalembert.arithmetic.parts import LostPart, Processes, in_parts
+from dalembert.arithmetic.parts import LostPart, in_parts
+from dalembert.arithmetic.processes import Processes
 from virtualwork import Guess, Input, Link, Mechanism
 
 # a call that kills its process unless the file is there, which it leaves behind

@@ -1,4 +1,4 @@
-"""What the estimates of rounding errors are made of: sizes of rates, inverses, and the second order near a limit.
+"""The errors of unknowns that an iteration found, and the second order near a limit.
 
 Close to a limit of the input the second order counts. With f = h² − c for the loop, c uncertain by κ, h = √c, and
 τ = κ/2h² the ratio of the second-order step to the first, h^(1−2k) changes by no more than
@@ -11,58 +11,85 @@ order, and of its rates no digit is known.
 
 from __future__ import annotations
 
-from math import comb
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from virtualwork.describe.parts import GROUND
+from virtualwork.formulas.linear import stack
 from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.rates import Rates
-from virtualwork.plan.steps import Term
+from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.positions import State, columns, ratio
+from virtualwork.plan.steps import Group
 
 # a singular value is not taken for smaller: the second order decides there, and does not see it
 FLOOR = 1e-13
 
 
-class Sizes:
-    """The sizes of rates: every product by the sizes of its factors, every sum without cancellation."""
+@dataclass(frozen=True)
+class Solution:
+    """How wrong the unknowns of a group may be: J⁻¹ times what its loops leave open.
 
-    def __init__(self, rates: Rates) -> None:
-        self.along = rates
-        self._turn: dict[str, list[Any]] = {}
+    Attributes
+    ----------
+    residual : array (n, 2·loops)
+    inverse : array (n, unknowns, 2·loops)
+        Close to a limit larger or smaller than J⁻¹, as the second order has it.
+    tau : array (n,)
+        The second-order step as a share of the first.
+    """
 
-    def turn(self, body: str, k: int) -> Any:
-        """Of the k-th derivative of e^{iθ}."""
-        if k == 0:
-            return 1.0
-        if body == GROUND:
-            return 0.0
-        known = self._turn.setdefault(body, [1.0])
-        rates = self.along.angle[body]
-        while len(known) <= k:
-            m = len(known)
-            known.append(sum(comb(m - 1, j) * np.abs(rates[j]) * known[m - 1 - j] for j in range(m)))
-        return known[k]
-
-    def term(self, t: Term, k: int) -> Any:
-        """Of the k-th derivative of z·s·e^{iθ}."""
-        if t.slide is None:
-            return abs(t.z) * self.turn(t.body, k)
-        s = [self.along.st.slide[t.slide], *self.along.slide[t.slide]]
-        return abs(t.z) * sum(comb(k, j) * np.abs(s[j]) * self.turn(t.body, k - j) for j in range(k + 1))
+    residual: Reals
+    inverse: Reals
+    tau: Reals
 
 
-def value_of(rates: Rates, t: Term, k: int) -> Any:
-    """The k-th derivative of a term."""
-    value = rates.vector((None, (t,)), k)
-    return 0.0 if value is None else value
+def solution(group: Group, poses: Poses, residual: Reals) -> Solution:
+    """How wrong the unknowns of a group may be, from what its loops leave open, (n, 2·loops)."""
+    plan = poses.plan
+    poses.solve([*plan.writes(group), *plan.reads(group)], 0)
+    scale = np.array([1 / poses.mechanism.size] * len(group.angles) + [1.0] * len(group.slides))
+    moved, tau = np.empty((poses.n, len(scale), residual.shape[1])), np.empty(poses.n)
+    with np.errstate(all="ignore"):
+        for rows, st in poses.rows():
+            jacobian = stack(columns(group, st), rows.stop - rows.start)
+            back = inverse(jacobian * scale)
+            first = (np.abs(back) @ residual[rows, :, None])[..., 0]
+            high, low = _second(group, st, back, first, scale)
+            moved[rows] = back * (scale * kept(high, low))[..., None]
+            tau[rows] = high.max(axis=1, initial=0.0)
+    return Solution(residual, moved, tau)
 
 
-def sum_of(rates: Rates, terms: tuple[Term, ...], k: int) -> Any:
-    """The k-th derivative of a sum of terms."""
-    value = rates.vector((None, terms), k)
-    return 0.0 if value is None else value
+def _second(group: Group, st: State, back: Reals, first: Reals, scale: Reals) -> tuple[Reals, Reals]:
+    """The second-order step of every unknown as a share of its first: no less than it is, and no more, (n, unknowns).
+
+    No less: all terms of the second order by their sizes. No more: with their signs, for a step in the direction
+    in which J is weakest.
+    """
+    weak = np.argmax(np.square(back).sum(axis=1), axis=1)
+    step = np.take_along_axis(back, weak[:, None, None], axis=2)[..., 0]
+    step *= np.min(first / np.maximum(np.abs(step), 1e-300), axis=1, initial=np.inf)[:, None]
+    parts: list[Reals] = []
+    for move in (first * scale, step * scale):
+        sized = not parts
+        bent = np.zeros((len(first), len(group.closures)), complex)
+        for i, closure in enumerate(group.closures):
+            for t in closure.terms:
+                shares = [ratio(group, t.body, angle) for angle in group.angles]
+                turned: Any = sum((abs(r) if sized else r) * move[:, c] for c, r in enumerate(shares) if r)
+                bare = t.z * (1.0 if t.body == GROUND else st.turn[t.body])
+                value = bare if t.slide is None else bare * st.slide[t.slide]
+                along: Any = 0.0
+                if t.slide in group.slides:
+                    along = 2j * bare * move[:, len(group.angles) + group.slides.index(t.slide)] * turned
+                curve = value * turned**2
+                bent[:, i] += np.abs(curve) + np.abs(along) if sized else along - curve
+        pairs = np.repeat(np.abs(bent), 2, axis=1) if sized else bent.view(float)
+        second = np.abs((np.abs(back) if sized else back) @ pairs[..., None])[..., 0]
+        parts.append(np.divide(second, first, out=np.zeros_like(second), where=first > 0))
+    return parts[0], parts[1]
 
 
 def kept(high: Reals, low: Reals) -> Reals:
@@ -75,12 +102,12 @@ def kept(high: Reals, low: Reals) -> Reals:
     return np.where(high < 0.5, near, 2 * np.minimum(2.0, np.sqrt(2 / np.maximum(low, 0.5))))
 
 
-def grown(tau: Reals, k: int) -> Reals:
+def grown(tau: Reals, k: float) -> Reals:
     """How much more than the first order a derivative errs, where the second-order step is a share τ of the first.
 
     τ is taken a quarter larger, for the third order.
     """
-    tau = 1.25 * tau
+    tau = 1.25 * np.asarray(tau)
     grown = np.expm1((0.5 - k) * np.log1p(-2 * tau)) / ((2 * k - 1) * np.maximum(tau, 1e-30))
     return np.where(tau < 1e-12, 1.0, np.where(tau < 0.5, grown, np.inf))
 
@@ -95,7 +122,7 @@ def inverse(j: Reals) -> Reals:
         except np.linalg.LinAlgError:
             out[good] = np.nan
         with np.errstate(invalid="ignore"):
-            size = np.abs(out).max(axis=(1, 2)) * np.abs(j).max(axis=(1, 2))
+            size = np.abs(out).max(axis=(1, 2), initial=0.0) * np.abs(j).max(axis=(1, 2), initial=0.0)
         good = good & ~(size < 0.1 / FLOOR)
     if good.any():
         left, s, right = np.linalg.svd(j[good], full_matrices=False)

@@ -12,7 +12,18 @@ from virtualwork.formulas.poses import Poses
 # (kind, of what …): see `recording.Recording.value`
 Key = tuple[Any, ...]
 # what the loads have a part in; a pose that is not assembled has none of it
-FORCES = {"effort", "newton-euler", "force", "moment", "reaction", "shaking", "shaking moment"}
+FORCES = {
+    "effort",
+    "newton-euler",
+    "force",
+    "moment",
+    "reaction",
+    "shaking",
+    "shaking moment",
+    "generalized",
+    "applied",
+    "applied moment",
+}
 # what the joints carry
 JOINTS = {"newton-euler", "force", "moment", "reaction"}
 # times that one pose is asked for, and poses, from which on the tape pays
@@ -47,6 +58,10 @@ def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:
         forces = forces or Dynamics(poses)
         if kind == "effort":
             return forces.effort[:, of[0]]
+        if kind == "generalized":
+            return forces.generalized[:, of[0]]
+        if kind.startswith("applied"):
+            return forces.applied(of[0])[kind != "applied"]
         if kind == "newton-euler":
             return forces.newton_euler[:, of[0]]
         if kind.startswith("shaking"):
@@ -63,6 +78,9 @@ def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:
         case "angle":
             body, order = of
             return poses.angle_derivative(body, order) if order else poses.angle(body)
+        case "turn":
+            poses.solve((f"angle:{of[0]}",), 0)
+            return poses.over(lambda _, st: st.turn[of[0]], complex)
         case "slide":
             return poses.slide_derivative(*of)
         case "dpoint":

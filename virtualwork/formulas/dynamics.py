@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
-from virtualwork.formulas.effort import effort, finished, write_effort
+from virtualwork.formulas.effort import effort, finished, generalized, write_effort
 from virtualwork.formulas.friction import settle
 from virtualwork.formulas.loads import EXTERNAL, OWN, Load
 from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, cross, leave_out, plus, xy
@@ -78,6 +78,12 @@ class Dynamics:
             self._effort = effort(self.scene)
             self._effort[~settled] = np.nan
         return self._effort
+
+    @property
+    def generalized(self) -> Reals:
+        """What balances the loads at each input, (n, k): the effort, but for motors that sit on another body than `on`."""
+        _ = self._settled
+        return generalized(self.scene)
 
     @cached_property
     def reactions(self) -> Reactions:
@@ -230,21 +236,35 @@ class Dynamics:
         _ = self._settled
         n = self.poses.n
         force, moment = np.zeros(n, complex), np.zeros(n)
-        center = self.scene.rigid[link].center
-        loads = [load for load in self.scene.case.everything if load.body == link and load.kind not in OWN]
+        loads = applied_loads(self.scene.case.everything, link)
         for block in self.scene.blocks([f"angle:{link}"]) if loads else ():
-            for load in loads:
-                value = block.formed(load)
-                if value is None:
-                    continue
-                if load.path is None:
-                    moment[block.rows] += value
-                    continue
-                force[block.rows] += value
-                arm = load.arm(block, center)
-                if arm is not None:
-                    moment[block.rows] += cross(arm, value)
+            f, m = reduced(loads, block, self.scene.rigid[link].center)
+            force[block.rows] += 0.0 if f is None else f
+            moment[block.rows] += 0.0 if m is None else m
         return force, moment
+
+
+def applied_loads(loads: Iterable[Load], link: str) -> list[Load]:
+    """What acts on a link but its weight and inertia."""
+    return [load for load in loads if load.body == link and load.kind not in OWN]
+
+
+def reduced(loads: Iterable[Load], block: Block, center: complex) -> tuple[Number, Number]:
+    """The sum of a link's loads over a block and their moment about a point of the link; None where zero."""
+    force: Number = None
+    moment: Number = None
+    for load in loads:
+        value = block.formed(load)
+        if value is None:
+            continue
+        if load.path is None:
+            moment = plus(moment, value)
+            continue
+        force = plus(force, value)
+        arm = load.arm(block, center)
+        if arm is not None:
+            moment = plus(moment, cross(arm, value))
+    return force, moment
 
 
 def shaking_loads(loads: Iterable[Load]) -> list[Load]:

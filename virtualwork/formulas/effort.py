@@ -26,6 +26,11 @@ from virtualwork.formulas.scene import Scene
 
 def effort(scene: Scene) -> Reals:
     """The effort at each input by virtual work, (n, k): N·m at a turning input, N at a slide."""
+    return through_carriers(scene, generalized(scene))
+
+
+def generalized(scene: Scene) -> Reals:
+    """What balances the loads at each input, (n, k), as if every motor sat on the body that its angle is measured from."""
     out = np.zeros((scene.poses.n, len(scene.mechanism.inputs)))
 
     def work(block: Block) -> None:
@@ -61,11 +66,11 @@ def generalized_force(paths: LoadPaths, block: Block, j: int) -> Number:
 
 
 def finished(scene: Scene, out: Reals) -> Reals:
-    """The generalized forces as efforts: NaN where not assembled, no −0, through motors' carriers."""
+    """What `write_effort` wrote: NaN where not assembled, no −0."""
     if scene.lost is not None:
         out[scene.lost] = np.nan
     out += 0.0
-    return through_carriers(scene, out)
+    return out
 
 
 def _singular(scene: Scene, block: Block, j: int) -> Any:

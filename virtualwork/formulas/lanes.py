@@ -23,7 +23,7 @@ from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Number, Reals, leave_out
 from virtualwork.formulas.poses import Branch, Poses
-from virtualwork.formulas.recording import NAMES, NEAR, Recording, names, quantity
+from virtualwork.formulas.recording import COMPLEX, NAMES, NEAR, Recording, names, quantity
 from virtualwork.formulas.scene import Scene
 
 # two threads that ask one assembly at once
@@ -82,7 +82,7 @@ class Lanes:
     def recording(self) -> Recording:
         """The formulas of the branch, for rates that are zero where these are."""
         inputs = self.poses.inputs
-        if inputs.shape[1] == 1 and len(inputs):
+        if inputs.shape[1] == 1 and len(inputs) and not self.branch.settled:
             self.branch.cover(float(np.nanmin(inputs)), float(np.nanmax(inputs)))
         moves = tuple(any(np.any(rate) for rate in rates) for rates in self.poses.rates)
         return recorded(self.branch, moves)
@@ -139,21 +139,22 @@ class Lanes:
         if self.branch.may_open:
             closed = {key: ("closed", *self.recording.hangs_on(key)) for key in keys}
         tape = taped(self.branch, self.recording, (*keys, *more, *dict.fromkeys(closed.values())))
-        out = run(tape, self.entering(tape.inputs))
+        vectors = [names(key)[0] for key in keys if key[0] in COMPLEX]
+        out = run(tape, self.entering(tape.inputs), pairs=vectors)
         n = self.poses.n
         careful: Any = self.branch.close_to_change(self.poses.inputs[:, 0])
         for key in more:
             near = np.abs(out[names(key)[0]]) < (NEAR if key[0] == "margin" else SINGULAR)
             if np.any(near):
                 careful = careful | np.broadcast_to(near, n)
-        nowhere = ~np.isfinite(self.poses.inputs).all(axis=1)
+        finite = np.isfinite(self.poses.inputs)
+        nowhere = None if finite.all() else ~finite.all(axis=1)
         for key in keys:
             value = quantity(out, key, n)
             if key in closed:
                 leave_out(value, ~np.isfinite(np.broadcast_to(out[names(closed[key])[0]], n)))
-            leave_out(value, nowhere)
-            if key[0] in FORCES:
-                value += 0.0
+            if nowhere is not None:
+                leave_out(value, nowhere)
             self.known[key] = value
         if careful.any():
             some = self.poses.some(careful)
@@ -192,7 +193,12 @@ class Lanes:
         self.poses.solve(self.branch.plan.writes(of), 0)
         at = int(i)
         if at < len(of.angles):
-            return self.poses.over(lambda _, st: st.angle[of.angles[at]])  # type: ignore[no-any-return]
+            body = of.angles[at]
+            # a closed form leaves the rotation alone
+            found: Reals = self.poses.over(
+                lambda _, st: st.angle[body] if body in st.angle else np.angle(st.turn[body])
+            )
+            return found
         return self.poses.over(lambda _, st: st.slide[of.slides[at - len(of.angles)]])  # type: ignore[no-any-return]
 
     def _angle(self, body: str) -> Reals:
@@ -241,7 +247,7 @@ def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
 
 def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
     """The tape of quantities, pruned once."""
-    key = recording.moves, recording.turning_over, keys
+    key = recording, keys
     with _writing:
         if key not in branch.recordings:
             branch.recordings[key] = recording.tape(keys)

@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from dalembert.arithmetic.recorded import Number, Recorder, bare
+from dalembert.arithmetic.engines import Outputs
+from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
 from dalembert.arithmetic.systems import regularity, solved
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
@@ -105,10 +106,18 @@ class Recording:
         self._forces: tuple[LoadPaths, JointForces, Block] | None = None
 
     # --- solving ------------------------------------------------------------------------------------------------
+    def enters(self, group: Group) -> bool:
+        """Whether the unknowns of a group enter: it has no closed form."""
+        return group.kind == "Newton"
+
+    def unknowns(self, group: Group) -> list[Number]:
+        """The unknowns of a group, angles and then slides, as they enter."""
+        n = len(group.angles) + len(group.slides)
+        return [self.recorder.input(f"x {group.name} {i}") for i in range(n)]
+
     def _close(self, group: Group, st: State) -> None:
-        if group.kind == "Newton":
-            n = len(group.angles) + len(group.slides)
-            x: list[Number] = [self.recorder.input(f"x {group.name} {i}") for i in range(n)]
+        if self.enters(group):
+            x = self.unknowns(group)
             put_unknowns(group, st, x)
             if not self.settled:
                 step = WRITTEN.solve(columns(group, st), gaps(group, st))
@@ -248,11 +257,10 @@ class Recording:
         outputs: dict[str, Number] = {}
         for key in keys:
             value = self.value(key)
-            where = names(key)
-            if len(where) == 1:
-                outputs[where[0]] = value.real
-            else:
-                outputs[where[0]], outputs[where[1]] = value.real, value.imag
+            parts = [value.real, value.imag][: len(names(key))]
+            if key[0] in FORCES:
+                parts = [RECORDED.unsigned(part) for part in parts]
+            outputs.update(zip(names(key), parts, strict=True))
         return self.recorder.tape(outputs)
 
     def _point(self, body: str, z: complex, node: str | None, order: int) -> Number:
@@ -356,7 +364,7 @@ class Recording:
         self.solve([key for g in chosen for key in self.plan.writes(g)], 0)
         total: Number = 0.0
         for group in chosen:
-            if group.kind == "Newton":
+            if self.enters(group):
                 unknowns = [self.st.angle[b] for b in group.angles] + [self.st.slide[s] for s in group.slides]
                 total = sum((abs(x) for x in unknowns), total)
             else:
@@ -377,7 +385,7 @@ class Recording:
         return self.st.margin[group]
 
 
-COMPLEX = {"point", "turn", "dpoint", "force", "reaction", "shaking"}
+COMPLEX = {"point", "turn", "dpoint", "force", "reaction", "shaking", "applied", "gap"}
 
 
 def names(key: Key) -> tuple[str, ...]:
@@ -390,17 +398,14 @@ def names(key: Key) -> tuple[str, ...]:
     return (f"{text} x", f"{text} y") if key[0] in COMPLEX else (text,)
 
 
-def quantity(rows: Mapping[str, Any], key: Key, n: int, to: str | None = None) -> Any:
+def quantity(rows: Outputs, key: Key, n: int, to: str | None = None) -> Any:
     """A quantity of n lanes from the rows of a run, or its derivative `to` an input: (n,), real or complex.
 
     What does not hang on the input has no row. A row of the run's own table is not copied.
     """
-    parts = [rows.get(name if to is None else f"d({name})/d({to})", 0.0) for name in names(key)]
-    if len(parts) == 1:
-        return parts[0] if np.ndim(parts[0]) else np.full(n, parts[0])
-    value = np.empty(n, complex)
-    value.real, value.imag = parts
-    return value
+    of = [name if to is None else f"d({name})/d({to})" for name in names(key)]
+    value = rows.get(of[0], 0.0) if len(of) == 1 else rows.complex(*of)
+    return value if np.ndim(value) else np.full(n, value)
 
 
 class _Setting(Shared):

@@ -8,6 +8,7 @@ least norm.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
@@ -15,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.numbers import Reals, cross
-from virtualwork.formulas.reactions import Reactions
+from virtualwork.formulas.block import Block
+from virtualwork.formulas.kinds import imaginary_part, real_part
+from virtualwork.formulas.numbers import Number, Reals, cross
+from virtualwork.formulas.reactions import JointForces, Reactions
 from virtualwork.plan.joints import Joint
 
 # ("fx" or "fy", joint, body), ("normal", joint, ""), ("moment", joint, ""), ("gear", number, ""), ...
@@ -24,6 +27,90 @@ Column = tuple[str, str, str]
 
 # a singular value below this share of the largest is none, lengths scaled by the mechanism's size
 NULL = 1e-9
+
+
+def unknowns(of: JointForces) -> list[Column]:
+    """The joint forces and torques of a mechanism."""
+    found: list[Column] = []
+    for joint in of.joints:
+        if joint.guide is None:
+            found += [
+                (axis, joint.key, body) for body in joint.bodies if body != GROUND for axis in ("fx", "fy")
+            ]
+        else:
+            found.append(("normal", joint.key, ""))
+            if of.mechanism.guides[joint.guide].is_slider:
+                found.append(("moment", joint.key, ""))
+    found += [("gear", str(i), "") for i in range(len(of.mechanism.gears))]
+    for j, entry in enumerate(of.mechanism.inputs):
+        found.append(("force" if entry.is_slide else "torque", str(j), ""))
+    return found
+
+
+def equations(of: JointForces, block: Block) -> Iterator[tuple[int, int | None, Number]]:
+    """What each equation holds over a block: its row, the unknown (None: what acts), and the real factor.
+
+    Three for each link, ΣF and ΣM about its centre of mass, then two for each pin that is not on the ground. Moments
+    and torques are divided by the size. Parts of one entry may come one after the other.
+    """
+    m, size = of.mechanism, of.mechanism.size
+    links = list(m.links)
+    column = {unknown: i for i, unknown in enumerate(unknowns(of))}
+
+    def put(body: str, unknown: Column, force: Number, arm: Number) -> Iterator[tuple[int, int, Number]]:
+        if body != GROUND:
+            i, col = 3 * links.index(body), column[unknown]
+            yield i, col, real_part(force)
+            yield i + 1, col, imaginary_part(force)
+            yield i + 2, col, cross(arm, force) / size
+
+    def turn(body: str, unknown: Column, factor: float) -> Iterator[tuple[int, int, Number]]:
+        if body != GROUND:
+            yield 3 * links.index(body) + 2, column[unknown], factor
+
+    for i, body in enumerate(links):
+        force, moment = of.force(block, body), of.moment(block, body)
+        if force is not None:
+            yield 3 * i, None, real_part(force)
+            yield 3 * i + 1, None, imaginary_part(force)
+        if moment is not None:
+            yield 3 * i + 2, None, moment / size
+    for joint in of.joints:
+        if joint.guide is None:
+            for body in joint.bodies:
+                if body != GROUND:
+                    arm = of.place(block, (joint.key, body)) + 0j
+                    yield from put(body, ("fx", joint.key, body), 1 + 0j, arm)
+                    yield from put(body, ("fy", joint.key, body), 1j, arm)
+            continue
+        g = m.guides[joint.guide]
+        rail = of.rail(block, joint.guide) + 0j
+        for body, sign in ((g.link, 1.0), (g.on, -1.0)):
+            if body == GROUND:
+                continue
+            arm = of.place(block, (joint.key, body)) + 0j
+            yield from put(body, ("normal", joint.key, ""), sign * 1j * rail, arm)
+            if g.is_slider:
+                yield from turn(body, ("moment", joint.key, ""), sign)
+            j = m.driver_of(joint.guide)
+            if j is not None:
+                yield from put(body, ("force", str(j), ""), sign * rail, arm)
+    for i, gear in enumerate(m.gears):
+        first, second = gear.links
+        for body, factor in ((second, 1.0), (first, -gear.ratio), (gear.arm, gear.ratio - 1.0)):
+            yield from turn(body, ("gear", str(i), ""), factor)
+    for j, entry in enumerate(m.inputs):
+        if not entry.is_slide:
+            yield from turn(str(entry.link), ("torque", str(j), ""), 1.0)
+            yield from turn(entry.on, ("torque", str(j), ""), -1.0)
+    for p, joint in enumerate(_free_pins(of)):
+        for axis, key in enumerate(("fx", "fy")):
+            for body in joint.bodies:
+                yield 3 * len(links) + 2 * p + axis, column[key, joint.key, body], 1.0
+
+
+def _free_pins(of: JointForces) -> list[Joint]:
+    return [joint for joint in of.joints if joint.guide is None and GROUND not in joint.bodies]
 
 
 class Statics:
@@ -39,105 +126,44 @@ class Statics:
 
     def __init__(self, reactions: Reactions) -> None:
         self.reactions = reactions
-        self.mechanism = mechanism = reactions.scene.mechanism
+        self.mechanism = reactions.scene.mechanism
         self.n = reactions.scene.poses.n
-        self.size: float = mechanism.size
-        self.unknowns: list[Any] = self._unknowns()
+        self.unknowns = unknowns(reactions)
 
-    def _unknowns(self) -> list[Any]:
-        found: list[Any] = []
-        for joint in self.reactions.joints:
-            if joint.guide is None:
-                found += [
-                    (axis, joint.key, body)
-                    for body in joint.bodies
-                    if body != GROUND
-                    for axis in ("fx", "fy")
-                ]
-            else:
-                found.append(("normal", joint.key, ""))
-                if self.mechanism.guides[joint.guide].is_slider:
-                    found.append(("moment", joint.key, ""))
-        found += [("gear", str(i), "") for i in range(len(self.mechanism.gears))]
-        for j, entry in enumerate(self.mechanism.inputs):
-            found.append(("force" if entry.is_slide else "torque", str(j), ""))
-        return found
+    @cached_property
+    def rows(self) -> int:
+        """How many equations: three for each link, two for each pin that is not on the ground."""
+        return 3 * len(self.mechanism.links) + 2 * len(_free_pins(self.reactions))
 
     def system(self) -> tuple[Reals, Reals]:
         """A (n, equations, unknowns) and b (n, equations); moments and torques are divided by the size."""
-        r = self.reactions
-        m = self.mechanism
-        links = list(m.links)
-        free_pins = [joint for joint in r.joints if joint.guide is None and GROUND not in joint.bodies]
-        rows = 3 * len(links) + 2 * len(free_pins)
-        a = np.zeros((self.n, rows, len(self.unknowns)))
-        b = np.zeros((self.n, rows))
-        column = {unknown: i for i, unknown in enumerate(self.unknowns)}
-        for block in r.blocks():
-            at = block.rows
-
-            def put(body: str, col: int, force: Any, arm: Any, at: Any = at) -> None:
-                if body == GROUND:
-                    return
-                i = 3 * links.index(body)
-                a[at, i, col] += np.real(force)
-                a[at, i + 1, col] += np.imag(force)
-                a[at, i + 2, col] += cross(arm, force) / self.size
-
-            def turn(body: str, col: int, factor: float, at: Any = at) -> None:
-                if body != GROUND:
-                    a[at, 3 * links.index(body) + 2, col] += factor
-
-            for body in links:
-                i = 3 * links.index(body)
-                force, moment = r.force(block, body), r.moment(block, body)
-                if force is not None:
-                    b[at, i], b[at, i + 1] = np.real(force), np.imag(force)
-                if moment is not None:
-                    b[at, i + 2] = moment / self.size
-            for joint in r.joints:
-                if joint.guide is None:
-                    for body in joint.bodies:
-                        if body != GROUND:
-                            arm = r.place(block, (joint.key, body)) + 0j
-                            put(body, column["fx", joint.key, body], 1 + 0j, arm)
-                            put(body, column["fy", joint.key, body], 1j, arm)
-                    continue
-                g = m.guides[joint.guide]
-                rail = r.rail(block, joint.guide) + 0j
-                for body, sign in ((g.link, 1.0), (g.on, -1.0)):
-                    if body == GROUND:
-                        continue
-                    arm = r.place(block, (joint.key, body)) + 0j
-                    put(body, column["normal", joint.key, ""], sign * 1j * rail, arm)
-                    if g.is_slider:
-                        turn(body, column["moment", joint.key, ""], sign)
-                    j = m.driver_of(joint.guide)
-                    if j is not None:
-                        put(body, column["force", str(j), ""], sign * rail, arm)
-            for i, gear in enumerate(m.gears):
-                first, second = gear.links
-                for body, factor in ((second, 1.0), (first, -gear.ratio), (gear.arm, gear.ratio - 1.0)):
-                    turn(body, column["gear", str(i), ""], factor)
-            for j, entry in enumerate(m.inputs):
-                if not entry.is_slide:
-                    turn(str(entry.link), column["torque", str(j), ""], 1.0)
-                    turn(entry.on, column["torque", str(j), ""], -1.0)
-        for p, joint in enumerate(free_pins):
-            for axis, key in enumerate(("fx", "fy")):
-                for body in joint.bodies:
-                    a[:, 3 * len(links) + 2 * p + axis, column[key, joint.key, body]] = 1.0
+        a, b = np.zeros((self.n, self.rows, len(self.unknowns))), np.zeros((self.n, self.rows))
+        for block in self.reactions.blocks():
+            for row, column, value in equations(self.reactions, block):
+                if column is None:
+                    b[block.rows, row] += value
+                else:
+                    a[block.rows, row, column] += value
         return a, b
 
     @cached_property
     def solved(self) -> tuple[Reals, Reals]:
         """The unknowns (n, u) and their null vectors (n, u, u)."""
+        x, null, impossible = self.least
+        value = x.copy()
+        value[(np.abs(null).max(axis=1) > 1e-7) | impossible[:, None]] = np.nan
+        return value, null
+
+    @cached_property
+    def least(self) -> tuple[Reals, Reals, NDArray[np.bool_]]:
+        """Of all solutions the least (n, u), the null vectors (n, u, u), and where there is none after all, (n,)."""
         a, b = self.system()
         u = len(self.unknowns)
         good: Any = np.isfinite(a).all(axis=(1, 2)) & np.isfinite(b).all(axis=1)
         value, null = np.full((self.n, u), np.nan), np.zeros((self.n, u, u))
+        impossible = np.zeros(self.n, dtype=bool)
         if not good.any():
-            return value, null
+            return value, null, impossible
         left, s, vh = np.linalg.svd(a[good], full_matrices=True)
         k = s.shape[1]
         seen = s > NULL * s[:, :1]
@@ -149,16 +175,14 @@ class Statics:
         # a load against a motion that the constraints leave free (a singular pose) has no equilibrium at all
         rest = along.copy()
         rest[:, :k][seen] = 0.0
-        impossible = np.abs(rest).max(axis=1) > 1e-9 * np.maximum(np.abs(b[good]).max(axis=1), 1e-300)
-        x[np.abs(free).max(axis=1) > 1e-7] = np.nan
-        x[impossible] = np.nan
+        impossible[good] = np.abs(rest).max(axis=1) > 1e-9 * np.maximum(np.abs(b[good]).max(axis=1), 1e-300)
         value[good], null[good] = x, free
-        return value, null
+        return value, null, impossible
 
     def get(self, unknown: Any) -> Reals:
         """One unknown over the poses; torques in N·m."""
         value = self.solved[0][:, self.unknowns.index(unknown)]
-        return value * self.size if unknown[0] in ("moment", "gear", "torque") else value
+        return value * self.mechanism.size if unknown[0] in ("moment", "gear", "torque") else value
 
     def joint_force(self, joint: Joint, body: str) -> NDArray[np.complex128]:
         """The force of a joint on a body, (n,) complex."""

@@ -54,8 +54,11 @@ class Crossing:
         return [sum(s * y for s, y in zip(shares, of, strict=True)) / total for of in values]
 
 
-def crossings(points: Iterable[float], unit: float) -> list[Crossing]:
-    """The crossings at change points, those within rounding of each other as one; `unit`: 1 rad, or a size."""
+def crossings(points: Iterable[float], unit: float, share: float = 1.0) -> list[Crossing]:
+    """The crossings at change points, those within rounding of each other as one; `unit`: 1 rad, or a size.
+
+    `share` of how far off poses are taken as a rule: with others the interpolation errs in another way.
+    """
     places: list[float] = []
     for at in sorted(points):
         if not places or at - places[-1] > 1e-6 * unit:
@@ -63,7 +66,7 @@ def crossings(points: Iterable[float], unit: float) -> list[Crossing]:
     found = []
     for i, at in enumerate(places):
         apart = [abs(at - other) for other in (*places[max(0, i - 1) : i], *places[i + 1 : i + 2])]
-        found.append(Crossing(at, min([REACH * unit, *(0.6 * x for x in apart)])))
+        found.append(Crossing(at, share * min([REACH * unit, *(0.6 * x for x in apart)])))
     return found
 
 

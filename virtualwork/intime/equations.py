@@ -15,6 +15,7 @@ import cmath
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -41,6 +42,8 @@ from virtualwork.intime.watch import Floats, Watch
 
 # of a turn: how far beyond an input its change points are looked for
 AHEAD = 1.0
+# of the poses from which is interpolated how far off others are taken, to see how much hangs on that
+OTHER = 0.85
 # how near a change point a fold is its own
 NEAR = 0.1
 TURN = 2 * math.pi
@@ -70,6 +73,7 @@ class Equations:
         self._covered = (math.inf, -math.inf)
         self._flips: dict[str, list[float]] = {}
         self._crossings: list[Crossing] = []
+        self._share = 1.0
         # starts that were looked at
         self._begun: set[tuple[float, ...]] = set()
         self._cover(self.mechanism.at[0])
@@ -369,7 +373,7 @@ class Equations:
                 raise Lost from None
             low, high = min(low, q - ahead), max(high, q + ahead)
             self._flips.update({name: at.tolist() for name, at in track.flips.items()})
-            self._crossings = crossings(track.crossings, self.scale[0])
+            self._crossings = crossings(track.crossings, self.scale[0], self._share)
         self._covered = (low, high) if track.active and not track.settled else EVERYWHERE
 
     def _crossing(self, q: float) -> Crossing | None:
@@ -382,6 +386,18 @@ class Equations:
         if self._untaped:
             return np.ones(len(q), dtype=bool)
         return np.array([self._crossing(x) is not None for x in q[:, 0].tolist()], dtype=bool)
+
+    def otherwise(self) -> Equations:
+        """The same equations, interpolated from other poses near change points."""
+        other = copy(self)
+        other._share, other._covered, other._crossings = OTHER, (math.inf, -math.inf), []
+        other._cover(self.mechanism.at[0])
+        return other
+
+    @property
+    def crosses(self) -> bool:
+        """Whether there are change points, as far as was looked."""
+        return bool(self._crossings)
 
     def clear(self, q: Reals) -> bool:
         """Whether no change point is near any of the values of the first input."""

@@ -106,6 +106,25 @@ def loop(k: int, rates: Tape) -> Loop:
     return Loop(body(k, passed), rates, kept)
 
 
+@lru_cache(maxsize=64)
+def again(k: int, rates: Tape) -> Loop:
+    """The loop of steps whose ends are given (`next`): no step is judged."""
+    recorder = Recorder()
+    enter = recorder.input
+    places, speeds, slopes = names(k)
+    own = {"t", *places, *speeds}
+    calls = Calls(recorder, [name for name in rates.inputs if name in own], slopes)
+    t, end, work = enter("t"), enter("next"), enter("work")
+    q, v, a = ([enter(name) for name in of] for of in (places, speeds, slopes))
+    done = step(called_by(calls), t, q, v, a, end - t)
+    out: dict[str, Number] = {"t": end, "left": enter("left"), "work": work + done.work}
+    out |= dict(zip(slopes, done.rates, strict=True))
+    for x, d, name in (*zip(q, done.dq, places, strict=True), *zip(v, done.dv, speeds, strict=True)):
+        out[name], out[f"l{name}"] = added(x, enter(f"l{name}"), d)
+    kept = ("t", *places, *speeds, *slopes, "work")
+    return Loop(recorder.tape(out | calls.outputs), rates, kept, ("next",))
+
+
 class March(NamedTuple):
     """What a march has found: the nodes, (rounds, n) each, by name; and the last state, (n,) each.
 
@@ -157,6 +176,14 @@ def beginning(
     ):
         found |= dict(zip(of, values, strict=True))
     return found | low
+
+
+def follow(k: int, rates: Tape, given: Lanes, state: Lanes, times: Reals, engine: str | None = None) -> March:
+    """Steps that end at given times, (rounds, n)."""
+    loop_of = again(k, rates)
+    begin = {name: state[name] for name in loop_of.states}
+    found, nodes = rounds.run(loop_of, given, begin, len(times), engine, {"next": times})
+    return March(nodes, {**state, **found})
 
 
 def over(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -28,7 +29,7 @@ from virtualwork.intime.control import (
 )
 from virtualwork.intime.equations import Equations, Lost
 from virtualwork.intime.explicit import DormandPrince, names
-from virtualwork.intime.marching import ROUNDS, beginning, loop, march, over
+from virtualwork.intime.marching import ROUNDS, beginning, follow, loop, march, over
 from virtualwork.intime.step import Method, Step
 from virtualwork.intime.watch import Check, Floats, Watch
 
@@ -49,6 +50,8 @@ class Path:
     work: list[float] = field(default_factory=list)
     ended: str = ""
     rejected: int = 0
+    # whether times are reached from the node after them
+    backwards: bool = False
 
     def put(self, t: float, q: Floats, v: Floats, rates: Floats, work: float) -> None:
         """Add a node."""
@@ -66,13 +69,17 @@ class Path:
         self.rates += rows[:, 2 * k + 1 : -1].tolist()
         self.work += rows[:, -1].tolist()
 
-    def at(self, times: Reals) -> tuple[Reals, Reals, Reals]:
-        """q, q̇ (n, k) and the work (n,) at times on the way: a step of the method from the node before each."""
+    def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
+        """q, q̇, q̈ (n, k) and the work (n,) at times on the way: a step of the method from the node before each."""
         t = np.array(self.t)
-        i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
+        # a stiff method does not go back
+        if self.backwards and self.method.stable < np.inf:
+            i = np.minimum(np.searchsorted(t, times), len(t) - 1)
+        else:
+            i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
         q, v = np.array(self.q)[i], np.array(self.v)[i]
         work, h = np.array(self.work)[i], times - t[i]
-        on = np.flatnonzero(h > 0)
+        on = np.flatnonzero(h)
         if len(on):
             state = t[i[on]], q[on], v[on], np.array(self.rates)[i[on]], h[on]
             if compiled(self.equations, self.method) is not None:
@@ -82,7 +89,10 @@ class Path:
             q[on] += dq
             v[on] += dv
             work[on] += dw
-        return q, v, work
+        a = np.array(self.rates)[i, : q.shape[1]]
+        if len(on):
+            a[on] = self.equations.many(times[on], q[on], v[on])[:, : q.shape[1]]
+        return q, v, a, work
 
 
 def walk(
@@ -96,6 +106,7 @@ def walk(
     check: Check | None = None,
     budget: int = MOST,
     left: Mapping[str, float] | None = None,
+    plan: Sequence[float] = (),
 ) -> Path:
     """Go from a state to a time.
 
@@ -110,6 +121,8 @@ def walk(
         Asked at every node; the path ends where it says why.
     left : mapping of a watch's name to its level
         Levels at which the path begins, and which the first step does not meet again.
+    plan : rising times
+        Where steps end, as far as it goes: they are not judged.
 
     Returns
     -------
@@ -132,7 +145,7 @@ def walk(
     grow, stiff = GROW, 0.0
     left = left or {}
     power = -1.0 / method.order
-    by_code = not stops
+    by_code, cut = not stops or bool(plan), False
     while t < end:
         if by_code and not (len(path.t) - 1) % ROUNDS and compiled(equations, method) is not None:
             # it goes on as far as nothing happens that has to be looked at step by step
@@ -141,7 +154,7 @@ def walk(
             for names_of, low in (("lq", low_q), ("lv", low_v)):
                 state |= {f"{names_of}{j}": x for j, x in enumerate(low)}
             (t, h, grow, stiff, work), q, v, low_q, low_v, rates, fastest = _marched(
-                path, given, state, watches, check, budget, left
+                path, given, state, watches, check, budget, left, plan
             )
             left, by_code = {}, False
             if path.ended:
@@ -153,7 +166,10 @@ def walk(
         i = bisect_right(stops, t)
         stop = min(stops[i], end) if i < len(stops) else end
         before, whole = h, stop - t
-        h = tried(h, whole)
+        i = bisect_right(plan, t + shortest(t, span))
+        planned = i < len(plan)
+        # where a step of the plan could not be done it is shorter
+        h = min(plan[i] - t, whole, h if cut else math.inf) if planned else tried(h, whole)
         if h < shortest(t, span):
             path.ended = "lost"
             return path
@@ -163,14 +179,15 @@ def walk(
         except (Lost, ZeroDivisionError, ValueError, OverflowError):
             # of the rates, or of their tape
             path.rejected += 1
-            h, grow = shorter(h, SHRINK), 1.0
+            h, grow, cut = shorter(h, SHRINK), 1.0, True
             continue
         error = method.size(done, allowed(tolerance, equations.scale, q, fastest, v, done.dv))
         wanted = SAFETY * error**power if error else GROW
-        if not error < 1.0:
+        if not error < (math.inf if planned else 1.0):
             path.rejected += 1
-            h, grow = shorter(h, wanted), 1.0
+            h, grow, cut = shorter(h, wanted), 1.0, True
             continue
+        cut = False
         following = longer(h, wanted, before, grow)
         found = node.met(watches, h, done, left) if watches else None
         met, left, grow = None, {}, GROW
@@ -178,7 +195,7 @@ def walk(
             met, level, h, done = found
             left = {met.name: level}
         stiff = stiffer(stiff, done.stiffness, method.stable)
-        t = stop if h == whole else t + h
+        t = stop if h == whole else plan[i] if planned and h == plan[i] - t else t + h
         q, low_q = _added(q, low_q, done.dq)
         v, low_v = _added(v, low_v, done.dv)
         work, rates, h = work + done.work, done.rates, following
@@ -213,8 +230,9 @@ def _marched(
     check: Check | None,
     budget: int,
     left: Mapping[str, float],
+    plan: Sequence[float],
 ) -> tuple[Floats, ...]:
-    """Go on by compiled code: to the end, to where `check` ends it, or to the last node before a watch is met."""
+    """Go on by compiled code: to the end (of the plan), to where `check` ends it, or to the last node before a watch."""
     equations = path.equations
     k = equations.k
     given |= {f"scale{j}": x for j, x in enumerate(equations.scale)}
@@ -227,11 +245,18 @@ def _marched(
 
     while True:
         before = state
-        found = march(k, equations.rates, given, state)
+        if plan:
+            ahead = bisect_right(plan, path.t[-1] + shortest(path.t[-1], given["span"]))
+            ends = [x for x in plan[ahead:] if x <= given["end"]]
+            if not ends:
+                return parts(before)
+            found = follow(k, equations.rates, {}, state, np.array(ends)[:, None])
+        else:
+            found = march(k, equations.rates, given, state)
         state, table = found.state, np.array(list(found.nodes.values()))[:, :, 0].T
         taken = np.diff(table[:, 0], prepend=np.ravel(before["t"])[0]) > 0
-        if not equations.clear(table[:, 1]):
-            # change points are near: step by step
+        if not np.isfinite(table).all() or not equations.clear(table[:, 1]):
+            # change points or a limit are near: step by step
             return parts(before)
         path.rejected += len(taken) - int(taken.sum())
         rows = table[taken]
@@ -261,6 +286,9 @@ def _marched(
                 return parts(state)
         if len(path.t) > budget:
             path.ended = "budget"
+        elif plan:
+            path.ended = "end" if path.t[-1] >= given["end"] else ""
+            return parts(state)
         elif not state["left"][0] > 0:
             path.ended = "end" if state["t"][0] >= given["end"] else "stiff" if found.stiff[0] else "lost"
         if path.ended:

@@ -1,4 +1,4 @@
-"""A simulation: two ways through time of different tolerance, the answer of the finer, and how far they lie apart."""
+"""A simulation: two ways through time, the second in steps half as long, and how far they lie apart."""
 
 from __future__ import annotations
 
@@ -15,16 +15,18 @@ from virtualwork.describe.parts import Input
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
-from virtualwork.intime.estimate import APART, FIRST, LEAST, TRIES, UNKNOWN, finer, share, spread
+from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, UNKNOWN, rounding, share, spread
 from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.friction import Rubbing
+from virtualwork.intime.implicit import Radau
 from virtualwork.intime.path import MOST
-from virtualwork.intime.step import Method
 from virtualwork.intime.travel import Travel, travel
 from virtualwork.intime.watch import Floats
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
+    from matplotlib.figure import FigureBase
+
     from dalembert.page import Page, Shown
     from virtualwork.animation import JointForce
 
@@ -56,10 +58,6 @@ class Run:
     @cached_property
     def _states(self) -> tuple[Reals, Reals, Reals, Reals]:
         return self.fine.at(self.t)
-
-    @cached_property
-    def _others(self) -> tuple[Reals, Reals, Reals, Reals]:
-        return self.coarse.at(self.t)
 
     @property
     def angle(self) -> Reals:
@@ -94,7 +92,11 @@ class Run:
     @cached_property
     def error_estimate(self) -> Reals:
         """(n, k): how far the inputs may be from the truth, rad or m."""
-        return self.spread(self.angle, self._others[0])
+        nodes = self.coarse.nodes
+        q, v, a, _ = self.fine.at(nodes)
+        found = spread(q, self.coarse.at(nodes)[0], self.share) + rounding(nodes, q, v, a)
+        # between two nodes that of the later one
+        return np.asarray(found[np.minimum(np.searchsorted(nodes, self.t), len(nodes) - 1)])
 
     @property
     def unknown(self) -> NDArray[np.bool_]:
@@ -120,6 +122,18 @@ class Run:
         """The motion at the first time, in the coordinates of the beginning: for its joints."""
         first = self.angle[:1], self.speed[:1], self.acceleration[:1], self.t[:1]
         return self.fine.legs[0].coordinates.motion(*first)
+
+    def plot(self, figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw inputs, speeds and energy over time and the mechanism at instants; return the axes.
+
+        The curves are drawn through more times than those asked for. Without a figure it is a new one of pyplot's;
+        without matplotlib (the extra `plot`) an ImportError.
+        """
+        from virtualwork.intime.picture import Course, draw, fine_times
+
+        fine = replace(self, t=fine_times(self.t))
+        course = Course(fine.t, fine.angle, fine.speed, fine.energy, fine.motion)
+        return draw(course, self.assembly.mechanism, figure)
 
     def animate(self, forces: bool = False) -> Page:
         """Return a page that moves: the mechanism by its own clock with play, slider, curves and values.
@@ -194,25 +208,24 @@ def simulate(
     equations.refuse(float(t[0]), q, v)
     scale = np.array(equations.scale)
     levels = _levels(m.inputs, until)
-    method: Method = DormandPrince()
-
-    def at(tolerance: float) -> Travel:
-        nonlocal method
-        found = travel(own, (float(t[0]), q, v), float(t[-1]), tolerance, levels, method)
-        # what was found to be stiff once is from the beginning
-        method = found.legs[-1].path.method
-        return found
-
     tolerance = max(LEAST, FIRST * accuracy)
-    coarse, fine, ratio = at(tolerance / APART), at(tolerance), APART
+    start = float(t[0]), q, v
+    fine = travel(own, start, float(t[-1]), tolerance, levels, DormandPrince())
+    if fine.stiff:
+        # what is stiff somewhere is from the beginning
+        fine = travel(own, start, float(t[-1]), tolerance, levels, Radau())
     for tries in range(TRIES):
-        shown = _reached(t, fine)
-        found = Run(assembly, shown, fine, coarse, float(share(ratio, tolerance)))
+        coarse, method = fine, fine.legs[0].path.method
+        # near change points every solution is interpolated from other poses
+        ways = own if tries % 2 else own.of(equations.otherwise())
+        fine = travel(ways, start, float(t[-1]), tolerance / (GAIN + 1), levels, method, coarse)
+        coarse.backwards()
+        part = 1.0 if equations.crosses else share(tolerance)
+        found = Run(assembly, _reached(t, fine), fine, coarse, part)
         worst = float((found.error_estimate / scale).max())
-        if worst <= accuracy or tolerance <= LEAST or tries == TRIES - 1:
+        if worst <= accuracy or tolerance <= LEAST or tries == TRIES - 1 or fine.steps > MOST / 2:
             break
-        then = float(finer(tolerance, accuracy, worst))
-        coarse, fine, ratio, tolerance = fine, at(then), then / tolerance, then
+        tolerance /= GAIN + 1
     return replace(found, warnings=(*equations.warnings, *_said(found, accuracy, worst, until, t)))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -45,10 +46,15 @@ class Leg:
         change = np.where(turning, change - TURN * np.round((change - near) / TURN), change)
         return np.asarray(self.first + np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(change, axis=0)]))
 
+    @property
+    def halves(self) -> Floats:
+        """The times of the nodes, and in the middle between them."""
+        t = self.path.t
+        return [x for a, b in pairwise(t) for x in (0.5 * (a + b), b)]
+
     def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
         """The coordinates, their speeds and accelerations, and the work."""
-        q, v, work = self.path.at(times)
-        return q, v, self.path.equations.many(times, q, v)[:, : q.shape[1]], work
+        return self.path.at(times)
 
     def states(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
         """The inputs, their speeds and accelerations, and the work."""
@@ -78,6 +84,20 @@ class Travel:
     def steps(self) -> int:
         """How many steps were taken."""
         return sum(len(leg.path.t) - 1 for leg in self.legs)
+
+    @property
+    def stiff(self) -> bool:
+        """Whether a leg ended for it was stiff."""
+        return any(leg.path.ended == "stiff" for leg in self.legs)
+
+    def backwards(self) -> None:
+        """From now on reach every time from the node after it.
+
+        Where a time lies in the first part of a step another solution reaches it by the very same step: from behind
+        it is another one.
+        """
+        for leg in self.legs:
+            leg.path.backwards = True
 
     @property
     def nodes(self) -> Reals:
@@ -110,7 +130,7 @@ class Travel:
         """Kinetic energy and that of gravity and springs, (n,) J."""
         out = np.empty(len(times))
         for leg, rows in self._parts(times):
-            q, v, _ = leg.path.at(times[rows])
+            q, v, _, _ = leg.path.at(times[rows])
             out[rows] = leg.path.equations.energies(times[rows], q, v)
         return out
 
@@ -176,6 +196,7 @@ def travel(
     tolerance: float,
     until: Mapping[int, float],
     method: Method,
+    like: Travel | None = None,
 ) -> Travel:
     """Go from a state of the inputs to a time, or until an input has a value.
 
@@ -186,6 +207,8 @@ def travel(
     until : mapping of an input's number to its value
     method : Method
         Where it is found to be stiff, the implicit one goes on.
+    like : Travel, optional
+        Each of its steps is done in two halves, leg by leg.
     """
     found = Travel()
     t, q, v = start
@@ -197,10 +220,12 @@ def travel(
             equations, v = equations.going_on(t, q, v, ended)
         monitor = Monitor(coordinates, inputs, coordinates.folds(q), bool(until) and not coordinates.own)
         watches = [*(monitor.until(j, level) for j, level in until.items()), *equations.watches()]
-        stops, budget = equations.stops, MOST - found.steps
+        most = MOST if like is None else MOST + 2 * like.steps
+        stops, budget = equations.stops, most - found.steps
         begin = t, q, v, work
         left = {ended: 0.0} if ended.startswith("friction") else None
-        path = walk(equations, method, begin, end, tolerance, watches, stops, monitor, budget, left)
+        plan = [] if like is None or len(found.legs) >= len(like.legs) else like.legs[len(found.legs)].halves
+        path = walk(equations, method, begin, end, tolerance, watches, stops, monitor, budget, left, plan)
         leg = Leg(coordinates, path, inputs)
         found.legs.append(leg)
         found.ended = path.ended

@@ -26,9 +26,9 @@ from virtualwork.family.written import Written
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
-from virtualwork.intime.estimate import APART, FIRST, LEAST, TRIES, finer, share, spread
+from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, rounding, share, spread
 from virtualwork.intime.explicit import names
-from virtualwork.intime.marching import beginning, march, over
+from virtualwork.intime.marching import beginning, follow, march, over
 from virtualwork.intime.powers import motion_of, places_and_speeds
 from virtualwork.intime.run import Run, rising, simulate
 
@@ -251,69 +251,40 @@ class _Lanes:
         """What enters the tapes in some variants."""
         return {name: x[rows] for name, x in self.given.items()}
 
-    # --- one way through time ---------------------------------------------------------------------------------------
+    # --- through time -----------------------------------------------------------------------------------------------
     def fill(self, runs: Runs, accuracy: float) -> Mask:
         """Let go of all that can be; which variants must be done singly, (v,)."""
         alone = ~self.together
-        rows = np.flatnonzero(self.together)
-        tolerance = np.full(len(rows), max(LEAST, FIRST * accuracy))
-        ratio = np.full(len(rows), APART)
-        twice = self.way(np.concatenate([rows, rows]), np.concatenate([tolerance / APART, tolerance]), alone)
-        coarse, fine = (
-            {name: x[half] for name, x in twice.items()} for half in np.split(np.arange(2 * len(rows)), 2)
-        )
+        rows, tolerance = np.flatnonzero(self.together), max(LEAST, FIRST * accuracy)
+        nodes = self.way(rows, tolerance, alone)
         for tries in range(TRIES):
-            error = spread(fine["q"], coarse["q"], share(ratio, tolerance)[:, None, None])
-            worst = (error / self.scale[rows, None]).max(axis=(1, 2), initial=0.0)
-            more = ~(worst <= accuracy) & (tolerance > LEAST) & ~alone[rows]
-            ends = ~alone[rows] & (~more | (tries == TRIES - 1))
-            self._put(runs, rows[ends], {name: x[ends] for name, x in fine.items()}, error[ends])
-            for i, x in zip(rows[ends], worst[ends], strict=True):
-                if not x <= accuracy:
-                    # how it must be said is known there
-                    alone[i] = True
-            if not more.any() or tries == TRIES - 1:
-                return alone
-            rows, ratio = rows[more], tolerance[more]
-            tolerance = finer(tolerance[more], accuracy, worst[more])
-            ratio = tolerance / ratio
-            coarse, fine = {name: x[more] for name, x in fine.items()}, self.way(rows, tolerance, alone)
+            coarse, nodes = nodes, self.halved(rows, nodes)
+            found = self._at(rows, nodes, self._error(coarse, nodes, share(tolerance)))
+            worst = (found["error"] / self.scale[rows, None]).max(axis=(1, 2), initial=0.0)
+            holds = worst <= accuracy
+            self._put(runs, rows[holds], {name: x[holds] for name, x in found.items()})
+            tolerance /= GAIN + 1
+            last = tolerance <= LEAST or tries == TRIES - 1 or len(nodes["t"]) > MOST
+            # what does not hold is tried again, and at last left to say itself why not
+            again = ~holds & ~alone[rows] & np.isfinite(worst) & (not last)
+            alone[rows[~holds & ~again]] = True
+            if not again.any():
+                break
+            rows, nodes = rows[again], {name: x[:, again] for name, x in nodes.items()}
         return alone
 
-    def meet(self) -> Mask:
-        """Which variants may have a change point on their way, (v,)."""
-        if self.k > 1:
-            return np.zeros(len(self.q), dtype=bool)
-        f, ends = self.family, np.stack([self.low, self.high], axis=1)[:, :, None]
-        rates: list[list[Any]] = [[1.0], [1.0], [0.0]]
-        return ~Solver(Part(f.mechanism, f.dimensions, f.values, ends, rates), self.solver).together
+    def _constants(self, rows: NDArray[np.intp]) -> dict[str, Any]:
+        """What enters the loop in some variants."""
+        return self.some(rows) | {f"scale{j}": self.scale[rows, j] for j in range(self.k)}
 
-    def _put(self, runs: Runs, rows: NDArray[np.intp], found: Mapping[str, Reals], error: Reals) -> None:
-        n = len(self.t)
-        given = {name: np.repeat(x, n) for name, x in self.some(rows).items()}
-        given |= dict(
-            zip(
-                places_and_speeds(self.k),
-                np.concatenate([found["q"], found["v"]], axis=2).reshape(-1, 2 * self.k).T,
-                strict=True,
-            )
-        )
-        with np.errstate(all="ignore"):
-            slopes, energy = (run(tape, given) for tape in (self.rates, self.energy))
-        for j in range(self.k):
-            runs.inputs[2, rows, :, j] = np.broadcast_to(slopes[f"a{j}"], len(rows) * n).reshape(-1, n)
-        for of, values in zip((0, 1, 3), (found["q"], found["v"], error), strict=True):
-            runs.inputs[of, rows] = values
-        runs.energies[0, rows] = np.broadcast_to(energy["energy"], len(rows) * n).reshape(-1, n)
-        runs.energies[1, rows] = found["work"]
+    def way(self, rows: NDArray[np.intp], tolerance: float, alone: Mask) -> dict[str, Reals]:
+        """The nodes of a way through all times, (rounds, lanes); marks in `alone` what has to be done singly.
 
-    def way(self, rows: NDArray[np.intp], tolerance: Reals, alone: Mask) -> dict[str, Reals]:
-        """q, q̇ (lanes, n, k) and the work (lanes, n) at all times; marks in `alone` what has to be done singly."""
+        A round in which a lane took no step repeats its last node.
+        """
         k, t = self.k, self.t
         span = float(t[-1] - t[0])
-        given: dict[str, Any] = self.some(rows)
-        given |= {f"scale{j}": self.scale[rows, j] for j in range(k)}
-        given |= {"tolerance": tolerance, "end": float(t[-1]), "span": span}
+        given = self._constants(rows) | {"tolerance": tolerance, "end": float(t[-1]), "span": span}
         places, speeds, rates = names(k)
         q, v = self.q[rows].T, self.v[rows].T
         with np.errstate(all="ignore"):
@@ -322,22 +293,66 @@ class _Lanes:
         fastest, h = first_steps(span, tolerance, self.scale[rows].T, q, v, slopes)
         state = beginning(float(t[0]), q, v, slopes, h, fastest, 0.0)
         state["left"] = np.where(np.isfinite(slopes).all(axis=0) & (span > 0), 1.0, 0.0)
-        nodes = [
-            {
-                name: np.broadcast_to(state[name], len(rows))[None]
-                for name in ("t", *places, *speeds, *rates, "work")
-            }
-        ]
+        kept = ("t", *places, *speeds, *rates, "work")
+        nodes = [{name: np.broadcast_to(state[name], len(rows))[None] for name in kept}]
         taken = 0
         while state["left"].max() > 0 and taken < MOST:
             found = march(k, self.rates, given, state, SOON if taken < 4 * SOON else LATER)
             state = found.state
             nodes.append(found.nodes)
             taken += len(found.nodes["t"])
-        whole = {name: np.concatenate([part[name] for part in nodes]) for name in nodes[0]}
-        alone[rows[~(np.ravel(whole["t"][-1]) >= t[-1])]] = True
+        whole = {name: np.concatenate([part[name] for part in nodes]) for name in kept}
+        alone[rows[~(whole["t"][-1] >= t[-1])]] = True
         alone[rows[self._folds(rows, whole)]] = True
-        return self._at(rows, whole)
+        return whole
+
+    def halved(self, rows: NDArray[np.intp], nodes: Mapping[str, Reals]) -> dict[str, Reals]:
+        """The nodes of the same ways in steps half as long."""
+        k = self.k
+        places, speeds, rates = names(k)
+        first = {name: x[0] for name, x in nodes.items()}
+        none = [np.zeros(len(rows))] * k
+        state = beginning(
+            first["t"],
+            [first[x] for x in places],
+            [first[x] for x in speeds],
+            [first[x] for x in rates],
+            0.0,
+            none,
+            first["work"],
+        )
+        t = nodes["t"]
+        times = np.stack([0.5 * (t[1:] + t[:-1]), t[1:]], axis=1).reshape(-1, t.shape[1])
+        found = follow(k, self.rates, self.some(rows), state, times).nodes
+        return {name: np.concatenate([x[None], found[name]]) for name, x in first.items()}
+
+    def _error(self, coarse: Mapping[str, Reals], fine: Mapping[str, Reals], of: float) -> Reals:
+        """The error of the inputs at all times, (lanes, n, k): that of the coarser way's next node."""
+        places, speeds, rates = names(self.k)
+        q, v, a = (np.stack([fine[name][::2].T for name in x], axis=-1) for x in (places, speeds, rates[:-1]))
+        other = np.stack([coarse[name].T for name in places], axis=-1)
+        found = spread(q, other, of) + rounding(coarse["t"].T, q, v, a)
+        at = np.stack([(coarse["t"] < x).sum(axis=0) for x in self.t], axis=1)
+        at = np.minimum(at, len(coarse["t"]) - 1)
+        return np.asarray(found[np.arange(len(found))[:, None], at])
+
+    def _at(self, rows: NDArray[np.intp], nodes: Mapping[str, Reals], error: Reals) -> dict[str, Reals]:
+        """The states at all times, from the node before each."""
+        k, t = self.k, self.t
+        places, speeds, rates = names(k)
+        before = np.stack([(nodes["t"] <= x).sum(axis=0) - 1 for x in t], axis=1)
+        lanes = np.arange(len(rows))[:, None]
+        state = {name: x[np.maximum(before, 0), lanes] for name, x in nodes.items()}
+        q, v, slopes = (np.stack([state[name] for name in of], axis=-1) for of in (places, speeds, rates))
+        work, h = state["work"].copy(), t - state["t"]
+        lane, on = np.nonzero(h > 0)
+        if len(lane):
+            here = (state["t"][lane, on], q[lane, on], v[lane, on], slopes[lane, on], h[lane, on])
+            dq, dv, dw = over(k, self.rates, self.some(rows[lane]), *here)
+            q[lane, on] += dq
+            v[lane, on] += dv
+            work[lane, on] += dw
+        return {"q": q, "v": v, "work": work, "error": error}
 
     def _folds(self, rows: NDArray[np.intp], nodes: Mapping[str, Reals]) -> Mask:
         """In which lanes a loop folds on the way."""
@@ -358,22 +373,29 @@ class _Lanes:
         self.high[rows] = np.fmax(self.high[rows], q.max(axis=0))
         return folds
 
-    def _at(self, rows: NDArray[np.intp], nodes: Mapping[str, Reals]) -> dict[str, Reals]:
-        """The states at all times, from the node before each."""
-        k, t = self.k, self.t
-        places, speeds, rates = names(k)
-        before = np.stack([(nodes["t"] <= x).sum(axis=0) - 1 for x in t], axis=1)
-        # of rounds that took no step the last node is the same
-        lanes = np.arange(len(rows))[:, None]
-        state = {name: x[np.maximum(before, 0), lanes] for name, x in nodes.items()}
-        q, v, slopes = (np.stack([state[name] for name in of], axis=-1) for of in (places, speeds, rates))
-        work, h = state["work"].copy(), t - state["t"]
-        lane, on = np.nonzero(h > 0)
-        if len(lane):
-            given = self.some(rows[lane])
-            here = (state["t"][lane, on], q[lane, on], v[lane, on], slopes[lane, on], h[lane, on])
-            dq, dv, dw = over(k, self.rates, given, *here)
-            q[lane, on] += dq
-            v[lane, on] += dv
-            work[lane, on] += dw
-        return {"q": q, "v": v, "work": work}
+    def meet(self) -> Mask:
+        """Which variants may have a change point on their way, (v,)."""
+        if self.k > 1:
+            return np.zeros(len(self.q), dtype=bool)
+        f, ends = self.family, np.stack([self.low, self.high], axis=1)[:, :, None]
+        rates: list[list[Any]] = [[1.0], [1.0], [0.0]]
+        return ~Solver(Part(f.mechanism, f.dimensions, f.values, ends, rates), self.solver).together
+
+    def _put(self, runs: Runs, rows: NDArray[np.intp], found: Mapping[str, Reals]) -> None:
+        n = len(self.t)
+        given = {name: np.repeat(x, n) for name, x in self.some(rows).items()}
+        given |= dict(
+            zip(
+                places_and_speeds(self.k),
+                np.concatenate([found["q"], found["v"]], axis=2).reshape(-1, 2 * self.k).T,
+                strict=True,
+            )
+        )
+        with np.errstate(all="ignore"):
+            slopes, energy = (run(tape, given) for tape in (self.rates, self.energy))
+        for j in range(self.k):
+            runs.inputs[2, rows, :, j] = np.broadcast_to(slopes[f"a{j}"], len(rows) * n).reshape(-1, n)
+        for of, values in zip((0, 1, 3), (found["q"], found["v"], found["error"]), strict=True):
+            runs.inputs[of, rows] = values
+        runs.energies[0, rows] = np.broadcast_to(energy["energy"], len(rows) * n).reshape(-1, n)
+        runs.energies[1, rows] = found["work"]

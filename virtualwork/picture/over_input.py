@@ -83,7 +83,8 @@ def forces(d: Dynamics, rows: Sequence[Row] | None = None, figure: FigureBase | 
     largest = max((float(np.abs(v[np.isfinite(v)]).max(initial=0.0)) for v in everything), default=0.0)
     ends = [_effort(top, d, x, largest), _joint_forces(bottom, x, shown, largest)]
     _name_input(bottom, x, label)
-    bottom.set_ylim(bottom=0)
+    # a force of zero is seen too
+    bottom.set_ylim(bottom=-0.03 * bottom.get_ylim()[1])
     found = [top, bottom]
     if shakes:
         hodograph, curve = right.subplots(2, 1, height_ratios=(2.6, tall))
@@ -109,9 +110,11 @@ def _input(poses: Poses) -> tuple[Reals, str]:
 
 
 def _name_input(axes: Axes, x: Reals, label: str) -> None:
-    from matplotlib.ticker import MultipleLocator
+    from matplotlib.ticker import MaxNLocator, MultipleLocator
 
     axes.set_xlabel(label)
+    if label == "step":
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     across = float(np.ptp(x)) if len(x) else 0.0
     if label.endswith("deg") and across >= 90:
         axes.xaxis.set_major_locator(

@@ -15,12 +15,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import record
+
+if TYPE_CHECKING:
+    from matplotlib.figure import FigureBase
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -216,6 +219,19 @@ class UnitLoad:
     force: ArrayLike = 0.0
     torque: ArrayLike = 0.0
 
+    @property
+    def acts(self) -> Mask:
+        """(n,): it acts on this link."""
+        force, torque = np.broadcast_arrays(self.force, self.torque)
+        here = (force != 0) | (torque != 0)
+        return np.asarray(here.reshape(-1, here.shape[-1]).any(axis=0))
+
+    @property
+    def unit(self) -> str:
+        """That of the unknown: N, N·m, or neither where it is both a force and a torque."""
+        kinds = {"N": np.any(np.asarray(self.force) != 0), "N·m": np.any(np.asarray(self.torque) != 0)}
+        return " and ".join(unit for unit, there in kinds.items() if there)
+
 
 @record
 @dataclass(frozen=True, eq=False, repr=False)
@@ -236,6 +252,44 @@ class Balance:
     """(..., k): the power of the known loads in each field, W."""
     given: tuple[LinkStates, tuple[UnitLoad, ...]] | None = field(default=None, repr=False, compare=False)
     """What was balanced."""
+
+    def plot(self, links: Sequence[str] = (), figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw the power of every load as a bar; of several instants, the unknowns over them. Return the axes.
+
+        Without a figure it is a new one of pyplot's; without matplotlib (the extra `plot`) an ImportError.
+
+        Parameters
+        ----------
+        links : sequence of str
+            What the links are called; default 1, 2, …
+        figure : matplotlib's figure or subfigure
+            Where to draw.
+        """
+        from virtualwork.textbook.picture import UNKNOWN, ledger, over_steps
+
+        assert self.given is not None
+        states, unknowns = self.given
+        named = links or [str(i + 1) for i in range(states.shape[-1])]
+        loads = [
+            (" and ".join(n for n, acts in zip(named, u.acts.tolist(), strict=True) if acts), u.unit)
+            for u in unknowns
+        ]
+        k = len(loads)
+        if self.value.ndim > 1:
+            values = self.value.reshape(-1, k)
+            series = {(f"{UNKNOWN} on {on}", unit): values[:, j] for j, (on, unit) in enumerate(loads)}
+            return over_steps(np.arange(1, len(values) + 1), series, figure)
+        found = []
+        for f in range(k):
+            of, at = (f" (field {f + 1})", (f,)) if k > 1 else ("", ())
+            for kind, term in states.terms.items():
+                powers, works = (
+                    np.broadcast_to(v, states.shape)[at].tolist() for v in (term.power, term.works)
+                )
+                found += [(n, kind + of, p) for n, p, does in zip(named, powers, works, strict=True) if does]
+            own = self.unknown_power[f].tolist()
+            found += [(on, UNKNOWN + of, p) for (on, _), p in zip(loads, own, strict=True)]
+        return ledger(found, figure)
 
     def error_estimate(self) -> Real:
         """Return a bound (..., k) of the rounding error of each unknown; infinite where it is not determined.

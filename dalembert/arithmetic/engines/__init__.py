@@ -7,7 +7,7 @@ overrides. All agree to rounding.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from dalembert.arithmetic.engines import blocks, floats
 from dalembert.arithmetic.tape import Tape
 
 Reals = NDArray[np.float64]
+Rows = Sequence[Reals] | Reals
 ENGINES = ("python", "numpy", "llvm")
 FEW = 4  # lanes up to which Python's floats are faster than numpy's calls
 PAYS = 3e8  # operations × lanes of one tape from which compiling it pays (some 0.1 s with the import)
@@ -30,7 +31,7 @@ class Outputs(Mapping[str, Any]):
     Attributes
     ----------
     tape : Tape
-    table : array (outputs, lanes), or a sequence of floats where every input was one
+    table : the row of each output, (lanes,), or a number where every input was one
     """
 
     __slots__ = ("table", "tape")
@@ -41,6 +42,16 @@ class Outputs(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         return self.table[self.tape.rows[name]]
 
+    def complex(self, real: str, imaginary: str) -> Any:
+        """Two outputs as one complex number: without a copy where the run was told that they are `pairs`."""
+        x, y = self.get(real, 0.0), self.get(imaginary, 0.0)
+        if np.ndim(x) and np.ndim(y) and x.strides == (16,) and y.ctypes.data == x.ctypes.data + 8:
+            start = (x.ctypes.data - x.base.ctypes.data) // 8
+            return x.base[start : start + 2 * len(x)].view(complex)
+        value = np.empty(np.broadcast_shapes(np.shape(x), np.shape(y)), complex)
+        value.real, value.imag = x, y
+        return value
+
     def __iter__(self) -> Iterator[str]:
         return iter(self.tape.names)
 
@@ -48,7 +59,9 @@ class Outputs(Mapping[str, Any]):
         return len(self.tape.outputs)
 
 
-def run(tape: Tape, inputs: Mapping[str, Any], engine: str | None = None) -> Outputs:
+def run(
+    tape: Tape, inputs: Mapping[str, Any], engine: str | None = None, pairs: Iterable[str] = ()
+) -> Outputs:
     """Run a tape on lanes.
 
     Parameters
@@ -58,6 +71,8 @@ def run(tape: Tape, inputs: Mapping[str, Any], engine: str | None = None) -> Out
         A float is the same for every lane. Further names are ignored.
     engine : "python", "numpy" or "llvm"
         Chosen by the size of the work where not given.
+    pairs : names of outputs
+        Each and the output after it are the parts of a complex number, and are laid one beside the other for it.
 
     Returns
     -------
@@ -96,12 +111,30 @@ def run(tape: Tape, inputs: Mapping[str, Any], engine: str | None = None) -> Out
     engine = engine or chosen(tape, n)
     if engine not in ENGINES:
         raise ValueError(f"engine '{engine}': expected {', '.join(ENGINES)}")
-    table = np.empty((len(tape.outputs), n))
+    first = frozenset(tape.rows[name] for name in pairs)
+    table = _table(len(tape.outputs), n, first)
     if engine == "python" and floats.takes(tape):
-        _on_floats(tape, columns, table)
-    elif not (engine == "llvm" and _on_llvm(tape, columns, table)):
+        _on_floats(tape, columns, table, n)
+    elif not (engine == "llvm" and _on_llvm(tape, columns, table, first)):
         blocks.run(tape, columns, table)
-    return Outputs(tape, table if any(column.ndim for column in columns) else table[:, 0])
+    return Outputs(
+        tape, table if any(column.ndim for column in columns) else np.array([row[0] for row in table])
+    )
+
+
+def _table(rows: int, n: int, pairs: frozenset[int]) -> Rows:
+    """The rows of a run, one after the other in memory; a pair takes the room of two, its numbers in turn."""
+    room = np.empty(rows * n)
+    if not pairs:
+        return room.reshape(rows, n)
+    found: list[Reals] = []
+    for row in range(rows):
+        if row in pairs:
+            both = room[row * n : (row + 2) * n]
+            found += [both[::2], both[1::2]]
+        elif row - 1 not in pairs:
+            found.append(room[row * n : (row + 1) * n])
+    return found
 
 
 def chosen(tape: Tape, n: int) -> str:
@@ -119,22 +152,18 @@ def compiled_code() -> bool:
     return find_spec("llvmlite") is not None
 
 
-def _on_floats(tape: Tape, columns: list[Reals], table: Reals) -> None:
+def _on_floats(tape: Tape, columns: list[Reals], table: Rows, n: int) -> None:
     function = floats.compiled(tape)
-    given = (
-        np.stack([np.broadcast_to(column, table.shape[1]) for column in columns]).T
-        if columns
-        else table[:0].T
-    )
-    for lane, values in enumerate(given.tolist()):
+    for lane, values in enumerate(zip(*(np.broadcast_to(c, n).tolist() for c in columns), strict=True)):
         try:
-            table[:, lane] = function(*values)
+            for row, value in zip(table, function(*values), strict=True):
+                row[lane] = value
         except (ZeroDivisionError, ValueError, OverflowError):
-            blocks.run(tape, [np.array([value]) for value in values], table[:, lane : lane + 1])
+            blocks.run(tape, [np.array([value]) for value in values], [row[lane : lane + 1] for row in table])
 
 
-def _on_llvm(tape: Tape, columns: list[Reals], table: Reals) -> bool:
+def _on_llvm(tape: Tape, columns: list[Reals], table: Rows, pairs: frozenset[int]) -> bool:
     # llvmlite takes some 0.1 s to load: only where it works
     from dalembert.arithmetic.engines import llvm
 
-    return llvm.run(tape, columns, table)
+    return llvm.run(tape, columns, table, pairs)

@@ -18,7 +18,9 @@ from dalembert.arithmetic.engines import floats
 from dalembert.arithmetic.tape import Tape, shortened
 
 Reals = NDArray[np.float64]
-BLOCK = 1024  # lanes: some thirty slots of them fit the cache
+# lanes of a block: as many as let the scratch fit the second cache. Longer ones pay numpy's calls by more lanes
+LEAST, MOST = 1024, 8192
+ROOM = 1 << 20  # bytes
 LONGEST = 1000  # operations of one generated function
 
 UFUNCS = {
@@ -116,6 +118,7 @@ class Blocks:
             else:
                 lines.append(f"{UFUNCS[kind]}({', '.join(given)}, {target})")
         self.slots = slots
+        self.block = min(MOST, max(LEAST, ROOM // (8 * max(slots, 1)) // LEAST * LEAST))
         self.parts = self._compiled(lines)
         self._own = threading.local()
 
@@ -133,32 +136,32 @@ class Blocks:
     def _scratch(self) -> tuple[list[Reals], NDArray[np.bool_]]:
         if not hasattr(self._own, "scratch"):
             # eight further lanes a row, so that the rows do not all begin at the same place of a cache's way
-            table = np.empty((self.slots, BLOCK + 8))
-            self._own.scratch = list(table[:, :BLOCK]), np.empty(BLOCK, dtype=bool)
+            table = np.empty((self.slots, self.block + 8))
+            self._own.scratch = list(table[:, : self.block]), np.empty(self.block, dtype=bool)
         return self._own.scratch  # type: ignore[no-any-return]
 
-    def __call__(self, columns: Sequence[Reals], out: Reals) -> None:
-        """Run: `columns` in the order of the tape's inputs, (n,), or () where uniform; `out` is (outputs, n)."""
-        n = out.shape[1]
+    def __call__(self, columns: Sequence[Reals], out: Sequence[Reals] | Reals) -> None:
+        """Run: `columns` in the order of the tape's inputs, (n,), or () where uniform; `out` a row an output, (n,)."""
+        n = len(out[0]) if len(out) else 0
         inputs = dict(zip(self.tape.inputs, columns, strict=True))
         varying = [inputs[name] for name in self.varying]
         with np.errstate(all="ignore"):
             common = self._common(inputs)
             constants = [common[str(number)] for number in self.read]
             slots, mask = self._scratch()
-            for i in range(0, n if self.parts else 0, BLOCK):
-                j = min(i + BLOCK, n)
-                rows = [out[row, i:j] for row in self.written]
-                whole = j - i == BLOCK
+            for i in range(0, n if self.parts else 0, self.block):
+                j = min(i + self.block, n)
+                rows = [out[row][i:j] for row in self.written]
+                whole = j - i == self.block
                 here, there = (slots, mask) if whole else ([s[: j - i] for s in slots], mask[: j - i])
                 arguments = [*(x[i:j] for x in varying), *constants, *rows, *here, there]
                 for part in self.parts:
                     part(*arguments)
         for row, kind, source in self.fill:
             if kind == "common":
-                out[row] = common[str(source)]
+                out[row][:] = common[str(source)]
             else:
-                out[row] = inputs[source] if kind == "input" else out[source]
+                out[row][:] = inputs[source] if kind == "input" else out[source]
 
     def _common(self, inputs: Mapping[str, Reals]) -> Mapping[str, Any]:
         """The values that are the same for all lanes, as floats where those go on."""
@@ -178,7 +181,7 @@ def compiled(tape: Tape, uniform: frozenset[str]) -> Blocks:
     return Blocks(tape, uniform)
 
 
-def run(tape: Tape, columns: Sequence[Reals], out: Reals) -> None:
-    """Run a tape: inputs in its order, (n,), or () for one number; `out` is (outputs, n)."""
+def run(tape: Tape, columns: Sequence[Reals], out: Sequence[Reals] | Reals) -> None:
+    """Run a tape: inputs in its order, (n,), or () for one number; `out` a row an output, (n,)."""
     uniform = frozenset(name for name, x in zip(tape.inputs, columns, strict=True) if not x.ndim)
     compiled(tape, uniform)(columns, out)

@@ -26,13 +26,13 @@ from dalembert.arithmetic.tape import Tape
 
 Reals = NDArray[np.float64]
 LONGEST = 8000  # operations: about a second to compile; numpy runs what is longer
-FORMAT = "2"  # of the code below: another number makes old files on disk useless
+FORMAT = "3"  # of the code below: another number makes old files on disk useless
 
 _FUNCTION = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
 # kept for the life of the process: compiled code holds their addresses
 _EXACT = {"sin": _FUNCTION(circular.sin), "cos": _FUNCTION(circular.cos)}
 _lock = threading.Lock()
-_compiled: dict[tuple[Tape, frozenset[str]], Code | None] = {}
+_compiled: dict[tuple[Tape, frozenset[str], frozenset[int]], Code | None] = {}
 _unusable: list[str] = []
 
 
@@ -45,47 +45,54 @@ class Code:
         kind = ctypes.CFUNCTYPE(None, ctypes.c_int64, pointer, ctypes.c_void_p, ctypes.c_int64)
         self._call = kind(address)
 
-    def __call__(self, columns: Sequence[Reals], out: Reals) -> None:
-        """Run: `out` is (outputs, n). At least one vector is done, and the last may do lanes again."""
-        n = out.shape[1]
-        columns, table = [np.ascontiguousarray(c) if c.ndim else c for c in columns], out
+    def __call__(self, columns: Sequence[Reals], out: Sequence[Reals] | Reals, pairs: frozenset[int]) -> None:
+        """Run: `out` is as `run` takes it. At least one vector is done, and the last may do lanes again."""
+        n, table = len(out[0]), out[0]
+        columns = [np.ascontiguousarray(c) if c.ndim else c for c in columns]
         if n < self.width:
-            table = np.empty((len(out), self.width))
+            table = np.empty(len(out) * self.width)
             columns = [c if c.ndim == 0 else np.resize(c, self.width) for c in columns]
-        elif out.strides[1] != out.itemsize:
-            table = np.empty(out.shape)
         # numbers that all lanes share stand side by side: an address of each array's own costs more than the work
         shared = np.array([c.item() for c in columns if not c.ndim])
         places = count(shared.ctypes.data, shared.itemsize)
         pointers = (ctypes.c_void_p * max(len(columns), 1))(
             *(c.ctypes.data if c.ndim else next(places) for c in columns)
         )
-        self._call(table.shape[1], pointers, table.ctypes.data, table.strides[0] // table.itemsize)
-        if table is not out:
-            out[:] = table[:, :n]
+        lanes = max(n, self.width)
+        self._call(lanes, pointers, table.ctypes.data, lanes)
+        if lanes > n:
+            for row, to in enumerate(out):
+                first = row - (row - 1 in pairs)
+                both = table[first * lanes : (first + 2) * lanes]
+                to[:] = both[row - first :: 2][:n] if first in pairs else both[:n]
 
 
-def run(tape: Tape, columns: Sequence[Reals], out: Reals) -> bool:
-    """Run a tape; False where this machine or this tape is not for compiled code."""
-    if len(tape.operations) > LONGEST or _unusable or not out.size:
+def run(
+    tape: Tape, columns: Sequence[Reals], out: Sequence[Reals] | Reals, pairs: frozenset[int] = frozenset()
+) -> bool:
+    """Run a tape; False where this machine or this tape is not for compiled code.
+
+    `out` has a row an output, one after the other in memory; those of `pairs` and the ones after them in turn.
+    """
+    if len(tape.operations) > LONGEST or _unusable or not len(out) or not len(out[0]):
         return False
     uniform = frozenset(name for name, x in zip(tape.inputs, columns, strict=True) if not x.ndim)
     with _lock:
-        key = (tape, uniform)
+        key = (tape, uniform, pairs)
         if key not in _compiled:
-            _compiled[key] = _code(tape, uniform)
+            _compiled[key] = _code(tape, uniform, pairs)
         code = _compiled[key]
     if code is None:
         return False
-    code(columns, out)
+    code(columns, out, pairs)
     return True
 
 
-def _code(tape: Tape, uniform: frozenset[str]) -> Code | None:
+def _code(tape: Tape, uniform: frozenset[str], pairs: frozenset[int]) -> Code | None:
     from dalembert.arithmetic.engines.lowered import lowered
 
-    name = "|".join([tape.key, ",".join(sorted(uniform))])
-    found = loaded(name, "tape", lambda width: lowered(tape, uniform, width))
+    name = "|".join([tape.key, ",".join(sorted(uniform)), ",".join(map(str, sorted(pairs)))])
+    found = loaded(name, "tape", lambda width: lowered(tape, uniform, pairs, width))
     return None if found is None else Code(*found)
 
 

@@ -1,8 +1,8 @@
 """A loop as LLVM's language: the state of a vector of lanes stays in registers from round to round.
 
-`void rounds(long groups, double *given, double *state, double *nodes, long *counts, long capacity)`: groups of as many
-lanes as a vector has, each with its own rows of `given` and `state`, one vector a row; of what is kept `nodes` has
-room for `capacity` rounds of each group, and `counts` says how many were done. The tape that is called stands once, as
+`void rounds(long groups, double *given, double *state, double *fed, double *nodes, long *counts, long capacity)`: groups
+of as many lanes as a vector has, each with its own rows of `given` and `state`, one vector a row; `fed` has the rows of
+each of its `capacity` rounds, of what is kept `nodes` has room for as many, and `counts` says how many were done. The tape that is called stands once, as
 a function of its own.
 """
 
@@ -21,9 +21,9 @@ def looped(loop: Loop, width: int) -> ir.Module:
     v = Vectors(module, width)
     inner = _inner(loop, v)
     pointer = v.double.as_pointer()
-    kind = ir.FunctionType(ir.VoidType(), [v.long, pointer, pointer, pointer, v.long.as_pointer(), v.long])
+    kind = ir.FunctionType(ir.VoidType(), [v.long, *[pointer] * 4, v.long.as_pointer(), v.long])
     function = ir.Function(module, kind, "rounds")
-    groups, given, state, nodes, counts, capacity = function.args
+    groups, given, state, fed, nodes, counts, capacity = function.args
 
     def number(value: int) -> ir.Constant:
         return ir.Constant(v.long, value)
@@ -54,10 +54,13 @@ def looped(loop: Loop, width: int) -> ir.Module:
     now = [b.phi(v.vector) for _ in loop.states]
     for phi, value in zip(now, begin, strict=True):
         phi.add_incoming(value, group)
-    values = _round(loop, v, b, inner, constants | dict(zip(loop.states, now, strict=True)))
+    turn = b.add(b.mul(g, capacity), i)
+    food = b.mul(turn, number(len(loop.fed)))
+    own_round = {name: b.load(place(fed, food, k), align=8) for k, name in enumerate(loop.fed)}
+    values = _round(loop, v, b, inner, constants | own_round | dict(zip(loop.states, now, strict=True)))
     places = dict(loop.body.outputs)
     following = {name: values[places[name]] for name in loop.states}
-    row = b.mul(b.add(b.mul(g, capacity), i), number(len(loop.kept)))
+    row = b.mul(turn, number(len(loop.kept)))
     for k, name in enumerate(loop.kept):
         b.store(following[name], place(nodes, row, k), align=8)
     done = b.add(i, number(1))

@@ -1,7 +1,8 @@
 """A tape as LLVM's language: one loop over vectors of lanes, every value in a register.
 
 `void tape(long n, double **inputs, double *outputs, long stride)`: inputs are columns of n doubles, or single ones where
-uniform; output k begins at outputs + k·stride. n is at least one vector; the last vector ends with the last lane.
+uniform; output k begins at outputs + k·stride, and one of `pairs` has the next in turn with its own. n is at least one
+vector; the last vector ends with the last lane.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dalembert.arithmetic.engines.vectors import Vectors
 from dalembert.arithmetic.tape import Tape
 
 
-def lowered(tape: Tape, uniform: frozenset[str], width: int) -> ir.Module:
+def lowered(tape: Tape, uniform: frozenset[str], pairs: frozenset[int], width: int) -> ir.Module:
     """The module of a tape."""
     module = ir.Module("tape")
     v = Vectors(module, width)
@@ -46,8 +47,20 @@ def lowered(tape: Tape, uniform: frozenset[str], width: int) -> ir.Module:
         return b.load(b.bitcast(b.gep(place[name], [i]), v.vector.as_pointer()), align=8)
 
     values = body(tape, v, b, enter)
-    for (_, number), row in zip(tape.outputs, rows, strict=True):
-        b.store(values[number], b.bitcast(b.gep(row, [i]), v.vector.as_pointer()), align=8)
+    found = [values[number] for _, number in tape.outputs]
+
+    def store(value: ir.Value, row: ir.Value, at: ir.Value) -> None:
+        b.store(value, b.bitcast(b.gep(row, [at]), v.vector.as_pointer()), align=8)
+
+    for k, row in enumerate(rows):
+        if k in pairs:
+            twice = b.add(i, i)
+            for half, at in enumerate((twice, b.add(twice, ir.Constant(v.long, width)))):
+                turn = [j // 2 + (width if j % 2 else 0) for j in range(half * width, (half + 1) * width)]
+                mask = ir.Constant(ir.VectorType(ir.IntType(32), width), turn)
+                store(b.shuffle_vector(found[k], found[k + 1], mask), row, at)
+        elif k - 1 not in pairs:
+            store(found[k], row, i)
     following = b.add(i, ir.Constant(v.long, width))
     over = b.icmp_signed(">", following, last)
     clipped = b.select(over, last, following)

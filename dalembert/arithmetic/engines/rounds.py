@@ -18,6 +18,8 @@ Reals = NDArray[np.float64]
 # what an operation takes on floats, and of numpy's the call and each lane, s; the time from which compiling a loop pays
 FLOATS, CALL, LANE = 4e-8, 1e-6, 1e-9
 PAYS = 0.15
+# of the code that is written: another number makes old files on disk useless
+FORMAT = 2
 
 _lock = threading.Lock()
 _time: dict[Loop, float] = {}
@@ -30,19 +32,20 @@ class Code:
     def __init__(self, loop: Loop, width: int, keeper: Any, address: int) -> None:
         self.loop, self.width, self._keeper = loop, width, keeper
         long = ctypes.c_int64
-        kind = ctypes.CFUNCTYPE(None, long, *[ctypes.c_void_p] * 4, long)
+        kind = ctypes.CFUNCTYPE(None, long, *[ctypes.c_void_p] * 5, long)
         self._call = kind(address)
 
-    def __call__(self, given: Reals, state: Reals, capacity: int) -> tuple[Reals, Reals]:
+    def __call__(self, given: Reals, state: Reals, fed: Reals, capacity: int) -> tuple[Reals, Reals]:
         """The state (s, n) after as many rounds as `capacity` at most, and what is kept of each, (rounds, kept, n)."""
         loop, width, n = self.loop, self.width, state.shape[1]
         groups = -(-n // width)
         # lanes that fill the last vector do the last lane's work again
         lanes = np.minimum(np.arange(groups * width), n - 1)
         given, state = (self._vectors(of, lanes) for of in (given, state))
+        food = self._vectors(fed.reshape(-1, n), lanes)
         nodes = np.empty((groups, capacity, len(loop.kept), width))
         counts = np.empty(groups, dtype=np.int64)
-        self._call(groups, *(of.ctypes.data for of in (given, state, nodes, counts)), capacity)
+        self._call(groups, *(of.ctypes.data for of in (given, state, food, nodes, counts)), capacity)
         rounds = int(counts.max())
         kept = nodes[:, :rounds].transpose(1, 2, 0, 3).reshape(rounds, len(loop.kept), -1)[:, :, :n]
         if counts.min() < rounds:
@@ -54,11 +57,18 @@ class Code:
 
     def _vectors(self, of: Reals, lanes: NDArray[np.intp]) -> Reals:
         """Rows of lanes as groups of rows of vectors."""
-        return np.ascontiguousarray(of[:, lanes].reshape(len(of), -1, self.width).transpose(1, 0, 2))
+        return np.ascontiguousarray(
+            of[:, lanes].reshape(len(of), len(lanes) // self.width, self.width).transpose(1, 0, 2)
+        )
 
 
 def run(
-    loop: Loop, given: Mapping[str, Any], state: Mapping[str, Any], capacity: int, engine: str | None = None
+    loop: Loop,
+    given: Mapping[str, Any],
+    state: Mapping[str, Any],
+    capacity: int,
+    engine: str | None = None,
+    fed: Mapping[str, Reals] | None = None,
 ) -> tuple[dict[str, Reals], dict[str, Reals]]:
     """Do rounds of a loop in every lane, until none goes on or `capacity` rounds are done.
 
@@ -69,6 +79,8 @@ def run(
         Constants and the state to begin with.
     engine : "numpy" or "llvm"
         Chosen by the work done so far where not given.
+    fed : mapping of name to array (capacity, n), optional
+        What every round has of its own.
 
     Returns
     -------
@@ -92,11 +104,14 @@ def run(
     n = max(np.size(x) for x in (*given.values(), *state.values()))
     constants = _rows(loop.constants, given, n)
     found = _rows(loop.states, state, n)
+    food = np.empty((capacity, len(loop.fed), n))
+    for i, name in enumerate(loop.fed):
+        food[:, i] = (fed or {})[name]
     code = ready(loop, engine)
     if code is not None:
-        found, kept = code(constants, found, capacity)
+        found, kept = code(constants, found, food, capacity)
     else:
-        found, kept = _on_blocks(loop, constants, found, capacity)
+        found, kept = _on_blocks(loop, constants, found, food)
         _spent(loop, len(kept) * (CALL + LANE * n))
     return (
         dict(zip(loop.states, found, strict=True)),
@@ -137,7 +152,7 @@ def _code(loop: Loop) -> Code | None:
 
         return looped(loop, width)
 
-    name = "|".join([loop.body.key, loop.inner.key, *loop.kept])
+    name = "|".join([f"rounds {FORMAT}", loop.body.key, loop.inner.key, *loop.kept, "fed", *loop.fed])
     found = llvm.loaded(name, "rounds", written)
     return None if found is None else Code(loop, *found)
 
@@ -149,16 +164,18 @@ def _rows(names: tuple[str, ...], of: Mapping[str, Any], n: int) -> Reals:
     return rows
 
 
-def _on_blocks(loop: Loop, given: Reals, state: Reals, capacity: int) -> tuple[Reals, Reals]:
+def _on_blocks(loop: Loop, given: Reals, state: Reals, fed: Reals) -> tuple[Reals, Reals]:
     """The same by numpy, on the lanes that still go on."""
     tape, state = loop.whole, state.copy()
     places = {name: i for i, name in enumerate(loop.states)}
-    rows = [(state, places[x]) if x in places else (given, loop.constants.index(x)) for x in tape.inputs]
+    every = (*loop.states, *loop.constants, *loop.fed)
+    rows = [every.index(x) for x in tape.inputs]
     going = np.arange(state.shape[1])
     kept = []
-    for _ in range(capacity):
+    for food in fed:
         found = np.empty((len(places), len(going)))
-        blocks.run(tape, [of[i, going] for of, i in rows], found)
+        whole = (*state, *given, *food)
+        blocks.run(tape, [whole[i][going] for i in rows], found)
         state[:, going] = found
         kept.append(state[[places[name] for name in loop.kept]])
         going = going[found[places["left"]] > 0]

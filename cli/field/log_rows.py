@@ -1,0 +1,394 @@
+"""The rows of a log side by side: rotors of like shape become arrays together, whatever their runs are called."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.errors import DataError
+from cli.field.read import NO, SHOWN, YES
+from cli.field.runs import Channel, Complex, Log, Real, Rows
+from cli.read.tables import Table
+
+
+class Masses(NamedTuple):
+    """What the rows of a table put on, an entry for each mass."""
+
+    planes: list[str]
+    row: Rows
+    """Ascending, (k,)."""
+    plane: Rows
+    value: Complex
+    """SI."""
+    told: NDArray[np.bool_]
+    """Whether a row says anything of masses, (n,)."""
+
+    @classmethod
+    def of(cls, rows: Sequence[dict[str, complex] | None]) -> Masses:
+        """Take the masses of each row, plane -> mass; None where it says nothing of them."""
+        planes: dict[str, int] = {}
+        entries = [
+            (i, planes.setdefault(plane, len(planes)), mass)
+            for i, masses in enumerate(rows)
+            for plane, mass in (masses or {}).items()
+        ]
+        row, plane, value = zip(*entries, strict=True) if entries else ((), (), ())
+        told = np.array([masses is not None for masses in rows])
+        at, of = (np.array(part, dtype=np.intp) for part in (row, plane))
+        return cls(list(planes), at, of, np.array(value, dtype=complex), told)
+
+    def by_row(self) -> list[dict[str, complex] | None]:
+        """Return them as `of` takes them."""
+        out: list[dict[str, complex] | None] = [{} if told else None for told in self.told.tolist()]
+        for i, plane, mass in zip(self.row.tolist(), self.plane.tolist(), self.value.tolist(), strict=True):
+            mine = out[i]
+            assert mine is not None
+            mine[self.planes[plane]] = mass
+        return out
+
+
+@dataclass
+class LogRows:
+    """What each row of the table says, by row."""
+
+    table: Table
+    rotor: Rows
+    rotors: list[str]
+    vibration: Complex
+    channel: Rows
+    channels: list[Channel]
+    """The sensor, state and speed of each row."""
+    masses: Masses
+    run: Rows
+    runs: list[str]
+    years: Real | None = None
+    """When it was read; NaN where the row does not say."""
+    reading_share: float = 0.0
+    """By what share of it a reading may be off from its decimals."""
+    mass_share: float = 0.0
+
+
+class Lines(Sequence[Log]):
+    """The rows of readings of many rotors' fits, each named when it is asked for."""
+
+    def __init__(self, names: list[str], run: Rows, again: Rows, years: Real | None) -> None:
+        self.names, self.run, self.again, self.years = names, run, again, years
+        self.senses: list[str | None] = [None] * len(run)
+
+    def __len__(self) -> int:
+        return len(self.run)
+
+    @overload
+    def __getitem__(self, i: int) -> Log: ...
+    @overload
+    def __getitem__(self, i: slice) -> list[Log]: ...
+    def __getitem__(self, i: int | slice) -> Log | list[Log]:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        rows = [(self.names[r], k) for r, k in zip(self.run[i].tolist(), self.again[i].tolist(), strict=True)]
+        return Log(rows, self.senses[i], None if self.years is None else self.years[i].tolist())
+
+    def only(self, rotors: Rows, lines: Rows) -> Lines:
+        """Return some lines of some of the rotors."""
+        mine = np.ix_(rotors, lines)
+        return Lines(
+            self.names, self.run[mine], self.again[mine], None if self.years is None else self.years[mine]
+        )
+
+
+class Part(NamedTuple):
+    """Rotors of like shape."""
+
+    rotors: Rows
+    """(g,)."""
+    lines: Lines
+    """The rows of readings, (g, r)."""
+    channels: list[Channel]
+    planes: list[str]
+    readings: Complex
+    """(g, r, s)."""
+    masses: Complex
+    """(g, r, p)."""
+    kept: Complex
+    """What stays on after the last run, (g, p)."""
+    weights: Real | None
+    """(g, s)."""
+
+    def only(self, rotors: Rows, lines: Rows, channels: Rows) -> Part:
+        """Return some lines and channels of some of the rotors."""
+        return Part(
+            self.rotors[rotors],
+            self.lines.only(rotors, lines),
+            [self.channels[s] for s in channels],
+            self.planes,
+            self.readings[np.ix_(rotors, lines, channels)],
+            self.masses[np.ix_(rotors, lines)],
+            self.kept[rotors],
+            None if self.weights is None else self.weights[np.ix_(rotors, channels)],
+        )
+
+
+def numbered(codes: Rows) -> tuple[Rows, Rows]:
+    """Number codes in the order in which they first stand: of each its number, and where each number first stands.
+
+    >>> numbered(np.array([7, 3, 7, 5]))
+    (array([0, 1, 0, 2]), array([0, 1, 3]))
+    """
+    _, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return rank[inverse], first[order]
+
+
+class _Listed:
+    """What of a kind each rotor has, in the order in which it first stands: rows are sorted by rotor."""
+
+    def __init__(self, rotor: Rows, code: Rows, rotors: int) -> None:
+        self.number, self.first = numbered(rotor * (int(code.max(initial=0)) + 1) + code)
+        self.code = code[self.first]
+        self.count = np.bincount(rotor[self.first], minlength=rotors)
+        self.start = np.cumsum(self.count) - self.count
+        self.place = self.number - self.start[rotor]
+        """Of each row the place within its rotor."""
+
+    def of(self, rotors: Rows) -> Rows:
+        """Return the numbers that these rotors have, (g, …): each of them as many."""
+        return np.asarray(self.start[rotors, None] + np.arange(self.count[rotors[0]]))
+
+    def told_apart(self, label: Rows) -> Rows:
+        """Tell rotors apart whose lists differ, beside what tells them apart already."""
+        most = int(self.code.max(initial=0)) + 2
+        for j in range(int(self.count.max(initial=0))):
+            has = self.count > j
+            code = np.where(has, self.code[np.where(has, self.start + j, 0)], most - 1)
+            label = np.unique(label * most + code, return_inverse=True)[1]
+        return label
+
+
+class Sorted:
+    """The rows of all rotors, sorted by rotor; what was on in each run, and which runs take part."""
+
+    def __init__(self, rows: LogRows, excluded: set[str]) -> None:
+        self.rows = rows
+        self.order = np.argsort(rows.rotor, kind="stable")
+        self.rotor = rows.rotor[self.order]
+        self.several = len(rows.rotors) > 1
+        self.warnings: list[str] = []
+        self.runs = _Listed(self.rotor, rows.run[self.order], len(rows.rotors))
+        self.run = self.runs.number
+        """Of each row its rotor's run."""
+        out = np.array([name in excluded for name in rows.runs])
+        self.takes_part = ~out[self.runs.code]
+        self._on()
+
+    def of(self, rotor: int) -> str:
+        """Return what a sentence about a rotor begins with, where there are several."""
+        return f"rotor {self.rows.rotors[rotor]}: " if self.several else ""
+
+    def _on(self) -> None:
+        """Tell what was on in each run, and what stays on after the last one of each rotor."""
+        rows, masses = self.rows, self.rows.masses
+        place = np.empty(len(self.order), dtype=np.intp)
+        place[self.order] = np.arange(len(self.order))
+        at = place[masses.row]
+        by_rotor = np.argsort(at, kind="stable")
+        at, plane, value = at[by_rotor], masses.plane[by_rotor], masses.value[by_rotor]
+        told = np.flatnonzero(masses.told[self.order])
+        first = np.full(len(self.runs.first), -1)
+        first[self.run[told[::-1]]] = told[::-1]
+        counts = at == first[self.run[at]]
+        self._agree(told, first, at, plane, value, counts)
+        at, plane, value = at[counts], plane[counts], value[counts]
+        # planes in the order of the runs
+        by_run = np.argsort(self.run[at], kind="stable")
+        at, plane, value = at[by_run], plane[by_run], value[by_run]
+        rotors = len(rows.rotors)
+        self.planes = _Listed(self.rotor[at], plane, rotors)
+        width = int(self.planes.count.max(initial=0))
+        on = np.zeros((len(first), width), dtype=complex)
+        on[self.run[at], self.planes.place] = value
+        self.has = np.zeros(on.shape, dtype=bool)
+        self.has[self.run[at], self.planes.place] = True
+        self.on = on
+        stays = self._stays()
+        standing = np.zeros((rotors, width), dtype=complex)
+        if stays.any():
+            for j in range(int(self.runs.count.max())):
+                mine = np.flatnonzero(self.runs.count > j)
+                run = self.runs.start[mine] + j
+                on[run] += standing[mine]
+                standing[mine[stays[run]]] = on[run[stays[run]]]
+            self.has |= on != 0
+        if "run" not in rows.table.texts:
+            # masses written as on the rotor: where runs are told apart by them the last ones are still on
+            last = np.cumsum(np.bincount(self.rotor, minlength=rotors)) - 1
+            never = ~np.logical_or.reduceat(stays, self.runs.start)
+            standing[never] = on[self.run[last[never]]]
+        self.standing = standing
+
+    def _agree(
+        self, told: Rows, first: Rows, at: Rows, plane: Rows, value: Complex, counts: NDArray[np.bool_]
+    ) -> None:
+        """Refuse rows that put on other masses than the first one of their run that tells them."""
+        rows = self.rows
+        entries = np.bincount(at, minlength=len(self.order))
+        wrong = entries[told] != entries[first[self.run[told]]]
+        bad = told[wrong].tolist()
+        # of one mass each the comparison is one of arrays
+        start = np.searchsorted(at, np.arange(len(self.order)))
+        others = at[~counts]
+        single = entries[others] == 1
+        one = start[first[self.run[others[single]]]]
+        own = np.flatnonzero(~counts)[single]
+        if len(one) and not len(bad):
+            bad += others[single][(plane[one] != plane[own]) | (value[one] != value[own])].tolist()
+        if not len(bad):
+            for row in np.unique(others[~single]).tolist():
+                both = [slice(start[r], start[r] + entries[r]) for r in (row, first[self.run[row]])]
+                mine, theirs = (dict(zip(plane[s].tolist(), value[s].tolist(), strict=True)) for s in both)
+                if mine != theirs:
+                    bad.append(row)
+        if bad:
+            row = min(bad)
+            size, i = next(iter(rows.table.cells.values())), int(self.order[row])
+            name = rows.runs[rows.run[i]]
+            raise rows.table.error(i, size.header, size.values[i], f"the masses as elsewhere in run {name}")
+
+    def _stays(self) -> NDArray[np.bool_]:
+        """Whether what a run has put on stays on."""
+        stays = np.zeros(len(self.runs.first), dtype=bool)
+        if "trial_kept" in self.rows.table.texts:
+            words, code = self.rows.table.numbered("trial_kept")
+            for k, word in enumerate(words):
+                if word.lower() not in (*YES, *NO):
+                    raise self.rows.table.error(int(np.argmax(code == k)), "trial_kept", word, "yes or no")
+            kept = np.array([word.lower() in YES for word in words])
+            stays[self.run[kept[code[self.order]]]] = True
+        return stays
+
+    def _planes(self) -> tuple[_Listed, Rows]:
+        """List the planes of each rotor in which a run that takes part has a mass, and their columns in `on`."""
+        active = np.logical_or.reduceat(self.has & self.takes_part[:, None], self.runs.start, axis=0)
+        rotor, place = np.nonzero(active)
+        return _Listed(rotor, self.planes.code[self.planes.start[rotor] + place], len(active)), place
+
+    def parts(self, named: Sequence[str | None] | None) -> Iterator[Part]:
+        """Yield rotors of like channels, planes and number of readings, and of like names where these count."""
+        rows, rotors = self.rows, len(self.rows.rotors)
+        mine = np.flatnonzero(self.takes_part[self.run] & np.isfinite(rows.vibration[self.order]))
+        rotor, run, channel = self.rotor[mine], self.run[mine], rows.channel[self.order[mine]]
+        lacking = np.flatnonzero(np.bincount(rotor, minlength=rotors) == 0)
+        if len(lacking):
+            of = self.of(int(lacking[0]))
+            left = (
+                "of the runs that are not excluded none was read"
+                if self.takes_part.any()
+                else "every run is excluded"
+            )
+            raise DataError(f"{rows.table.file}: {of}{left}: expected runs to fit")
+        again = _again(run * len(rows.channels) + channel)
+        lines = _Listed(rotor, run * (int(again.max()) + 1) + again, rotors)
+        channels = _Listed(rotor, channel, rotors)
+        planes, places = self._planes()
+        if named is None:
+            self._require_masses()
+        label = planes.told_apart(channels.told_apart(lines.count))
+        if named is not None:
+            known: dict[str | None, int] = {}
+            of_name = np.array([known.setdefault(name, len(known)) for name in named])
+            label = np.unique(label, return_inverse=True)[1] * len(known) + of_name
+        label, begin = numbered(label)
+        members, rows_of = (np.argsort(of, kind="stable") for of in (label, label[rotor]))
+        many, many_rows = (np.bincount(of, minlength=len(begin)) for of in (label, label[rotor]))
+        rank = np.empty(rotors, dtype=np.intp)
+        rank[members] = np.arange(rotors) - np.repeat(np.cumsum(many) - many, many)
+        years = self._years(mine, run, lines)
+        for group, at in zip(
+            np.split(members, np.cumsum(many)[:-1]), np.split(rows_of, np.cumsum(many_rows)[:-1]), strict=True
+        ):
+            here, heads, columns = lines.of(group), channels.of(group), planes.of(group)
+            readings = np.full((*here.shape, heads.shape[1]), complex(np.nan))
+            readings[rank[rotor[at]], lines.place[at], channels.place[at]] = rows.vibration[
+                self.order[mine[at]]
+            ]
+            first = lines.first[here]
+            when = None if years is None else years[here]
+            if when is not None:
+                self._lacking(group, when, self.runs.code[run[first]])
+            yield Part(
+                group,
+                Lines(rows.runs, self.runs.code[run[first]], again[first], when),
+                [rows.channels[c] for c in channels.code[heads[0]].tolist()],
+                [rows.masses.planes[k] for k in planes.code[columns[0]].tolist()],
+                readings,
+                np.take_along_axis(self.on[run[first]], places[columns][:, None, :], axis=2),
+                np.take_along_axis(self.standing[group], places[columns], axis=1),
+                self._weights(group, self.order[mine[channels.first[heads]]]),
+            )
+
+    def _require_masses(self) -> None:
+        """Refuse a rotor on which no mass ever was."""
+        some = np.logical_or.reduceat(
+            ((self.on != 0) & self.takes_part[:, None]).any(axis=1), self.runs.start
+        )
+        if not some.all():
+            of = self.of(int(np.argmin(some)))
+            raise DataError(
+                f"{self.rows.table.file}: {of}no mass ever changed: what a mass does to the vibration is not known; expected a "
+                "run with a mass on the rotor"
+            )
+
+    def _weights(self, group: Rows, at: Rows) -> Real | None:
+        """Return the weights of the channels (g, s), written in these rows."""
+        given = self.rows.table.numbers.get("weight")
+        if given is None:
+            return None
+        weights = np.where(np.isnan(given.values[at]), 1.0, given.values[at])
+        wrong = ~(weights > 0).any(axis=1) | (weights < 0).any(axis=1)
+        if wrong.any():
+            of = self.of(int(group[np.argmax(wrong)]))
+            raise DataError(
+                f"{self.rows.table.file}: {of}the weights are zero or negative: expected one that is positive"
+            )
+        return weights
+
+    def _years(self, mine: Rows, run: Rows, lines: _Listed) -> Real | None:
+        """Return when each row of readings was read: each says it itself, or its run does once."""
+        if self.rows.years is None:
+            return None
+        years = self.rows.years[self.order[mine]]
+        given = np.flatnonzero(np.isfinite(years))[::-1]
+        of_run, of_line = np.full(len(self.runs.first), np.nan), np.full(len(lines.first), np.nan)
+        of_run[run[given]] = years[given]
+        of_line[lines.number[given]] = years[given]
+        return np.where(np.isnan(of_line), of_run[run[lines.first]], of_line)
+
+    def _lacking(self, group: Rows, years: Real, run: Rows) -> None:
+        """Say of which runs the date is not known."""
+        for i in np.flatnonzero(np.isnan(years).any(axis=1)).tolist():
+            names = dict.fromkeys(self.rows.runs[k] for k in run[i, np.isnan(years[i])].tolist())
+            if len(self.warnings) == SHOWN:
+                self.warnings.append("… and the same of further rotors: no date")
+            elif len(self.warnings) < SHOWN:
+                self.warnings.append(
+                    f"{self.of(int(group[i]))}no date in run{'s' * (len(names) > 1)} {', '.join(names)}: drift over time is not tested"
+                )
+
+
+def _again(codes: Rows) -> Rows:
+    """Tell how often each code stood before.
+
+    >>> _again(np.array([4, 2, 4, 4]))
+    array([0, 0, 1, 2])
+    """
+    order = np.argsort(codes, kind="stable")
+    inside = codes[order]
+    begin = np.concatenate([[True], inside[1:] != inside[:-1]])
+    out = np.empty_like(order)
+    out[order] = np.arange(len(order)) - np.maximum.accumulate(np.where(begin, np.arange(len(order)), 0))
+    return out

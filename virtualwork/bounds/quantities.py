@@ -1,0 +1,236 @@
+"""Bounds of the rounding errors of a motion's quantities, from the adjoint of the tape that records them.
+
+A quantity y is a list of real operations (`virtualwork.formulas.recording`); each rounds, and the adjoint says how much
+of that arrives at y (`dalembert.arithmetic.adjoint`). What enters the tape and is not exact brings its own error: the
+input, where it was swept; the constant of an angle, a sum of others; what a table gives; and the unknowns x of a group
+without a closed form, which an iteration found. These leave in each loop of the group a gap, as computed and with the
+rounding of computing it, ρ together: then to first order J·δx = −ρ and componentwise |δx| ≤ |J⁻¹|·ρ (N. J. Higham,
+Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM 2002, §7.1 and §7.2), groups one after the other.
+
+Close to a limit the second order counts too: see `virtualwork.bounds.second_order`. Dimensions, loads and inputs are
+taken as exact. A bound is infinite where no digit is known, NaN where the pose is not assembled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dalembert.arithmetic.adjoint import FEW, bounds_of_few, rounding_bounds
+from dalembert.arithmetic.engines import run
+from virtualwork.bounds.doubted import Doubted
+from virtualwork.bounds.second_order import Solution, grown, solution
+from virtualwork.formulas.asked import FORCES, Key, over_blocks
+from virtualwork.formulas.lanes import Lanes, Turning, taped
+from virtualwork.formulas.loads import Tabled
+from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.recording import names
+
+# roundings of a constant that is none of the plan's: the product of a mass and a place
+CONSTANT = 1.0
+# units by which the cosine of an input of an even sweep errs besides, where e^{iq} is a product of three factors
+SWEPT = 3.0
+EMPTY: Mapping[str, Any] = MappingProxyType({})
+# what a load's derivatives and its lever make of a limit's root h: a force of order k goes as h^(−2k)
+BESIDE_LIMIT = 0.5
+
+
+class Bounds:
+    """Bounds of the rounding errors of quantities, by their keys (`Recording.value`)."""
+
+    def __init__(self, poses: Poses, *, careful: bool = False, swept: bool = False) -> None:
+        self.poses, self.n = poses, poses.n
+        # poses that are asked for bounds are those of an assembly
+        self.branch = cast(Turning, poses.branch)
+        # every group's unknowns are judged by the gaps that they leave, however they were found
+        self.careful = careful
+        self.swept = swept or any(st.spins for st in poses.states())
+        self.lanes = Lanes(self.branch, poses)
+        self._known: dict[Key, Reals] = {}
+        self._solutions: dict[str, Solution] = {}
+
+    def of(self, key: Key) -> Reals:
+        """The bound of a quantity's error, (n,); the length of the error of a vector."""
+        if key not in self._known:
+            self._known[key] = self._formed(key)
+            if self._beside is not None:
+                rows, beside = self._beside
+                self._known[key][rows] = beside.of(key)
+        return self._known[key]
+
+    @cached_property
+    def _beside(self) -> tuple[NDArray[np.bool_], Bounds] | None:
+        """The poses close to a change point, where a series replaces the closed forms."""
+        if self.careful:
+            return None
+        # what was covered is known then
+        _ = self.lanes.recording
+        rows = self.branch.close_to_change(self.poses.inputs[:, 0])
+        if not rows.any():
+            return None
+        some = self.poses.some(rows)
+        given = np.broadcast_to(np.asarray(self.poses.input_error, dtype=float), self.poses.inputs.shape)
+        some.input_error = given[rows]
+        some.time = None if self.poses.time is None else self.poses.time[rows]
+        return rows, Bounds(some, careful=True, swept=self.swept)
+
+    @cached_property
+    def recording(self) -> Doubted:
+        """The formulas of the branch, with the constants of its plan as inputs, and unknowns that may be wrong."""
+        branch, plain = self.branch, self.lanes.recording
+        entered = frozenset(g.name for g in branch.plan.groups) if self.careful else frozenset(branch.folded)
+        key = "doubted", plain.moves, plain.turning_over, entered
+        if key not in branch.recordings:
+            branch.recordings[key] = Doubted(plain, branch, entered)
+        found: Doubted = branch.recordings[key]
+        return found
+
+    # --- one quantity -----------------------------------------------------------------------------------------------
+    def _formed(self, key: Key) -> Reals:
+        if key[0] in FORCES and self.poses.mechanism.friction:
+            # found by iteration
+            return np.full(self.n, np.inf)
+        groups = self.recording.hangs_on(key)
+        closed = ("closed", *groups)
+        found = self.run([key], [closed] if self.branch.may_open else [])
+        tau = self._tau(groups, found)
+        with np.errstate(all="ignore"):
+            bound = _length([found[f"error({name})"] for name in names(key)])
+            order = self._order(key)
+            if order:
+                bound = bound * grown(tau, order)
+            if self.careful:
+                bound = bound + self._apart(key, [found[name] for name in names(key)])
+        bound = np.array(np.broadcast_to(bound, self.n), dtype=float)
+        bound[~np.isfinite(bound)] = np.inf
+        lost = ~np.isfinite(self.poses.inputs).all(axis=1)
+        if self.branch.may_open:
+            lost |= ~np.isfinite(np.broadcast_to(found[names(closed)[0]], self.n))
+        bound[lost] = np.nan
+        return bound
+
+    def _apart(self, key: Key, parts: list[Any]) -> Any:
+        """By how much a quantity as it was found is off from the tape's."""
+        apart = over_blocks(self.poses, key) - (parts[0] if len(parts) == 1 else parts[0] + 1j * parts[1])
+        return np.abs(np.angle(np.exp(1j * apart)) if key[0] == "angle" and not key[2] else apart)
+
+    def _order(self, key: Key) -> float:
+        """Half the power of 1/h with which a quantity grows at a limit, less one half."""
+        if key[0] not in FORCES:
+            return 0.0 if key[0] in ("turn", "gap") else float(key[-1])
+        moves = any(self.recording.moves[:2])
+        return BESIDE_LIMIT + (2.0 if moves else BESIDE_LIMIT)
+
+    def run(
+        self,
+        keys: Sequence[Key],
+        more: Iterable[Key] = (),
+        exact: str = "",
+        known: Mapping[str, Reals] = EMPTY,
+    ) -> Mapping[str, Any]:
+        """Quantities and more by their names, the bounds of the former, `error(name)`, and τ, `tau`.
+
+        The unknowns of the group `exact` are taken as they are; `known` enters, exact, besides.
+        """
+        tape = taped(self.branch, self.recording, (*keys, *more))
+        given = {**known} | self._entering((name for name in tape.inputs if name not in known), exact)
+        errors = self._errors(
+            name for name in tape.inputs if not exact or not name.startswith(f"open {exact} ")
+        )
+        inputs = {name: f"error {name}" for name in errors}
+        given |= {inputs[name]: error for name, error in errors.items()}
+        wanted = tuple(name for key in keys for name in names(key))
+        how = CONSTANT, SWEPT if self.swept else 0.0
+        if self.n <= FEW:
+            return bounds_of_few(tape, given, inputs, wanted, *how)
+        key = "bounds", tape, tuple(inputs), wanted, how
+        if key not in self.branch.recordings:
+            self.branch.recordings[key] = rounding_bounds(tape, inputs, wanted, *how)
+        return run(self.branch.recordings[key], given)
+
+    def _tau(self, groups: Sequence[str], found: Mapping[str, Any]) -> Any:
+        """τ of roots on the tape, and of groups whose unknowns enter."""
+        tau = found["tau"]
+        for group in self.branch.plan.groups:
+            if group.name in groups and self.recording.enters(group):
+                tau = np.maximum(tau, self._solution(group.name).tau)
+        return tau
+
+    def residual(
+        self, keys: Sequence[Key], known: Mapping[str, Reals] = EMPTY, exact: str = ""
+    ) -> tuple[Reals, Reals]:
+        """The size of what should be zero, as computed and with its rounding, (n, rows), and τ, (n,)."""
+        found = self.run(keys, exact=exact, known=known)
+        rows = [row for key in keys for row in names(key)]
+        left = np.empty((self.n, len(rows)))
+        for i, row in enumerate(rows):
+            left[:, i] = found[f"error({row})"] + np.abs(found[row])
+        tau = found["tau"] if exact else self._tau(self.recording.hangs_on(keys[0]), found)
+        return left, np.broadcast_to(tau, self.n)
+
+    # --- what enters -------------------------------------------------------------------------------------------------
+    def _entering(self, inputs: Iterable[str], exact: str) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        rest = []
+        for name in inputs:
+            kind, _, of = name.partition(" ")
+            if name in self.recording.constants:
+                found[name] = self.recording.constants[name][0]
+            elif kind == "open":
+                found[name] = 0.0
+            elif kind == "inverse":
+                group, i, r = of.rsplit(" ", 2)
+                found[name] = 0.0 if group == exact else self._solution(group).inverse[:, int(i), int(r)]
+            else:
+                rest.append(name)
+        return found | self.lanes.entering(rest)
+
+    def _errors(self, inputs: Iterable[str]) -> dict[str, Any]:
+        """The errors of what enters, where it is not exact."""
+        given = np.broadcast_to(np.asarray(self.poses.input_error, dtype=float), self.poses.inputs.shape)
+        found: dict[str, Any] = {}
+        for name in inputs:
+            kind, _, of = name.partition(" ")
+            if name in self.recording.constants:
+                error = self.recording.constants[name][1]
+                if error:
+                    found[name] = error
+            elif kind == "open":
+                group, row = of.rsplit(" ", 1)
+                found[name] = self._solution(group).residual[:, int(row)]
+            elif kind == "table":
+                found[name] = self._table(int(of.split()[0]))
+            elif not of and kind[0] == "q" and given[:, int(kind[1:])].any():
+                found[name] = given[:, int(kind[1:])]
+        return found
+
+    def _solution(self, name: str) -> Solution:
+        """What the loops of a group leave open, and what its unknowns are wrong by for it."""
+        if name not in self._solutions:
+            group = next(g for g in self.branch.plan.groups if g.name == name)
+            keys: list[Key] = [("gap", name, i) for i in range(len(group.closures))]
+            left, _ = self.residual(keys, exact=name)
+            self._solutions[name] = solution(group, self.poses, left)
+        return self._solutions[name]
+
+    def _table(self, number: int) -> Reals:
+        """Of what a table gives: its reading, and where it is read."""
+        case = self.recording.forces[0].case
+        table = [load for load in case.loads if isinstance(load, Tabled)][number]
+        at, force = np.array([row[0] for row in table.table]), np.array([row[1] for row in table.table])
+        steep = float(np.max(np.abs(np.diff(force) / np.diff(at)), initial=0.0))
+        far = np.abs(self.poses.inputs[:, 0]) if table.axis == "input" else np.abs(at).max()
+        read = 2 * EPS * float(np.abs(force).max()) + EPS * steep * (far + np.abs(at).max())
+        if table.axis in ("angle", "speed"):
+            read = read + steep * self.of(("angle", table.body, int(table.axis == "speed")))
+        return np.broadcast_to(read, self.n)
+
+
+def _length(parts: list[Any]) -> Any:
+    return parts[0] if len(parts) == 1 else np.hypot(*parts)
