@@ -83,7 +83,7 @@ def speed(
         "ratio": [m.ratio for m in measurements],
         "aim_ratio": [m.aim_ratio for m in measurements],
         "memory_bytes": [m.bytes for m in measurements],
-        "kernel_calls": [m.kernels for m in measurements],
+        "operations": [m.operations for m in measurements],
         "peer": ["yes" if m.peer else "no" for m in measurements],
     }
     return Result(

@@ -157,7 +157,7 @@ def tables(measurements: Sequence[Measurement]) -> list[str]:
             ("error", lambda m: "" if m.error is None else f"{m.error:.1e}"),
             (over, lambda m: f"{m.ratio:.2f}" if m.ratio else ""),
             ("memory an item", lambda m: f"{m.bytes / m.size:,.3g} B" if m.bytes else ""),
-            ("kernel calls", lambda m: str(m.kernels) if m.kernels else ""),
+            ("operations a pose", lambda m: str(m.operations) if m.operations else ""),
         ]
         filled = [(head, show) for head, show in columns if any(show(m) for m in mine)]
         rows = [(f"*{m.method}*" if m.peer else m.method, *(show(m) for _, show in filled)) for m in mine]

@@ -87,7 +87,7 @@ def test_mechanisms() -> None:
 
 
 def test_skipping() -> None:
-    calls = [ms[0].kernels or 0 for ms in of("skipping").values()]
+    calls = [ms[0].operations or 0 for ms in of("skipping").values()]
     assert calls[0] == max(calls)
     everything, _, torque, no_gravity, at_rest, one_force, velocity, foot, pin = calls
     assert everything > torque > no_gravity > at_rest > one_force

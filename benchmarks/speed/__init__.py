@@ -8,6 +8,10 @@ extended precision or rational arithmetic (`benchmarks.truth`); never against th
 DOMAINS = {
     "mechanisms": ("benchmarks.speed.mechanisms", "mechanisms in motion, their torque and joint forces"),
     "evaluators": ("benchmarks.speed.evaluators", "the tape: evaluators on each engine, beside C"),
+    "variants": (
+        "benchmarks.speed.variants",
+        "families of mechanisms, beside a loop and beside poses of one",
+    ),
     "skipping": ("benchmarks.speed.skipping", "what is saved where less is asked for"),
     "rotors": ("benchmarks.speed.rotors", "corrections of rotors with known masses"),
     "field": ("benchmarks.speed.field", "corrections from measured vibration"),

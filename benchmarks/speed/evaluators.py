@@ -100,13 +100,13 @@ def _sweep(
     if work in floors:
         least = measured(DOMAIN, work, FLOOR, floors[work], error=error(floors[work]()), **known)
         yield least
-    for engine, aim, over in (("numpy", aims[0], None), ("llvm", aims[1], aims[2])):
-        if engine == "llvm" and not compiled_code():
+    for name, aim, over in (("numpy", aims[0], None), ("llvm", aims[1], aims[2])):
+        if name == "llvm" and not compiled_code():
             continue
-        with _engine(engine):
+        with engine(name):
             off = error(evaluator(angles, *rates))
             found = measured(
-                DOMAIN, work, engine, lambda: evaluator(angles, *rates), error=off, aim_ns=aim, **known
+                DOMAIN, work, name, lambda: evaluator(angles, *rates), error=off, aim_ns=aim, **known
             )
         if least is not None:
             found = replace(found, floor=FLOOR, ratio=found.units / least.units, aim_ratio=over)
@@ -114,7 +114,8 @@ def _sweep(
 
 
 @contextmanager
-def _engine(name: str) -> Iterator[None]:
+def engine(name: str) -> Iterator[None]:
+    """Run every tape by one engine."""
     before = os.environ.get("DALEMBERT_ENGINE")
     os.environ["DALEMBERT_ENGINE"] = name
     try:

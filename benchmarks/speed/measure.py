@@ -38,8 +38,8 @@ class Measurement:
     """The condition number of the problem, where that is what varies."""
     bytes: float | None = None
     """The most memory that a call held at once, its answer included."""
-    kernels: int | None = None
-    """How many steps of the solution were worked out."""
+    operations: int | None = None
+    """How many operations on real numbers a pose costs: all that is left on its tape."""
     peer: bool = False
     """Another package's time and error, for comparison."""
 

@@ -151,13 +151,15 @@ def _a_decade(axes: Axes, values: list[float], way: str) -> None:
 
 
 def _bars(axes: Axes, measurements: list[Measurement]) -> None:
-    """Draw times as bars, with the count of kernel calls or the ratio to the floor at their ends."""
+    """Draw times as bars, with the count of operations or the ratio to the floor at their ends."""
     scale, unit = (1e-6, "ms") if max(m.ns for m in measurements) > 1e6 else (1.0, "ns")
     places = np.arange(len(measurements))[::-1]
     widths = [m.ns * scale for m in measurements]
     axes.barh(places, widths, color="0.75", edgecolor="black", lw=0.8)
     for place, width, m in zip(places, widths, measurements, strict=True):
-        note = f"{m.kernels} kernel calls" if m.kernels else f"{m.ratio:.2f} × {m.floor}" if m.ratio else ""
+        note = (
+            f"{m.operations} operations" if m.operations else f"{m.ratio:.2f} × {m.floor}" if m.ratio else ""
+        )
         axes.annotate(f" {note}", (width, place), (2, 0), textcoords="offset points", va="center", fontsize=7)
     axes.set_yticks(places, [m.method for m in measurements], fontsize=7)
     axes.set_xlim(0, 1.45 * max(widths))

@@ -1,12 +1,10 @@
-"""What skipping saves: one scene, and less and less of it asked for; time, and calls of the kernels."""
+"""What skipping saves: one scene, and less and less of it asked for; time, and the operations that are left on the tape."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from types import CodeType, FrameType
 from typing import Any
 
 import numpy as np
@@ -15,122 +13,65 @@ from numpy.typing import NDArray
 from benchmarks.scenes import loaded_klann
 from benchmarks.speed.measure import Measurement, measured, seconds
 from virtualwork import Mechanism
-from virtualwork.formulas import closed_forms, load_paths, loads, positions, quantities
-from virtualwork.formulas.rates import Rates
-from virtualwork.formulas.reactions import Reactions
 from virtualwork.motion import Motion
 
 Real = NDArray[np.float64]
 
 DOMAIN = "skipping"
 
-PINS = (
-    ("A", "crank"),
-    ("B", "coupler"),
-    ("C", "rocker"),
-    ("D", "rocker"),
-    ("E", "arm"),
-    ("F", "leg"),
-    ("G", "leg"),
+PINS = ("A.crank", "B.coupler", "C.rocker", "D.rocker", "E.arm", "F.leg", "G.leg")
+FOOT = ("points.H", "points.H.velocity", "points.H.acceleration")
+TURNS = tuple(
+    f"links.{link}.{what}"
+    for link in ("coupler", "rocker", "arm", "leg")
+    for what in ("angle", "omega", "alpha")
 )
+FORCES = ("effort", *(f"reactions.{pin}" for pin in PINS))
 
 
-def kernels() -> set[CodeType]:
-    """Return the functions that do the work: closed forms, placements, derivative steps, loads, joint forces."""
-    found: list[Any] = [
-        closed_forms.two_angles,
-        closed_forms.angle_and_slide,
-        closed_forms.turning_slide,
-        closed_forms.two_slides,
-        positions.run,
-        Rates.advance,
-        Reactions.on_side,
-    ]
-    kinds = [
-        kind
-        for module in (loads, quantities, load_paths)
-        for kind in vars(module).values()
-        if isinstance(kind, type)
-    ]
-    found += [kind.form for kind in kinds if issubclass(kind, loads.Load | quantities.Quantity)]
-    return {function.__code__ for function in found}
+def quantity(motion: Motion, name: str) -> Real:
+    """Return a quantity of a motion, called as an evaluator calls it."""
+    kind, *of = name.split(".")
+    if kind == "effort":
+        return motion.effort
+    if kind == "reactions":
+        return motion.reaction(*of)
+    whose: Any = motion.point(of[0]) if kind == "points" else motion.link(of[0])
+    found: Real = getattr(whose, of[1] if len(of) > 1 else "position")
+    return found
 
 
-def count(call: Callable[[], Any]) -> int:
-    """Return how often a call enters a kernel, once all that is kept from a first call is there."""
-    call()
-    wanted, entered = kernels(), 0
-
-    def watch(frame: FrameType, event: str, _: Any) -> None:
-        nonlocal entered
-        if event == "call" and frame.f_code in wanted:
-            entered += 1
-
-    before = sys.getprofile()
-    sys.setprofile(watch)
-    try:
-        call()
-    finally:
-        sys.setprofile(before)
-    return entered
-
-
-def _forces(motion: Motion, *, joints: bool) -> list[Real]:
-    return [motion.effort, *(motion.reaction(pin, on=link) for pin, link in PINS if joints)]
-
-
-def _everything(mechanism: Mechanism, angles: Real) -> list[Real]:
-    motion = mechanism.motion(angles, speed=10.0, acceleration=0.0)
-    foot = motion.point("H")
-    turns = [motion.link(name) for name in ("coupler", "rocker", "arm", "leg")]
-    rates = [x for link in turns for x in (link.angle, link.omega, link.alpha)]
-    return [foot.position, foot.velocity, foot.acceleration, *rates, *_forces(motion, joints=True)]
-
-
-def _reactions(mechanism: Mechanism, angles: Real) -> list[Real]:
-    return _forces(mechanism.motion(angles, speed=10.0, acceleration=0.0), joints=True)
-
-
-def _effort(mechanism: Mechanism, angles: Real) -> list[Real]:
-    return _forces(mechanism.motion(angles, speed=10.0, acceleration=0.0), joints=False)
-
-
-def _at_rest(mechanism: Mechanism, angles: Real) -> list[Real]:
-    return _forces(mechanism.motion(angles, speed=0.0, acceleration=0.0), joints=False)
-
-
-def _velocity(mechanism: Mechanism, angles: Real) -> list[Real]:
-    foot = mechanism.motion(angles, speed=10.0, acceleration=0.0).point("H")
-    return [foot.position, foot.velocity]
-
-
-def _foot(mechanism: Mechanism, angles: Real) -> list[Real]:
-    return [mechanism.motion(angles).point("H").position]
-
-
-def _pin(mechanism: Mechanism, angles: Real) -> list[Real]:
-    return [mechanism.motion(angles).point("C").position]
+def ask(mechanism: Mechanism, angles: Real, speed: float, names: tuple[str, ...]) -> list[Real]:
+    """Return quantities of a new motion."""
+    motion = mechanism.motion(angles, speed=speed, acceleration=0.0)
+    return [quantity(motion, name) for name in names]
 
 
 def measure(quick: bool) -> Iterator[Measurement]:
-    """Yield times and kernel calls of the Klann leg with masses, gravity and a force at its foot, asked for ever less."""
+    """Yield times and operations of the Klann leg with masses, gravity and a force at its foot, asked for ever less."""
     angles = np.linspace(0.0, 2 * np.pi, 4096 if quick else 40_960)
     heavy, light = loaded_klann(), loaded_klann(masses=False, gravity=False)
     no_weights = loaded_klann(gravity=False)
-    asked: tuple[tuple[str, Mechanism, Callable[[Mechanism, Real], list[Real]]], ...] = (
-        ("everything: foot, angles and rates, torque, joint forces", heavy, _everything),
-        ("torque and every joint force", heavy, _reactions),
-        ("torque alone, by virtual work", heavy, _effort),
-        ("torque, no gravity", no_weights, _effort),
-        ("torque, at rest: no inertia loads, no acceleration", heavy, _at_rest),
-        ("torque, no masses, no gravity: one force left", light, _effort),
-        ("the foot's position and velocity, no acceleration", heavy, _velocity),
-        ("the foot's position", heavy, _foot),
-        ("one pin's position: arm and leg are never solved", heavy, _pin),
+    effort, turning = ("effort",), 10.0
+    asked: tuple[tuple[str, Mechanism, float, tuple[str, ...]], ...] = (
+        (
+            "everything: foot, angles and rates, torque, joint forces",
+            heavy,
+            turning,
+            (*FOOT, *TURNS, *FORCES),
+        ),
+        ("torque and every joint force", heavy, turning, FORCES),
+        ("torque alone, by virtual work", heavy, turning, effort),
+        ("torque, no gravity", no_weights, turning, effort),
+        ("torque, at rest: no inertia loads, no acceleration", heavy, 0.0, effort),
+        ("torque, no masses, no gravity: one force left", light, turning, effort),
+        ("the foot's position and velocity, no acceleration", heavy, turning, FOOT[:2]),
+        ("the foot's position", heavy, 0.0, FOOT[:1]),
+        ("one pin's position: arm and leg are never solved", heavy, 0.0, ("points.C",)),
     )
     whole = 0.0
-    for method, mechanism, ask in asked:
-        call = partial(ask, mechanism, angles)
+    for method, mechanism, speed, names in asked:
+        call = partial(ask, mechanism, angles, speed, names)
         whole = whole or seconds(call, 0.3) / len(angles) * 1e9
         found = measured(
             DOMAIN,
@@ -138,6 +79,6 @@ def measure(quick: bool) -> Iterator[Measurement]:
             method,
             call,
             size=len(angles),
-            kernels=count(call),
+            operations=mechanism.evaluator(*names).operations(speed=speed != 0.0, acceleration=False),
         )
         yield replace(found, floor="everything", ratio=found.ns / whole)

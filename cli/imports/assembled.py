@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import replace
-from itertools import chain, product
+from itertools import chain
 
 import numpy as np
 
 from cli.imports.drawn import GROUND, Drawing
 from cli.imports.toml import text
-from virtualwork import Guess, Mechanism
+from virtualwork import Mechanism
 from virtualwork.describe.errors import MechanismError
 
 # degrees of an input that says nothing of where it begins
@@ -20,9 +19,6 @@ TRIED = tuple(range(0, 360, 15))
 NEAR = 1e-9
 # a little way of an input: rad, or of the mechanism's size
 LITTLE = 1e-3
-# guesses near a singular pose that are tried on either side
-TRIES = 6
-NEARBY = 0.6  # rad, of any link
 
 
 def described(d: Drawing, source: str) -> str:
@@ -41,7 +37,6 @@ def described(d: Drawing, source: str) -> str:
         if not _moves(d, m):
             d.notes.append(
                 "its input moves to neither side of the drawn pose: it stands at a limit there, or where assemblies meet"
-                f"{_moving_near(d, m)}"
             )
         if d.posed:
             off, point = max(_gaps(d, m, motion), default=(0.0, ""))
@@ -59,31 +54,6 @@ def _moves(d: Drawing, m: Mechanism) -> bool:
     ways = [m.size * LITTLE if e.slide is not None else LITTLE for e in d.drives]
     inputs = np.array([[e.at + side * w for e, w in zip(d.drives, ways, strict=True)] for side in (-1, 1)])
     return bool(m.motion(inputs if len(ways) > 1 else inputs[:, 0]).assembled.any())
-
-
-def _moving_near(d: Drawing, m: Mechanism) -> str:
-    """Return a guess near the drawn pose from which it moves, as far as one of some tries finds it."""
-    if len(d.drives) > 1 or d.drives[0].slide is not None:
-        return ""
-    draw = np.random.default_rng(1)
-    start = m.guess.angles
-    for _, turn in product(range(TRIES), (0.05, -0.05)):
-        off = draw.normal(scale=0.3, size=len(start))
-        at = d.drives[0].at + turn
-        angles = {name: a + float(o) for (name, a), o in zip(start.items(), off, strict=True)}
-        driven = str(d.drives[0].link)
-        angles[driven] = start.get(driven, 0.0) + turn
-        try:
-            near = replace(m, guess=Guess(at, angles))
-            motion = near.motion(np.array([at, at + 0.2 * turn]))
-            found = np.array([motion.link(name).angle for name in start])
-        except (MechanismError, np.linalg.LinAlgError):
-            continue
-        way = float(np.abs(np.angle(np.exp(1j * (found[:, 0] - np.array(list(start.values())))))).max())
-        if motion.assembled.all() and way < NEARBY:
-            rows = (f'{n} = "{a:.6g} rad"' for n, a in zip(start, found[:, 0], strict=True))
-            return f'; it moves from the [guess] at = "{at:.6g} rad", {", ".join(rows)}'
-    return ""
 
 
 def _gaps(d: Drawing, m: Mechanism, motion: object) -> list[tuple[float, str]]:

@@ -9,6 +9,8 @@ from cli.imports.drawn import GROUND, SAME, Drawing, Drive, Place, Slide, apart,
 from cli.imports.words import damaged, left_out
 
 LENGTHS = ("mm", "cm", "m", "in", "ft")
+# what is read of a document, and what only tells about it
+KEYS = {"mechanism", "units", "joints", "links", "slots", "cylinders", "actuators", "notes", "source", "meta"}
 
 
 def read(file: str, data: Any) -> list[Drawing]:
@@ -86,12 +88,16 @@ class _Reader:
         self.riders: dict[str, tuple[Slide, str, str]] = {}
         for k, e in enumerate(self.entries("slots"), 1):
             self._slot(k, e)
+            self._limits(f"slot {k}", e)
         self.pistons: dict[frozenset[str], Slide] = {}
         for k, e in enumerate(self.entries("cylinders"), 1):
             self._cylinder(f"cylinder {k}", self.known(f"cylinder {k}", listed(e, "joints", "jointIds")))
             self._limits(f"cylinder {k}", e)
         for k, e in enumerate(self.entries("actuators"), 1):
             self._actuator(k, e)
+        for key, value in self.data.items():
+            if key not in KEYS and isinstance(value, list | dict) and value:
+                d.notes.append(left_out(key, "it has no like here"))
         return d
 
     def _slot(self, k: int, e: dict[str, Any]) -> None:

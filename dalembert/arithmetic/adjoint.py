@@ -254,7 +254,7 @@ class _Bounds:
         largest: Number = 0.0
         for share in self.shares.values():
             # what is no number counts as none: the bound is none either
-            largest = share if isinstance(largest, float) else kind.select(share - largest, share, largest)
+            largest = kind.select(share - largest, share, largest)
         return found | {"tau": largest}
 
     def error(self, output: int) -> Number:
@@ -266,7 +266,7 @@ class _Bounds:
             own = self._own[number]
             if isinstance(own, float) and own == 0:
                 continue
-            part = own if isinstance(bar, float) and bar == 1.0 else abs(bar) * own
+            part = abs(_times(bar, own))
             total = part if isinstance(total, float) and total == 0 else total + part
         # the bound's own roundings, and the products of two of them that the first order leaves out
         return total * (UNIT_ROUNDOFF * (1 + 2.0**-20))
@@ -282,7 +282,7 @@ class _Bounds:
         self.shares[number] = 0.5 * error / a
 
     def _errs_by(self, number: int) -> Number:
-        """What an operation adds to the error, in units u."""
+        """What an operation adds to the error, in units u; of either sign."""
         name, *arguments = self.sweep.tape.operations[number]
         if name == "input":
             error = self.errors.get(arguments[0])
@@ -304,12 +304,14 @@ class _Bounds:
             further = self.constants * abs(constant)
         elif name in ("sin", "cos") and operations[arguments[0]][0] == "input":
             further = self.turned
-        size = abs(self.sweep.values[number])
-        size = size if roundings == 1.0 else size * roundings
+        size = self.sweep.values[number]
         if name in ("sin", "cos"):
             # next to 1 they have no more than half as many
+            size = abs(size) * roundings
             size = self.sweep.kind.select(size - 2.0, 2.0, size)
-        return size + further if further else size
+        elif roundings != 1.0:
+            size = size * roundings
+        return abs(size) + further if further else size
 
 
 def _needed(tape: Tape, names: set[str]) -> list[bool]:

@@ -153,7 +153,9 @@ function drawCentres(i) {
     centreCells?.[k].forEach((cell, axis) => (cell.textContent = far ? "∞" : short([x, y][axis] / lengths)));
     if (!(u > -20 && u < width + 20 && v > -20 && v < height + 20)) continue;
     d += `M${fixed(u - 5, v - 5)}L${fixed(u + 5, v + 5)}M${fixed(u - 5, v + 5)}L${fixed(u + 5, v - 5)}`;
-    words.put(u, v - 11, `${whole.bodies[a].name} / ${whole.bodies[b].name}`, "centre");
+    const text = `${whole.bodies[a].name} / ${whole.bodies[b].name}`;
+    const aside = LETTER[0] * text.length + 8;
+    set(text, [[u, v - 11], [u, v + 12], [u + aside, v], [u - aside, v]], "centre");
   }
   crosses.setAttribute("d", d);
 }
@@ -240,23 +242,24 @@ for (const series of data.series) {
 }
 
 // --- all of a pose ----------------------------------------------------------------------------------------------------
-// beside a point, on the side where none of its links leads away; a link's name in the middle of a plate or beside a bar,
-// where no other name stands
+// beside a point, on the side where none of its links leads away; a link's name in the middle of a plate or beside a bar;
+// where other names stand there, on another side, and nowhere if there is no room
 const neighbours = whole.points.map((_, k) => [...new Set(whole.bodies.slice(1).filter((b) => b.points.includes(k)).flatMap((b) => b.points))].filter((other) => other !== k));
 const LETTER = [3.4, 8]; // half a letter's width; a line's height
+let taken = []; // middles and half sides of what is written so far, and of the pins
+const free = ([u, v, w, h]) => taken.every(([x, y, a, b]) => Math.abs(u - x) > w + a || Math.abs(v - y) > h + b);
+function set(text, places, kind) {
+  const [w, h] = [LETTER[0] * text.length, LETTER[1]];
+  const box = places.map(([u, v]) => [Math.min(Math.max(u, w), width - w), v, w, h]).find(free);
+  if (!box) return;
+  taken.push(box);
+  words.put(box[0], box[1], text, kind);
+}
 function labels(stands, i) {
   if (!stands || !drawn.names) return;
   const places = whole.points.map((p) => [px(at(whole, p.x, i)), py(at(whole, p.y, i))]);
-  const taken = places.map(([u, v]) => [u, v, 5, 5]);
-  const free = ([u, v, w, h]) => taken.every(([x, y, a, b]) => Math.abs(u - x) > w + a || Math.abs(v - y) > h + b);
+  taken.push(...places.map(([u, v]) => [u, v, 5, 5]));
   const unit = ([du, dv]) => [du / (Math.hypot(du, dv) || 1), dv / (Math.hypot(du, dv) || 1)];
-  const set = (label, places, kind) => {
-    const [w, h] = [LETTER[0] * label.t.length, LETTER[1]];
-    const boxes = places.map(([u, v]) => [u, v, w, h]);
-    const box = boxes.find(free) ?? boxes[0];
-    taken.push(box);
-    words.put(box[0], box[1], label.t, kind);
-  };
   // how far aside the middle of a name stands: a long one farther to the left or right
   const aside = (label, [du, dv], gap) => [du * (gap + Math.max(0, LETTER[0] * (label.t.length - 2))), dv * gap];
   const across = ([du, dv]) => (du > 0 ? [dv, -du] : [-dv, du]);
@@ -268,8 +271,13 @@ function labels(stands, i) {
     if (!label.b) towards.push([0, 1.4]);
     let way = [0, 1].map((axis) => -towards.reduce((sum, one) => sum + one[axis], 0));
     if (Math.hypot(...way) < 0.35) way = across(towards[0] ?? [-1, 0]);
-    const [du, dv] = aside(label, unit(way), 15);
-    set(label, [[u + du, v + dv]], "point");
+    const [c, d] = unit(way);
+    const around = [15, 26].flatMap((gap) => [0, 1, -1, 2, -2, 3, -3, 4].map((eighth) => {
+      const [p, q] = [Math.cos((eighth * Math.PI) / 4), Math.sin((eighth * Math.PI) / 4)];
+      const [du, dv] = aside(label, [c * p - d * q, c * q + d * p], gap);
+      return [u + du, v + dv];
+    }));
+    set(label.t, around, "point");
   }
   for (const label of whole.labels.filter((one) => one.of === "link")) {
     const [u, v] = carried(stands[label.b], ...label.z).map((x, axis) => [px, py][axis](x));
@@ -280,7 +288,7 @@ function labels(stands, i) {
       const [du, dv] = aside(label, side.map((x) => sign * x), 12);
       return [u + du + share * along[0], v + dv + share * along[1]];
     }));
-    set(label, ends.length > 2 ? [[u, v], ...beside] : beside, `body ${classOf(label.b)}`);
+    set(label.t, ends.length > 2 ? [[u, v], ...beside] : beside, `body ${classOf(label.b)}`);
   }
 }
 function legend() {
@@ -297,6 +305,7 @@ function legend() {
 function drawAll(i) {
   const [stands] = figures.map((figure) => drawFigure(figure, i));
   missing.style.display = stands ? "none" : "";
+  taken = [];
   labels(stands, i);
   for (const [kind, draw] of Object.entries(drawers)) draw(i, drawn[kind === "force" ? "forces" : kind]);
   drawCentres(i);

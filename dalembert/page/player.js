@@ -99,9 +99,9 @@ function stepOf(low, high, most, degrees = false) {
   return turned ?? power * [1, 2, 5, 10].find((m) => m * power >= rough * (1 - 1e-9));
 }
 function ticks(low, high, step) {
-  const found = [];
-  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) found.push(Number((i * step).toPrecision(12)));
-  return found;
+  const first = Math.ceil(low / step - 1e-9);
+  const count = Math.min(Math.floor(high / step + 1e-9) - first + 1, 50);
+  return Array.from({ length: Math.max(0, count) }, (_, k) => Number(((first + k) * step).toPrecision(12)));
 }
 
 // --- the pose shown, and time -----------------------------------------------------------------------------------------
@@ -287,7 +287,9 @@ function plot(column) {
       const lines = data.series.map((s) => s.columns[k]?.values ?? []);
       let [low, high] = range(lines.flatMap((values) => range(values)).filter(Number.isFinite));
       if (!(low <= high)) [low, high] = [0, 1];
-      const pad = (high - low) * 0.06 || Math.abs(high) * 0.1 || 1;
+      // what varies by rounding alone is constant
+      const varies = high - low > 1e-12 * Math.max(Math.abs(low), Math.abs(high));
+      const pad = varies ? (high - low) * 0.06 : Math.abs(high) * 0.1 || 1;
       [low, high] = [low - pad, high + pad];
       let [left, right] = range(x);
       if (left === right) [left, right] = [left - 1, right + 1];

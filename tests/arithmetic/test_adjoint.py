@@ -8,7 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from dalembert.arithmetic.adjoint import derivatives, rounding_bounds
+from dalembert.arithmetic.adjoint import bounds_of_few, derivatives, rounding_bounds
 from dalembert.arithmetic.engines import ENGINES, run
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
 from dalembert.arithmetic.tape import Tape
@@ -106,6 +106,30 @@ def test_bounds_hold_close_to_a_limit() -> None:
     }
     errors, bounds = errors_and_bounds(four_bar(), given, "numpy")
     assert (errors <= bounds).all()
+
+
+@pytest.mark.parametrize("x", [2.0, 1 + 1e-13, 1 + 2.0**-52, 1.0])
+def test_one_lane_says_what_many_and_a_tape_say(x: float) -> None:
+    """Of two roots of differences: the chord, and the largest share of the second order."""
+    recorder = Recorder()
+    first, second = recorder.input("x") * recorder.input("x") - 1.0, recorder.input("z") * 0.7 - 1.0
+    tape = recorder.tape({"slow": first.sqrt() + second.sqrt(), "fast": 1.0 / first.sqrt()})
+    given = {"x": x, "z": 3.0}
+    one = bounds_of_few(tape, given, {}, tape.names)
+    many = bounds_of_few(tape, {name: np.full(3, v) for name, v in given.items()}, {}, tape.names)
+    with np.errstate(all="ignore"):
+        written = run(rounding_bounds(tape), given, "numpy")
+
+    def number(value: float) -> float:
+        # infinite or no number: both say that nothing is known
+        return float(np.nan_to_num(value, nan=np.inf, posinf=np.inf))
+
+    for name in many:
+        assert number(one[name]) == pytest.approx(number(many[name][0]), rel=1e-12), name
+        assert number(written[name]) == pytest.approx(number(many[name][0]), rel=1e-12), name
+    assert (one["tau"] >= 0.5) == (x == 1.0)
+    # the root of what may be a rounding of 1
+    assert one["error(slow)"] < 5e-8
 
 
 def test_errors_of_inputs_go_through() -> None:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from dalembert.arithmetic.processes import Processes
-from virtualwork import Force, Gear, Guess, Input, Link, Mechanism, Motor, Spring, Torque
+from virtualwork import Force, Gear, Guess, Input, Link, Mechanism, Motor, Spring, Torque, TorsionSpring
 from virtualwork.describe.dimensions import changed, dimensions, value
 from virtualwork.describe.errors import DescriptionError, MechanismError
+from virtualwork.family.part import Solver
 
 KINDS = ["four-bar", "slider-crank", "inverted slider-crank", "Watt", "Stephenson", "triad"]
 
@@ -255,3 +256,33 @@ def test_an_executor_gives_the_same_numbers_whatever_it_is(monkeypatch):
         sent = family.motion(angle, executor=processes)
         np.testing.assert_array_equal(alone.effort, sent.effort)
         np.testing.assert_array_equal(alone.assembled, sent.assembled)
+
+
+TABLE = tuple((float(q), complex(3 * np.cos(q), 2 * np.sin(2 * q))) for q in np.linspace(0, 2 * np.pi, 25))
+
+
+@pytest.mark.parametrize(("last", "wound"), [(2.5, False), (9.0, True)])
+def test_torsion_springs_and_tables_over_the_input_are_lanes(last, wound):
+    """Where no spring counts whole turns the tape has it; elsewhere each variant is described alone."""
+    springs = [
+        TorsionSpring(("crank", "coupler"), 0.7, -1.5, 0.01),
+        TorsionSpring(("coupler", "rocker"), 2.0, 0.3),
+        TorsionSpring(("ground", "crank"), 0.2, 0.1),
+    ]
+    m = four_bar(torsion_springs=springs, forces=[Force("coupler", "H", 0j, history=TABLE)])
+    paths = ("links.coupler.C.x", "ground.D.x", "torsion_springs.2.stiffness", "torsion_springs.2.free_angle")
+    rng = np.random.default_rng(4)
+    numbers = {p: float(value(m, p)) * (1 + 0.05 * rng.normal(size=24)) for p in paths}
+    angle = np.linspace(0.7, last, 9)
+    motion = m.vary(numbers).motion(angle)
+    solver = Solver(motion.part)
+    _, alone = solver.lanes([("effort", 0)])
+    assert alone.all() == wound
+    assert wound or not alone.any()
+    effort, force = motion.effort, motion.reaction("C", "rocker")
+    for i in range(24):
+        alone_one = m.vary(numbers)[i].motion(angle, 8.0, -3.0)
+        scale = np.nanmax(np.abs(alone_one.effort))
+        np.testing.assert_allclose(effort[i], alone_one.effort, rtol=1e-12, atol=1e-12 * scale)
+        true = alone_one.reaction("C", "rocker")
+        np.testing.assert_allclose(force[i], true, rtol=1e-11, atol=1e-12 * np.nanmax(np.abs(true)))

@@ -15,8 +15,8 @@ from virtualwork.branch.choice import Along
 from virtualwork.branch.roots import chebyshev_nodes, real_roots
 from virtualwork.describe.description import Description
 from virtualwork.formulas.double_roots import settle, singular
-from virtualwork.formulas.linear import solve, stack, stack_rows
-from virtualwork.formulas.newton import newton, write_unknowns
+from virtualwork.formulas.linear import SINGULAR, solve, stack, stack_rows
+from virtualwork.formulas.newton import gaps, newton, write_unknowns
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import State, columns
 from virtualwork.formulas.rates import Rates
@@ -28,6 +28,14 @@ NODES = 120
 FINEST = 1e-7
 # of one turn: nodes this near to where they are to end have reached it
 SEAM = 2 * FINEST
+# of the largest singular value: what is singular but for rounding
+UPRIGHT = 1e-9
+# the same, but for rounding of drawn coordinates
+NEARLY = 1e-4
+# rad or sizes of the mechanism for a turn of the input: no guess with slower unknowns stands upright
+STEEP = 100.0
+# rad, or sizes of the mechanism: how far beside an upright guess its neighbours are looked for
+WAYS = (0.1, 0.03, 0.01)
 
 
 class Continuation:
@@ -48,6 +56,9 @@ class Continuation:
         self.stopped = {1: False, -1: False}
         # the last one that was taken
         self.step = {1: np.inf, -1: np.inf}
+        # the input of the guess and its neighbours', where the branch stands upright over it
+        self.upright: tuple[float, float, float] | None = None
+        self._begin_upright()
 
     def _state(self, q: float, x: Reals | None = None) -> State:
         """What the group hangs on at one input; its own unknowns too, where they are given."""
@@ -70,6 +81,65 @@ class Continuation:
         if not np.isfinite(jacobian).all():
             return rate, np.nan
         return rate, float(np.prod(np.linalg.svd(jacobian[0], compute_uv=False)))
+
+    def _begin_upright(self) -> None:
+        """Lay a node to each side of a guess where the branch stands upright: unknowns go as the cube root of the input.
+
+        There the Jacobian is singular, but with the input's own column it is not: along its null vector the loops are
+        closed by the unknowns and the input together. Where both sides lie at one side of the input it is a limit.
+        """
+        q, x = self.q[0], self.x[0]
+        unit = np.where(np.arange(len(x)) < len(self.group.angles), 1.0, self.size)
+        if np.abs(self.rate[0] / unit).max(initial=0.0) * self.track.length < STEEP:
+            return
+        jacobian, along, _ = self._linear(q, x)
+        if jacobian.shape[0] != jacobian.shape[1] or not np.isfinite(jacobian).all():
+            return
+        u, s, vt = np.linalg.svd(jacobian * unit / self.size)
+        one = s[-1] <= NEARLY * s[0] and (len(s) == 1 or s[-2] > NEARLY * s[0])
+        if not one or abs(u[:, -1] @ along) <= SINGULAR * self.size:
+            return
+        sides = [self._beside(q, x, way * vt[-1], unit) for way in (1.0, -1.0)]
+        found = sorted((side for side in sides if side is not None), key=lambda side: side[0])
+        if len(found) < 2 or not found[0][0] < q < found[1][0]:
+            return
+        low, high = found
+        beside = [(to, at, *self._rate(self._state(to, at))) for to, at in (low, high)]
+        # of coordinates that were rounded: a fold between the two is not stepped over
+        if s[-1] > UPRIGHT * s[0] and len({np.sign(det) for *_, det in beside} | {np.sign(self.det[0])}) > 1:
+            return
+        for place, (to, at, rate, det) in zip((0, 2), beside, strict=True):
+            self.q.insert(place, to)
+            self.x.insert(place, at)
+            self.rate.insert(place, rate)
+            self.det.insert(place, det)
+        # the rate in the middle is infinite, and its determinant rounding
+        self.rate[1], self.det[1] = np.zeros(len(x)), self.det[0]
+        self.upright = (low[0], q, high[0])
+
+    def _linear(self, q: float, x: Reals) -> tuple[Reals, Reals, Reals]:
+        """The Jacobian of the loops, their change with the input, and their gaps at one pose."""
+        st = self._state(q, x)
+        d = Rates(self.assembly.plan, st, [[1.0]], self.track)
+        d.advance(self.before, 1)
+        right = stack_rows(d.right_side(self.group, 1), 1)[0]
+        return stack(columns(self.group, st), 1)[0], right, stack_rows(gaps(self.group, st), 1)[0]
+
+    def _beside(self, q: float, x: Reals, null: Reals, unit: Reals) -> tuple[float, Reals] | None:
+        """Go a way along a null vector, and close the loops there by the unknowns and the input (Newton-Raphson)."""
+        for way in WAYS:
+            to, at = q, x + way * null * unit
+            for _ in range(12):
+                jacobian, along, gap = self._linear(to, at)
+                bordered = np.block([[jacobian, along[:, None]], [null / unit, 0.0]])
+                rest = np.append(gap, null / unit @ (at - x) - way)
+                if not np.isfinite(bordered).all():
+                    break
+                move = np.linalg.lstsq(bordered, -rest)[0]
+                at, to = at + move[:-1], to + float(move[-1])
+                if np.abs(move[:-1] / unit).max() <= 1e-13 and np.abs(gap).max() <= 1e-13 * self.size:
+                    return to, at
+        return None
 
     def extend(self, a: float, b: float) -> None:
         """Go on until the nodes cover a to b."""
@@ -168,6 +238,8 @@ class Continuation:
         """The unknowns' derivative across a removable singularity of the Jacobian: of the polynomial through poses
         on both sides of it (Chebyshev points, so that it holds some 12 digits of a velocity)."""
         half = 0.06 * self.track.length / (2 * np.pi)
+        if self.upright is not None and abs(q - self.upright[1]) < half:
+            return np.full(len(self.x[0]), np.nan)
         nodes = chebyshev_nodes(14)
         self.extend(q - half, q + half)
         x = self.unknowns(q + half * nodes)
@@ -237,6 +309,14 @@ class Continuation:
                 + b * t * t * (3 - 2 * t)
                 + h * (rate[i] * t * (1 - t) ** 2 - rate[i + 1] * t * t * (1 - t))
             )
+        if self.upright is not None:
+            low, middle, high = self.upright
+            k = int(np.searchsorted(nodes, middle))
+            for end, node in ((low, k - 1), (high, k + 1)):
+                within = (q - middle) * (end - middle) >= 0
+                within &= np.abs(q - middle) <= abs(end - middle)
+                share = np.cbrt((q[within] - middle) / (end - middle))[:, None]
+                start[within] = x[k] + share * (x[node] - x[k])
         for limit, side in self.ends:
             # between the last node and the limit: x = x_L − 2x′·√((q_L − q_last)(q_L − q)), the fold's own parabola
             end = -1 if side < 0 else 0
@@ -253,6 +333,9 @@ class Continuation:
             if self.group.name in self.track.folded:
                 found = settle(self.group, many, found, self.size)
                 st.folded.add(self.group.name)
+        if self.upright is not None:
+            at = np.abs(q - middle) <= FINEST**2 * self.track.length
+            found[at], closed = x[k], closed | at
         found[~(closed & inside)] = np.nan
         write_unknowns(self.group, st, found)
         st.margin[self.group.name] = (

@@ -6,17 +6,20 @@ way to the poses), it is left to be described alone.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.engines import run, run_grid
 from virtualwork.branch.guess import BESIDE, informed
 from virtualwork.describe.description import Description
 from virtualwork.family.written import CHOICE, Written
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.recording import names
 
 Mask = NDArray[np.bool_]
 # radicand (a squared sine) below which a guess stands at a change point or a limit, or nearly so
@@ -25,10 +28,10 @@ CLOSE = 1e-9
 TOLD = 0.5
 # rad, or of the mechanism's size: how finely the way to the poses is looked through, and what is a dip of a radicand
 STEP, DIP = 2 * np.pi / 90, 0.05
+# so many times wider are the steps that tell where no dip can be
+WIDER = 2
 # what a dip has to go down to for two branches to meet there
 MEETS = 1e-8
-# variants from which samples are worked out one after the other
-ROWS = 512
 # lanes worked on together
 LANES = 1 << 18
 
@@ -63,8 +66,9 @@ def signs(
         known = {**given} | {f"sign {name}": sign for name, sign in chosen.items()}
         step = BESIDE * (m.size if m.inputs[0].is_slide else 1.0)
         for side in (step, -step):
-            for name, depth in _radicands(written, known, np.full((1, n), m.at[0] + side)).items():
-                told &= ~(opens[name] & (depth[0] >= 0))
+            for name, open_ in opens.items():
+                depth = _sampled(written, ("margin", name), known, np.array([[m.at[0] + side]]), n)
+                told &= ~(open_ & (depth[0] >= 0))
     return chosen, told
 
 
@@ -81,66 +85,99 @@ def meet_on_the_way(
     than its neighbours, the dip is followed down.
     """
     found = np.zeros(n, dtype=bool)
-    if not written.closed or not (high > low).any():
-        return found
-    count = samples(m, float(np.max(high - low)))
-    each = max(1, LANES // count)
-    for a in range(0, n, each):
-        rows = slice(a, min(a + each, n))
-        here = {name: value[rows] if np.ndim(value) else value for name, value in known.items()}
-        q = way(m, low[rows], high[rows], count)
-        for name, depth in _radicands(written, here, q).items():
-            found[rows] |= meets(written, name, here, q, depth)
+    if written.closed:
+        for here, some, q in _along(m, known, n, low, high):
+            for group in written.closed:
+                radicand = partial(_sampled, written, ("margin", group.name))
+                found[here] |= _meet(radicand, some, q, len(found[here]))
+    return found
+
+
+def stays_within(
+    written: Written,
+    m: Description,
+    known: Mapping[str, Any],
+    key: Key,
+    bound: float,
+    low: Reals,
+    high: Reals,
+) -> Mask:
+    """Of which variants a quantity is no larger than a bound over their inputs from low to high, (n,)."""
+    n = len(low)
+    found = np.ones(n, dtype=bool)
+    for here, some, q in _along(m, known, n, low, high):
+        found[here] = (np.abs(_sampled(written, key, some, q, len(found[here]))) < bound).all(axis=0)
     return found
 
 
 def samples(m: Description, span: float) -> int:
-    """How many samples of a way are looked at."""
+    """How many samples of a way are looked at, of a turn at most."""
     return int(np.ceil(min(span / (m.size if m.inputs[0].is_slide else 1.0), 2 * np.pi) / STEP)) + 2
 
 
-def way(m: Description, low: Any, high: Any, count: int) -> Reals:
-    """The samples of ways from low to high, of a turn at most; (count, n)."""
-    return np.linspace(low, np.minimum(high, low + (np.inf if m.inputs[0].is_slide else 2 * np.pi)), count)
+def _along(
+    m: Description, known: Mapping[str, Any], n: int, low: Reals, high: Reals
+) -> Iterator[tuple[slice, dict[str, Any], Reals]]:
+    """Some variants at a time, what is known of them, and inputs on their way, (samples, variants or 1)."""
+    span = float(np.max(high - low, initial=0.0))
+    slide = m.inputs[0].is_slide
+    turn = np.inf if slide else 2 * np.pi
+    count = samples(m, span)
+    alike = bool((low == low[0]).all() and (high == high[0]).all())
+    each = max(1, LANES // count)
+    for a in range(0, n, each):
+        here = slice(a, min(a + each, n))
+        some = {name: values if np.ndim(values) == 0 else values[here] for name, values in known.items()}
+        # where all share their inputs one list of them will do
+        first, last = (end[here][: 1 if alike else None] for end in (low, high))
+        yield here, some, np.linspace(first, np.minimum(last, first + turn), count)
 
 
-def _radicands(written: Written, known: Mapping[str, Any], q: Reals) -> dict[str, Reals]:
-    """The radicand of each closed form at inputs (samples, rows)."""
-    keys = [("margin", group.name) for group in written.closed]
-    tape = written.tape(keys)
-    given = {name: known[name] for name in tape.inputs if name != "q0"}
-    depth = np.empty((len(keys), *q.shape))
+def _meet(radicand: Callable[..., Reals], known: Mapping[str, Any], q: Reals, n: int) -> Mask:
+    """Which variants may have a change point of a group at inputs (samples, n or 1)."""
+    found = np.zeros(n, dtype=bool)
+    # about a change point the radicand grows with the square of the distance: at a wider step a dip is higher
+    wide = np.unique([*range(0, len(q), WIDER), len(q) - 1])
+    depth = radicand(known, q[wide], n)
+    left = np.flatnonzero(~(depth > DIP * WIDER**2).all(axis=0))
+    if len(left):
+        some = {name: values if np.ndim(values) == 0 else values[left] for name, values in known.items()}
+        near = q if q.shape[1] == 1 else q[:, left]
+        found[left] = _meets(some, near, radicand, len(left))
+    return found
+
+
+def _across(known: Mapping[str, Any]) -> dict[str, Any]:
+    """What is known of each variant, as the columns of a grid."""
+    return {name: values[None] if np.ndim(values) else values for name, values in known.items()}
+
+
+def _sampled(written: Written, key: Key, known: Mapping[str, Any], q: Reals, n: int) -> Reals:
+    """A quantity at inputs (samples, n or 1): (samples, n)."""
+    tape = written.tape([key])
+    shape = len(q), n
     with np.errstate(all="ignore"):
-        if q.shape[1] < ROWS:
-            each = {name: np.tile(x, len(q)) if np.ndim(x) else x for name, x in given.items()}
-            out = run(tape, each | {"q0": q.ravel()})
-            for k, name in enumerate(tape.names):
-                depth[k] = np.reshape(out[name], q.shape)
-        else:
-            for i, sample in enumerate(q):
-                # an input that all variants share is turned once
-                at = float(sample[0]) if (sample == sample[0]).all() else sample
-                out = run(tape, given | {"q0": at})
-                for k, name in enumerate(tape.names):
-                    depth[k, i] = out[name]
-    return dict(zip((group.name for group in written.closed), depth, strict=True))
+        found = run_grid(tape, _across(known) | {"q0": q}, shape)[names(key)[0]]
+    return np.broadcast_to(found, len(q) * n).reshape(shape)
 
 
-def meets(written: Written, group: str, known: Mapping[str, Any], q: Reals, depth: Reals) -> Mask:
-    """Where a dip of a group's radicand (samples, rows), which is followed down, goes to zero."""
+def _meets(known: Mapping[str, Any], q: Reals, radicand: Callable[..., Reals], n: int) -> Mask:
+    """Where a dip of the radicand, which is followed down, goes to zero."""
+    depth = radicand(known, q, n)
     inner = depth[1:-1]
     dips = (inner <= depth[:-2]) & (inner <= depth[2:]) & (inner < DIP) & (inner > 0)
-    found: Mask = np.asarray((np.abs(depth[[0, -1]]) < MEETS).any(axis=0))
+    meets: Mask = np.asarray((np.abs(depth[[0, -1]]) < MEETS).any(axis=0))
     places, lanes = np.nonzero(dips)
     if not len(lanes):
-        return found
-    here = {name: values[lanes] if np.ndim(values) else values for name, values in known.items()}
-    centre, half = q[places + 1, lanes], q[1, lanes] - q[0, lanes]
+        return meets
+    here = {name: values if np.ndim(values) == 0 else values[lanes] for name, values in known.items()}
+    of = lanes if q.shape[1] > 1 else np.zeros_like(lanes)
+    centre, half = q[places + 1, of], q[1, of] - q[0, of]
     every = np.arange(len(lanes))
     for _ in range(5):
         near = centre + half * np.linspace(-1, 1, 9)[:, None]
-        below = _radicands(written, here, near)[group]
+        below = radicand(here, near, len(lanes))
         lowest = np.argmin(below, axis=0)
         centre, half, least = near[lowest, every], half / 4, below[lowest, every]
-    found[lanes[least < MEETS]] = True
-    return found
+    meets[lanes[least < MEETS]] = True
+    return meets

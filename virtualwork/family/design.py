@@ -18,7 +18,7 @@ from dalembert.arithmetic.engines import run
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.describe.errors import DescriptionError, hint
-from virtualwork.family.branches import CLOSE, DIP, TOLD, meets, samples, signs, way
+from virtualwork.family.branches import CLOSE, DIP, TOLD, meet_on_the_way, samples, signs
 from virtualwork.family.part import Part, Solver
 from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Reals
@@ -175,21 +175,19 @@ class Design:
             lanes = self._lanes[1]
         margins = [("margin", group.name) for group in looked]
         table = run(written.tape((*self.keys, *margins)), {**known, "q0": lanes}).table
-        for i, group in enumerate(looked):
-            depth = table[rows + i, n:]
-            # NaN is not greater either
-            if (
-                not depth.min() > DIP
-                and meets(written, group.name, known, lanes[n:, None], depth[:, None])[0]
-            ):
+        # NaN is not greater either
+        if looked and not table[rows:, n:].min() > DIP:
+            ends = (lanes[n:].min(keepdims=True), lanes[n:].max(keepdims=True))
+            if meet_on_the_way(written, self.mechanism, known, 1, *ends)[0]:
                 return None
         return np.where(np.isfinite(table[:rows, :n]), table[:rows, :n], np.nan)
 
     def _with_way(self, q: Reals) -> Reals:
-        """Inputs, and behind them samples of the way from the guess over all of them."""
-        at = self.mechanism.at[0]
-        low, high = min(np.nanmin(q), at), max(np.nanmax(q), at)
-        return np.concatenate([q, way(self.mechanism, low, high, samples(self.mechanism, float(high - low)))])
+        """Inputs, and behind them samples of the way from the guess over all of them, of a turn at most."""
+        m = self.mechanism
+        low, high = min(np.nanmin(q), m.at[0]), max(np.nanmax(q), m.at[0])
+        last = min(high, low + (np.inf if m.inputs[0].is_slide else 2 * np.pi))
+        return np.concatenate([q, np.linspace(low, last, samples(m, float(high - low)))])
 
     def _differences(self, x: Reals, q: Reals, inputs_alone: bool) -> Reals:
         """The derivatives from differences; those to all inputs from one design."""

@@ -171,7 +171,10 @@ class FamilyMotion:
                 for columns, value in zip(found, values, strict=True):
                     columns.append(value)
                 self._reasons |= {rows[i].start + place: reason for place, reason in reasons.items()}
-            self._known |= {key: np.concatenate(columns) for key, columns in zip(new, found, strict=True)}
+            self._known |= {
+                key: columns[0] if len(columns) == 1 else np.concatenate(columns)
+                for key, columns in zip(new, found, strict=True)
+            }
         return [self._known[key] for key in keys]
 
     @cached_property

@@ -14,15 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.engines import run_grid
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed
 from virtualwork.describe.errors import MechanismError
-from virtualwork.family.branches import LANES, meet_on_the_way, signs
+from virtualwork.family.branches import LANES, meet_on_the_way, signs, stays_within
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import FORCES, Key, over_blocks
 from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Number, Reals, leave_out
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import COMPLEX, NAMES, NEAR, quantity
@@ -30,6 +31,8 @@ from virtualwork.formulas.recording import COMPLEX, NAMES, NEAR, quantity
 Mask = NDArray[np.bool_]
 # the key of 0 where a pose is assembled
 ASSEMBLED: Key = ("assembled",)
+# rad: a torsion spring that is twisted by no more all along its way counts no whole turns
+HALF = 2.6
 # variants described one by one whose poses are kept for the next question
 KEPT = 500
 
@@ -111,7 +114,7 @@ class Solver:
     def assembly(self) -> Assembly | None:
         """That of the mechanism itself; None where its own dimensions cannot be put together."""
         try:
-            found = Assembly.from_guess(self.part.mechanism)
+            found = assembled(self.part.mechanism)
             _ = found.track
         except MechanismError:
             return None
@@ -129,13 +132,17 @@ class Solver:
         ):
             return None
         moves = tuple(any(np.any(rate) for rate in order) for order in self.part.rates)
-        fixed = [d for d in self.part.dimensions if d.where[0] != "inputs"]
-        found = Written(own, fixed, moves, own_signs=True)
+        fixed = tuple(d for d in self.part.dimensions if d.where[0] != "inputs")
+        key = "family", fixed, moves
+        if key not in own.recordings:
+            own.recordings[key] = Written(own, fixed, moves, own_signs=True)
+        found: Written = own.recordings[key]
         return None if found.open_gears else found
 
     @cached_property
     def _given(self) -> dict[str, Reals]:
-        return {d.path: self.part.values[:, i] for i, d in enumerate(self.part.dimensions)}
+        columns = np.ascontiguousarray(self.part.values.T)
+        return {d.path: column for d, column in zip(self.part.dimensions, columns, strict=True)}
 
     @cached_property
     def _signs(self) -> tuple[dict[str, Reals], Mask]:
@@ -151,12 +158,24 @@ class Solver:
                 # what a description refuses
                 told &= self._given[d.path] >= 0
         if len(m.inputs) == 1 and told.any():
-            q = part.inputs[:, :, 0]
-            low = np.broadcast_to(np.minimum(np.nanmin(q, axis=1, initial=np.inf), m.at[0]), v)
-            high = np.broadcast_to(np.maximum(np.nanmax(q, axis=1, initial=-np.inf), m.at[0]), v)
+            low, high = self._span
             known = self._given | {f"sign {name}": sign for name, sign in found.items()}
             told &= ~meet_on_the_way(written, m, known, v, low, high)
         return found, told
+
+    @cached_property
+    def _span(self) -> tuple[Reals, Reals]:
+        """The least and the largest value of the one input of each variant, with that of the guess, (v,) each."""
+        v, at = len(self.part.values), self.part.mechanism.at[0]
+        q = self.part.inputs[:, :, 0]
+        low = np.minimum(np.nanmin(q, axis=1, initial=np.inf), at)
+        high = np.maximum(np.nanmax(q, axis=1, initial=-np.inf), at)
+        return np.broadcast_to(low, v), np.broadcast_to(high, v)
+
+    @property
+    def _known(self) -> dict[str, Reals]:
+        """The dimensions and the signs of each variant."""
+        return self._given | {f"sign {name}": sign for name, sign in self.signs.items()}
 
     @property
     def signs(self) -> dict[str, Reals]:
@@ -178,14 +197,21 @@ class Solver:
     def lanes(self, keys: Sequence[Key]) -> tuple[list[Any], Mask]:
         """The quantities of the variants that are on the tape; and which are not, (v,): of those they are NaN."""
         v, n = self.part.shape
-        out = [np.full((v, n), np.nan, complex if key[0] in COMPLEX else float) for key in keys]
-        there = self.together if self.takes(keys) else np.zeros(v, dtype=bool)
-        places = np.flatnonzero(there)
-        each = max(1, LANES // max(n, 1))
+        there = self._taken(keys) if self.takes(keys) else np.zeros(v, dtype=bool)
         alone = ~there
+        each = max(1, LANES // max(n, 1))
+        if not alone.any() and v <= each:
+            return self._on_tape(keys, slice(None))
+        out = [np.empty((v, n), complex if key[0] in COMPLEX else float) for key in keys]
+        places = np.flatnonzero(there)
         for i in range(0, len(places), each):
             rows = places[i : i + each]
-            alone[rows[self._on_tape(keys, rows, out)]] = True
+            found, near = self._on_tape(keys, rows)
+            alone[rows[near]] = True
+            for to, values in zip(out, found, strict=True):
+                to[rows] = values
+        for to in out:
+            to[alone] = np.nan
         return out, alone
 
     def takes(self, keys: Sequence[Key]) -> bool:
@@ -193,15 +219,35 @@ class Solver:
         m, written = self.part.mechanism, self.written
         if written is None:
             return False
-        forces = any(key[0] in FORCES for key in keys)
-        if forces and (m.torsion_springs or any(f.history for f in m.forces)):
-            return False
+        if any(key[0] in FORCES for key in keys) and not m.friction:
+            # what a table gives is known beforehand where it is over the input
+            loads = written.recording.forces[0].case.loads
+            if any(isinstance(load, Tabled) and load.axis != "input" for load in loads):
+                return False
         return written.recording.takes(keys)
 
-    def _on_tape(self, keys: Sequence[Key], rows: NDArray[np.intp], out: list[Any]) -> Mask:
-        """Work out some variants on the tape; which of them are better described alone."""
+    def _taken(self, keys: Sequence[Key]) -> Mask:
+        """Which variants have quantities on the tape: of forces those whose torsion springs count no whole turns."""
+        if any(key[0] in FORCES for key in keys):
+            return self.together & self._unwound
+        return self.together
+
+    @cached_property
+    def _unwound(self) -> Mask:
+        """Which variants' torsion springs stay within half a turn of free all the way, (v,)."""
+        v, m = self.part.shape[0], self.part.mechanism
+        found = np.ones(v, dtype=bool)
+        if len(m.inputs) > 1 or self.written is None:
+            return found
+        low, high = self._span
+        for number in range(len(m.torsion_springs)):
+            found &= stays_within(self.written, m, self._known, ("twist", number), HALF, low, high)
+        return found
+
+    def _on_tape(self, keys: Sequence[Key], rows: NDArray[np.intp] | slice) -> tuple[list[Any], Mask]:
+        """Work out some variants on the tape; and which of them are better described alone."""
         assert self.written is not None
-        n = self.part.shape[1]
+        v, n = len(self.part.values[rows]), self.part.shape[1]
         written = self.written
         closed = {key: ("closed", *written.recording.hangs_on(key)) for key in keys}
         forces = any(key[0] in FORCES for key in keys)
@@ -210,34 +256,43 @@ class Solver:
         whole = list(dict.fromkeys(closed.values()))
         tape = written.tape((*asked, *whole, *margins))
         with np.errstate(all="ignore"):
-            found = run(tape, {name: self._lanes(name, rows) for name in tape.inputs})
-            lanes = {
-                key: quantity(found, key, len(rows) * n).reshape(-1, n) for key in (*asked, *whole, *margins)
-            }
-            near = np.zeros(len(rows), dtype=bool)
-            for key in margins:
-                near |= (np.abs(lanes[key]) < NEAR).any(axis=1)
-        for key, values in zip(keys, out, strict=True):
-            here = np.zeros((len(rows), n)) if key == ASSEMBLED else lanes[key]
-            leave_out(here, ~np.isfinite(lanes[closed[key]]))
-            values[rows] = here
-        return near
+            found = run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n))
+            lanes = {key: quantity(found, key, v * n).reshape(v, n) for key in (*asked, *whole, *margins)}
+        near = np.zeros(v, dtype=bool)
+        for key in margins:
+            near |= (np.abs(lanes[key]) < NEAR).any(axis=1)
+        gaps = {key: ~np.isfinite(lanes[key]) for key in whole}
+        values = [np.zeros((v, n)) if key == ASSEMBLED else lanes[key] for key in keys]
+        for key, here in zip(keys, values, strict=True):
+            if gaps[closed[key]].any():
+                leave_out(here, gaps[closed[key]])
+        return values, near
 
-    def _lanes(self, name: str, rows: NDArray[np.intp]) -> Any:
-        """An input of the tape for some variants in all their poses."""
-        v, n = self.part.shape
+    def _entering(self, name: str, rows: NDArray[np.intp] | slice) -> Any:
+        """An input of the tape for some variants: a number, or what broadcasts to (v, n)."""
         kind, _, group = name.partition(" ")
         if group and kind == "sign":
             sign = self._signs[0][group][rows]
-            return float(sign[0]) if (sign == sign[0]).all() else np.repeat(sign, n)
+            return float(sign[0]) if (sign == sign[0]).all() else sign[:, None]
         if name in self._given:
-            return np.repeat(self._given[name][rows], n)
+            return self._given[name][rows, None]
+        if kind == "near":
+            # a torsion spring that counts no whole turns
+            return 0.0
+        if kind == "table":
+            number, part = group.split()
+            loads = self.written.recording.forces[0].case.loads if self.written is not None else ()
+            table = [load for load in loads if isinstance(load, Tabled)][int(number)]
+            q = self.part.inputs[:, :, 0]
+            force = np.asarray(table.over(q.ravel(), True)).reshape(q.shape)
+            value = force.real if part == "x" else force.imag
+            return value[rows] if len(value) > 1 else value
         j = int(name[1:])
         value = self.part.inputs[:, :, j] if name[0] == "q" else self.part.rates[NAMES.index(name[0]) - 1][j]
         # what is the same in all lanes is worked out once
-        return (
-            np.broadcast_to(value, (v, n))[rows].ravel() if np.size(value) > 1 else float(np.ravel(value)[0])
-        )
+        if np.size(value) == 1:
+            return float(np.ravel(value)[0])
+        return value[rows] if len(value) > 1 else value
 
     def _one(self, i: int, keys: Sequence[Key], out: list[Any]) -> None:
         """Describe one variant alone."""
@@ -260,6 +315,26 @@ class Solver:
                         values[i] = np.where(poses.assembled, 0.0, np.nan)
                     else:
                         values[i] = over_blocks(poses, key, forces)
+
+
+_assembled: dict[int, Assembly] = {}
+# mechanisms of which a process keeps what it has written down
+MECHANISMS = 8
+
+
+def assembled(mechanism: Description) -> Assembly:
+    """A mechanism put together once, with what has been written down of it.
+
+    Raises
+    ------
+    MechanismError
+    """
+    found = _assembled.get(id(mechanism))
+    if found is None or found.mechanism is not mechanism:
+        while len(_assembled) >= MECHANISMS:
+            _assembled.pop(next(iter(_assembled)), None)
+        found = _assembled[id(mechanism)] = Assembly.from_guess(mechanism)
+    return found
 
 
 _solvers: dict[tuple[str, int], Solver] = {}

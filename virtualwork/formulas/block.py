@@ -62,8 +62,14 @@ class Shared:
         known = [self.plan.angles[body] for body in (a, b)]
         if all(not angle.bases for angle in known):
             return (st.affine(known[1]) - spring.free_angle) - st.affine(known[0])
-        within = st.kind.angle(st.turn[b] * st.turn[a].conjugate() * rotation(-spring.free_angle))
+        within = self.within(st, spring)
         return within if len(st.inputs) > 1 else self.wound(spring, st, within)
+
+    @staticmethod
+    def within(st: State, spring: TorsionSpring) -> Number:
+        """A torsion spring's twist, within half a turn of free."""
+        a, b = spring.links
+        return st.kind.angle(st.turn[b] * st.turn[a].conjugate() * rotation(-spring.free_angle))
 
 
 class Setting(Shared):

@@ -236,6 +236,7 @@ class Recording:
         ("shaking",), ("shaking moment",)            complex; real
         ("closed", groups' names …)                  a finite number where these groups are assembled
         ("margin", group's name)                     the radicand of a closed form, relative
+        ("twist", number)                            of a torsion spring, within half a turn of free
         ("regularity", group's name)                 of a larger group: how far its Jacobian is from singular, of 1
         """
         if key not in self._values:
@@ -288,6 +289,14 @@ class Recording:
     def _turn(self, body: str) -> Number:
         self.solve((f"angle:{body}",), 0)
         return self.st.turn[body]
+
+    def _twist(self, number: int) -> Number:
+        spring = self.mechanism.torsion_springs[number]
+        if all(not self.plan.angles[body].bases for body in spring.links):
+            # the inputs alone fix it, whole turns included
+            return 0.0
+        self.solve([f"angle:{body}" for body in spring.links if body != GROUND], 0)
+        return Shared.within(self.st, spring)
 
     def _angle(self, body: str, order: int) -> Number:
         if body == GROUND:

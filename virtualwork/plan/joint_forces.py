@@ -92,7 +92,8 @@ class Order:
             column = np.zeros(len(bodies))
             for body, factor in relation.shares.items():
                 if body != GROUND:
-                    column[bodies.index(body)] += factor
+                    # of a ratio that varies, its number
+                    column[bodies.index(body)] += complex(factor).real
             unknowns.append((relation.kind, relation.number))
             columns_.append(column)
         pattern = np.array(columns_).reshape(len(unknowns), len(bodies)).T

@@ -19,6 +19,7 @@ from dalembert.arithmetic.tape import Tape
 Reals = NDArray[np.float64]
 Rows = Sequence[Reals] | Reals
 ENGINES = ("python", "numpy", "llvm")
+NARROW = 32  # columns from which on a grid is worked on as one
 FEW = 4  # lanes up to which Python's floats are faster than numpy's calls
 PAYS = 3e8  # operations × lanes of one tape from which compiling it pays (some 0.1 s with the import)
 
@@ -135,6 +136,35 @@ def _table(rows: int, n: int, pairs: frozenset[int]) -> Rows:
         elif row - 1 not in pairs:
             found.append(room[row * n : (row + 1) * n])
     return found
+
+
+def run_grid(tape: Tape, inputs: Mapping[str, Any], shape: tuple[int, int]) -> Outputs:
+    """Run a tape over a grid, every row with every column, such as variants with poses.
+
+    Parameters
+    ----------
+    tape : Tape
+    inputs : mapping of name to number, or array that broadcasts to the shape
+        What hangs on the row alone is (r, 1), on the column alone (1, c).
+    shape : (r, c)
+
+    Returns
+    -------
+    Outputs
+        The lanes of a row lie side by side: (r c,), or a number where all inputs are numbers.
+    """
+    given = {name: inputs[name] for name in tape.inputs}
+    r, c = shape
+    both = any(np.size(x) > max(np.shape(x)) for x in given.values() if np.ndim(x))
+    engine = os.environ.get("DALEMBERT_ENGINE")
+    if c < NARROW or r < 2 or both or (engine or chosen(tape, r * c)) != "numpy":
+        return run(
+            tape,
+            {n: np.broadcast_to(x, shape).ravel() if np.ndim(x) else x for n, x in given.items()},
+        )
+    from dalembert.arithmetic.engines import grids
+
+    return Outputs(tape, grids.run(tape, given, shape).reshape(len(tape.outputs), r * c))
 
 
 def chosen(tape: Tape, n: int) -> str:

@@ -61,12 +61,7 @@ class Blocks:
         self.tape = tape
         self.varying = [name for name in tape.inputs if name not in uniform]
         operations = tape.operations
-        lanes = [False] * len(operations)
-        for number, (kind, *arguments) in enumerate(operations):
-            if kind == "input":
-                lanes[number] = arguments[0] not in uniform
-            elif kind != "const":
-                lanes[number] = any(lanes[a] for a in arguments)
+        self.of_lanes = lanes = self.lanes_of(tape, uniform)
         body = [n for n, op in enumerate(operations) if lanes[n] and op[0] != "input"]
         last = {a: n for n in body for a in operations[n][1:]}
         outputs: dict[int, str] = {}
@@ -121,6 +116,16 @@ class Blocks:
         self.block = min(MOST, max(LEAST, ROOM // (8 * max(slots, 1)) // LEAST * LEAST))
         self.parts = self._compiled(lines)
         self._own = threading.local()
+
+    def lanes_of(self, tape: Tape, uniform: frozenset[str]) -> list[bool]:
+        """Which operations are not the same for all lanes."""
+        lanes: list[bool] = []
+        for kind, *arguments in tape.operations:
+            if kind == "input":
+                lanes.append(arguments[0] not in uniform)
+            else:
+                lanes.append(kind != "const" and any(lanes[a] for a in arguments))
+        return lanes
 
     def _compiled(self, lines: list[str]) -> list[Callable[..., None]]:
         names = [f"x{k}" for k in range(len(self.varying))] + [f"c{n}" for n in self.read]
