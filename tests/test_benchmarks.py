@@ -64,6 +64,13 @@ def errors(found: dict[tuple[str, str], list[Measurement]], method: str = "") ->
     return [m.error for (_, name), ms in found.items() for m in ms if m.error is not None and method in name]
 
 
+@pytest.mark.slow
+def test_motion_in_time() -> None:
+    found = of("in-time")
+    assert max(errors(found)) < 1e-6
+    assert {"Andrews' mechanism, 0.03 s, accuracy 3e-10"} < {work for work, _ in found}
+
+
 def test_mechanisms() -> None:
     found = of("mechanisms")
     for (work, method), ms in found.items():

@@ -17,7 +17,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from benchmarks.peers import field, mechanisms, rotation
+from benchmarks.peers import field, in_time, mechanisms, rotation
 from benchmarks.speed.measure import Measurement
 
 Peer = Callable[[bool], Iterator[Measurement]]
@@ -65,6 +65,7 @@ PEERS: dict[str, tuple[tuple[str, Peer], ...]] = {
         ("scipy", mechanisms.by_fsolve),
         ("numpy", mechanisms.by_nine_equations),
     ),
+    "in-time": (("scipy", in_time.by_scipy), ("sksundae", in_time.by_sundials)),
     "field": (("hsbalance", field.by_hsbalance),),
     "rotation": (
         ("mujoco", rotation.by_mujoco),

@@ -8,6 +8,7 @@ extended precision or rational arithmetic (`benchmarks.truth`); never against th
 DOMAINS = {
     "mechanisms": ("benchmarks.speed.mechanisms", "mechanisms in motion, their torque and joint forces"),
     "evaluators": ("benchmarks.speed.evaluators", "the tape: evaluators on each engine, beside C"),
+    "in-time": ("benchmarks.speed.in_time", "motion under forces, beside other integrators"),
     "variants": (
         "benchmarks.speed.variants",
         "families of mechanisms, beside a loop and beside poses of one",

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Request:
     """What the options ask for."""
 
@@ -43,7 +43,7 @@ class Verdict(NamedTuple):
     residual: float
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Balancing:
     """The corrections as given out, one row per rotor and plane, and what they leave; all in SI."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from functools import partial
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,7 +16,7 @@ from cli.show.reported import reported
 if TYPE_CHECKING:
     from cli.show.columns import Result, Section
 
-EXAMPLES = files("cli") / "examples"
+EXAMPLES = Path(__file__).parent
 ABOUT = "example.toml"
 EXPECTED = "expected.csv"
 

@@ -11,11 +11,13 @@ from cli.read import options
 from cli.show.output import command, suffix_among
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from matplotlib.figure import Figure
 
     from cli.field.fit import LogFits
     from cli.field.solve import FieldBalancing
-    from cli.show.columns import Document, Result, Table
+    from cli.show.columns import Document, Result, Sheet, Table
 
 
 EXAMPLE = "fan-one-plane"
@@ -211,12 +213,9 @@ def run(
 
     from cli.field import request as asked
     from cli.field.files import read_runout, read_stored, stored_alpha
-    from cli.field.fit import Asked, LogFits, masses_at
     from cli.field.layouts import alpha_of, is_log
-    from cli.field.log import read_log
     from cli.field.read import NotOneInitialRun, read_runs, runs_table
     from cli.field.runs import more_than_unknowns
-    from cli.field.sisters import Sisters
     from cli.field.solve import FieldBalancing
     from cli.read.tolerance import tolerance_of
 
@@ -257,6 +256,9 @@ def run(
             fit = True
     lagging = against if phase_lag or rotation is not None else None
     if measured is None:
+        from cli.field.log import read_log
+        from cli.field.sisters import Sisters
+
         measured = read_log(
             runs,
             table,
@@ -291,17 +293,23 @@ def run(
     )
     with options.processes(workers) as executor:
         found = FieldBalancing(measured, request, stored, executor)
-    fits = LogFits(found, Asked(masses_at(predict, measured), suggest, robust)) if fit else None
+    fits = None
+    if fit:
+        from cli.field.fit import Asked, LogFits, masses_at
+
+        fits = LogFits(found, Asked(masses_at(predict, measured), suggest, robust))
     return _result(found, fits, save_influence)
 
 
 def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | None) -> Result:
-    from cli.field import columns, fit, fit_columns, fit_words, remarks, report, words
-    from cli.field.coefficient_columns import coefficients
+    from cli.field import columns, remarks, words
     from cli.show.columns import Result
-    from cli.show.text import csv_text
 
-    warnings = remarks.warnings(found) + list(fit.remarks(found))
+    warnings = remarks.warnings(found)
+    if fits is not None:
+        from cli.field import fit, fit_columns, fit_words
+
+        warnings += fit.remarks(found)
 
     def document() -> Document:
         whole = columns.document(found)
@@ -311,20 +319,32 @@ def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | 
         assert fits is not None
         return fit_columns.residuals(fits)
 
+    def influence() -> Table:
+        from cli.field.coefficient_columns import coefficients
+
+        return coefficients(found)
+
+    def sheets() -> Iterator[Sheet]:
+        from cli.field.report import sheets
+
+        return sheets(found, fits)
+
+    def stored() -> bytes:
+        from cli.show.text import csv_text
+
+        return csv_text(influence().cells).encode()
+
     def figure() -> Figure:
         from cli.field import fit_picture, picture
 
         few = range(min(len(found.runs.rotors), 3))
         return picture.draw(found, few) if fits is None else fit_picture.draw(fits, few)
 
-    beside = {}
-    if save_influence is not None:
-        beside[save_influence] = lambda: csv_text(coefficients(found).cells).encode()
     return Result(
         document=document,
         tables={
             "corrections": lambda: columns.corrections(found, warnings),
-            "influence": lambda: coefficients(found),
+            "influence": influence,
             "prediction": lambda: columns.prediction(found),
             **({} if found.request.places is None else {"split": lambda: columns.split(found)}),
             **({} if fits is None else {"residuals": residuals}),
@@ -333,10 +353,10 @@ def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | 
         notes=lambda: (fit_words.notes(fits) if fits is not None else "") + words.notes(found),
         afterword=lambda: words.afterword(found) + (fit_words.afterword(fits) if fits is not None else ""),
         figure=figure,
-        method=report.METHOD,
-        sheets=lambda: report.sheets(found, fits),
+        method=words.METHOD,
+        sheets=sheets,
         shows_input=True,
         about={"title": "Balancing in the field"},
-        beside=beside,
+        beside={} if save_influence is None else {save_influence: stored},
         warnings=warnings,
     )

@@ -68,7 +68,7 @@ class Coefficients(NamedTuple):
     """Complex, of that and of the covariance; inf where the file does not say."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Stored:
     """Stored influence coefficients."""
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from balancing import place, plane_significance, trial_effect
+import balancing
+from balancing import plane_significance, trial_effect
 from cli.field.runs import Group
 from cli.field.solve import SHOWN, FieldBalancing, Solved
 from cli.read.units import degrees
@@ -78,7 +79,7 @@ def _remarks(found: FieldBalancing, solved: Solved) -> Iterator[str]:
         yield from _more(int(fine.sum()), "initial vibration within --max-residual already")
     for w in solved.corrections[:SHOWN].ravel():
         if found.request.places is not None and w != 0:
-            missed = place(complex(w), np.radians(found.request.places)).error
+            missed = balancing.place(complex(w), np.radians(found.request.places)).error
             if abs(missed) > 1e-9 * abs(w):
                 yield f"a correction at {degrees(w):.4g}° cannot be reached from the places given"
 

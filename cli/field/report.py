@@ -16,13 +16,6 @@ from cli.read.units import degrees, from_si
 from cli.show.columns import Column, Section, Sheet, Table
 from cli.show.text import angle_text
 
-METHOD = (
-    "Influence coefficients from trial runs (E. L. Thearle 1934), corrections by least squares or by the smallest largest "
-    "residual (T. P. Goodman 1964; second-order cone program), all runs of a log fitted together; tolerance after ISO "
-    "21940-11. The masses are at the radius of the trial masses."
-)
-
-
 MOST = 24  # rotors of one report
 
 

@@ -13,7 +13,7 @@ from cli.read.tolerance import Tolerance
 from cli.read.units import UNITS, amplitude_kind, parse_number, to_si
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Request:
     """What the options ask for."""
 

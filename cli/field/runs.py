@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing import JointFit, Prior
+import balancing
 from cli.read.tables import Table
 
 Real = NDArray[np.float64]
@@ -50,7 +50,7 @@ class Trial:
     kept: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Log:
     """The rows of a rotor's fit: for each the run's name, and which of its repeated readings it holds."""
 
@@ -67,11 +67,11 @@ class Log:
         return list(dict.fromkeys(run for run, _ in self.rows))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Before:
     """What was known of a machine before its runs."""
 
-    prior: Prior
+    prior: balancing.Prior
     machines: int
     """Whose coefficients they are."""
     scatter: float | None
@@ -80,7 +80,7 @@ class Before:
     """Standard deviation of their readings as vectors, in the runs' unit, and its complex degrees of freedom."""
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class Group:
     """Rotors that were measured in the same way."""
 
@@ -110,7 +110,7 @@ class Group:
     """Bounds of the errors of `initial`, `runs` and `on` against the decimals of the table; worked out when asked for."""
     first: str = ""
     """The initial run."""
-    fit: JointFit | None = None
+    fit: balancing.JointFit | None = None
     """Where all runs were fitted at once: `initial` is fitted then, and there are no trial runs."""
     logs: Sequence[Log] = ()
     before: Before | None = None
@@ -150,7 +150,7 @@ class Group:
         return np.asarray(np.sqrt(np.maximum(pooled, own) / (2 * self.counts)))
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class Runs:
     """A table of runs."""
 

@@ -50,7 +50,7 @@ SHOWN = 5  # of so many rotors the same is said, of the others together
 UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class Solved:
     """A group's result."""
 

@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 
 FEW = 6  # so many rotors are shown in full
 
+METHOD = (
+    "Influence coefficients from trial runs (E. L. Thearle 1934), corrections by least squares or by the smallest largest "
+    "residual (T. P. Goodman 1964; second-order cone program), all runs of a log fitted together; tolerance after ISO "
+    "21940-11. The masses are at the radius of the trial masses."
+)
+
 
 def conventions(found: FieldBalancing) -> str:
     """Say how angles and phases are counted and what the corrections mean."""

@@ -89,7 +89,7 @@ class Asked:
     def families(self, shown: NDArray[np.float64]) -> Families | None:
         """How variants are solved together; None where they are not."""
         plain = self.branch is None and self.request.tables in ([], ["--forces"])
-        if not plain or self.digits or (self.only is None and not self.request.forces):
+        if not plain or self.digits:
             return None
         found = Families(self.analysis(self.mechanism), self.request.forces, Solver(self.part(shown)))
         return found if found.pays else None

@@ -279,10 +279,14 @@ def run(
         beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
         beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}
         beside |= {"--branch all": branch == "all"}
-        beside |= {"--vary": vary, "--variants": variants, "--tolerance": spreads}
+        beside |= {"--tolerance": spreads}
         clash = [flag for flag, value in beside.items() if value and flag != "--forces"]
         if clash:
             raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
+        lonely: dict[str, object] = {"--html": html, "--digits": show.digits, "--workers": workers}
+        single = [flag for flag, value in lonely.items() if value]
+        if single and (vary or variants is not None):
+            raise options.bad(single[0], "expected one mechanism with --time, and no --vary or --variants")
     elif accuracy is not None or until is not None:
         raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
     if html is not None:
@@ -303,6 +307,11 @@ def run(
             home.warnings += said
             home.check_names()
             motion = InTime(home, *times_and_accuracy(time, accuracy), until, bare, forces)
+            if several is not None:
+                from cli.mechanism.variants_in_time import VariantsInTime
+
+                found_all = VariantsInTime(motion, several, names, branch)
+                return replace(found_all.result(about), within=lambda: told(file))
             if html is not None:
                 refuse_long(len(motion.times))
             result = _with_page(

@@ -19,12 +19,13 @@ from cli.read import options
 from cli.show.columns import Result, Table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from cli.show.columns import Document
+    from cli.show.columns import Column, Document
+    from virtualwork import Mechanism
     from virtualwork.intime.run import Run
     from virtualwork.intime.travel import Travel
 
@@ -67,6 +68,7 @@ class InTime:
     @cached_property
     def run(self) -> Run:
         """The simulation."""
+        from virtualwork import MechanismError
         from virtualwork.intime.run import simulate
 
         a = self.analysis
@@ -74,6 +76,8 @@ class InTime:
         (assembly,) = a.assemblies
         try:
             return simulate(assembly, self.times, accuracy=self.accuracy, until=level)
+        except MechanismError:
+            raise
         except ValueError as error:
             raise DataError(f"{a.file}: {error}") from None
 
@@ -106,26 +110,8 @@ class InTime:
         return found
 
     def _inputs(self, way: Travel) -> dict[Any, dict[str, Reals]]:
-        run = self.run
-        q, v, acceleration, _ = way.at(run.t)
-        found: dict[Any, dict[str, Reals]] = {}
-        for j, entry in enumerate(self.analysis.mechanism.inputs):
-            error = run.error_estimate[:, j]
-            if entry.is_slide:
-                found[entry.name] = {
-                    "position_m": q[:, j],
-                    "speed_m_s": v[:, j],
-                    "acceleration_m_s2": acceleration[:, j],
-                    "error_estimate_m": error,
-                }
-            else:
-                found[entry.name] = {
-                    "angle_deg": np.degrees(q[:, j]),
-                    "speed_rad_s": v[:, j],
-                    "acceleration_rad_s2": acceleration[:, j],
-                    "error_estimate_deg": np.degrees(error),
-                }
-        return found
+        q, v, acceleration, _ = way.at(self.run.t)
+        return inputs_of(self.analysis.mechanism, q, v, acceleration, self.run.error_estimate)
 
     def _forces(self, motion: Any) -> Parts:
         found: dict[Any, dict[str, Reals]] = {}
@@ -150,15 +136,8 @@ class InTime:
 
     def table(self) -> Table:
         """A row for each time."""
-        columns = [column("t_s", self.run.t.tolist())]
-        inputs = self.analysis.mechanism.inputs
-        for kind, entries in self.fine.items():
-            for name, values in entries.items():
-                for key, numbers in values.items():
-                    header = _header(kind, name, key, several=len(inputs) > 1)
-                    error = None if key.startswith("error") else partial(self._error, kind, name, key)
-                    columns.append(column(header, cells(numbers), error))
-        return Table(columns, keys=("t_s",))
+        several = len(self.analysis.mechanism.inputs) > 1
+        return Table(columns_of(self.run.t, self.fine, several, self._error), keys=("t_s",))
 
     def _error(self, kind: str, name: Any, key: str) -> list[float]:
         spread = self.run.spread(self.fine[kind][name][key], self.coarse[kind][name][key])
@@ -166,32 +145,10 @@ class InTime:
 
     def document(self) -> Document:
         """The JSON document."""
-        lists = {
-            kind: {name: {key: cells(values) for key, values in of.items()} for name, of in entries.items()}
-            for kind, entries in self.fine.items()
-        }
-        rows: list[Document] = []
-        for i, t in enumerate(self.run.t.tolist()):
-            row: dict[str, Any] = {"t_s": t}
-            for kind, entries in lists.items():
-                here = {name: {key: values[i] for key, values in of.items()} for name, of in entries.items()}
-                if kind == "energy":
-                    row |= here[""]
-                elif kind == "shaking":
-                    row[kind] = here[""]
-                elif kind == "reactions":
-                    row[kind] = [
-                        {"joint": joint, "on": on, "from": of, **values}
-                        for (joint, on, of), values in here.items()
-                    ]
-                elif here:
-                    row[kind] = here
-            rows.append(row)
-        drift = self.run.energy_drift
         return {
             "name": self.analysis.mechanism.name,
-            "time": rows,
-            "energy_drift_J": float(drift[np.argmax(np.abs(drift))]),
+            "time": rows_of_time(self.run.t, self.fine),
+            "energy_drift_J": largest(self.run.energy_drift),
             "methods": self.run.fine.methods,
             "steps": self.run.fine.steps,
         }
@@ -233,6 +190,72 @@ class InTime:
             about={"title": a.mechanism.name or "Mechanism"} | about,
             warnings=[*a.warnings, *self.run.warnings],
         )
+
+
+def inputs_of(m: Mechanism, q: Reals, v: Reals, a: Reals, error: Reals) -> dict[Any, dict[str, Reals]]:
+    """The inputs, their rates and errors (n, k) by name, as they are shown."""
+    found: dict[Any, dict[str, Reals]] = {}
+    for j, entry in enumerate(m.inputs):
+        if entry.is_slide:
+            found[entry.name] = {
+                "position_m": q[:, j],
+                "speed_m_s": v[:, j],
+                "acceleration_m_s2": a[:, j],
+                "error_estimate_m": error[:, j],
+            }
+        else:
+            found[entry.name] = {
+                "angle_deg": np.degrees(q[:, j]),
+                "speed_rad_s": v[:, j],
+                "acceleration_rad_s2": a[:, j],
+                "error_estimate_deg": np.degrees(error[:, j]),
+            }
+    return found
+
+
+def columns_of(
+    t: Reals, parts: Parts, several: bool, error: Callable[[str, Any, str], list[float]] | None = None
+) -> list[Column]:
+    """What is found at each time as columns; `several`: whether there are several inputs."""
+    columns = [column("t_s", t.tolist())]
+    for kind, entries in parts.items():
+        for name, values in entries.items():
+            for key, numbers in values.items():
+                told = None if error is None or key.startswith("error") else partial(error, kind, name, key)
+                columns.append(column(_header(kind, name, key, several=several), cells(numbers), told))
+    return columns
+
+
+def rows_of_time(t: Reals, parts: Parts) -> list[Document]:
+    """What is found at each time as JSON."""
+    lists = {
+        kind: {name: {key: cells(values) for key, values in of.items()} for name, of in entries.items()}
+        for kind, entries in parts.items()
+    }
+    rows: list[Document] = []
+    for i, time in enumerate(t.tolist()):
+        row: dict[str, Any] = {"t_s": time}
+        for kind, entries in lists.items():
+            here = {name: {key: values[i] for key, values in of.items()} for name, of in entries.items()}
+            if kind == "energy":
+                row |= here[""]
+            elif kind == "shaking":
+                row[kind] = here[""]
+            elif kind == "reactions":
+                row[kind] = [
+                    {"joint": joint, "on": on, "from": of, **values}
+                    for (joint, on, of), values in here.items()
+                ]
+            elif here:
+                row[kind] = here
+        rows.append(row)
+    return rows
+
+
+def largest(drift: Reals) -> float | None:
+    """The largest of numbers by size, sign and all; None where there is none."""
+    there = drift[np.isfinite(drift)]
+    return float(there[np.argmax(np.abs(there))]) if len(there) else None
 
 
 def _xy(z: NDArray[np.complex128]) -> tuple[Reals, Reals]:

@@ -82,8 +82,9 @@ def posed(
 def counted(m: Mechanism) -> str:
     """Say what a mechanism is made of.
 
+    >>> from cli.examples.command import EXAMPLES
     >>> from virtualwork import Mechanism
-    >>> counted(Mechanism.from_toml("cli/examples/klann/klann.toml"))
+    >>> counted(Mechanism.from_toml(EXAMPLES / "klann" / "klann.toml"))
     '5 links, 7 pins, driven by crank'
     """
     kinds = {

@@ -18,7 +18,7 @@ _PARTED = r"(?s)(.*\S)\s*(?:,|\s/\s|\sin\s)\s*(\S.*)\Z"
 NO_UNIT = ("", "-", "1")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Heading:
     """A column's header."""
 
@@ -200,8 +200,6 @@ def likeness(headings: Iterable[Heading], known: Mapping[str, str], texts: Seque
 
 def offers(headings: Iterable[Heading], known: Mapping[str, str], texts: Sequence[str]) -> list[str]:
     """Return for columns that are not known but may be meant the option that takes them: `--column mass_g=Masse`."""
-    from shlex import quote
-
     out = []
     for each in headings:
         base, unit = each.base, each.unit
@@ -210,6 +208,8 @@ def offers(headings: Iterable[Heading], known: Mapping[str, str], texts: Sequenc
             base = base.removesuffix(f"_{unit}") if unit else base
         quantity = quantity_meant(base, (*known, *texts))
         if quantity:
+            from shlex import quote
+
             dimension = known.get(quantity)
             fit = "" if dimension is None else find_unit(dimension, unit) or next(iter(UNITS[dimension]))
             out.append(f"--column {quantity}{'_' * bool(fit)}{fit}={quote(each.written)}")

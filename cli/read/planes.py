@@ -14,7 +14,7 @@ from cli.read.tables import read
 from cli.read.units import SMALLEST, parse_quantity, to_si
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Planes:
     """Correction planes, in SI; `rotor` names each plane's rotor where they differ from rotor to rotor."""
 

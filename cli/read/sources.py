@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 LARGE = 10_000
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Source:
     """A table before its cells are read."""
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Numbers:
     """A column of numbers in the file's own unit; NaN where an allowed blank or mark stands."""
 
@@ -35,7 +35,7 @@ class Numbers:
     values: NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Cells:
     """A column with a unit whose cells are left as text."""
 
@@ -65,7 +65,7 @@ class Cells:
             return None
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Table:
     """A table as read: columns by the name of their quantity, without the unit suffix."""
 

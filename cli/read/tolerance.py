@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from cli.read import options
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tolerance:
     """A permissible residual unbalance."""
 

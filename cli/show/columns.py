@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Document = dict[str, Json]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, repr=False)
 class Column:
     """A quantity of a table: strings are names, None and NaN are empty cells."""
 
@@ -40,7 +40,7 @@ class Column:
         return f"{self.name}_{self.unit}" if self.unit else self.name
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, repr=False)
 class Table:
     """Columns of one length."""
 

@@ -25,6 +25,7 @@ ROWS = 36  # so many rows of a result are shown
 READ = 24  # so many rows of an input
 LINES = 100  # so many lines of a file
 WIDE = 88  # characters beside each other that fit A4 and Letter
+TINY = 1e-9  # a number smaller than this may be the rounding of zero
 _THINNED = ("step", "t_s")  # of tables that begin so every k-th row is shown: they are sweeps
 
 
@@ -95,7 +96,11 @@ def report(
         sections = [*([Section("Given", given)] if given else []), *first.sections]
         sheets = [replace(first, sections=[*sections, *([check] if check else [])]), *others]
     pages = [
-        Page(sheet.title, [(s.title, list(_printed(s.parts, finish))) for s in sheet.sections], sheet.figure)
+        Page(
+            sheet.title,
+            [(s.title, list(_printed(s.parts, finish)) or ["none"]) for s in sheet.sections],
+            sheet.figure,
+        )
         for sheet in sheets
     ]
     call = " ".join(["dalembert", *map(_quoted, sys.argv[1:])])
@@ -195,7 +200,7 @@ def _grids(table: Table) -> Iterator[Part]:
     headers: list[str] = []
     texts: list[list[str]] = []
     for column in table.columns:
-        values = [column.values[i] for i in kept]
+        values = _known(column, kept)
         if thinned:
             values = _without_noise(values)
         cells = [
@@ -219,9 +224,20 @@ def _grids(table: Table) -> Iterator[Part]:
         rows = [list(row) for row in zip(*(texts[k] for k in here), strict=True)]
         yield Grid([headers[k] for k in here], rows, [numbers[k] for k in here])
     if every > 1:
-        yield f"every {every}th of {length} rows"
+        yield f"one row in {every} of {length}"
     elif length > len(kept):
         yield f"… and {length - len(kept)} further rows"
+
+
+def _known(column: Column, kept: Sequence[int]) -> list[Cell]:
+    """The values of rows; what is within its own rounding error of zero is nothing."""
+    values = [column.values[i] for i in kept]
+    if column.error is None or not any(isinstance(v, float) and 0 < abs(v) < TINY for v in values):
+        return values
+    bounds = column.error()
+    return [
+        0.0 if isinstance(v, float) and abs(v) <= bounds[i] else v for i, v in zip(kept, values, strict=True)
+    ]
 
 
 def _without_noise(values: list[Cell]) -> list[Cell]:
@@ -237,7 +253,10 @@ def _words(name: str) -> str:
 
 def said(header: str) -> str:
     """Return a header that stands in a cell as people write it: `inertia_x_kg_m2` is inertia x [kg·m²]."""
-    if " " in header.partition(":")[0] or "_" not in header:
+    of, colon, rest = header.rpartition(": ")
+    if colon:
+        return f"{of}: {said(rest)}"
+    if " " in header or "_" not in header:
         return header
     parts = header.split("_")
     for k in range(1, len(parts)):

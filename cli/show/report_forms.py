@@ -31,13 +31,15 @@ p { margin: 1.5mm 0; white-space: pre-wrap } pre { font: 8pt/1.3 monospace; whit
 table { border-collapse: collapse; margin: 1.5mm 0 2.5mm; font-size: 9pt; max-width: 100% } thead { display: table-header-group }
 th, td { padding: .5mm 1.6mm; text-align: left; vertical-align: top; border-bottom: .2mm solid #ccc } tr { break-inside: avoid }
 th { background: #eee; font-weight: 600; vertical-align: bottom } .n { text-align: right; font-variant-numeric: tabular-nums }
-td.n { white-space: nowrap } th { overflow-wrap: break-word } .good { color: #06632f; font-weight: 600 } .bad { color: #b00020; font-weight: 700 }
+td.n { white-space: nowrap } th, td { overflow-wrap: break-word } .long { overflow-wrap: anywhere } .good { color: #06632f; font-weight: 600 } .bad { color: #b00020; font-weight: 700 }
 .warning { border-left: 1mm solid #b00020; padding-left: 2mm } footer { margin-top: 4mm; font-size: 8.5pt; color: #444 }
 figure { margin: 3mm 0; break-inside: avoid } svg { display: block; max-width: 100%; height: auto; max-height: 95mm; margin: 0 auto } .rows svg { max-height: 220mm }
 section + section { break-before: page }
 @page { margin: 13mm 12mm } @media print { body { margin: 0; padding: 0; max-width: none } }
 """
 _MARKS = {**dict.fromkeys(GOOD, "good"), **dict.fromkeys(BAD, "bad")}
+LONG = 40
+"""A word of more characters is cut where the line ends."""
 _NO_PICTURE = "(No picture: matplotlib is not installed.)"
 
 
@@ -130,6 +132,7 @@ def _html_part(part: Part) -> str:
         cells = []
         for cell, number in zip(row, part.numbers, strict=True):
             kinds = [*(["n"] if number else []), *([_MARKS[cell]] if cell in _MARKS else [])]
+            kinds += ["long"] if max(map(len, cell.split()), default=0) > LONG else []
             of = f' class="{" ".join(kinds)}"' if kinds else ""
             cells.append(f"<{tag}{of}>{html.escape(cell)}</{tag}>")
         return f"<tr>{''.join(cells)}</tr>\n"

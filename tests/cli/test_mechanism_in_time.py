@@ -122,3 +122,38 @@ def test_a_torque_over_time_is_refused_in_a_pose(dalembert: Dalembert, pendulum:
     assert done.returncode == 1
     assert "only a motion in time has it" in done.stderr
     assert dalembert("mechanism", str(pendulum), "--time", "0:1:1").returncode == 0
+
+
+def test_variants_are_let_go_together(dalembert: Dalembert, pendulum: Path) -> None:
+    """Rows begin with the variant; each is what the file with that number gives."""
+    vary = "--vary", "links.bob.P.x=1:2:1", "--set", "links.bob.center.x=0.5"
+    done = dalembert("mechanism", pendulum, "--time", "0:1:0.5", *vary)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    assert [row["variant"] for row in rows] == ["1"] * 3 + ["2"] * 3
+    one = dalembert("mechanism", pendulum, "--time", "0:1:0.5", *vary[2:], "--set", "links.bob.P.x=2")
+    alone = list(csv.DictReader(io.StringIO(one.stdout)))
+    for row, own in zip(rows[3:], alone, strict=True):
+        assert float(row["links.bob.P.x_m"]) == 2
+        assert math.isclose(float(row["input_deg"]), float(own["input_deg"]), abs_tol=1e-9)
+        assert math.isclose(float(row["energy_J"]), float(own["energy_J"]), abs_tol=1e-9)
+
+
+def test_variants_with_an_end_and_points_in_json(dalembert: Dalembert, pendulum: Path) -> None:
+    more = "--vary", "links.bob.mass=0:1:1", "--until", "bob=-90deg", "--only", "P", "--json"
+    done = dalembert("mechanism", pendulum, "--time", "0:2:1", *more)
+    assert done.returncode == 0, done.stderr
+    none, one = json.loads(done.stdout)["variants"]
+    assert none["time"] == []
+    assert none["energy_drift_J"] is None
+    assert one["set"] == {"links.bob.mass_kg": 1.0}
+    assert math.isclose(one["time"][-1]["inputs"]["bob"]["angle_deg"], -90)
+    assert math.isclose(one["time"][-1]["points"]["P"]["y_m"], -1)
+    assert "variant 1: no mass moves with input 'bob'" in done.stderr
+
+
+def test_what_variants_in_time_do_not_have_is_refused(dalembert: Dalembert, pendulum: Path) -> None:
+    for flag in (["--digits"], ["--workers", "2"], ["--html", "x.html"]):
+        done = dalembert("mechanism", pendulum, "--time", "0:1:1", "--vary", "links.bob.mass=1:2:1", *flag)
+        assert done.returncode == 2
+        assert "expected one mechanism with --time" in done.stderr

@@ -199,7 +199,7 @@ def test_a_sweep_is_thinned_and_said_so(dalembert: Dalembert, tmp_path: Path) ->
     options = ("--forces", "--sweep", "0deg:60deg/999", "--report", "r.html", "-o", "out.csv")
     assert dalembert("mechanism", "clamp.toml", *options).returncode == 0
     page = read(tmp_path / "r.html")
-    assert "every 28th of 1000 rows" in page.texts["p"]
+    assert "one row in 28 of 1000" in page.texts["p"]
     steps = [row[0] for row in page.tables[0][1:]]
     assert steps == [str(1 + 28 * k) for k in range(36)]
 

@@ -451,6 +451,17 @@ def test_chaos_past_all_digits_is_said() -> None:
     assert run.error_estimate[-1].max() > 0.1
 
 
+def test_rest_at_a_change_point_is_named_with_its_time() -> None:
+    """A parallelogram stretched out: at rest it may go on in two ways, with a speed only in one."""
+    flat = replace(
+        bars(1),
+        inputs=(Input(link="crank0", value=0.0),),
+        guess=Guess(0.0, {"crank1": 0.0, "coupler0": 0.0}),
+    )
+    assert "at 0 s it rests at a change point" in flat.simulate([0, 0.1], accuracy=1e-6).warnings[0]
+    assert not flat.simulate([0, 0.1], speed=1.0, accuracy=1e-6).warnings
+
+
 @pytest.mark.parametrize("wrong", [{"times": [0, 0]}, {"times": []}, {"times": [0, 1], "accuracy": 2.0}])
 def test_wrong_questions(wrong: dict[str, object]) -> None:
     with pytest.raises(ValueError, match=r"times|accuracy"):

@@ -226,9 +226,10 @@ class Dynamics:
 
         self.scene.each((), work)
         out = ~self.poses.assembled
-        force[out], moment[out] = np.nan, np.nan
         if self.scene.lost is not None:
-            force[self.scene.lost], moment[self.scene.lost] = np.nan, np.nan
+            out = out | self.scene.lost
+        leave_out(force, out)
+        leave_out(moment, out)
         return xy(force), moment
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:

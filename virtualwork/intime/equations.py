@@ -399,6 +399,11 @@ class Equations:
         """Whether there are change points, as far as was looked."""
         return bool(self._crossings)
 
+    def meets(self, q: float) -> bool:
+        """Whether an input is at a change point, but for rounding."""
+        found = nearest(self._crossings, q)
+        return found is not None and abs(q - found.at) < 1e-7 * self.scale[0]
+
     def clear(self, q: Reals) -> bool:
         """Whether no change point is near any of the values of the first input."""
         low, high = float(q.min()), float(q.max())

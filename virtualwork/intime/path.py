@@ -35,6 +35,8 @@ from virtualwork.intime.watch import Check, Floats, Watch
 
 # steps of one simulation
 MOST = 200_000
+# of a planned step's error over the one allowed: halves of what a tolerance chose may be so much rougher than this one's
+ROUGH = 256.0
 
 
 @dataclass
@@ -122,7 +124,7 @@ def walk(
     left : mapping of a watch's name to its level
         Levels at which the path begins, and which the first step does not meet again.
     plan : rising times
-        Where steps end, as far as it goes: they are not judged.
+        Where steps end, as far as it goes: they are judged roughly.
 
     Returns
     -------
@@ -183,7 +185,7 @@ def walk(
             continue
         error = method.size(done, allowed(tolerance, equations.scale, q, fastest, v, done.dv))
         wanted = SAFETY * error**power if error else GROW
-        if not error < (math.inf if planned else 1.0):
+        if not error < (ROUGH if planned else 1.0):
             path.rejected += 1
             h, grow, cut = shorter(h, wanted), 1.0, True
             continue
@@ -247,7 +249,7 @@ def _marched(
         before = state
         if plan:
             ahead = bisect_right(plan, path.t[-1] + shortest(path.t[-1], given["span"]))
-            ends = [x for x in plan[ahead:] if x <= given["end"]]
+            ends = [x for x in plan[ahead : ahead + ROUNDS] if x <= given["end"]]
             if not ends:
                 return parts(before)
             found = follow(k, equations.rates, {}, state, np.array(ends)[:, None])
@@ -288,7 +290,6 @@ def _marched(
             path.ended = "budget"
         elif plan:
             path.ended = "end" if path.t[-1] >= given["end"] else ""
-            return parts(state)
         elif not state["left"][0] > 0:
             path.ended = "end" if state["t"][0] >= given["end"] else "stiff" if found.stiff[0] else "lost"
         if path.ended:

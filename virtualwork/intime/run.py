@@ -291,6 +291,12 @@ def _said(
         found.append(f"ends at {run.fine.end:.9g} s, after {MOST} steps: a lower accuracy takes fewer")
     elif run.fine.ended not in ("end", "until"):
         found.append(f"ends at {run.fine.end:.9g} s: {run.fine.ended}")
+    undecided = run.fine.undecided
+    if undecided is not None:
+        found.append(
+            f"at {undecided:.9g} s it rests at a change point, from where more than one motion leads on: that of the "
+            "guess's branch is followed"
+        )
     if run.unknown.any():
         found.append(
             f"no digit is known from {run.t[np.argmax(run.unknown)]:.6g} s on: the motion makes any error grow, "

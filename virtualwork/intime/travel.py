@@ -46,12 +46,6 @@ class Leg:
         change = np.where(turning, change - TURN * np.round((change - near) / TURN), change)
         return np.asarray(self.first + np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(change, axis=0)]))
 
-    @property
-    def halves(self) -> Floats:
-        """The times of the nodes, and in the middle between them."""
-        t = self.path.t
-        return [x for a, b in pairwise(t) for x in (0.5 * (a + b), b)]
-
     def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
         """The coordinates, their speeds and accelerations, and the work."""
         return self.path.at(times)
@@ -90,6 +84,20 @@ class Travel:
         """Whether a leg ended for it was stiff."""
         return any(leg.path.ended == "stiff" for leg in self.legs)
 
+    @property
+    def undecided(self) -> float | None:
+        """The first time at which it rests at a change point; None where it never does.
+
+        With a speed the motion is decided there: only one of the branches that meet goes on with it.
+        """
+        for leg in self.legs:
+            path = leg.path
+            rest = 1e-7 * float(np.abs(np.array(path.v)).max())
+            for t, q, v in zip(path.t, path.q, path.v, strict=True):
+                if path.equations.meets(q[0]) and abs(v[0]) <= rest:
+                    return t
+        return None
+
     def backwards(self) -> None:
         """From now on reach every time from the node after it.
 
@@ -103,6 +111,11 @@ class Travel:
     def nodes(self) -> Reals:
         """The times between steps."""
         return np.unique(np.concatenate([leg.path.t for leg in self.legs]))
+
+    @property
+    def halves(self) -> Floats:
+        """The times of the nodes, and in the middle between them."""
+        return [x for a, b in pairwise(self.nodes.tolist()) for x in (0.5 * (a + b), b)]
 
     @property
     def methods(self) -> list[str]:
@@ -208,9 +221,10 @@ def travel(
     method : Method
         Where it is found to be stiff, the implicit one goes on.
     like : Travel, optional
-        Each of its steps is done in two halves, leg by leg.
+        Each of its steps is done in two halves.
     """
     found = Travel()
+    plan = [] if like is None else like.halves
     t, q, v = start
     inputs, work = q, 0.0
     ended = ""
@@ -224,7 +238,6 @@ def travel(
         stops, budget = equations.stops, most - found.steps
         begin = t, q, v, work
         left = {ended: 0.0} if ended.startswith("friction") else None
-        plan = [] if like is None or len(found.legs) >= len(like.legs) else like.legs[len(found.legs)].halves
         path = walk(equations, method, begin, end, tolerance, watches, stops, monitor, budget, left, plan)
         leg = Leg(coordinates, path, inputs)
         found.legs.append(leg)
