@@ -7,6 +7,7 @@ if TYPE_CHECKING:
     from virtualwork.describe.errors import AssemblyError, DescriptionError, MechanismError, MobilityError
     from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
     from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link
+    from virtualwork.family.target import Target
     from virtualwork.formulas.effort import ledger
     from virtualwork.mechanism import Mechanism, equilibria
     from virtualwork.study import counterweights
@@ -45,6 +46,7 @@ __all__ = [
     "MobilityError",
     "Motor",
     "Spring",
+    "Target",
     "Torque",
     "TorsionSpring",
     "UnitLoad",
@@ -92,6 +94,7 @@ _ROOMS = {
         "equilibria",
     ),
     "virtualwork.study": ("counterweights",),
+    "virtualwork.family.target": ("Target",),
     "virtualwork.study.check": (
         "Check",
         "grashof_class",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,8 +16,12 @@ from virtualwork.describe.reader import read, read_text
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from virtualwork.evaluator import Evaluator
+    from virtualwork.family.design import Design
     from virtualwork.family.fitting import Fit
+    from virtualwork.family.target import Target
     from virtualwork.intime.run import Run
     from virtualwork.intime.variants import Variants
     from virtualwork.study.check import Check
@@ -242,38 +246,45 @@ class Mechanism(Description):
 
     def fit(
         self,
-        point: str,
-        target: ArrayLike,
-        free: Mapping[str, tuple[float, float]],
+        wanted: str | Sequence[Target],
+        target: ArrayLike | None = None,
+        free: Mapping[str, tuple[float, float]] | None = None,
         inputs: ArrayLike | None = None,
         starts: int = 256,
         seed: int = 0,
+        best: int = 1,
+        executor: Executor | None = None,
     ) -> Fit[Mechanism]:
-        """Find the dimensions of which a point comes nearest to a target, in the sense of least squares.
+        """Find the dimensions of which points, links or slides come nearest to targets, in the sense of least squares.
 
         Parameters
         ----------
-        point : str
-            Its name.
-        target : array (n, 2), or complex (n,)
-            Places, m, two or more.
+        wanted : str, or sequence of Target
+            `H` or `points.H`: a point along a path; `links.rocker`: a link's angle, `slides.B`: a slide's travel, over
+            the input (function generation). Targets hold their own places, inputs and weights.
+        target : array (n, 2), or complex (n,); array (n,)
+            Of the one name: places in m; angles in rad or travels in m. Two rows or more.
         free : mapping of path to (low, high)
             The dimensions that are looked for, and their bounds, SI.
         inputs : array (n,), optional
-            The input at each place, rad or m; without it that is free, in the order of the places.
+            The input at each row, rad or m; without it that is free, in the order of the rows.
         starts : int
             Points of a Sobol sequence within the bounds; the description's own numbers are the first start.
         seed : int
             Of that sequence.
+        best : int
+            So many distinct solutions, as far as there are: the further ones are `others` of the best.
+        executor : concurrent.futures.Executor
+            Refines the starts; the numbers are the same without it.
 
         Raises
         ------
         DescriptionError
             Unknown names, a dimension that moves no point, bounds the wrong way round.
         MechanismError
-            Where no start within the bounds can be assembled at every place.
+            Where no start within the bounds can be assembled at every row.
         ValueError
-            A target of fewer than two points, or not as many inputs.
+            A target of fewer than two rows, or not as many inputs.
 
         Examples
         --------
@@ -284,8 +295,48 @@ class Mechanism(Description):
         (2.0, True)
         """
         from virtualwork.family.fitting import fit
+        from virtualwork.family.target import Target
 
-        return fit(self, point, target, free, inputs, starts, seed)
+        if isinstance(wanted, str):
+            wanted = [Target({wanted: () if target is None else target}, inputs)]
+        elif target is not None or inputs is not None:
+            raise ValueError("fit: expected targets, or one name with its target and inputs")
+        return fit(self, wanted, free or {}, starts, seed, best, executor)
+
+    def design(self, paths: Sequence[str], *wanted: str) -> Design:
+        """Positions as a function of some dimensions: what an optimiser of one's own evaluates, with its gradient.
+
+        Parameters
+        ----------
+        paths : sequence of str
+            The dimensions, in the order in which their numbers are given.
+        wanted : str
+            `points.H`, `links.rocker`, `slides.B`: what is asked for.
+
+        Returns
+        -------
+        Design
+            `design(numbers, angle)` is (rows, n), x and y of a point in two rows; `design.slopes(numbers, angle)` is
+            (rows, n, d + 1), the derivatives to the dimensions and last to the input.
+
+        Raises
+        ------
+        DescriptionError
+            A path or a name that is not there; more than one input.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link
+        >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": 1})}, inputs=Input("arm"))
+        >>> at = arm.design(["links.arm.P.x"], "points.P")
+        >>> at([2.0], [0.0]).tolist(), (at.slopes([2.0], [0.0])[:, 0] + 0.0).tolist()
+        ([[2.0], [0.0]], [[1.0, 0.0], [0.0, 2.0]])
+        """
+        from virtualwork.describe.dimensions import named
+        from virtualwork.family.design import Design, place_key
+
+        found = [dimension for path in paths for dimension in named(self, path)]
+        return Design(self, found, [place_key(self, name) for name in wanted])
 
     @cached_property
     def check(self) -> Check:

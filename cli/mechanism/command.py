@@ -32,7 +32,7 @@ EXAMPLE = "klann"
 PANELS = {
     "What": "at sweep inputs only branch",
     "Variants": "change vary variants tolerance draws seed distribution workers",
-    "Fitting": "fit point free",
+    "Fitting": "fit point link slide free weight starts best",
     "How": "order newton time accuracy until",
     "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states html schema",
 }
@@ -169,16 +169,38 @@ def run(
         typer.Option(help="Of what is drawn: a limit is three standard deviations, or the end."),
     ] = "normal",
     workers: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Processes that solve variants, or what is drawn.")
+        int | None,
+        typer.Option(
+            min=1, metavar="N", help="Processes that solve variants, draws, or the starts of a fit."
+        ),
     ] = None,
     fit: Annotated[
-        str | None,
-        typer.Option(metavar="TARGET.csv", help="Dimensions of which a point comes through these places."),
+        list[str] | None,
+        typer.Option(metavar="TARGET.csv", help="Dimensions that come nearest to these places; repeatable."),
     ] = None,
-    point: Annotated[str | None, typer.Option(metavar="NAME", help="Of --fit.")] = None,
+    point: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Of --fit: x and y of a point; repeatable.")
+    ] = None,
+    link: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Of --fit: the angle of a link; repeatable.")
+    ] = None,
+    slide: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Of --fit: the travel along the guide at a point; repeatable."),
+    ] = None,
     free: Annotated[
         list[str] | None,
         typer.Option(metavar="PATH=LOW:HIGH", help="With --fit: a dimension and its bounds; repeatable."),
+    ] = None,
+    weight: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=NUMBER", help="Of --fit: a row counts so often; repeatable."),
+    ] = None,
+    starts: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Of --fit: where it begins (default 256).")
+    ] = None,
+    best: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Of --fit: the best distinct solutions.")
     ] = None,
     schema: Annotated[
         bool,
@@ -231,10 +253,9 @@ def run(
             f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text",
         )
     spreads = tolerance or draws is not None
-    if workers is not None and not (draws or vary or variants):
-        raise options.bad(
-            "--workers", "expected --draws, --vary or --variants: one mechanism is one process's"
-        )
+    if workers is not None and not (draws or vary or variants or fit):
+        told_of = "expected --draws, --vary, --variants or --fit: one mechanism is one process's"
+        raise options.bad("--workers", told_of)
     if spreads:
         from cli.mechanism.tolerance import Tolerances
         from cli.mechanism.tolerated import checked, with_tolerances
@@ -242,15 +263,18 @@ def run(
         others = {"--vary": vary, "--variants": variants, "--branch": branch, "--states": states}
         others |= {"--graph": graph, "--html": html, **dict.fromkeys(own, "asked"), "--forces": None}
         checked(draws, tolerance, [flag for flag, given in others.items() if given])
-    if fit is not None or point is not None or free:
-        from cli.mechanism.fitted import fitted
+    if any((fit, point, link, slide, free, weight, starts, best)):
+        from cli.mechanism.fitted import FitOptions, fitted
 
         unfit: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--vary": vary}
         unfit |= {"--variants": variants, "--time": time, "--only": only, "--order": order, "--html": html}
-        unfit |= {"--states": states, "--tolerance": spreads, "--branch": branch, **of_one}
+        unfit |= {"--states": states, "--tolerance": spreads, "--branch": branch}
+        unfit |= {"--explain": explain, "--graph": graph}
         there = [*own, *(flag for flag, value in unfit.items() if value)]
         with told(file):
-            return replace(fitted(file, fit, point, free, change, seed, there), within=lambda: told(file))
+            fits = FitOptions(fit, point, link, slide, free, weight, starts, best)
+            result = fitted(file, fits, change, seed, workers or 1, there)
+            return replace(result, within=lambda: told(file))
     if time is not None:
         beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
         beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}

@@ -1,9 +1,10 @@
-"""`--fit`: the dimensions of which a point comes through given places, and the file with them in it."""
+"""`--fit`: the dimensions of which points, links and slides come nearest to a target, and the file with them in it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,73 +12,132 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.errors import DataError
+from cli.mechanism.fit_targets import targets, wanted, weights
 from cli.mechanism.solve import load
 from cli.mechanism.tables import beside
 from cli.mechanism.variants import assigned, assignment, in_si, quantity
 from cli.read import options
 from cli.read.files import read_bytes
-from cli.read.units import read_degrees, to_si
+from cli.read.units import read_degrees
 from cli.show.columns import Column, Result, Table
+from cli.show.picture import blank
 from virtualwork.describe.dimensions import Dimension, value
 from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.units import Units
 
 if TYPE_CHECKING:
-    from cli.show.columns import Document
+    from matplotlib.figure import Figure
+
+    from cli.show.columns import Document, Json
     from virtualwork import Mechanism
     from virtualwork.family.fitting import Fit
+    from virtualwork.family.target import Reached
 
+STARTS = 256
 # relative: how well what is written has to read as what was found
 WRITTEN = 1e-12
 
 
+@dataclass(frozen=True)
+class FitOptions:
+    """The options of a fit, as they are given."""
+
+    tables: Sequence[str] | None
+    points: Sequence[str] | None
+    links: Sequence[str] | None
+    slides: Sequence[str] | None
+    free: Sequence[str] | None
+    weight: Sequence[str] | None
+    starts: int | None
+    best: int | None
+
+    def check(self, others: Sequence[str]) -> None:
+        """Refuse what is missing, and `others`: options that do not go with a fit."""
+        names = self.points or self.links or self.slides
+        needs = {"--fit TARGET.csv": self.tables, "--point NAME": names, "--free PATH=LOW:HIGH": self.free}
+        for needed, given in needs.items():
+            if not given:
+                own = (
+                    "--fit" if self.tables else "--point" if names else "--free" if self.free else "--starts"
+                )
+                raise options.bad(needed.split()[0], f"missing beside {own}: expected {needed}")
+        if others:
+            raise options.bad("--fit", f"expected without {others[0]}: it finds dimensions, not poses")
+
+
 def fitted(
-    file: str,
-    target: str | None,
-    point: str | None,
-    free: Sequence[str] | None,
-    change: Sequence[str] | None,
-    seed: int,
-    others: Sequence[str],
+    file: str, asked: FitOptions, change: Sequence[str] | None, seed: int, workers: int, others: Sequence[str]
 ) -> Result:
     """Find the dimensions, and show them; `others` are options that do not go with it."""
-    for flag, given in (("--fit", target), ("--point", point), ("--free", free)):
-        if not given:
-            example = {"--fit": "TARGET.csv", "--point": "NAME", "--free": "PATH=LOW:HIGH"}[flag]
-            there = "--fit" if flag != "--fit" else "--point" if point else "--free"
-            raise options.bad(flag, f"missing beside {there}: expected {flag} {example}")
-    if others:
-        raise options.bad("--fit", f"expected without {others[0]}: it finds dimensions, not poses")
-    assert target is not None
-    assert point is not None
-    assert free is not None
+    asked.check(others)
     m, bare, said, about = load(file)
     if len(m.inputs) != 1:
         raise options.bad("--fit", f"{len(m.inputs)} inputs: expected a mechanism with one")
     m = assigned(m, bare, change) if change else m
-    if not any(point in points for points in m.bodies.values()):
-        names = ", ".join(dict.fromkeys(p for points in m.bodies.values() for p in points))
-        raise options.bad("--point", f"no point is named '{point}': expected one of {names}")
-    bounds = _bounds(m, free, bare)
-    places, inputs = _target(m, point, target, said)
+    names = wanted(m, asked.points, asked.links, asked.slides)
+    weight = weights(asked.weight, names)
+    bounds = _bounds(m, asked.free or (), bare)
+    aims = targets(m, asked.tables or (), names, weight, said)
     try:
-        found = m.fit(point, places, bounds, inputs, seed=seed)
+        with options.processes(workers) as pool:
+            found = m.fit(
+                aims,
+                free=bounds,
+                starts=asked.starts or STARTS,
+                seed=seed,
+                best=asked.best or 1,
+                executor=pool,
+            )
     except DescriptionError as error:
         raise options.bad("--free", error) from None
+    solutions = [found, *found.others]
+    if len(solutions) < (asked.best or 1):
+        said.append(f"fit: found {len(solutions)} distinct of {asked.best} solutions asked for")
+    said += found.remarks
+    for i, other in enumerate(found.others, 2):
+        said += [f"solution {i}: {remark}" for remark in other.remarks]
+    places = _places(found)
     return Result(
-        document=lambda: _document(found),
-        tables={"fit": lambda: _numbers(found), "points": lambda: _places(found)},
+        document=lambda: {"name": m.name, "fit": _document(solutions)},
+        tables={"fit": lambda: _numbers(solutions), **places},
         notes=lambda: m.name,
-        afterword=lambda: (
-            f"{point} comes within {found.max:.3g} m of all {len(found.target)} target points, "
-            f"{found.rms:.3g} m in the root of the mean square; the file's own numbers and "
-            f"{found.starts - 1} others were starts."
-        ),
+        afterword=lambda: _sentence(found),
+        figure=lambda: _drawn(found),
         toml=lambda: _text(file, found, bare).encode(),
-        warnings=[*said, *found.remarks],
+        warnings=said,
         method="Nonlinear least squares within bounds, from many starts, with exact derivatives.",
         about={"title": m.name or "Mechanism"} | about,
     )
+
+
+def _drawn(found: Fit[Mechanism]) -> Figure:
+    figure = blank()
+    found.plot(figure)
+    if found.mechanism.name:
+        figure.suptitle(found.mechanism.name, fontsize=10)
+    return figure
+
+
+def _sentence(found: Fit[Mechanism]) -> str:
+    parts = [
+        f"{_name(each)} comes within {_size(each, each.max):.3g} {_unit(each)} of all {len(each.target)} rows of its "
+        f"target, {_size(each, each.rms):.3g} {_unit(each)} in the root of the mean square"
+        for each in found.reached
+    ]
+    return f"{'; '.join(parts)}. The file's own numbers and {found.starts - 1} others were starts."
+
+
+def _name(each: Reached) -> str:
+    return each.name.rpartition(".")[2]
+
+
+def _unit(each: Reached) -> str:
+    return "deg" if each.kind == "angle" else "m"
+
+
+def _size(each: Reached, value: Any) -> Any:
+    """A distance as it is shown."""
+    return np.degrees(value) if each.kind == "angle" else value
 
 
 def _bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[str, tuple[float, float]]:
@@ -101,78 +161,80 @@ def _bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[
     return found
 
 
-def _target(m: Mechanism, point: str, path: str, said: list[str]) -> tuple[Any, Any]:
-    """The places (n, 2) and, where the table has them, the inputs (n,), SI."""
-    from cli.read.tables import read
-
-    turning = not m.inputs[0].is_slide
-    kinds = {"x": "length", "y": "length", "input": "angle" if turning else "length"}
-    # a table of poses has the point's name before its coordinates
-    own = {f"{point}_{axis}_".lower(): f"{axis}_" for axis in "xy"}
-
-    def meant(headers: list[str]) -> list[str]:
-        return [
-            next((to + h[len(at) :] for at, to in own.items() if h.lower().startswith(at)), h)
-            for h in headers
-        ]
-
-    table = read(path, numbers=kinds, texts=("step",), headers=meant)
-    for name in ("x", "y"):
-        table.require(name, "length")
-    if table.rows < 2:
-        raise DataError(f"{table.file}: a target of one point: expected two or more rows")
-    said += table.warnings
-    si = {name: np.asarray(to_si(c.values, kinds[name], c.unit)) for name, c in table.numbers.items()}
-    return np.stack([si["x"], si["y"]], axis=1), si.get("input")
-
-
 def _shown(dimension: Dimension, si: float) -> float:
     return read_degrees(si) if dimension.unit == "deg" else si
 
 
-def _document(found: Fit[Mechanism]) -> Document:
-    numbers = zip(found.dimensions, found.values.tolist(), strict=True)
-    return {
-        "name": found.mechanism.name,
-        "fit": {
-            "parameters": {d.header: _shown(d, si) for d, si in numbers},
-            "rms_m": found.rms,
-            "max_m": found.max,
-            "starts": found.starts,
-            "evaluations": found.evaluations,
-        },
-    }
+def _parameters(found: Fit[Mechanism]) -> dict[str, float]:
+    return {d.header: _shown(d, si) for d, si in zip(found.dimensions, found.values.tolist(), strict=True)}
 
 
-def _numbers(found: Fit[Mechanism]) -> Table:
-    """One row: the dimensions, and how near they come."""
-    numbers = zip(found.dimensions, found.values.tolist(), strict=True)
-    parameters = [Column(d.path, d.unit, [_shown(d, si)]) for d, si in numbers]
-    return Table(
-        [
-            *parameters,
-            Column("rms", "m", [found.rms]),
-            Column("max", "m", [found.max]),
-            Column("starts", "", [float(found.starts)]),
-            Column("evaluations", "", [float(found.evaluations)]),
-        ]
-    )
+def _misses(reached: Sequence[Reached]) -> dict[str, float]:
+    """Root of the mean square and largest distance of lengths together, and of angles."""
+    found: dict[str, float] = {}
+    for unit in ("m", "deg"):
+        parts = [_size(each, each.distances) for each in reached if _unit(each) == unit]
+        if parts:
+            every = np.concatenate(parts)
+            found |= {
+                f"rms_{unit}": float(np.sqrt(np.mean(every**2))),
+                f"max_{unit}": float(every.max()),
+            }
+    return found
 
 
-def _places(found: Fit[Mechanism]) -> Table:
-    """A row for each place of the target."""
+def _document(solutions: Sequence[Fit[Mechanism]]) -> Document:
+    def one(found: Fit[Mechanism]) -> Document:
+        each: list[Json] = [{"name": _name(r), **_misses([r])} for r in found.reached]
+        return {"parameters": _parameters(found), **_misses(found.reached), "targets": each}
+
+    best, *others = solutions
+    document = one(best) | {"starts": best.starts, "evaluations": best.evaluations}
+    return document | ({"others": [one(other) for other in others]} if others else {})
+
+
+def _numbers(solutions: Sequence[Fit[Mechanism]]) -> Table:
+    """A row for each solution: the dimensions, and how near they come."""
+    best = solutions[0]
+    columns = [
+        Column(d.path, d.unit, [_parameters(found)[d.header] for found in solutions]) for d in best.dimensions
+    ]
+    misses = [_misses(found.reached) for found in solutions]
+    for header in misses[0]:
+        name, unit = header.split("_")
+        columns.append(Column(name, unit, [each[header] for each in misses]))
+    columns.append(Column("starts", "", [float(best.starts)] * len(solutions)))
+    columns.append(Column("evaluations", "", [float(best.evaluations)] * len(solutions)))
+    if len(solutions) == 1:
+        return Table(columns)
+    numbers = [str(i) for i in range(1, len(solutions) + 1)]
+    return Table([Column("solution", "", numbers), *columns], keys=("solution",))
+
+
+def _places(found: Fit[Mechanism]) -> dict[str, Callable[[], Table]]:
+    """A table for each target, a row for each of its rows."""
+    by_target: dict[int, list[Reached]] = {}
+    for each in found.reached:
+        by_target.setdefault(id(each.inputs), []).append(each)
     turning = not found.mechanism.inputs[0].is_slide
-    inputs = np.degrees(found.inputs) if turning else found.inputs
-    return Table(
-        [
-            Column("input", "deg" if turning else "m", inputs),
-            Column("x", "m", found.positions.real),
-            Column("y", "m", found.positions.imag),
-            Column("target_x", "m", found.target.real),
-            Column("target_y", "m", found.target.imag),
-            Column("distance", "m", found.distances),
-        ]
-    )
+
+    def table(reached: Sequence[Reached]) -> Table:
+        inputs = reached[0].inputs
+        columns = [Column("input", "deg" if turning else "m", np.degrees(inputs) if turning else inputs)]
+        for each in reached:
+            name = "" if len(found.reached) == 1 else f"{_name(each)}_"
+            for title, values in (("", each.values), ("target_", each.target)):
+                if each.kind == "point":
+                    columns.append(Column(f"{name}{title}x", "m", values.real))
+                    columns.append(Column(f"{name}{title}y", "m", values.imag))
+                else:
+                    what = "angle" if each.kind == "angle" else "position"
+                    columns.append(Column(f"{name}{title}{what}", _unit(each), _size(each, values)))
+            columns.append(Column(f"{name}distance", _unit(each), _size(each, each.distances)))
+        return Table(columns)
+
+    names = ["points" if i == 0 else f"points {i + 1}" for i in range(len(by_target))]
+    return {name: partial(table, of) for name, of in zip(names, by_target.values(), strict=True)}
 
 
 def _text(file: str, found: Fit[Mechanism], bare: Mapping[str, str]) -> str:

@@ -141,7 +141,7 @@ class Many:
         workers = min(self.workers, len(starts))
         with processes(workers) as pool:
             try:
-                with closing(in_parts(function, work, pool, 2 * workers)) as parts:  # type: ignore[type-var]
+                with closing(in_parts(function, work, pool, 2 * workers)) as parts:
                     for found, said in progress(parts, count, "variants", each):
                         self.said.join(said)
                         yield found

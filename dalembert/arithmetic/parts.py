@@ -6,7 +6,7 @@ A part knows all that it needs, so that no number hangs on who works it out. One
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -40,7 +40,7 @@ def in_parts(
     parts: Iterable[tuple[Any, ...]],
     executor: Executor | None = None,
     ahead: int = AHEAD,
-) -> Iterator[R]:
+) -> Generator[R, None, None]:
     """Give what a function returns of each part, in their order.
 
     Parameters

@@ -133,3 +133,79 @@ def test_a_bad_target_is_one_line_and_nothing_is_written(dalembert, target, tmp_
     assert said in found.stderr
     assert found.stderr.count("\n") == 1
     assert not (tmp_path / "fitted.toml").exists()
+
+
+def test_a_link_and_a_point_with_weights(dalembert, target, tmp_path):
+    options = (*TRUE, "--sweep", "0:330:30", "--only", "H,rocker", "-o", "t.csv")
+    assert dalembert("mechanism", "m.toml", *options).returncode == 0
+    found = dalembert(*FIT, "--link", "rocker", "--weight", "rocker=0.5", *FREE, "--json")
+    assert found.returncode == 0, found.stderr
+    fit = json.loads(found.stdout)["fit"]
+    assert fit["max_m"] < 1e-10
+    assert fit["max_deg"] < 1e-8
+    assert [each["name"] for each in fit["targets"]] == ["H", "rocker"]
+    # a table of its own with the short header, and as many rows as it has
+    (tmp_path / "r.csv").write_text(
+        "input_deg,angle_deg,weight\n"
+        + "".join(
+            f"{r['input_deg']},{r['rocker_angle_deg']},2\n"
+            for r in rows((tmp_path / "t.csv").read_text())[::3]
+        )
+    )
+    again = dalembert(*FIT, "--fit", "r.csv", "--link", "rocker", *FREE, "--text")
+    assert again.returncode == 0, again.stderr
+    assert "rocker comes within" in again.stdout
+
+
+def test_the_options_of_the_search(dalembert, target, tmp_path):
+    found = dalembert(*FIT, *FREE, "--starts", "16", "--best", "3", "--plot", "fit.svg", "--json")
+    assert found.returncode == 0, found.stderr
+    fit = json.loads(found.stdout)["fit"]
+    assert fit["starts"] == 16
+    assert "<svg" in (tmp_path / "fit.svg").read_text()
+    told = "fit: found 1 distinct of 3 solutions asked for"
+    others = fit.get("others", [])
+    assert all(each["max_m"] >= fit["max_m"] for each in others)
+    assert (told in found.stderr) == (not others)
+
+
+@pytest.mark.slow
+def test_workers_find_the_same(dalembert, target):
+    alone, two = (dalembert(*FIT, *FREE, *more) for more in ((), ("--workers", "2")))
+    assert two.stdout == alone.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "status", "said"),
+    [
+        (("--link", "rockr"), 2, "did you mean 'rocker'"),
+        (("--slide", "B"), 2, "no slot or slider is named 'B'"),
+        (("--point", "H", "--point", "H"), 2, "given twice"),
+        (("--point", "H", "--weight", "H=-1"), 2, "0 or more"),
+        (("--point", "H", "--weight", "C=1"), 2, "expected one of H"),
+        (("--point", "H", "--starts", "0"), 2, "--starts"),
+        (("--point", "H", "--best", "0"), 2, "--best"),
+        (("--link", "rocker"), 1, "no column"),
+        (("--point", "H", "--point", "C"), 1, "no columns of C"),
+        (("--point", "H", "--fit", "nothing.csv"), 1, "nothing.csv"),
+    ],
+)
+def test_a_bad_name_or_number_is_one_line(dalembert, target, tmp_path, options, status, said):
+    found = dalembert("mechanism", "m.toml", "--fit", "t.csv", *options, *FREE, "-o", "fitted.toml")
+    assert found.returncode == status
+    assert said in found.stderr
+    assert not found.stdout
+    assert "Traceback" not in found.stderr
+    assert not (tmp_path / "fitted.toml").exists()
+
+
+def test_the_example_finds_scott_russells_mechanism(dalembert):
+    dalembert("examples", "straight-line-fit")
+    free = ("links.crank.A.x=70:115", "links.rod.P.x=-130:-80", "links.rod.P.y=-15:15")
+    options = [word for path in free for word in ("--free", path)]
+    found = dalembert("mechanism", "straight-line.toml", "--fit", "line.csv", "--point", "P", *options)
+    (row,) = rows(found.stdout)
+    # crank, rod and its extension are equal: then the point is on the line exactly
+    numbers = [float(row[f"{path.split('=')[0]}_m"]) for path in free]
+    assert numbers == pytest.approx([0.1, -0.1, 0], abs=1e-12)
+    assert float(row["max_m"]) < 1e-12

@@ -159,11 +159,11 @@ class Sent:
 
 
 def question(v):
-    """Variants of the four-bar at one pose, one by one: bounds of rounding errors are asked for."""
+    """Variants of the four-bar at one pose, one by one, as a branch is asked for."""
     m = Mechanism.from_toml_text(FOUR_BAR)
     varied = Variants((dimensions(m)["ground.D.x"],), [np.linspace(0.1, 0.11, v)], grid=True)
     q = wanted(m, ["40deg"], None, None).part(0, 1)
-    return Many(Asked("m.toml", m, varied.dimensions, q, {}, 0, None, None, Request(), {}, True), varied, 2)
+    return Many(Asked("m.toml", m, varied.dimensions, q, {}, 0, None, "1", Request(), {}, False), varied, 2)
 
 
 def test_a_part_whose_worker_died_is_done_again(tmp_path):

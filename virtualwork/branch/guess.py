@@ -25,6 +25,8 @@ from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, Turn
 
 C = TypeVar("C", bound=Choice)
+# rad, or of the mechanism's size: how far beside a guess that tells nothing one looks
+BESIDE = 0.02
 
 
 def choose(m: Description, make: Callable[..., C]) -> C:
@@ -213,7 +215,7 @@ class _Chooser:
         """
         if len(self.m.inputs) != 1:
             return None
-        step = 0.02 * (self.m.size if self.m.inputs[0].is_slide else 1.0)
+        step = BESIDE * (self.m.size if self.m.inputs[0].is_slide else 1.0)
         before = Choice(self.m, self.plan, signs)
         for side in (1, -1):
             st = State([self.m.at[0] + side * step])
@@ -295,16 +297,11 @@ class _Chooser:
         self.warnings.append(
             f"[guess] at: {group.name} cannot be assembled there{why}; its branch is that of the guessed angles"
         )
-        e = [np.exp(1j * self.angles[b]) if b in self.angles else None for b in group.angles]
         try:
-            if group.kind == "RRR" and e[0] is not None and e[1] is not None:
-                return 1 if cross(case.arm(0, st) * e[0], case.arm(1, st) * e[1]) >= 0 else -1
-            if group.kind == "RRP" and e[0] is not None:
-                z, body = case.rails[0]
-                return 1 if dot(case.arm(0, st) * e[0], z * st.turn[body]) >= 0 else -1
-        except (KeyError, TypeError):
-            pass
-        return 1
+            seen = sign_of_angles(group, case, st, self.angles)
+        except (KeyError, TypeError, ZeroDivisionError):
+            seen = None
+        return 1 if seen is None or seen >= 0 else -1
 
     # --- groups with no closed form ------------------------------------------------------------------------
     def _newton(self, group: Group, st: State) -> Any:
@@ -362,6 +359,18 @@ def distance(
                     here = st.point[base] + st.sum(terms) + z * st.turn[body]
                     total = total + squared(bare(here - points[name])) / bare(m.size**2)
     return total
+
+
+def sign_of_angles(group: Group, case: Case, st: State, angles: Mapping[str, Number]) -> Number:
+    """The sine or cosine that a closed form's sign is of, at the guessed angles; None where they do not say."""
+    e = [rotation(angles[b]) if b in angles else None for b in group.angles]
+    if group.kind == "RRR" and e[0] is not None and e[1] is not None:
+        v, u = case.arm(0, st), case.arm(1, st)
+        return bare(cross(v * e[0], u * e[1]) / (abs(v) * abs(u)))
+    if group.kind == "RRP" and e[0] is not None:
+        v, (z, body) = case.arm(0, st), case.rails[0]
+        return bare(dot(v * e[0], z * st.turn[body]) / abs(v))
+    return None
 
 
 def informed(m: Description, group: Group) -> bool:

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.engines import run_grid
-from virtualwork.branch.guess import informed
+from dalembert.arithmetic.engines import run, run_grid
+from virtualwork.branch.guess import BESIDE, informed
 from virtualwork.describe.description import Description
-from virtualwork.family.written import Written
+from virtualwork.family.written import CHOICE, Written
 from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.recording import names
@@ -37,7 +37,7 @@ LANES = 1 << 18
 
 
 def signs(
-    written: Written, m: Description, given: Mapping[str, Reals], n: int
+    written: Written, m: Description, given: Mapping[str, Any], n: int
 ) -> tuple[dict[str, Reals], Mask]:
     """The sign of each closed form of each variant, (n,), and which variants tell theirs.
 
@@ -46,24 +46,34 @@ def signs(
     written : Written
         With the signs as inputs.
     m : Description
-    given : mapping of path to array (n,)
+    given : mapping of path to number or array (n,)
     """
-    told = np.ones(n, dtype=bool)
-    known: dict[str, Any] = dict(given) | {f"q{j}": at for j, at in enumerate(m.at)}
-    found: dict[str, Reals] = {}
+    if not all(informed(m, group) for group in written.closed):
+        return {}, np.zeros(n, dtype=bool)
     with np.errstate(all="ignore"):
+        found = run(written.choice, {**given, **_inputs(m)})
+        told, opens = np.ones(n, dtype=bool), {}
         for group in written.closed:
-            if not informed(m, group):
-                return found, np.zeros(n, dtype=bool)
-            tape, name = written.choice(group), f"sign {group.name}"
-            both = run_grid(tape, _across(known) | {name: np.array([[1.0], [-1.0]])}, (2, n))
-            a, b = np.broadcast_to(both["distance"], 2 * n).reshape(2, n)
-            margin = np.broadcast_to(both["margin"], 2 * n)[:n]
-            told &= (margin > CLOSE) & (np.minimum(a, b) < TOLD * np.maximum(a, b))
-            nearer = np.where(a <= b, 1.0, -1.0)
-            found[group.name] = nearer
-            known[name] = float(nearer[0]) if (nearer == nearer[0]).all() else nearer
-    return found, told
+            margin, a, b, seen, _ = (np.asarray(found[f"{what} {group.name}"]) for what in CHOICE)
+            stands = margin > 0
+            near, far = np.minimum(a, b), np.maximum(a, b)
+            told &= ~(np.abs(margin) <= CLOSE)
+            told &= np.where(stands, near < TOLD * far, (seen == 0) | ~(np.abs(seen) < CLOSE))
+            opens[group.name] = np.broadcast_to(~stands, n)
+    chosen = {g.name: np.broadcast_to(found[f"sign {g.name}"], n) + 0.0 for g in written.closed}
+    if len(m.inputs) == 1 and any(each.any() for each in opens.values()):
+        # one that is assembled next to the guess is chosen by how it stands there
+        known = {**given} | {f"sign {name}": sign for name, sign in chosen.items()}
+        step = BESIDE * (m.size if m.inputs[0].is_slide else 1.0)
+        for side in (step, -step):
+            for name, open_ in opens.items():
+                depth = _sampled(written, ("margin", name), known, np.array([[m.at[0] + side]]), n)
+                told &= ~(open_ & (depth[0] >= 0))
+    return chosen, told
+
+
+def _inputs(m: Description) -> dict[str, float]:
+    return {f"q{j}": at for j, at in enumerate(m.at)}
 
 
 def meet_on_the_way(
@@ -100,6 +110,11 @@ def stays_within(
     return found
 
 
+def samples(m: Description, span: float) -> int:
+    """How many samples of a way are looked at, of a turn at most."""
+    return int(np.ceil(min(span / (m.size if m.inputs[0].is_slide else 1.0), 2 * np.pi) / STEP)) + 2
+
+
 def _along(
     m: Description, known: Mapping[str, Any], n: int, low: Reals, high: Reals
 ) -> Iterator[tuple[slice, dict[str, Any], Reals]]:
@@ -107,7 +122,7 @@ def _along(
     span = float(np.max(high - low, initial=0.0))
     slide = m.inputs[0].is_slide
     turn = np.inf if slide else 2 * np.pi
-    count = int(np.ceil(min(span / (m.size if slide else 1.0), 2 * np.pi) / STEP)) + 2
+    count = samples(m, span)
     alike = bool((low == low[0]).all() and (high == high[0]).all())
     each = max(1, LANES // count)
     for a in range(0, n, each):

@@ -1,69 +1,81 @@
-"""Dimensions that bring a point of a mechanism through given places: dimensional synthesis by least squares.
+"""Dimensions of which points, links and slides come nearest to a target: dimensional synthesis by least squares.
 
 Starts of a low-discrepancy sequence (Sobol's, scrambled by a seed) are worked out together, as variants; the best are
-refined with exact derivatives. Where the timing is free, the input at each place is an unknown too, and begins at the
-poses of a coarse sweep that come nearest to the places in their order.
+refined with exact derivatives. Where the timing is free, the inputs begin at the poses of a coarse sweep that come
+nearest to the rows of the target in their order, and follow the dimensions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.parts import in_parts
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, named, value
 from virtualwork.describe.errors import DescriptionError, MechanismError
-from virtualwork.family.part import Part, Solver
-from virtualwork.formulas.asked import Key
+from virtualwork.family.descent import AWAY, Descent
+from virtualwork.family.design import Design, place_key
+from virtualwork.family.part import ASSEMBLED
+from virtualwork.family.starts import COARSE, along, in_turn, shares
+from virtualwork.family.target import Aim, Reached, Target
 from virtualwork.formulas.numbers import Complexes, Reals
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
 
 D = TypeVar("D", bound=Description)
 
-# of the starts, the first by distance are put in order, and the first of those refined: roughly, then the best to the end
-ORDERED, REFINED = 48, 24
-ROUGH, LAST = 40, 300
-# of the mechanism's size: a fit as near as this is not looked for again
+# of the starts, the first by distance are put in order; the first of those are refined in rounds, so many by so many
+# steps, the best of each round further in the next
+ORDERED, ROUNDS = 64, ((48, 15), (8, 100), (1, 300))
+# of the mechanism's size, or rad: a fit as near as this is not looked for again
 MET = 1e-12
-# of the mechanism's size: how far a pose that cannot be assembled counts as away
-AWAY = 10.0
-# poses of the coarse sweep, and of the look over the whole range
-COARSE, FINE = 120, 721
+# poses of the look over the whole range
+FINE = 721
+# of the bounds: solutions that differ less than this in every dimension are one
+SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Fit(Generic[D]):
-    """The dimensions of which a point comes nearest to its target.
+    """The dimensions that come nearest to a target.
 
     Attributes
     ----------
     mechanism : Description
         With the fitted numbers.
+    before : Description
+        Without them.
     dimensions : tuple of Dimension
     values : array (d,)
         SI.
-    inputs : array (n,)
-        Rad or m, at each place of the target.
-    positions, target : array (n,)
-        Where the point comes, and where it should, x + iy in m.
+    reached : tuple of Reached
+        What each point, link and slide of the target does.
     starts, evaluations : int
-        Tried, and mechanisms worked out over the target in all.
+        Tried, and mechanisms worked out over a target in all.
     remarks : tuple of str
         What the designer should know: bounds reached, defects of assembly and of order.
+    others : tuple of Fit
+        Further solutions, where more than one was asked for: the next best first.
     """
 
     mechanism: D
+    before: D
     dimensions: tuple[Dimension, ...]
     values: Reals
-    inputs: Reals
-    positions: Complexes
-    target: Complexes
+    reached: tuple[Reached, ...]
     starts: int
     evaluations: int
     remarks: tuple[str, ...]
+    others: tuple[Fit[D], ...] = ()
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -71,223 +83,306 @@ class Fit(Generic[D]):
         return dict(zip((d.path for d in self.dimensions), self.values.tolist(), strict=True))
 
     @property
+    def inputs(self) -> Reals:
+        """(n,) rad or m, at each row of the (first) target."""
+        return self.reached[0].inputs
+
+    @property
+    def positions(self) -> Complexes:
+        """(n,) where the (first) point comes, x + iy in m."""
+        return self.reached[0].values
+
+    @property
+    def target(self) -> Complexes:
+        """(n,) where it should."""
+        return self.reached[0].target
+
+    @property
     def distances(self) -> Reals:
-        """(n,) m."""
-        return np.asarray(np.abs(self.positions - self.target))
+        """(n,) m; rad where it is a link's angle."""
+        return self.reached[0].distances
 
     @property
     def rms(self) -> float:
-        """Root of the mean square of the distances, m."""
-        return float(np.sqrt(np.mean(self.distances**2)))
+        """Root of the mean square of all distances, m; rad of the angles, where there is nothing else."""
+        return float(np.sqrt(np.mean(self._all**2)))
 
     @property
     def max(self) -> float:
-        """The largest distance, m."""
-        return float(self.distances.max())
+        """The largest distance, m; rad where there are only angles."""
+        return float(self._all.max())
+
+    @property
+    def _all(self) -> Reals:
+        lengths = [each.distances for each in self.reached if each.kind != "angle"]
+        return np.concatenate(lengths or [each.distances for each in self.reached])
+
+    def plot(self, figure: FigureBase | None = None) -> list[Axes]:
+        """Draw the targets, and what the mechanism does over their range: a panel for each point, link and slide.
+
+        Parameters
+        ----------
+        figure : matplotlib figure
+            A new one of pyplot's where not given.
+        """
+        from virtualwork.picture.fitted import Fitted, fitted
+
+        own = np.array([float(value(self.before, d.path).real) for d in self.dimensions])
+        turning = not self.before.inputs[0].is_slide
+        panels = []
+        for each in self.reached:
+            design = Design(self.before, self.dimensions, [place_key(self.before, each.name)])
+            q = np.linspace(each.inputs.min(), each.inputs.max(), FINE)
+            lines = [design(numbers, q) for numbers in (self.values, own)]
+            after, before = (t[0] + 1j * t[1] if each.kind == "point" else t[0] for t in lines)
+            name = each.name.rpartition(".")[2]
+            panels.append(Fitted(name, each.kind, turning, q, after, before, each.inputs, each.target))
+        return fitted(panels, figure)
 
     def __repr__(self) -> str:
         found = ", ".join(f"{path}={number:.6g}" for path, number in self.parameters.items())
-        return f"Fit({found}; rms {self.rms:.3g} m)"
+        unit = "rad" if all(each.kind == "angle" for each in self.reached) else "m"
+        return f"Fit({found}; rms {self.rms:.3g} {unit})"
 
 
 def fit(
     m: D,
-    point: str,
-    target: ArrayLike,
+    targets: Sequence[Target],
     free: Mapping[str, tuple[float, float]],
-    inputs: ArrayLike | None = None,
     starts: int = 256,
     seed: int = 0,
+    best: int = 1,
+    executor: Executor | None = None,
 ) -> Fit[D]:
-    """Find the dimensions whose point comes nearest to a target; see `Mechanism.fit`."""
-    problem = _Problem(m, point, target, free, inputs)
-    return problem.solved(starts, seed)
+    """Find the dimensions that come nearest to targets; see `Mechanism.fit`."""
+    if starts < 1 or best < 1:
+        raise ValueError(f"starts and best: found {starts} and {best}, expected 1 or more")
+    return _Problem(m, targets, free).solved(starts, seed, best, executor)
+
+
+class _Refined(NamedTuple):
+    """A start refined: shares of the way from the lower to the upper bounds, the inputs of each target.
+
+    With half the sum of squares, the largest residual, and what it cost.
+    """
+
+    x: Reals
+    inputs: tuple[Reals, ...]
+    cost: float
+    largest: float
+    evaluations: int
 
 
 class _Problem(Generic[D]):
-    """What is looked for. Unknowns are shares of the way from a lower to an upper bound, then free inputs."""
+    """What is looked for: shares of the way from a lower to an upper bound, and the inputs that are free."""
 
-    def __init__(
-        self,
-        m: D,
-        point: str,
-        target: ArrayLike,
-        free: Mapping[str, tuple[float, float]],
-        inputs: ArrayLike | None,
-    ) -> None:
-        self.m, self.evaluations = m, 0
-        self.target = _target(target)
+    def __init__(self, m: D, targets: Sequence[Target], free: Mapping[str, tuple[float, float]]) -> None:
+        self.m, self.targets, self.free = m, targets, free
         if len(m.inputs) != 1:
             raise DescriptionError(f"found {len(m.inputs)} inputs, expected one for a fit")
-        self.key = _key(m, point)
+        self.aims = [Aim.read(m, target) for target in targets]
+        if not self.aims:
+            raise ValueError("target: expected one or more")
         found = _free(m, free)
         self.dimensions = tuple(found)
         self.low, self.high = np.array(list(found.values()), dtype=float).T
-        self.q = None if inputs is None else np.asarray(inputs, dtype=float)
-        if self.q is not None and (self.q.shape != self.target.shape or not np.isfinite(self.q).all()):
-            raise ValueError(f"inputs: expected {len(self.target)} finite numbers, one for each target point")
-        self.size = float(m.size)
-        self._first: Solver | None = None
-        self._last: tuple[bytes, Solver] | None = None
+        self.designs = [Design(m, self.dimensions, aim.keys) for aim in self.aims]
 
-    # --- evaluation -----------------------------------------------------------------------------------------------
-    def solver(self, values: Reals, q: Reals) -> Solver:
-        """Variants (v, d) at their inputs (v or 1, n)."""
-        self.evaluations += len(values)
-        part = Part(self.m, self.dimensions, values, q[:, :, None], [[0.0], [0.0], [0.0]])
-        found = Solver(part, self._first)
-        self._first = self._first or found
-        return found
+    @property
+    def evaluations(self) -> int:
+        """Mechanisms worked out over a target so far."""
+        return sum(design.evaluations for design in self.designs)
 
-    def places(self, values: Reals, q: Reals) -> Complexes:
-        """Where the point is, (v, n); NaN where it cannot be."""
-        return self.solver(values, q).values([self.key])[0]  # type: ignore[no-any-return]
+    def own(self) -> _Problem[D]:
+        """The same with designs of its own: what is worked out on one does not meet another on another thread."""
+        return _Problem(self.m, self.targets, self.free)
 
-    def split(self, x: Reals) -> tuple[Reals, Reals]:
-        """The dimensions (1, d) and the inputs (1, n) of the unknowns."""
-        d = len(self.dimensions)
+    def values(self, x: Reals) -> Reals:
+        """The dimensions (d,) of shares."""
         # the product may pass the bound by a rounding
-        values = np.clip(self.low + x[:d] * (self.high - self.low), self.low, self.high)
-        return values[None], (x[d:] if self.q is None else self.q)[None]
+        return np.asarray(np.clip(self.low + x * (self.high - self.low), self.low, self.high))
 
-    def at(self, x: Reals) -> Solver:
-        """The mechanism of some unknowns: the last one is kept, for its derivatives."""
-        name = x.tobytes()
-        if self._last is None or self._last[0] != name:
-            self._last = name, self.solver(*self.split(x))
-        return self._last[1]
+    def residuals(self, x: Reals, inputs: Sequence[Reals]) -> Reals:
+        """How far every row of every target is off, weighted: of the mechanism's size, or rad."""
+        values = self.values(x)
+        parts = zip(self.aims, self.designs, inputs, strict=True)
+        off = np.concatenate([aim.apart(design(values, q)).ravel() for aim, design, q in parts])
+        return np.where(np.isfinite(off), off, AWAY)
 
-    def residuals(self, x: Reals) -> Reals:
-        """(2n,), of the mechanism's size."""
-        apart = (self.at(x).values([self.key])[0][0] - self.target) / self.size
-        return _real(np.where(np.isfinite(apart), apart, AWAY))
-
-    def jacobian(self, x: Reals) -> Reals:
-        """(2n, unknowns): from one sweep backwards, or from differences where the mechanism is not on the tape."""
-        d, n = len(self.dimensions), len(self.target)
-        slopes = self.at(x).slopes(self.key)
-        slopes = self._differences(x) if slopes is None else slopes[0]
-        slopes = np.where(np.isfinite(slopes), slopes, 0.0) / self.size
-        to_shares = slopes[:, :d] * (self.high - self.low)
-        if self.q is not None:
-            return _real(to_shares)
-        return _real(np.hstack([to_shares, np.zeros((n, n)) + np.diag(slopes[:, d])]))
-
-    def _differences(self, x: Reals) -> Complexes:
-        """The derivatives (n, d + 1) from steps away from the farther bound; of all inputs from one variant."""
-        d = len(self.dimensions)
-        values, q = self.split(x)
-        step = 1e-7 * (self.high - self.low) * np.where(values[0] - self.low > self.high - values[0], -1, 1)
-        turn = 1e-7 * (self.size if self.m.inputs[0].is_slide else 1.0)
-        rows = np.vstack([values, values + np.diag(step), values])
-        along = np.vstack([np.repeat(q, d + 1, axis=0), q + turn])
-        z = self.places(rows, along)
-        return np.asarray(((z[1:] - z[0]) / np.append(step, turn)[:, None]).T)
+    def hold(self, x: Reals | None) -> bool:
+        """Hold every loop on the branch that it has at some shares; None: let it go."""
+        values = None if x is None else self.values(x)
+        held = [design.hold(values) for design in self.designs]
+        return all(held)
 
     # --- starts -----------------------------------------------------------------------------------------------------
-    def starts(self, count: int, seed: int) -> Reals:
-        """Shares (count, d): the file's own numbers, as near as the bounds let them, then Sobol's."""
-        from scipy.stats import qmc
-
-        own = np.array([float(value(self.m, d.path).real) for d in self.dimensions])
-        first = np.clip((own - self.low) / (self.high - self.low), 0.0, 1.0)
-        drawn = qmc.Sobol(len(own), seed=seed).random_base2(max(0, int(np.ceil(np.log2(max(count, 1))))))
-        return np.vstack([first, drawn])[:count]
-
-    def begun(self, shares: Reals) -> list[Reals]:
-        """The unknowns to refine, the most promising first."""
-        values = self.low + shares * (self.high - self.low)
-        if self.q is not None:
-            cost = self._cost(np.abs(self.places(values, self.q[None]) - self.target) ** 2).sum(axis=1)
-            return list(shares[np.argsort(cost, kind="stable")[:REFINED]])
+    def begun(self, starts: Reals) -> list[tuple[Reals, tuple[Reals, ...]]]:
+        """The shares and inputs to refine, the most promising first, of shares (count, d)."""
+        values = self.low + starts * (self.high - self.low)
         at, m = self.m.at[0], self.m
         turning = not m.inputs[0].is_slide
-        span = 2 * np.pi if turning else 4 * self.size
+        span = 2 * np.pi if turning else 4 * m.size
         q = at + span * np.arange(COARSE) / COARSE - (0.0 if turning else span / 2)
-        swept = self.places(values, q[None])
-        nearest = np.array(
-            [self._cost(np.abs(path[:, None] - self.target) ** 2).min(axis=0).sum() for path in swept]
-        )
-        found: list[tuple[float, Reals]] = []
-        for i in np.argsort(nearest, kind="stable")[:ORDERED]:
-            away = self._cost(np.abs(swept[i][:, None] - self.target) ** 2)
-            for sense in (1, -1):
-                cost, places = _in_order(away[::sense], turning)
-                # past the end of the turn the input goes on
-                turns, k = np.divmod(places, COARSE)
-                inputs = q[::sense][k] + sense * turns * span
-                found.append((cost, np.concatenate([shares[i], inputs])))
+        cost = np.zeros(len(starts))
+        swept: list[Reals | None] = []
+        for aim, design in zip(self.aims, self.designs, strict=True):
+            if aim.inputs is not None:
+                swept.append(None)
+                off = aim.apart(design.table(values, aim.inputs[None]))
+                cost += _cost((off**2).sum(axis=0)).sum(axis=1)
+            else:
+                table = design.table(values, q[None])
+                swept.append(table)
+                away = (_cost(aim.from_each(table[:, i])) for i in range(len(values)))
+                cost += [each.min(axis=0).sum() for each in away]
+        order = np.argsort(cost, kind="stable")
+        if all(table is None for table in swept):
+            given = tuple(aim.inputs for aim in self.aims if aim.inputs is not None)
+            return [(starts[i], given) for i in order[: ROUNDS[0][0]]]
+        found: list[tuple[float, tuple[Reals, tuple[Reals, ...]]]] = []
+        for i in order[:ORDERED]:
+            ways = [
+                [(0.0, aim.inputs)] * 2
+                if table is None or aim.inputs is not None
+                else along(_cost(aim.from_each(table[:, i])), q, turning)
+                for aim, table in zip(self.aims, swept, strict=True)
+            ]
+            # the better way round of each target, then the other
+            for each in zip(*ways, strict=True):
+                found.append((sum(c for c, _ in each), (starts[i], tuple(way for _, way in each))))
         found.sort(key=lambda each: each[0])
-        # what cannot be assembled near every place leads nowhere, while anything else does
-        there = [x for cost, x in found[:REFINED] if cost < (AWAY * self.size) ** 2]
-        return there or [x for _, x in found[:1]]
-
-    def _cost(self, squared: Reals) -> Reals:
-        return np.where(np.isfinite(squared), squared, (AWAY * self.size) ** 2)
+        # what cannot be assembled near every row leads nowhere, while anything else does
+        hopeless = AWAY**2
+        return [x for c, x in found if c < hopeless or found[0][0] >= hopeless]
 
     # --- solution ---------------------------------------------------------------------------------------------------
-    def solved(self, starts: int, seed: int) -> Fit[D]:
-        """Refine the best starts; stop at one that meets the target."""
-        best: Any = None
-        for x in self.begun(self.starts(starts, seed)):
-            found = self.refined(x, ROUGH)
-            if best is None or found.cost < best.cost:
-                best = found
-            if np.abs(best.fun).max() < MET:
-                break
-        best = self.refined(best.x, LAST)
-        values, q = (each[0] for each in self.split(best.x))
-        z = self.at(best.x).values([self.key])[0][0]
-        if not np.isfinite(z).all():
-            k = int(np.argmin(np.isfinite(z)))
-            raise MechanismError(
-                f"fit: of {starts} starts within the bounds none can be assembled at all {len(z)} target points: "
-                f"the best not at target point {k + 1}"
+    def solved(self, starts: int, seed: int, best: int, executor: Executor | None) -> Fit[D]:
+        """Refine the best starts; stop when as many as asked for meet the target."""
+        own = np.array([float(value(self.m, d.path).real) for d in self.dimensions])
+        begun = self.begun(shares((own - self.low) / (self.high - self.low), starts, seed))
+        evaluations = self.evaluations
+        met: list[_Refined] = []
+        for count, steps in ROUNDS:
+            found: list[_Refined] = []
+            # each part has what it needs for itself, on threads too
+            work = (
+                (self.own() if executor else self, *start, steps)
+                for start in begun[: max(count, 2 * best if best > 1 else 1)]
             )
-        numbers = zip((d.path for d in self.dimensions), values.tolist(), strict=True)
-        mechanism = changed(self.m, dict(numbers))
-        remarks = tuple(self.remarks(values, q))
-        return Fit(mechanism, self.dimensions, values, q, z, self.target, starts, self.evaluations, remarks)
+            with closing(in_parts(_refined, work, executor)) as refined:
+                for each in refined:
+                    evaluations += each.evaluations
+                    found.append(each)
+                    if each.largest < MET:
+                        met = self._distinct([*met, each])
+                    if len(met) >= best:
+                        break
+            found = self._distinct([*met, *found])
+            if len(met) >= best:
+                break
+            begun = [(each.x, each.inputs) for each in found]
+        fits = [self._fit(each, starts, evaluations) for each in found[:best]]
+        there = [each for each in fits if each is not None]
+        if not there:
+            raise MechanismError(
+                f"fit: of {starts} starts within the bounds none can be assembled at all target points"
+            )
+        return replace(there[0], others=tuple(there[1:]))
 
-    def refined(self, x: Reals, steps: int) -> Any:
-        """One start, by a trust region within the bounds."""
+    def _distinct(self, found: Sequence[_Refined]) -> list[_Refined]:
+        """The best of each place in the space of dimensions, the best first."""
+        kept: list[_Refined] = []
+        for each in sorted(found, key=lambda e: e.cost):
+            if all(np.abs(each.x - other.x).max() > SAME for other in kept):
+                kept.append(each)
+        return kept
+
+    def refined(self, x: Reals, inputs: Sequence[Reals], steps: int) -> _Refined:
+        """One start, by a trust region within the bounds.
+
+        Every loop is held on the branch that it begins on, for on the way the guess may tell nothing; what is found counts
+        as its own guess has it.
+        """
+        before = self.evaluations
+        begins = np.abs(self.residuals(x, inputs)).max() < AWAY
+        held = self.hold(x)
+        found, at = self._descended(x, inputs, steps)
+        if held:
+            there = self.residuals(found, at)
+            self.hold(None)
+            # on the way to the poses there is a change point, or the guess means another assembly there
+            if begins and np.abs(self.residuals(found, at) - there).max() > SAME:
+                found, at = self._descended(x, inputs, steps)
+        off = self.residuals(found, at)
+        largest = float(np.abs(off).max())
+        return _Refined(found, tuple(at), float(off @ off) / 2, largest, self.evaluations - before)
+
+    def _descended(self, x: Reals, inputs: Sequence[Reals], steps: int) -> tuple[Reals, Sequence[Reals]]:
         from scipy.optimize import least_squares
 
-        d = len(self.dimensions)
-        low, high = np.full(len(x), -np.inf), np.full(len(x), np.inf)
-        low[:d], high[:d] = 0.0, 1.0
-        return least_squares(
-            self.residuals,
-            np.clip(x, low, high),
-            self.jacobian,
-            (low, high),
+        width = self.high - self.low
+        way = Descent(self.aims, self.designs, self.values, width, inputs)
+        bounds = (0.0, 1.0)
+        # dogbox steps along the bounds; trf, which keeps off them, creeps in the long valleys of this problem
+        found = least_squares(
+            way.residuals,
+            np.clip(x, *bounds),
+            way.jacobian,
+            bounds,
+            method="dogbox",
             ftol=1e-15,
             xtol=1e-15,
             gtol=1e-15,
             max_nfev=steps,
         )
+        return np.asarray(found.x), way.at(found.x).inputs
 
-    def remarks(self, values: Reals, q: Reals) -> list[str]:
-        """What is to be said of the solution."""
+    def _fit(self, found: _Refined, starts: int, evaluations: int) -> Fit[D] | None:
+        """A solution as it is handed out; None where it cannot be assembled at every row."""
+        values = self.values(found.x)
+        reached: list[Reached] = []
+        inputs: list[Reals] = []
+        for aim, design, q in zip(self.aims, self.designs, found.inputs, strict=True):
+            table = design(values, q)
+            if aim.inputs is None and not self.m.inputs[0].is_slide:
+                # the same poses within a turn, where a turn brings them back
+                within = in_turn(q, self.m.at[0])
+                same = design(values, within)
+                if np.abs(aim.apart(same) - aim.apart(table)).max() < MET:
+                    q, table = within, same
+            if not np.isfinite(table).all():
+                return None
+            reached += aim.reached(table, q)
+            inputs.append(q)
+        numbers = zip((d.path for d in self.dimensions), values.tolist(), strict=True)
+        mechanism = changed(self.m, dict(numbers))
+        remarks = tuple(self._remarks(values, inputs))
+        return Fit(mechanism, self.m, self.dimensions, values, tuple(reached), starts, evaluations, remarks)
+
+    def _remarks(self, values: Reals, inputs: Sequence[Reals]) -> list[str]:
+        """What is to be said of a solution."""
         said = []
         for d, number, low, high in zip(self.dimensions, values, self.low, self.high, strict=True):
             if min(number - low, high - number) < 1e-6 * (high - low):
                 said.append(f"fit: {d.path} ends at its bound")
-        order = np.diff(q) * np.sign(q[-1] - q[0])
-        if self.q is None and (order < 0).any():
-            k = int(np.argmin(order))
-            said.append(
-                f"fit: order defect: the input meets target point {k + 2} before target point {k + 1}"
-            )
-        whole = np.linspace(q.min(), q.max(), FINE)
-        gaps = whole[~np.isfinite(self.places(values[None], whole[None])[0])]
+        for aim, q in zip(self.aims, inputs, strict=True):
+            order = np.diff(q) * np.sign(q[-1] - q[0])
+            if aim.inputs is None and (order < 0).any():
+                k = int(np.argmin(order))
+                said.append(
+                    f"fit: order defect: the input meets target point {k + 2} before target point {k + 1}"
+                )
+        every = np.concatenate(inputs)
+        whole = np.linspace(every.min(), every.max(), FINE)
+        (there,) = self.designs[0].solved(values[None], whole[None], [ASSEMBLED])
+        gaps = whole[~np.isfinite(there[0])]
         if len(gaps):
             low, high = (self._shown(float(each)) for each in (gaps[0], gaps[-1]))
             said.append(
                 f"fit: branch defect: between the target points it cannot be assembled from {low} to {high} "
                 f"({len(gaps)} of {FINE} poses): it does not pass there without being taken apart"
             )
-        if self._first is not None and self._first.written is None:
+        if not self.designs[0].exact:
             said.append("fit: derivatives are differences: this mechanism has groups without a closed form")
         return said
 
@@ -295,59 +390,12 @@ class _Problem(Generic[D]):
         return f"{q:.6g} m" if self.m.inputs[0].is_slide else f"{np.degrees(q):.6g} deg"
 
 
-def _in_order(away: Reals, cyclic: bool) -> tuple[float, NDArray[np.intp]]:
-    """Which pose goes to which place, (n,), so that poses never go back and Σ away (poses, places) is least.
-
-    Around a turn any pose may be the first, and poses past the last go on from the first.
-
-    >>> _in_order(np.array([[9.0, 0.0], [0.0, 9.0], [4.0, 4.0]]), True)
-    (0.0, array([1, 3]))
-    """
-    m, n = away.shape
-    firsts = np.arange(m) if cyclic else np.zeros(1, dtype=int)
-    around = (firsts[:, None] + np.arange(m)) % m
-    total = away[around, 0].copy()
-    if cyclic:
-        total[:, 1:] = np.inf
-    before = []
-    for j in range(1, n):
-        least = np.minimum.accumulate(total, axis=1)
-        # where the least so far was
-        here = np.where(total == least, np.arange(m), 0)
-        before.append(np.maximum.accumulate(here, axis=1))
-        total = least + away[around, j]
-    first, k = np.unravel_index(np.argmin(total), total.shape)
-    cost = float(total[first, k])
-    places = [int(k)]
-    for back in reversed(before):
-        places.append(int(back[first, places[-1]]))
-    return cost, firsts[first] + np.array(places[::-1])
+def _refined(problem: _Problem[Any], x: Reals, inputs: Sequence[Reals], steps: int) -> _Refined:
+    return problem.refined(x, inputs, steps)
 
 
-def _real(z: Complexes) -> Reals:
-    """Real parts above imaginary parts."""
-    return np.concatenate([np.real(z), np.imag(z)])
-
-
-def _target(given: ArrayLike) -> Complexes:
-    found = np.asarray(given)
-    if not np.iscomplexobj(found):
-        found = np.asarray(found, dtype=float)
-        if found.ndim != 2 or found.shape[1] != 2:
-            raise ValueError(f"target: expected shape (n, 2), found {found.shape}")
-        found = found[:, 0] + 1j * found[:, 1]
-    if found.ndim != 1 or len(found) < 2:
-        raise ValueError(f"target: found {found.size} point, expected two or more")
-    if not np.isfinite(found).all():
-        raise ValueError("target: expected finite numbers")
-    return found
-
-
-def _key(m: Description, point: str) -> Key:
-    for body, points in m.bodies.items():
-        if point in points:
-            return ("point", body, 0j, point, 0)
-    raise DescriptionError(f"no point is named '{point}'")
+def _cost(squared: Reals) -> Reals:
+    return np.where(np.isfinite(squared), squared, AWAY**2)
 
 
 def _free(m: Description, free: Mapping[str, tuple[float, float]]) -> dict[Dimension, tuple[float, float]]:

@@ -214,21 +214,6 @@ class Solver:
             to[alone] = np.nan
         return out, alone
 
-    def slopes(self, key: Key) -> Any | None:
-        """The derivatives of a quantity to the dimensions and then the inputs, (v, n, d + k).
-
-        None where a variant is not on the tape, or a dimension is an input's own.
-        """
-        if not self.takes([key]) or not self._taken([key]).all():
-            return None
-        assert self.written is not None
-        v, n = self.part.shape
-        enters = [d.path for d in self.part.dimensions] + [f"q{j}" for j in range(self.part.inputs.shape[2])]
-        tape = self.written.slopes(key, tuple(enters))
-        with np.errstate(all="ignore"):
-            found = run_grid(tape, {name: self._entering(name, slice(None)) for name in tape.inputs}, (v, n))
-        return np.stack([quantity(found, key, v * n, to=name).reshape(v, n) for name in enters], axis=-1)
-
     def takes(self, keys: Sequence[Key]) -> bool:
         """Whether the tape has such quantities: friction iterates, redundant statics and twists are of each variant."""
         m, written = self.part.mechanism, self.written

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 
 from dalembert.arithmetic.adjoint import derivatives
-from dalembert.arithmetic.recorded import Recorder
+from dalembert.arithmetic.recorded import RECORDED, Recorder, bare
 from dalembert.arithmetic.tape import Tape
 from dalembert.arithmetic.varied import Varied
 from virtualwork.branch.assembly import Assembly
-from virtualwork.branch.guess import distance
+from virtualwork.branch.guess import distance, sign_of_angles
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, value
 from virtualwork.formulas.asked import Key
+from virtualwork.formulas.kinds import WRITTEN
+from virtualwork.formulas.numbers import Number
+from virtualwork.formulas.positions import Case, State, run
 from virtualwork.formulas.recording import Recording
 from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Step, Turn
+
+# what the tape of the choice says of each group
+CHOICE = ("margin", "plus", "minus", "guessed", "sign")
 
 
 class Written:
@@ -57,9 +64,9 @@ class Written:
             self.mechanism, self.plan, signs, moves, turning, assembly.geared, settled, recorder
         )
         self._tapes: dict[tuple[Key, ...], Tape] = {}
-        self._slopes: dict[tuple[Key, tuple[str, ...]], Tape] = {}
+        self._slopes: dict[tuple[tuple[Key, ...], tuple[str, ...]], Tape] = {}
 
-    @property
+    @cached_property
     def closed(self) -> list[Group]:
         """The groups with a closed form that has two branches."""
         return [g for g in self.plan.groups if g.kind not in ("Newton", "PRP")]
@@ -71,21 +78,51 @@ class Written:
             self._tapes[asked] = self.recording.tape(asked)
         return self._tapes[asked]
 
-    def slopes(self, key: Key, enters: tuple[str, ...]) -> Tape:
-        """The tape of a quantity's derivatives to what enters, as far as it hangs on that; written once."""
-        if (key, enters) not in self._slopes:
-            tape = self.tape((key,))
+    def slopes(self, keys: Sequence[Key], enters: tuple[str, ...]) -> Tape:
+        """The tape of quantities' derivatives to what enters, as far as they hang on that; written once."""
+        asked = tuple(keys), enters
+        if asked not in self._slopes:
+            tape = self.tape(keys)
             there = [name for name in enters if name in tape.inputs]
-            self._slopes[key, enters] = derivatives(tape, there)
-        return self._slopes[key, enters]
+            self._slopes[asked] = derivatives(tape, there)
+        return self._slopes[asked]
 
-    def choice(self, group: Group) -> Tape:
-        """The tape of a group's radicand, and of its distance from what the guess says, at the inputs of the guess."""
-        rec = self.recording
-        rec.solve(self.plan.writes(group), 0)
-        angles, points = known_by_guess(self.mechanism)
-        apart = distance(group, rec.st, self.plan, self.mechanism, angles, points)
-        return rec.recorder.tape({"margin": rec.st.margin[group.name], "distance": apart})
+    @cached_property
+    def choice(self) -> Tape:
+        """The tape of how each closed form's branch is chosen at the inputs of the guess, in the order of solution.
+
+        Of each group: its radicand (`margin`), the distance of both assemblies from what the guess says (`plus`,
+        `minus`), the sign that the guessed angles have (`guessed`), and what follows from these (`sign`): the nearer
+        assembly, or where there is none the guessed angles' sign.
+        """
+        recorder, m = self.recording.recorder, self.mechanism
+        st = State([recorder.input(f"q{j}") for j in range(len(m.inputs))], kind=WRITTEN)
+        angles, points = known_by_guess(m)
+        outputs: dict[str, Number] = {}
+
+        def close(group: Group, st: State) -> None:
+            case, size, name = Case(group), bare(m.size), group.name
+            if group not in self.closed:
+                case.solve(st, 1, size)
+                return
+            apart = []
+            for sign in (1.0, -1.0):
+                trial = st.copy()
+                case.solve(trial, sign, size)
+                apart.append(distance(group, trial, self.plan, m, angles, points))
+            guessed = sign_of_angles(group, case, st, angles)
+            guessed = 1.0 if guessed is None else guessed
+            margin = trial.margin[name]
+            # at zero the guess is taken as positive; what is not a number is not
+            beyond = RECORDED.select(1.0 + guessed, 1.0, -1.0)
+            beyond = RECORDED.select(guessed, 1.0, RECORDED.select(-guessed, -1.0, beyond))
+            sign = RECORDED.select(margin, RECORDED.select(apart[0] - apart[1], -1.0, 1.0), beyond)
+            case.solve(st, sign, size)
+            values = margin, apart[0], apart[1], guessed, sign
+            outputs.update(zip((f"{what} {name}" for what in CHOICE), values, strict=True))
+
+        run(self.plan.steps, st, close)
+        return recorder.tape(outputs)
 
 
 def _turns(step: Step) -> tuple[Turn, ...]:

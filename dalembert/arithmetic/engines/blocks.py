@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.tape import Tape, performed
+from dalembert.arithmetic.engines import floats
+from dalembert.arithmetic.tape import Tape, shortened
 
 Reals = NDArray[np.float64]
 # lanes of a block: as many as let the scratch fit the second cache. Longer ones pay numpy's calls by more lanes
@@ -61,8 +62,6 @@ class Blocks:
         self.varying = [name for name in tape.inputs if name not in uniform]
         operations = tape.operations
         self.of_lanes = lanes = self.lanes_of(tape, uniform)
-        # the part that is the same for all lanes, and which of its values the lanes read
-        self.common = [(n, *op) for n, op in enumerate(operations) if not lanes[n]]
         body = [n for n, op in enumerate(operations) if lanes[n] and op[0] != "input"]
         last = {a: n for n in body for a in operations[n][1:]}
         outputs: dict[int, str] = {}
@@ -84,7 +83,10 @@ class Blocks:
                 place[number] = f"c{number}"
             elif kind == "input":
                 place[number] = f"x{self.varying.index(arguments[0])}"
+        # what is the same for all lanes: which of it the lanes read, and its own operations
         self.read = sorted({a for n in body for a in operations[n][1:] if not lanes[a]})
+        same = {*self.read, *(source for _, kind, source in self.fill if kind == "common")}
+        self.same = shortened(operations, [(str(number), number) for number in sorted(same)])
         free: list[str] = []
         slots = 0
         lines: list[str] = []
@@ -149,8 +151,8 @@ class Blocks:
         inputs = dict(zip(self.tape.inputs, columns, strict=True))
         varying = [inputs[name] for name in self.varying]
         with np.errstate(all="ignore"):
-            common = self._common(inputs) if self.common else []
-            constants = [common[number] for number in self.read]
+            common = self._common(inputs)
+            constants = [common[str(number)] for number in self.read]
             slots, mask = self._scratch()
             for i in range(0, n if self.parts else 0, self.block):
                 j = min(i + self.block, n)
@@ -162,21 +164,20 @@ class Blocks:
                     part(*arguments)
         for row, kind, source in self.fill:
             if kind == "common":
-                out[row][:] = common[source]
+                out[row][:] = common[str(source)]
             else:
                 out[row][:] = inputs[source] if kind == "input" else out[source]
 
-    def _common(self, inputs: Mapping[str, Reals]) -> list[Any]:
-        """The values that are the same for all lanes; None for the others."""
-        found: list[Any] = [None] * len(self.tape.operations)
-        for number, kind, *arguments in self.common:
-            if kind == "const":
-                found[number] = np.float64(arguments[0])
-            elif kind == "input":
-                found[number] = inputs[arguments[0]][()]
-            else:
-                found[number] = performed(kind, [found[a] for a in arguments], NUMPY)
-        return found
+    def _common(self, inputs: Mapping[str, Reals]) -> Mapping[str, Any]:
+        """The values that are the same for all lanes, as floats where those go on."""
+        given = {name: inputs[name][()] for name in self.same.inputs}
+        if floats.takes(self.same):
+            try:
+                found = floats.compiled(self.same)(*map(float, given.values()))
+                return dict(zip(self.same.names, found, strict=True))
+            except (ZeroDivisionError, ValueError, OverflowError):
+                pass
+        return self.same.on(given, NUMPY)
 
 
 @lru_cache(maxsize=128)

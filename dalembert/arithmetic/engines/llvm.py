@@ -14,6 +14,7 @@ import threading
 import warnings
 from collections.abc import Callable, Sequence
 from hashlib import sha256
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -51,8 +52,13 @@ class Code:
         if n < self.width:
             table = np.empty(len(out) * self.width)
             columns = [c if c.ndim == 0 else np.resize(c, self.width) for c in columns]
+        # numbers that all lanes share stand side by side: an address of each array's own costs more than the work
+        shared = np.array([c.item() for c in columns if not c.ndim])
+        places = count(shared.ctypes.data, shared.itemsize)
+        pointers = (ctypes.c_void_p * max(len(columns), 1))(
+            *(c.ctypes.data if c.ndim else next(places) for c in columns)
+        )
         lanes = max(n, self.width)
-        pointers = (ctypes.c_void_p * max(len(columns), 1))(*(c.ctypes.data for c in columns))
         self._call(lanes, pointers, table.ctypes.data, lanes)
         if lanes > n:
             for row, to in enumerate(out):

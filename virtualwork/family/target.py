@@ -1,0 +1,200 @@
+"""What a fit aims at, and what it reached: points at places, links at angles, slides at travels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from virtualwork.describe.description import Description
+from virtualwork.family.design import place_key
+from virtualwork.formulas.asked import Key
+from virtualwork.formulas.numbers import Reals
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """Where points, links and slides should be, one beside the other at the same inputs.
+
+    Attributes
+    ----------
+    places : mapping of name to array
+        `points.H` or `H`: (n, 2) or complex (n,), m. `links.rocker`: angles (n,), rad, compared modulo 2π.
+        `slides.B`: travels (n,), m.
+    inputs : array (n,), optional
+        Rad or m; without it the input at each row is found too, in the order of the rows.
+    weights : mapping of name to number, or array (n,)
+        A row of weight w counts as if it stood w times; 1 where not given. Lengths are counted in sizes of the
+        mechanism, angles in radians.
+
+    Examples
+    --------
+    >>> Target({"links.rocker": [0.1, 0.4]}, inputs=[0.0, 1.0], weights={"links.rocker": 2.0}).places["links.rocker"]
+    [0.1, 0.4]
+    """
+
+    places: Mapping[str, ArrayLike]
+    inputs: ArrayLike | None = None
+    weights: Mapping[str, ArrayLike] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """One quantity of a target, and what the fitted mechanism does there.
+
+    Attributes
+    ----------
+    name : str
+    kind : "point", "angle" or "slide"
+    inputs : array (n,)
+        Rad or m.
+    values, target : array (n,)
+        x + iy in m of a point, rad of a link's angle, m of a slide.
+    """
+
+    name: str
+    kind: str
+    inputs: Reals
+    values: NDArray[Any]
+    target: NDArray[Any]
+
+    @property
+    def distances(self) -> Reals:
+        """(n,) m, or rad."""
+        apart = self.values - self.target
+        return np.abs(_round_turn(apart) if self.kind == "angle" else apart)
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of the distances, m or rad."""
+        return float(np.sqrt(np.mean(self.distances**2)))
+
+    @property
+    def max(self) -> float:
+        """The largest distance, m or rad."""
+        return float(self.distances.max())
+
+
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """A target read: what a design is asked, and how far its answer is from what is wanted.
+
+    Attributes
+    ----------
+    keys : tuple
+    names : tuple of str
+    wanted : array (rows, n)
+        x and y of a point are two rows.
+    scale : array (rows, n)
+        Roots of the weights, over the size for lengths.
+    angle : array (rows, 1) of bool
+    inputs : array (n,) or None
+    """
+
+    keys: tuple[Key, ...]
+    names: tuple[str, ...]
+    wanted: Reals
+    scale: Reals
+    angle: NDArray[np.bool_]
+    inputs: Reals | None
+
+    @classmethod
+    def read(cls, m: Description, target: Target) -> Aim:
+        """A target, checked.
+
+        Raises
+        ------
+        DescriptionError
+            A name that is not there.
+        ValueError
+            Fewer than two rows, rows that do not go together, numbers that are not finite, a weight below 0.
+        """
+        keys = {name: place_key(m, name) for name in target.places}
+        if not keys:
+            raise ValueError("target: expected a point, a link or a slide")
+        wanted, scale, angle = [], [], []
+        n = None
+        for name, key in keys.items():
+            rows = _rows(name, key[0] == "point", target.places[name], n)
+            n = rows.shape[1]
+            weight = np.asarray(target.weights.get(name, 1.0), dtype=float)
+            if weight.shape not in ((), (n,)) or not (np.isfinite(weight) & (weight >= 0)).all():
+                raise ValueError(f"weights of {name}: expected one number, or {n}, 0 or more")
+            wanted.append(rows)
+            unit = 1.0 if key[0] == "angle" else 1.0 / m.size
+            scale.append(np.broadcast_to(np.sqrt(weight) * unit, rows.shape))
+            angle += [key[0] == "angle"] * len(rows)
+        strange = [name for name in target.weights if name not in keys]
+        if strange:
+            raise ValueError(f"weights: '{strange[0]}' is not in the target")
+        q = None if target.inputs is None else np.asarray(target.inputs, dtype=float)
+        if q is not None and (q.shape != (n,) or not np.isfinite(q).all()):
+            raise ValueError(f"inputs: expected {n} finite numbers, one for each row of the target")
+        flags = np.array(angle)[:, None]
+        return cls(tuple(keys.values()), tuple(keys), np.vstack(wanted), np.vstack(scale), flags, q)
+
+    def __len__(self) -> int:
+        return int(self.wanted.shape[1])
+
+    def apart(self, found: Reals) -> Reals:
+        """How far it is off, weighted, (rows, ..., n): lengths in sizes of the mechanism, angles in rad."""
+        return self._off(found, self.wanted, self.scale)
+
+    def from_each(self, found: Reals) -> Reals:
+        """Σ (weighted distance)² of every pose of (rows, ..., poses) from every row of the target, (..., poses, n)."""
+        off = self._off(found[..., None], self.wanted[:, None, :], self.scale[:, None, :])
+        return np.asarray((off**2).sum(axis=0))
+
+    def _off(self, found: Reals, wanted: Reals, scale: Reals) -> Reals:
+        def beside(each: NDArray[Any]) -> NDArray[Any]:
+            return each.reshape(len(each), *(1,) * (found.ndim - each.ndim), *each.shape[1:])
+
+        apart = found - beside(wanted)
+        if self.angle.any():
+            apart = np.where(beside(self.angle), _round_turn(apart), apart)
+        return np.asarray(apart * beside(scale))
+
+    def reached(self, found: Reals, inputs: Reals) -> tuple[Reached, ...]:
+        """What a design does, (rows, n)."""
+        out, row = [], 0
+        for name, key in zip(self.names, self.keys, strict=True):
+            if key[0] == "point":
+                values, target = (each[row] + 1j * each[row + 1] for each in (found, self.wanted))
+            else:
+                values, target = found[row], self.wanted[row]
+            out.append(Reached(name, key[0], inputs, values, target))
+            row += 2 if key[0] == "point" else 1
+        return tuple(out)
+
+
+def _rows(name: str, is_point: bool, given: ArrayLike, n: int | None) -> Reals:
+    """The numbers of one quantity, (1 or 2, n)."""
+    found = np.asarray(given)
+    if is_point:
+        if np.iscomplexobj(found):
+            found = np.stack([found.real, found.imag], axis=-1)
+        found = np.asarray(found, dtype=float)
+        if found.ndim != 2 or found.shape[1] != 2:
+            raise ValueError(f"target of {name}: expected shape (n, 2), found {found.shape}")
+        found = found.T
+    else:
+        found = np.asarray(found, dtype=float)
+        if found.ndim != 1:
+            raise ValueError(f"target of {name}: expected shape (n,), found {found.shape}")
+        found = found[None]
+    count = found.shape[1]
+    if count < 2:
+        raise ValueError(f"target of {name}: found {count} point, expected two or more")
+    if n is not None and count != n:
+        raise ValueError(f"target of {name}: found {count} rows, and {n} of the one before it")
+    if not np.isfinite(found).all():
+        raise ValueError(f"target of {name}: expected finite numbers")
+    return found
+
+
+def _round_turn(angle: Reals) -> Reals:
+    """Within half a turn of 0."""
+    return angle - 2 * np.pi * np.round(angle / (2 * np.pi))
