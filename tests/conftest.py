@@ -49,7 +49,7 @@ def forks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Forks]:
 def dalembert(forks: Forks, tmp_path: Path) -> Dalembert:
     """Run `dalembert ARGS` in an empty folder; a traceback or an internal error fails the test.
 
-    DALEMBERT_TESTS_BY_SCRIPT=1 calls the installed script itself: .ci/run does so in its slow tests.
+    DALEMBERT_TESTS_BY_SCRIPT=1 calls the installed script itself: .ci/run does so too, for users and published cases.
     """
 
     def run(*arguments: object, stdin: str | bytes = "") -> subprocess.CompletedProcess[str]:

@@ -17,9 +17,23 @@ import sys
 import traceback
 from importlib import import_module
 from pathlib import Path
+from pkgutil import walk_packages
 from typing import Any
 
 LONGEST = 120  # seconds, until a call is ended
+OWN = ("dalembert", "balancing", "virtualwork", "rigidbody3d", "cli")
+HEAVY = (
+    "pandas",
+    "scipy.integrate",
+    "scipy.interpolate",
+    "scipy.linalg",
+    "scipy.optimize",
+    "scipy.spatial.transform",
+    "scipy.stats",
+    "matplotlib.backends.backend_agg",
+    "matplotlib.figure",
+    "matplotlib.projections.polar",
+)
 
 
 class Forks:
@@ -99,11 +113,13 @@ def _call(request: dict[str, Any]) -> int:
 
 def serve() -> None:
     """Import what commands import, then fork for each request."""
-    from cli.app import COMMANDS
-
-    heavy = ("pandas", "matplotlib.figure", "matplotlib.backends.backend_agg")
-    for module in (*heavy, *(module for module, _ in COMMANDS.values())):
-        import_module(module)
+    for name in HEAVY:
+        import_module(name)
+    for name in OWN:
+        for module in walk_packages(import_module(name).__path__, f"{name}."):
+            # what the command loads by itself where it pays, and the command itself
+            if ".engines." not in module.name and not module.name.endswith("__main__"):
+                import_module(module.name)
     gc.freeze()
     for line in iter(sys.stdin.readline, ""):
         child = os.fork()
