@@ -19,8 +19,9 @@ def state(seconds: int, a: str = "0", b: str = "-0.5", g: str = "9.81", steps: i
     """Angles and their rates a number of seconds after rest, to some 35 digits; quick motions need more steps a second."""
     with mp.workdps(DIGITS):
         y = [mpf(a), mpf(b), mpf(0), mpf(0)]
+        powers = [mpf(steps) ** -n for n in range(ORDER + 1)]
         for _ in range(seconds * steps):
-            y = [mp.polyval(x[::-1], mpf(1) / steps) for x in _series(y, mpf(g))]
+            y = [mp.fdot(x, powers[: len(x)]) for x in _series(y, mpf(g))]
         return y
 
 

@@ -161,7 +161,8 @@ def test_counts_beyond_measure(arguments: tuple[str, ...], dalembert: Dalembert)
 
 @pytest.mark.skipif(not hasattr(os, "wait4"), reason="the system does not tell a process's memory")
 @pytest.mark.parametrize(
-    "options", [["--json"], [], ["--only", "H", "--json"], ["--only", "H"], ["--forces"]]
+    "options",
+    [["--json"], [], ["--only", "H", "--json"], ["--only", "H"], ["--forces"], ["--states", "s.csv"]],
 )
 def test_a_sweep_takes_no_more_than_is_reckoned(
     options: list[str], dalembert: Dalembert, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -180,8 +181,8 @@ def test_a_sweep_takes_no_more_than_is_reckoned(
     m = load("klann.toml").mechanism
     names = ["H"] if "--only" in options else None
     analysis = Analysis("klann.toml", m, wanted(m, None, "0deg:360deg/5000", None), 2, names)
-    json_asked = "--json" in options
-    reckoned = analysis.bytes_each(json=json_asked, table=not json_asked, forces="--forces" in options) * 4990
+    as_json, states, forces = (option in options for option in ("--json", "--states", "--forces"))
+    reckoned = analysis.bytes_each(json=as_json, table=not as_json, states=states, forces=forces) * 4990
     assert peak[5000] - peak[10] <= reckoned + 8e6  # what the allocator keeps
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.poses import Poses
+
+if TYPE_CHECKING:
+    from virtualwork.formulas.dynamics import Dynamics
 
 # (kind, of what …): see `recording.Recording.value`
 Key = tuple[Any, ...]
@@ -55,7 +57,11 @@ def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:
     """A quantity worked out over blocks of poses, (n,)."""
     kind, *of = key
     if kind in FORCES:
-        forces = forces or Dynamics(poses)
+        if forces is None:
+            # a dozen files: a scene without forces does not load them
+            from virtualwork.formulas.dynamics import Dynamics
+
+            forces = Dynamics(poses)
         if kind == "effort":
             return forces.effort[:, of[0]]
         if kind == "generalized":
