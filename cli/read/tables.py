@@ -8,6 +8,7 @@ stumbles over is read again by the standard `csv` module, which knows the row of
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -60,7 +61,7 @@ class Cells:
                 return None
             texts = together.replace(",", ".").split("\0")
         try:
-            return np.fromiter((float(text or "nan") for text in texts), float, len(texts))
+            return np.array([float(text) if text else math.nan for text in texts], dtype=float)
         except ValueError:
             return None
 
@@ -314,6 +315,8 @@ def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
             return False
         decimal_comma = True
     rows = len(frame)
+    # to look for blanks once is quicker than to strip a million cells that have none
+    blanks = not source.text.isascii() or any(blank in source.text for blank in " \t\v\f\x1c\x1d\x1e\x1f")
     marks: dict[tuple[int, str], str] = {}
     for name, index, unit, kind, may_be_blank in plan:
         if kind == "number" and not marker:
@@ -345,7 +348,9 @@ def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
             table._numbered[name] = list(unique), of_code[codes]
             continue
         else:
-            cells = [cell.strip() for cell in frame[index].tolist()]
+            cells = frame[index].tolist()
+            if blanks:
+                cells = [cell.strip() for cell in cells]
             if source.has_commas([cells]) and not decimal_comma:
                 return False
             table.cells[name] = Cells(source.header[index], unit, cells, decimal_comma)
