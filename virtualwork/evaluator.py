@@ -14,11 +14,10 @@ from numpy.typing import ArrayLike
 
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.errors import DescriptionError, hint
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.asked import COMPLEX, Key
 from virtualwork.formulas.lanes import Lanes, Ready, ready, recorded, taped
 from virtualwork.formulas.numbers import xy
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.recording import COMPLEX
 
 POINT = ("position", "velocity", "acceleration", "jerk")
 LINK = ("angle", "omega", "alpha", "jerk")

@@ -15,9 +15,8 @@ from dalembert.arithmetic.tape import Tape
 from virtualwork import Mechanism
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import MechanismError
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.asked import Key, names
 from virtualwork.formulas.lanes import Lanes, taped
-from virtualwork.formulas.recording import names
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:

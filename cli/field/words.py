@@ -52,19 +52,6 @@ def runs_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
     return columns
 
 
-def trials_lines(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
-    """What was on the rotor in each trial run, a line each."""
-    lines = []
-    for j, trial in enumerate(solved.group.trials):
-        masses = " + ".join(
-            f"{found.amount(abs(t)):.6g} {found.unit} at {angle_text(degrees(t), '.6g')}° in {plane}"
-            for plane, t in zip(solved.group.planes, solved.group.on[i, j], strict=True)
-            if t
-        )
-        lines.append(f"run {trial.run}: {masses} on{', kept' if trial.kept else ''}")
-    return lines
-
-
 def influence_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
     """The influence coefficients: a row for each sensor."""
     columns: Columns = {"sensor": [str(channel) for channel in solved.group.channels]}
@@ -75,22 +62,6 @@ def influence_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
             float(a) for a in to_si(np.abs(alpha), found.runs.per, found.runs.mass_unit)
         ]
         columns[f"{plane}: phase°"] = [round(float(a), 2) for a in degrees(alpha)]
-    return columns
-
-
-def correction_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
-    """The corrections with their uncertainty, and the equivalent removal."""
-    w = solved.corrections[i]
-    columns: Columns = {
-        "plane": list(solved.planes),
-        f"ADD {found.unit}": [float(found.amount(abs(c))) for c in w],
-        "at angle°": [float(degrees(c)) for c in w],
-    }
-    spreads = found.uncertainty(solved)
-    if spreads is not None:
-        columns[f"± {found.unit}"] = [_known(found.amount(x)) for x in spreads[0][i]]
-        columns["± angle°"] = [_known(x) for x in spreads[1][i]]
-    columns["or REMOVE at°"] = [float(degrees(-c)) if c else 0.0 for c in w]
     return columns
 
 

@@ -17,8 +17,7 @@ from cli.read.options import processes
 from cli.show.columns import Column, Table
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, spread, summary
-from virtualwork.formulas.asked import Key
-from virtualwork.formulas.recording import COMPLEX
+from virtualwork.formulas.asked import COMPLEX, Key
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

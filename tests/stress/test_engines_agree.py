@@ -24,8 +24,8 @@ from dalembert.arithmetic.adjoint import rounding_bounds
 from dalembert.arithmetic.engines import run
 from virtualwork import Mechanism
 from virtualwork.describe.errors import MechanismError
+from virtualwork.formulas.asked import names
 from virtualwork.formulas.lanes import Lanes, taped
-from virtualwork.formulas.recording import names
 
 ANSWERS = json.loads(
     (Path(__file__).parents[1] / "data" / "answers_of_0_1_0.json").read_text(encoding="utf-8")

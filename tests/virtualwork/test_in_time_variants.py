@@ -8,28 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from virtualwork import Friction, Guess, Input, Link, Mechanism
+from tests.virtualwork.test_in_time import four_bar
+from virtualwork import Friction, Input, Link, Mechanism
 from virtualwork.intime.variants import Runs, Variants
 
 G = 9.81
-
-
-def four_bar(driver: str = "crank", **more: object) -> Mechanism:
-    """A crank-rocker with masses."""
-    at = {"crank": math.radians(60), "rocker": math.radians(98.95026226818)}
-    others = {"crank": 1.05, "coupler": 0.47, "rocker": 1.73}
-    return Mechanism(
-        {"A": 0j, "D": 0.4 + 0j},
-        {
-            "crank": Link({"A": 0j, "B": 0.1 + 0j}, mass=1, center=0.05 + 0j, inertia=0.1),
-            "coupler": Link({"B": 0j, "C": 0.35 + 0j}, mass=2, center=0.175 + 0j, inertia=0.02),
-            "rocker": Link({"D": 0j, "C": 0.25 + 0j}, mass=1.5, center=0.125 + 0j, inertia=0.008),
-        },
-        inputs=Input(link=driver, value=at[driver]),
-        guess=Guess(at[driver], {name: a for name, a in others.items() if name != driver}),
-        gravity=-1j * G,
-        **more,  # type: ignore[arg-type]
-    )
 
 
 def pendulum(**more: object) -> Mechanism:

@@ -20,8 +20,8 @@ from virtualwork.describe.dimensions import dimensions, value
 from virtualwork.describe.loads import Force, Torque
 from virtualwork.family.sensitivity import Sensitivities
 from virtualwork.family.written import Written
+from virtualwork.formulas.asked import names
 from virtualwork.formulas.lanes import Lanes
-from virtualwork.formulas.recording import names
 
 # between them every kind: lengths, angles, masses, guides, gears, springs, motors, loads
 EXAMPLES = ["boom/boom", "engine/engine", "crank-press/press", "desk-lamp/lamp", "two-disc-four-bar/four-bar",

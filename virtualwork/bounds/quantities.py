@@ -25,12 +25,11 @@ from dalembert.arithmetic.adjoint import FEW, bounds_of_few, rounding_bounds
 from dalembert.arithmetic.engines import run
 from virtualwork.bounds.doubted import Doubted
 from virtualwork.bounds.second_order import Solution, grown, solution
-from virtualwork.formulas.asked import FORCES, Key, over_blocks
+from virtualwork.formulas.asked import FORCES, Key, names, over_blocks
 from virtualwork.formulas.lanes import Lanes, Turning, taped
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.recording import names
 
 # roundings of a constant that is none of the plan's: the product of a mass and a place
 CONSTANT = 1.0

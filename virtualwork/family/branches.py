@@ -17,9 +17,8 @@ from dalembert.arithmetic.engines import run, run_grid
 from virtualwork.branch.guess import BESIDE, informed
 from virtualwork.describe.description import Description
 from virtualwork.family.written import CHOICE, Written
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.asked import Key, names
 from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.recording import names
 
 Mask = NDArray[np.bool_]
 # radicand (a squared sine) below which a guess stands at a change point or a limit, or nearly so

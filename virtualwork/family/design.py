@@ -20,9 +20,8 @@ from virtualwork.describe.dimensions import Dimension
 from virtualwork.describe.errors import DescriptionError, hint
 from virtualwork.family.branches import CLOSE, DIP, TOLD, meet_on_the_way, samples, signs
 from virtualwork.family.part import Part, Solver
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.asked import COMPLEX, Key, names
 from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.recording import COMPLEX, names
 
 AT_REST: list[list[Any]] = [[0.0], [0.0], [0.0]]
 

@@ -21,12 +21,12 @@ from virtualwork.describe.dimensions import Dimension, changed
 from virtualwork.describe.errors import MechanismError
 from virtualwork.family.branches import LANES, meet_on_the_way, signs, stays_within
 from virtualwork.family.written import Written
-from virtualwork.formulas.asked import FORCES, Key, over_blocks
+from virtualwork.formulas.asked import COMPLEX, FORCES, Key, over_blocks, quantity
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Number, Reals, leave_out
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.recording import COMPLEX, NAMES, NEAR, quantity
+from virtualwork.formulas.recording import NAMES, NEAR
 
 Mask = NDArray[np.bool_]
 # the key of 0 where a pose is assembled

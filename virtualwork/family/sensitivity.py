@@ -19,10 +19,10 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.dimensions import Dimension, named, value
 from virtualwork.describe.errors import DescriptionError, MechanismError
 from virtualwork.family.written import Written
-from virtualwork.formulas.asked import FORCES, JOINTS, Key
+from virtualwork.formulas.asked import FORCES, JOINTS, Key, quantity
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.recording import NAMES, quantity
+from virtualwork.formulas.recording import NAMES
 
 # what an input's own numbers are called on the tape
 ENTERS = {"value": "q", "speed": "v", "acceleration": "a", "jerk": "j"}

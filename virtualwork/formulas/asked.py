@@ -1,4 +1,4 @@
-"""What can be asked of poses, each quantity by its key; and whether it is asked for so often that the tape pays."""
+"""What can be asked of poses, each quantity by its key, and what it is called on a tape; and whether the tape pays."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from virtualwork.formulas.poses import Poses
 
 if TYPE_CHECKING:
+    from dalembert.arithmetic.engines import Outputs
     from virtualwork.formulas.dynamics import Dynamics
 
 # (kind, of what …): see `recording.Recording.value`
@@ -28,6 +31,8 @@ FORCES = {
 }
 # what the joints carry
 JOINTS = {"newton-euler", "force", "moment", "reaction"}
+# what has two parts
+COMPLEX = {"point", "turn", "dpoint", "force", "reaction", "shaking", "applied", "gap"}
 # times that one pose is asked for, and poses, from which on the tape pays
 OFTEN = 50
 MANY_POSES = 1_000_000
@@ -95,3 +100,23 @@ def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:
         case "dangle":
             return poses.angle_coefficient(*of)
     raise KeyError(key)
+
+
+def names(key: Key) -> tuple[str, ...]:
+    """What the outputs of a quantity are called on the tape: one, or two where it is complex.
+
+    >>> names(("angle", "crank", 1)), names(("force", "pin:B", "coupler"))
+    (('angle crank 1',), ('force pin:B coupler x', 'force pin:B coupler y'))
+    """
+    text = " ".join(repr(part) if isinstance(part, complex) else str(part) for part in key)
+    return (f"{text} x", f"{text} y") if key[0] in COMPLEX else (text,)
+
+
+def quantity(rows: Outputs, key: Key, n: int, to: str | None = None) -> Any:
+    """A quantity of n lanes from the rows of a run, or its derivative `to` an input: (n,), real or complex.
+
+    What does not hang on the input has no row. A row of the run's own table is not copied.
+    """
+    of = [name if to is None else f"d({name})/d({to})" for name in names(key)]
+    value = rows.get(of[0], 0.0) if len(of) == 1 else rows.complex(*of)
+    return value if np.ndim(value) else np.full(n, value)

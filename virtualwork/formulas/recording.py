@@ -19,16 +19,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-import numpy as np
-
-from dalembert.arithmetic.engines import Outputs
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
 from dalembert.arithmetic.systems import regularity, solved
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
 from virtualwork.describe.loads import TorsionSpring
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import FORCES, JOINTS, Key
+from virtualwork.formulas.asked import FORCES, JOINTS, Key, names
 from virtualwork.formulas.block import Block, Shared, Table
 from virtualwork.formulas.dynamics import resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
@@ -392,29 +389,6 @@ class Recording:
         of = next(g for g in self.plan.groups if g.name == group)
         self.solve(self.plan.writes(of), 0)
         return self.st.margin[group]
-
-
-COMPLEX = {"point", "turn", "dpoint", "force", "reaction", "shaking", "applied", "gap"}
-
-
-def names(key: Key) -> tuple[str, ...]:
-    """What the outputs of a quantity are called on the tape: one, or two where it is complex.
-
-    >>> names(("angle", "crank", 1)), names(("force", "pin:B", "coupler"))
-    (('angle crank 1',), ('force pin:B coupler x', 'force pin:B coupler y'))
-    """
-    text = " ".join(repr(part) if isinstance(part, complex) else str(part) for part in key)
-    return (f"{text} x", f"{text} y") if key[0] in COMPLEX else (text,)
-
-
-def quantity(rows: Outputs, key: Key, n: int, to: str | None = None) -> Any:
-    """A quantity of n lanes from the rows of a run, or its derivative `to` an input: (n,), real or complex.
-
-    What does not hang on the input has no row. A row of the run's own table is not copied.
-    """
-    of = [name if to is None else f"d({name})/d({to})" for name in names(key)]
-    value = rows.get(of[0], 0.0) if len(of) == 1 else rows.complex(*of)
-    return value if np.ndim(value) else np.full(n, value)
 
 
 class _Setting(Shared):
