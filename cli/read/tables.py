@@ -315,8 +315,6 @@ def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
             return False
         decimal_comma = True
     rows = len(frame)
-    # to look for blanks once is quicker than to strip a million cells that have none
-    blanks = not source.text.isascii() or any(blank in source.text for blank in " \t\v\f\x1c\x1d\x1e\x1f")
     marks: dict[tuple[int, str], str] = {}
     for name, index, unit, kind, may_be_blank in plan:
         if kind == "number" and not marker:
@@ -348,9 +346,7 @@ def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
             table._numbered[name] = list(unique), of_code[codes]
             continue
         else:
-            cells = frame[index].tolist()
-            if blanks:
-                cells = [cell.strip() for cell in cells]
+            cells = [cell.strip() for cell in frame[index].tolist()]
             if source.has_commas([cells]) and not decimal_comma:
                 return False
             table.cells[name] = Cells(source.header[index], unit, cells, decimal_comma)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -512,3 +513,17 @@ def test_a_kept_mass_stays_on_where_its_run_is_left_out(dalembert: Dalembert) ->
     assert rotor["fit"]["residual_sd"] < 1e-12
     for one, a in zip(rotor["influence"], alpha, strict=True):
         assert polar(one["magnitude_per_kg"], one["phase_deg"]) / 1000 == pytest.approx(a, rel=1e-11)
+
+
+def test_a_large_log_is_read_as_a_small_one_line_breaks_in_cells_too(
+    dalembert: Dalembert, tmp_path: Path
+) -> None:
+    """A blank cell may be quoted and hold a line break."""
+    head = "rotor,run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n"
+    runs = ('1,1,10,20,,"\n",', '2,1,14,50,A,"5\n",30', "3,1,9,80,A,7,100")
+    for name, count in (("small.csv", 1), ("large.csv", 4000)):
+        rows = "".join(f"m{i},{run}\n" for i in range(count) for run in runs)
+        (tmp_path / name).write_text(head + rows)
+    small, large = (dalembert("field", name, "--fit") for name in ("small.csv", "large.csv"))
+    assert small.returncode == large.returncode == 0, large.stderr
+    assert large.stdout.splitlines()[:2] == small.stdout.splitlines()
