@@ -11,7 +11,7 @@ array([2., 2., 2.])
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -142,10 +142,9 @@ class Motion:
         DescriptionError
             Where no body has a point of that name.
         """
-        for body, points in self.mechanism.bodies.items():
-            if name in points:
-                return PointMotion(self, body, points[name], name)
-        raise DescriptionError(f"no point is named '{name}'")
+        if name not in self.mechanism.points:
+            raise DescriptionError(f"no point is named '{name}'")
+        return PointMotion(self, *self.mechanism.points[name], name)
 
     def at(self, link: str, point: Point | str) -> PointMotion:
         """Motion of any point of a link: a name, or coordinates in the link's own axes."""
@@ -179,12 +178,33 @@ class Motion:
 
         return Lanes(self.assembly, self.poses)
 
+    def points(self, names: Iterable[str], order: int = 0) -> dict[str, list[Complexes]]:
+        """Several points: each one's position and its derivatives in time up to an order, x + iy, from one pass."""
+        return self._up_to(order, {name: ("point", *self.mechanism.points[name], name) for name in names})
+
+    def links(self, names: Iterable[str], order: int = 0) -> dict[str, list[Reals]]:
+        """Several links: each one's angle and its derivatives in time up to an order, from one pass."""
+        return self._up_to(order, {name: ("angle", name) for name in names})
+
+    def _up_to(self, order: int, of: dict[str, Key]) -> dict[str, list[Any]]:
+        found = self.values([(*key, k) for key in of.values() for k in range(order + 1)])
+        return {name: found[i * (order + 1) : (i + 1) * (order + 1)] for i, name in enumerate(of)}
+
+    def values(self, keys: Sequence[Key]) -> list[Any]:
+        """Quantities by their keys (`Recording.value`), (n,) each: from the tape where that pays, else over blocks."""
+        keys = tuple(keys)
+        way = pays(self.assembly.recordings.setdefault("asked", {}), self.poses.n, keys)
+        if way == "lanes" or (
+            way == "one" and (self.lanes.known.keys() >= set(keys) or self.lanes.one(keys))
+        ):
+            return [value.copy() for value in self.lanes.values(keys)]
+        if FORCES.isdisjoint(key[0] for key in keys):
+            return self.poses.values(keys)
+        return [over_blocks(self.poses, key, self.dynamics) for key in keys]
+
     def value(self, key: Key) -> Any:
-        """A quantity by its key (`Recording.value`), (n,): from the tape where that pays, else over blocks of poses."""
-        way = pays(self.assembly.recordings.setdefault("asked", {}), self.n, (key,))
-        if way == "lanes" or (way == "one" and (key in self.lanes.known or self.lanes.one((key,)))):
-            return self.lanes.values((key,))[0].copy()
-        return over_blocks(self.poses, key, self.dynamics if key[0] in FORCES else None)
+        """A quantity by its key, (n,)."""
+        return self.values((key,))[0]
 
     @cached_property
     def rounding(self) -> Bounds:

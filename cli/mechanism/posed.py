@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.mechanism.poses import of_link, of_point
+from cli.mechanism.poses import of_links, of_points
 from cli.read.units import UNITS, from_si, read_degrees, written
 from cli.show.columns import Column, Section, Sheet, Table
 
@@ -33,7 +33,7 @@ def posed(
         return [None if v is None else from_si(v, "length", length) for v in clean(values, m.size)]
 
     points = dict.fromkeys(p for body in m.bodies.values() for p in body)
-    places = {p: of_point(motion, p, 0) for p in points}
+    places = of_points(motion, list(points), 0)
     table = Table(
         [
             Column("point", "", list(points)),
@@ -50,15 +50,14 @@ def posed(
         for e, v in zip(m.inputs, inputs, strict=True)
         if e.on == "ground" and not e.is_slide
     }
+    angles = of_links(motion, list(m.links), 0, driven)
     links = Table(
         [
             Column("link", "", list(m.links)),
             Column(
                 "angle",
                 "deg",
-                clean(
-                    [of_link(motion, name, 0, driven.get(name))["angle_deg"][0] for name in m.links], 360.0
-                ),
+                clean([turned["angle_deg"][0] for turned in angles.values()], 360.0),
             ),
             Column("mass", "kg", [m.rigid[name].mass for name in m.links]),
             Column("inertia", "kg_m2", [m.rigid[name].inertia for name in m.links]),

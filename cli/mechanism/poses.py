@@ -11,6 +11,8 @@ from cli.mechanism.solve import Analysis
 from cli.read.units import degrees
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from numpy.typing import NDArray
 
     from virtualwork.motion import Motion
@@ -35,18 +37,16 @@ def pair(z: NDArray[np.complex128]) -> tuple[Column, Column]:
     return cells(np.where(known, z.real, np.nan)), cells(np.where(known, z.imag, np.nan))
 
 
-def of_link(
-    motion: Motion, name: str, order: int, given: NDArray[np.float64] | None = None
-) -> dict[str, Column]:
-    """A link's angle and its rates; `given`: the angle of a driven link as it was asked for, degrees."""
-    link = motion.link(name)
-    angle = np.where(np.isfinite(link.angle), degrees(np.exp(1j * link.angle)), np.nan)
-    if given is not None:
-        angle = np.where(np.isfinite(angle), given, np.nan)
-    parts = {"angle_deg": cells(exact_degrees(angle))}
-    for key, attribute in zip(LINK[1 : order + 1], ("omega", "alpha", "jerk"), strict=False):
-        parts[key] = cells(getattr(link, attribute))
-    return parts
+def of_links(
+    motion: Motion, names: Sequence[str], order: int, given: Mapping[str, NDArray[np.float64]]
+) -> dict[str, dict[str, Column]]:
+    """Links' angles and their rates; `given`: the angles of driven links as they were asked for, degrees."""
+    found = {}
+    for name, (angle, *rates) in motion.links(names, order).items():
+        shown = exact_degrees(given[name]) if name in given else degrees(np.exp(1j * angle))
+        columns = [np.where(np.isfinite(angle), shown, np.nan), *rates]
+        found[name] = {key: cells(values) for key, values in zip(LINK, columns, strict=False)}
+    return found
 
 
 def exact_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -55,12 +55,16 @@ def exact_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(reduced >= 360.0, 0.0, reduced)
 
 
-def of_point(motion: Motion, name: str, order: int) -> dict[str, Column]:
-    """A point's position and its rates."""
-    parts: dict[str, Column] = {}
-    for k in range(order + 1):
-        parts |= zip(POINT[k], pair(motion.point(name).complex(k)), strict=True)
-    return parts
+def of_points(motion: Motion, names: Sequence[str], order: int) -> dict[str, dict[str, Column]]:
+    """Points' positions and their rates."""
+    return {
+        name: {
+            key: values
+            for keys, z in zip(POINT, found, strict=False)
+            for key, values in zip(keys, pair(z), strict=True)
+        }
+        for name, found in motion.points(names, order).items()
+    }
 
 
 def of_slide(motion: Motion, name: str, order: int) -> dict[str, Column]:
@@ -121,11 +125,8 @@ def document(analysis: Analysis) -> list[dict[str, Any]]:
                 assembled.tolist(),
                 cells(motion.condition) if analysis.only is None else None,
                 marks_of(analysis, motion),
-                {
-                    name: of_link(motion, name, analysis.order, analysis.given(name))
-                    for name in analysis.links
-                },
-                {name: of_point(motion, name, analysis.order) for name in analysis.points},
+                of_links(motion, analysis.links, analysis.order, analysis.given),
+                of_points(motion, analysis.points, analysis.order),
                 {name: of_slide(motion, name, analysis.order) for name in analysis.slides},
             )
         )

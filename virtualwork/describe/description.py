@@ -126,6 +126,15 @@ class Description(Record):
         return {GROUND: self.ground} | {name: link.points for name, link in self.links.items()}
 
     @cached_property
+    def points(self) -> Mapping[str, tuple[str, complex]]:
+        """Each named point: the first body that has it, the ground before the links, and its place in that body's axes."""
+        found: dict[str, tuple[str, complex]] = {}
+        for body, points in self.bodies.items():
+            for name, z in points.items():
+                found.setdefault(name, (body, z))
+        return found
+
+    @cached_property
     def pins(self) -> Mapping[str, tuple[str, ...]]:
         """The bodies that meet at each pin, in the order of the file, the ground first."""
         holders: dict[str, list[str]] = {}
