@@ -26,7 +26,7 @@ from virtualwork.describe.parts import Point, as_point
 from virtualwork.formulas.asked import FORCES, Key, over_blocks, pays
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.sweep import EvenSweep
+from virtualwork.formulas.positions import EvenSweep
 from virtualwork.parts_of_motion import LinkMotion, PointMotion, SlideMotion
 from virtualwork.plan.steps import Step
 from virtualwork.table import columns

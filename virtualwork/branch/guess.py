@@ -14,11 +14,12 @@ from virtualwork.branch.choice import Choice
 from virtualwork.branch.solutions import every_solution, guessed_unknowns
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
+from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
 from virtualwork.formulas.linear import stack, stack_rows
 from virtualwork.formulas.newton import gaps, newton, write_unknowns
 from virtualwork.formulas.numbers import Number, cross, dot
-from virtualwork.formulas.positions import Case, State, columns, run
+from virtualwork.formulas.positions import State, columns, run
 from virtualwork.formulas.winding import principal
 from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
@@ -353,11 +354,12 @@ def distance(
             total = total + squared(bare(st.turn[body] - bare(rotation(angles[body]))))
         base, terms = done.anchors[body]
         placed = all(t.body in st.turn and (t.slide is None or t.slide in st.slide) for t in terms)
-        if placed and base in st.point and body in st.turn:
-            for name, z in m.links[body].points.items():
-                if name in points:
-                    here = st.point[base] + st.sum(terms) + z * st.turn[body]
-                    total = total + squared(bare(here - points[name])) / bare(m.size**2)
+        named = [(name, z) for name, z in m.links[body].points.items() if name in points]
+        if named and placed and base in st.point and body in st.turn:
+            origin = st.at((base, terms))
+            for name, z in named:
+                here = origin + z * st.turn[body]
+                total = total + squared(bare(here - points[name])) / bare(m.size**2)
     return total
 
 

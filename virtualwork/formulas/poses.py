@@ -18,9 +18,8 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.linear import inverse_norm, stack
 from virtualwork.formulas.numbers import Complexes, Number, Reals
-from virtualwork.formulas.positions import BLOCK, SWEEP, Case, State, columns, run
+from virtualwork.formulas.positions import BLOCK, SWEEP, EvenSweep, State, columns, run
 from virtualwork.formulas.rates import Passage, Rates
-from virtualwork.formulas.sweep import EvenSweep
 from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
 
 
@@ -56,8 +55,8 @@ class Branch(Protocol):
         """The steps that targets hang on, as far as they were asked for."""
 
     @property
-    def plain(self) -> dict[str, tuple[Case, int, float]]:
-        """The closed forms that keep their sign wherever the input goes: case, sign, size."""
+    def plain(self) -> dict[str, Callable[[State], None]]:
+        """The closed forms that keep their sign wherever the input goes, each ready to be solved."""
 
     @property
     def close(self) -> Callable[[Group, State], None]:
