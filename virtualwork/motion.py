@@ -29,7 +29,6 @@ from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.positions import EvenSweep
 from virtualwork.parts_of_motion import LinkMotion, PointMotion, SlideMotion
 from virtualwork.plan.steps import Step
-from virtualwork.table import columns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -384,6 +383,8 @@ class Motion:
         ['crank_rad', 'assembled', 'crank_angle_rad', 'P_x_m', 'P_y_m']
         """
         from pandas import DataFrame
+
+        from virtualwork.table import columns
 
         return DataFrame(columns(self.poses))
 

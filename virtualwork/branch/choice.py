@@ -9,9 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from dalembert.arithmetic.records import record
+from dalembert.arithmetic.records import Record, record
 from virtualwork.describe.description import Description
-from virtualwork.describe.record import Record
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import State, run

@@ -11,13 +11,10 @@ import numpy as np
 from dalembert.arithmetic.recorded import bare, squared
 from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.choice import Choice
-from virtualwork.branch.solutions import every_solution, guessed_unknowns
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
 from virtualwork.formulas.linear import stack, stack_rows
-from virtualwork.formulas.newton import gaps, newton, write_unknowns
 from virtualwork.formulas.numbers import Number, cross, dot
 from virtualwork.formulas.positions import State, columns, run
 from virtualwork.formulas.winding import principal
@@ -90,6 +87,8 @@ class _Chooser:
 
     def _refuse_floating(self) -> None:
         """Refuse a mechanism of which a part is free though the count of its joints and inputs says otherwise."""
+        from virtualwork.formulas.constraints import hidden_freedom
+
         x = []
         for name, link in self.m.links.items():
             turn = complex(np.exp(1j * self.angles.get(name, 0.0)))
@@ -140,6 +139,8 @@ class _Chooser:
 
     def _refuse_overdriven(self, done: Plan, st: State) -> None:
         """Constraints that depend on each other may leave less motion than there are inputs."""
+        from virtualwork.formulas.constraints import Constraints, coordinates
+
         jacobian = Constraints.at(self.m, coordinates(self.m, done, st), {}).jacobian
         try:
             s = np.linalg.svd(jacobian, compute_uv=False)
@@ -306,6 +307,10 @@ class _Chooser:
 
     # --- groups with no closed form ------------------------------------------------------------------------
     def _newton(self, group: Group, st: State) -> Any:
+        # a mechanism whose groups all have a closed form does not load these
+        from virtualwork.branch.solutions import every_solution, guessed_unknowns
+        from virtualwork.formulas.newton import gaps, newton, write_unknowns
+
         many = st.copy(many=True)
         why = ""
         start = guessed_unknowns(group, many, self.angles, self.points, self.m, self.plan.directions)

@@ -12,21 +12,22 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from virtualwork.branch.change_point import ChangePoint, near_by, put, through
 from virtualwork.branch.choice import Choice
-from virtualwork.branch.continuation import Continuation, along_lines
-from virtualwork.branch.limits import Limit, limits, own_range
-from virtualwork.branch.period import SAME, repetition
+from virtualwork.branch.limits import SAME, Limit, limits, own_range, repetition
 from virtualwork.branch.radicand import lowest, rounding, vanishes
 from virtualwork.branch.winding import Winding, wind_along_lines
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.positions import State, run
 from virtualwork.plan.steps import Group, Step, turns
+
+if TYPE_CHECKING:
+    from virtualwork.branch.continuation import Continuation
 
 # of one turn, or of one mechanism's size of slide
 SAMPLES = 720
@@ -338,7 +339,7 @@ class Track:
         """How many turns of the input tell the poses of the branch apart: its period.
 
         A branch between two limits needs what tells its own inputs apart; any other as many as bring every group back
-        to where it stood. None with a slide or several inputs, and where no number of turns up to `period.TURNS` does it.
+        to where it stood. None with a slide or several inputs, and where no number of turns up to `limits.TURNS` does it.
         """
         n = self.repetition
         if n == 1 or self.slides or not self.has_limits:
@@ -387,6 +388,9 @@ class Track:
     # --- groups with no closed form ------------------------------------------------------------------------------
     def _continued(self, group: Group) -> Continuation:
         if group.name not in self.continuations:
+            # four files: a mechanism whose groups all have a closed form does not load them
+            from virtualwork.branch.continuation import Continuation
+
             self.continuations[group.name] = Continuation(self, group)
         return self.continuations[group.name]
 
@@ -395,4 +399,6 @@ class Track:
         if self.active:
             self._continued(group).close(st)
         else:
+            from virtualwork.branch.continuation import along_lines
+
             along_lines(self, group, st)

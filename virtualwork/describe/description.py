@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
-from dalembert.arithmetic.records import record
+from dalembert.arithmetic.records import Record, record
 from virtualwork.describe.checks import refuse
 from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.describe.parts import (
@@ -25,7 +25,6 @@ from virtualwork.describe.parts import (
     as_point,
     as_points,
 )
-from virtualwork.describe.record import Record
 
 
 @record
