@@ -230,13 +230,11 @@ class Track:
                 if isinstance(s, Group) and s.kind == "Newton":
                     return
                 self.assembly.run_untracked([s], st)
-                if isinstance(s, Group) and s.kind != "PRP" and vanishes(st.margin[s.name], self._noise(s)):
-                    self._fold(s.name)
-                    self.assembly.cases[s.name].solve(st, 1, self.assembly.mechanism.size, folded=True)
-
-    def _noise(self, group: Group) -> float:
-        """The rounding of a group's radicand."""
-        return rounding(self.assembly.cases[group.name], self.assembly.mechanism.size)
+                if isinstance(s, Group) and s.kind != "PRP":
+                    case, size = self.assembly.cases[s.name], self.assembly.mechanism.size
+                    if vanishes(st.margin[s.name], rounding(case, size)):
+                        self._fold(s.name)
+                        case.solve(st, 1, size, folded=True)
 
     def warnings(self) -> tuple[str, ...]:
         """The assembly's warnings, and the groups that are singular in every pose in what was covered."""
@@ -289,7 +287,8 @@ class Track:
 
     def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
         """Find where the radicand crosses or touches zero; say whether a change point was found."""
-        if group.kind != "PRP" and vanishes(m, self._noise(group)):
+        noise = rounding(self.assembly.cases[group.name], self.assembly.mechanism.size)
+        if vanishes(m, noise):
             self._fold(group.name)
             return True
         if np.mean(np.abs(m) < 1e-14) > 0.9:
@@ -303,16 +302,16 @@ class Track:
         dips = 1 + np.flatnonzero((m[1:-1] <= m[:-2]) & (m[1:-1] < m[2:]) & (np.abs(m[1:-1]) < DIP))
         fresh: list[float] = []
         for i in dips:
-            found = lowest(partial(self.margin, group), float(q[i - 1]), float(q[i + 1]), self._noise(group))
+            found = lowest(partial(self.margin, group), float(q[i - 1]), float(q[i + 1]), noise)
             if found is None:
                 continue
-            where, depth, noise = found
+            where, depth, left = found
             # the gap is narrower than the samples
-            if depth < -noise and m[i] > 0:
+            if depth < -left and m[i] > 0:
                 self.brackets += [(group.name, float(q[i - 1]), where), (group.name, where, float(q[i + 1]))]
             # a change point at the seam of two chunks belongs to both
             edge = 1e-9 * self.length
-            if abs(depth) <= noise and a - edge <= where < b + edge:
+            if abs(depth) <= left and a - edge <= where < b + edge:
                 known = self.flips.setdefault(group.name, np.empty(0))
                 self.assembly.plain.pop(group.name, None)
                 if not len(known) or np.abs(known - where).min() > SAME * self.length:

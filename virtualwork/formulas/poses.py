@@ -212,22 +212,14 @@ class Poses:
                     for i in range(0, self.n, BLOCK)
                 ]
                 if k == 1 and self.swept:
-                    self._sweep(self.inputs[:, 0], self._blocks)
+                    sweep = self.block_of or EvenSweep(self.inputs[0, 0], self.inputs[-1, 0], self.n)
+                    sweep.give(self._blocks)
         return self._blocks
 
     @property
     def swept(self) -> bool:
         """Whether this is a sweep of so many poses, or a block of one, that e^{iq} is formed by angle addition."""
         return self.n > SWEEP or self.block_of is not None
-
-    def _sweep(self, q: Reals, blocks: list[State]) -> None:
-        """Give the blocks of an even sweep their e^{iq}; where one block is not even, none gets them."""
-        sweep = self.block_of or EvenSweep(q[0], q[-1], self.n)
-        if all(sweep.off(q[i : i + BLOCK]) is not None for i in range(0, len(q), BLOCK)):
-            for st in blocks:
-                turns = sweep.turns(np.asarray(st.inputs[0]))
-                if turns is not None:
-                    st.spins[0] = turns
 
     def rows(self) -> Iterator[tuple[slice, State]]:
         """The blocks, each with the poses that are in it."""

@@ -6,7 +6,7 @@ Assur group. The steps do not know what kind of numbers they run on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -158,6 +158,16 @@ class EvenSweep:
         with np.errstate(invalid="ignore"):
             off = (q - q[0]) - self.ramp[: len(q)]
             return off if off.max() <= self.bound and off.min() >= -self.bound else None
+
+    def give(self, blocks: Sequence[State]) -> None:
+        """Give blocks of poses their e^{iq}; where one block is not even, none gets them."""
+        turns = []
+        for st in blocks:
+            turns.append(self.turns(st.inputs[0]))
+            if turns[-1] is None:
+                return
+        for st, spin in zip(blocks, turns, strict=True):
+            st.spins[0] = spin
 
     def turns(self, q: Reals) -> Complexes | None:
         """e^{iq} of a block, (≤ BLOCK,); None where the sweep is not even."""

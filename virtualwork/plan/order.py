@@ -97,7 +97,7 @@ class _Planner:
         self.joined: set[str] = set()
 
     def run(self) -> Plan:
-        self.blocks = decompose(self.m)
+        self.blocks = decompose(self.m, self.relations)
         for body_point, z in self.points[GROUND].items():
             self._place(body_point, GROUND, z)
         pending = list(self.blocks.order)
