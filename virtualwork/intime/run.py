@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -207,7 +207,7 @@ def simulate(
     equations = own.equations
     equations.refuse(float(t[0]), q, v)
     scale = np.array(equations.scale)
-    levels = _levels(m.inputs, until)
+    levels = levels_of(m.inputs, until)
     tolerance = max(LEAST, FIRST * accuracy)
     start = float(t[0]), q, v
     fine = travel(own, start, float(t[-1]), tolerance, levels, DormandPrince())
@@ -221,7 +221,7 @@ def simulate(
         fine = travel(ways, start, float(t[-1]), tolerance / (GAIN + 1), levels, method, coarse)
         coarse.backwards()
         part = 1.0 if equations.crosses else share(tolerance)
-        found = Run(assembly, _reached(t, fine), fine, coarse, part)
+        found = Run(assembly, reached(t, fine.end), fine, coarse, part)
         worst = float((found.error_estimate / scale).max())
         if worst <= accuracy or tolerance <= LEAST or tries == TRIES - 1 or fine.steps > MOST / 2:
             break
@@ -263,7 +263,7 @@ def _state(
     return np.broadcast_to(value, (k,)).tolist()  # type: ignore[no-any-return]
 
 
-def _levels(inputs: Sequence[Input], until: Mapping[str, float] | None) -> dict[int, float]:
+def levels_of(inputs: Sequence[Input], until: Mapping[str, float] | None) -> dict[int, float]:
     """The values of inputs that end the motion."""
     names = [e.name for e in inputs]
     for name in until or ():
@@ -272,12 +272,17 @@ def _levels(inputs: Sequence[Input], until: Mapping[str, float] | None) -> dict[
     return {names.index(name): float(level) for name, level in (until or {}).items()}
 
 
-def _reached(t: Reals, way: Travel) -> Reals:
-    """The times up to the end of a way; where it ends before the last, its end is the last."""
-    if way.end >= t[-1]:
+def reached(t: Reals, end: float) -> Reals:
+    """The times up to the end of a motion; where it ends before the last, its end is the last."""
+    if end >= t[-1]:
         return t
-    near = 1e-8 * (way.end - t[0])
-    return np.append(t[t < way.end - near], way.end)
+    near = 1e-8 * (end - t[0])
+    return np.append(t[t < end - near], end)
+
+
+def not_met(until: Iterable[str], last: float) -> str:
+    """What is said where no input has its value up to the last time."""
+    return f"{', '.join(until)}: the event is not met before {last:g} s"
 
 
 def _said(
@@ -286,7 +291,7 @@ def _said(
     """What must be said of the answer."""
     found = []
     if run.fine.ended == "end" and until:
-        found.append(f"{', '.join(until)}: the event is not met before {asked[-1]:g} s")
+        found.append(not_met(until, float(asked[-1])))
     if run.fine.ended == "budget":
         found.append(f"ends at {run.fine.end:.9g} s, after {MOST} steps: a lower accuracy takes fewer")
     elif run.fine.ended not in ("end", "until"):
