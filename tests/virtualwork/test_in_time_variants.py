@@ -160,8 +160,8 @@ def test_lanes_and_single_runs_end_alike_where_one_of_two_inputs_does() -> None:
 def test_an_event_ends_lanes_that_are_let_go_singly_too() -> None:
     """A rocker that passes its dead point: no lane can, and each is let go alone."""
     family = four_bar("rocker").vary({"links.coupler.mass": [1.0, 2.0]})
-    runs = family.simulate([0, 0.5, 1.0], speed=3.0, until={"rocker": 1.5})
-    assert ((runs.times[:, 2] > 0.5) & (runs.times[:, 2] < 1.0)).all()
-    assert runs.angle[:, 2, 0] == pytest.approx([1.5, 1.5], abs=1e-15)
+    runs = family.simulate([0, 0.5, 1.0], speed=3.0, until={"rocker": 1.7})
+    assert np.isfinite(runs.times).sum(axis=1).tolist() == [2, 2]
+    assert runs.angle[:, 1, 0] == pytest.approx([1.7, 1.7], abs=1e-14)
     with pytest.raises(ValueError, match="no input is named 'bab'"):
         family.simulate([0, 1.0], until={"bab": 1.0})
