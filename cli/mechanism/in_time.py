@@ -160,6 +160,17 @@ class InTime:
     def _error(self, kind: str, name: Any, key: str) -> list[float]:
         return bounds_of(self.run.spread(self.fine[kind][name][key], self.coarse[kind][name][key]))
 
+    @property
+    def errors(self) -> dict[tuple[str, Any, str], list[float]]:
+        """The bounds of the errors of all that has one, worked out."""
+        return {
+            (kind, name, key): self._error(kind, name, key)
+            for kind, entries in self.fine.items()
+            for name, of in entries.items()
+            for key in of
+            if not key.startswith("error")
+        }
+
     def document(self) -> Document:
         """The JSON document."""
         return {

@@ -165,3 +165,9 @@ def test_an_event_ends_lanes_that_are_let_go_singly_too() -> None:
     assert runs.angle[:, 1, 0] == pytest.approx([1.7, 1.7], abs=1e-14)
     with pytest.raises(ValueError, match="no input is named 'bab'"):
         family.simulate([0, 1.0], until={"bab": 1.0})
+
+
+def test_variants_at_their_first_time_alone() -> None:
+    runs = pendulum().vary({"links.bob.mass": [1.0, 2.0]}).simulate([0.5], angle=0.25, speed=2.0)
+    assert runs.angle[:, 0, 0].tolist() == [0.25, 0.25]
+    assert runs.acceleration[:, 0, 0] == pytest.approx([-G * math.cos(0.25)] * 2, rel=1e-14)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
     from dalembert.page import Page, Shown
-    from virtualwork.animation import JointForce
+    from virtualwork.animation import JointForce, Series
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +158,7 @@ class Run:
         >>> "P_vx_m_s" in pendulum.simulate([0, 0.1, 0.2], angle=0.0).animate().html
         True
         """
-        from virtualwork.animation import JointForce, force_columns, plain
+        from virtualwork.animation import JointForce, force_columns, moving_page, plain
         from virtualwork.table import moving_columns
 
         m = self.assembly.mechanism
@@ -169,14 +169,21 @@ class Run:
         table |= moving_columns(m, self.motion.poses, 3)
         pairs = self.first_motion.dynamics.reactions.order.pairs if forces else ()
         table |= force_columns(self.motion.dynamics, pairs)
-        return self.page(plain(table), ["t_s", *inputs], [JointForce.of(*pair) for pair in pairs])
+        series = self.series(plain(table), ["t_s", *inputs], [JointForce.of(*pair) for pair in pairs])
+        return moving_page(m.name, [series], time="t_s")
 
-    def page(self, columns: Mapping[str, Shown], over: Sequence[str], arrows: Sequence[JointForce]) -> Page:
-        """Return the page of columns of this run, `t_s` and `over` among them; see `virtualwork.animation.Series`.
+    def series(
+        self,
+        columns: Mapping[str, Shown],
+        over: Sequence[str],
+        arrows: Sequence[JointForce],
+        name: str = "",
+    ) -> Series:
+        """Return this run for a page, with columns (`t_s` and `over` among them); see `virtualwork.animation.Series`.
 
         They have every place and rate, for a page solves nothing of a motion whose coordinates change on the way.
         """
-        from virtualwork.animation import Series, moving_page
+        from virtualwork.animation import Series
         from virtualwork.picture.shapes import shapes_of
 
         home = self.fine.legs[0].coordinates
@@ -184,8 +191,7 @@ class Run:
         drawing = shapes_of(self.first_motion.poses, self.motion.poses)
         # beyond a dead point the inputs have another pose
         fine = len(self.fine.legs) == 1
-        series = Series(poses, drawing, columns, over, arrows, fine=fine)
-        return moving_page(poses.mechanism.name, [series], time="t_s")
+        return Series(poses, drawing, columns, over, arrows, name, fine)
 
 
 def simulate(
