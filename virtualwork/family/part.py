@@ -141,7 +141,9 @@ class Solver:
 
     @cached_property
     def _given(self) -> dict[str, Reals]:
-        return {d.path: np.ascontiguousarray(self.part.values[:, i]) for i, d in enumerate(self.part.dimensions)}
+        return {
+            d.path: np.ascontiguousarray(self.part.values[:, i]) for i, d in enumerate(self.part.dimensions)
+        }
 
     @cached_property
     def _signs(self) -> tuple[dict[str, Reals], Mask]:
@@ -190,9 +192,7 @@ class Solver:
             self._one(int(place), keys, found)
         return found
 
-    def lanes(
-        self, keys: Sequence[Key], out: Sequence[NDArray[Any]] | None = None
-    ) -> tuple[list[Any], Mask]:
+    def lanes(self, keys: Sequence[Key], out: Sequence[NDArray[Any]] | None = None) -> tuple[list[Any], Mask]:
         """The quantities of the variants that are on the tape; and which are not, (v,): of those they are NaN."""
         v, n = self.part.shape
         there = self._taken(keys) if self.takes(keys) else np.zeros(v, dtype=bool)

@@ -18,6 +18,7 @@ from dalembert.arithmetic.tape import Tape
 
 Reals = NDArray[np.float64]
 Rows = Sequence[Reals] | Reals
+Tables = Sequence[NDArray[Any]] | NDArray[Any]
 ENGINES = ("python", "numpy", "llvm")
 NARROW = 32  # columns from which on a grid is worked on as one
 WIDEST = 8  # columns from which on compiled code takes a grid: its longest vector
@@ -136,8 +137,8 @@ def _table(rows: int, n: int, pairs: frozenset[int]) -> Rows:
 
 
 def run_grid(
-    tape: Tape, inputs: Mapping[str, Any], shape: tuple[int, int], out: Sequence[NDArray[Any]] | None = None
-) -> Sequence[NDArray[Any]]:
+    tape: Tape, inputs: Mapping[str, Any], shape: tuple[int, int], out: Tables | None = None
+) -> Tables:
     """Run a tape over a grid, every row with every column, such as variants with poses.
 
     Parameters
@@ -156,7 +157,7 @@ def run_grid(
         `out`, or new arrays (r, c).
     """
     r, c = shape
-    table = np.empty((len(tape.outputs), r, c)) if out is None else out
+    table: Tables = np.empty((len(tape.outputs), r, c)) if out is None else out
     given = [np.asarray(inputs[name], dtype=float) for name in tape.inputs]
     given = [x.reshape(()) if x.size == 1 else x for x in given]
     engine = os.environ.get("DALEMBERT_ENGINE") or chosen(tape, r * c)
@@ -210,7 +211,7 @@ def _on_floats(tape: Tape, columns: list[Reals], table: Rows, n: int) -> None:
             blocks.run(tape, [np.array([value]) for value in values], [row[lane : lane + 1] for row in table])
 
 
-def _on_llvm(tape: Tape, inputs: list[Reals], table: Rows, shape: tuple[int, int]) -> bool:
+def _on_llvm(tape: Tape, inputs: list[Reals], table: Tables, shape: tuple[int, int]) -> bool:
     # llvmlite takes some 0.1 s to load: only where it works
     from dalembert.arithmetic.engines import llvm
 

@@ -86,7 +86,7 @@ def compiled(tape: Tape, rows: frozenset[str], columns: frozenset[str]) -> Grid:
 
 
 def run(
-    tape: Tape, inputs: Sequence[Reals], shape: tuple[int, int], out: Sequence[NDArray[Any]]
+    tape: Tape, inputs: Sequence[Reals], shape: tuple[int, int], out: Sequence[NDArray[Any]] | NDArray[Any]
 ) -> None:
     """Run a tape over a grid.
 
@@ -123,4 +123,6 @@ def run(
         for j in range(0, c, WIDE):
             wide = min(WIDE, c - j)
             part = {name: x[:, j : j + wide] if name in columns else x for name, x in given.items()}
-            grid.over(part, [table[:, j : j + wide] if table.ndim == 2 else table for table in out], (r, wide))
+            grid.over(
+                part, [table[:, j : j + wide] if table.ndim == 2 else table for table in out], (r, wide)
+            )

@@ -51,7 +51,10 @@ class Code:
             # the pieces that complex numbers are of lie apart here, as any two outputs
             wide = np.empty((len(out), 2 * self.width))
             inputs = [np.resize(x, self.width) if x.ndim else x for x in inputs]
-            to = [row[::2] if x.strides[-1] == 16 else row[: self.width] for row, x in zip(wide, out, strict=True)]
+            to = [
+                row[::2] if x.strides[-1] == 16 else row[: self.width]
+                for row, x in zip(wide, out, strict=True)
+            ]
             for k in _pairs(out):
                 to[k + 1] = wide[k, 1::2]
             self(inputs, to, (1, self.width))
@@ -90,9 +93,7 @@ def _pairs(out: Sequence[Reals] | Reals) -> list[int]:
     return found
 
 
-def run(
-    tape: Tape, inputs: Sequence[Reals], out: Sequence[Any] | Reals, shape: tuple[int, int]
-) -> bool:
+def run(tape: Tape, inputs: Sequence[Reals], out: Sequence[Any] | Reals, shape: tuple[int, int]) -> bool:
     """Run a tape; False where this machine or this tape is not for compiled code.
 
     Parameters
@@ -134,7 +135,9 @@ def _kind(x: Reals, rows: int, columns: int) -> str:
 def _code(tape: Tape, inputs: str, outputs: str) -> Code | None:
     from dalembert.arithmetic.engines.lowered import lowered
 
-    found = loaded(f"{tape.key}|{inputs}|{outputs}", "tape", lambda width: lowered(tape, inputs, outputs, width))
+    found = loaded(
+        f"{tape.key}|{inputs}|{outputs}", "tape", lambda width: lowered(tape, inputs, outputs, width)
+    )
     return None if found is None else Code(*found)
 
 
