@@ -256,6 +256,9 @@ def _keep(path: Path, code: bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         partial.write_bytes(sha256(code).digest() + code)
         os.replace(partial, path)
+        # what one that was killed left of it; whoever still writes the same finds it done
+        for left in path.parent.glob(f"{path.name}.*.part"):
+            left.unlink(missing_ok=True)
     except OSError:
         try:
             partial.unlink(missing_ok=True)
