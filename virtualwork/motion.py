@@ -11,7 +11,7 @@ array([2., 2., 2.])
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -176,18 +176,6 @@ class Motion:
         from virtualwork.formulas.lanes import Lanes
 
         return Lanes(self.assembly, self.poses)
-
-    def points(self, names: Iterable[str], order: int = 0) -> dict[str, list[Complexes]]:
-        """Several points: each one's position and its derivatives in time up to an order, x + iy, from one pass."""
-        return self._up_to(order, {name: ("point", *self.mechanism.points[name], name) for name in names})
-
-    def links(self, names: Iterable[str], order: int = 0) -> dict[str, list[Reals]]:
-        """Several links: each one's angle and its derivatives in time up to an order, from one pass."""
-        return self._up_to(order, {name: ("angle", name) for name in names})
-
-    def _up_to(self, order: int, of: dict[str, Key]) -> dict[str, list[Any]]:
-        found = self.values([(*key, k) for key in of.values() for k in range(order + 1)])
-        return {name: found[i * (order + 1) : (i + 1) * (order + 1)] for i, name in enumerate(of)}
 
     def values(self, keys: Sequence[Key]) -> list[Any]:
         """Quantities by their keys (`Recording.value`), (n,) each: from the tape where that pays, else over blocks."""

@@ -32,16 +32,15 @@ def posed(
     def lengths(values: list[float | None]) -> list[float | None]:
         return [None if v is None else from_si(v, "length", length) for v in clean(values, m.size)]
 
-    points = dict.fromkeys(p for body in m.bodies.values() for p in body)
-    places = of_points(motion, list(points), 0)
+    places = of_points(motion, {p: ("point", *place, p) for p, place in m.points.items()}, 0)
     table = Table(
         [
-            Column("point", "", list(points)),
+            Column("point", "", list(places)),
             Column(
-                "of", "", [", ".join(name for name, body in m.bodies.items() if p in body) for p in points]
+                "of", "", [", ".join(name for name, body in m.bodies.items() if p in body) for p in places]
             ),
-            Column("x", length, lengths([places[p]["x_m"][0] for p in points])),
-            Column("y", length, lengths([places[p]["y_m"][0] for p in points])),
+            Column("x", length, lengths([places[p]["x_m"][0] for p in places])),
+            Column("y", length, lengths([places[p]["y_m"][0] for p in places])),
         ],
         ("point",),
     )

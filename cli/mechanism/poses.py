@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from virtualwork.formulas.asked import Key
     from virtualwork.motion import Motion
 
 Column = list[Any]
@@ -37,12 +38,18 @@ def pair(z: NDArray[np.complex128]) -> tuple[Column, Column]:
     return cells(np.where(known, z.real, np.nan)), cells(np.where(known, z.imag, np.nan))
 
 
+def up_to(motion: Motion, order: int, of: dict[str, Key]) -> dict[str, list[Any]]:
+    """Quantities and their derivatives in time up to an order, from one pass; `of`: their keys without the order."""
+    found = iter(motion.values([(*key, k) for key in of.values() for k in range(order + 1)]))
+    return {name: [next(found) for _ in range(order + 1)] for name in of}
+
+
 def of_links(
     motion: Motion, names: Sequence[str], order: int, given: Mapping[str, NDArray[np.float64]]
 ) -> dict[str, dict[str, Column]]:
     """Links' angles and their rates; `given`: the angles of driven links as they were asked for, degrees."""
     found = {}
-    for name, (angle, *rates) in motion.links(names, order).items():
+    for name, (angle, *rates) in up_to(motion, order, {name: ("angle", name) for name in names}).items():
         shown = exact_degrees(given[name]) if name in given else degrees(np.exp(1j * angle))
         columns = [np.where(np.isfinite(angle), shown, np.nan), *rates]
         found[name] = {key: cells(values) for key, values in zip(LINK, columns, strict=False)}
@@ -55,15 +62,15 @@ def exact_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(reduced >= 360.0, 0.0, reduced)
 
 
-def of_points(motion: Motion, names: Sequence[str], order: int) -> dict[str, dict[str, Column]]:
-    """Points' positions and their rates."""
+def of_points(motion: Motion, places: dict[str, Key], order: int) -> dict[str, dict[str, Column]]:
+    """Points' positions and their rates; `places`: their keys."""
     return {
         name: {
             key: values
             for keys, z in zip(POINT, found, strict=False)
             for key, values in zip(keys, pair(z), strict=True)
         }
-        for name, found in motion.points(names, order).items()
+        for name, found in up_to(motion, order, places).items()
     }
 
 
@@ -126,7 +133,7 @@ def document(analysis: Analysis) -> list[dict[str, Any]]:
                 cells(motion.condition) if analysis.only is None else None,
                 marks_of(analysis, motion),
                 of_links(motion, analysis.links, analysis.order, analysis.given),
-                of_points(motion, analysis.points, analysis.order),
+                of_points(motion, analysis.places, analysis.order),
                 {name: of_slide(motion, name, analysis.order) for name in analysis.slides},
             )
         )
