@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from dalembert.arithmetic.engines.blocks import NUMPY
+from dalembert.arithmetic.arrays import NUMPY
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
 from dalembert.arithmetic.tape import Kind, Tape
 
