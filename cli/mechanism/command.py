@@ -326,7 +326,7 @@ def run(
         if html is not None:
             refuse_long(q.n * (1 if several is None else several.count))
         alone = several is None and html is None and not spreads and own in ([], ["--forces"])
-        if alone and show.streams and analysis.is_long:
+        if alone and show.streams and not show.as_json and analysis.is_long:
             return _long(analysis, forces, states, show.digits)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not show.json or show.expect is not None or show.output is not None

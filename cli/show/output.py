@@ -154,9 +154,11 @@ class ShowOptions:
 
     @property
     def streams(self) -> bool:
-        """Whether a table is all that is asked for, so that it can be written block by block."""
-        others = self.json or self.text or self.plot or self.expect or self.report
-        return self.form in (".csv", ".parquet", ".xlsx") and not others
+        """Whether one table, or one JSON document, is all that is asked for, so that it can be written part by part."""
+        others = self.text or self.plot or self.expect or self.report or (self.json and self.output)
+        # what --digits says of the table stands in the document too
+        others = others or (self.digits and self.form == ".json")
+        return self.form in (".csv", ".parquet", ".xlsx", ".json") and not others
 
     @property
     def as_json(self) -> bool:

@@ -194,20 +194,23 @@ class Solver:
             self._one(int(place), keys, out)
         return out
 
-    def lanes(self, keys: Sequence[Key]) -> tuple[list[Any], Mask]:
-        """The quantities of the variants that are on the tape; and which are not, (v,): of those they are NaN."""
+    def lanes(self, keys: Sequence[Key], near: float = 0.0) -> tuple[list[Any], Mask]:
+        """The quantities of the variants that are on the tape; and which are not, (v,): of those they are NaN.
+
+        `near`: a variant is not, if a radicand of its poses is below this.
+        """
         v, n = self.part.shape
         there = self._taken(keys) if self.takes(keys) else np.zeros(v, dtype=bool)
         alone = ~there
         each = max(1, LANES // max(n, 1))
         if not alone.any() and v <= each:
-            return self._on_tape(keys, slice(None))
+            return self._on_tape(keys, slice(None), near)
         out = [np.empty((v, n), complex if key[0] in COMPLEX else float) for key in keys]
         places = np.flatnonzero(there)
         for i in range(0, len(places), each):
             rows = places[i : i + each]
-            found, near = self._on_tape(keys, rows)
-            alone[rows[near]] = True
+            found, apart = self._on_tape(keys, rows, near)
+            alone[rows[apart]] = True
             for to, values in zip(out, found, strict=True):
                 to[rows] = values
         for to in out:
@@ -244,29 +247,32 @@ class Solver:
             found &= stays_within(self.written, m, self._known, ("twist", number), HALF, low, high)
         return found
 
-    def _on_tape(self, keys: Sequence[Key], rows: NDArray[np.intp] | slice) -> tuple[list[Any], Mask]:
+    def _on_tape(
+        self, keys: Sequence[Key], rows: NDArray[np.intp] | slice, near: float
+    ) -> tuple[list[Any], Mask]:
         """Work out some variants on the tape; and which of them are better described alone."""
         assert self.written is not None
         v, n = len(self.part.values[rows]), self.part.shape[1]
         written = self.written
         closed = {key: ("closed", *written.recording.hangs_on(key)) for key in keys}
-        forces = any(key[0] in FORCES for key in keys)
-        margins: list[Key] = [("margin", g.name) for g in written.closed] if forces else []
+        if any(key[0] in FORCES for key in keys):
+            near = max(near, NEAR)
+        margins: list[Key] = [("margin", g.name) for g in written.closed] if near else []
         asked = [key for key in keys if key != ASSEMBLED]
         whole = list(dict.fromkeys(closed.values()))
         tape = written.tape((*asked, *whole, *margins))
         with np.errstate(all="ignore"):
             found = run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n))
             lanes = {key: quantity(found, key, v * n).reshape(v, n) for key in (*asked, *whole, *margins)}
-        near = np.zeros(v, dtype=bool)
+        apart = np.zeros(v, dtype=bool)
         for key in margins:
-            near |= (np.abs(lanes[key]) < NEAR).any(axis=1)
+            apart |= (np.abs(lanes[key]) < near).any(axis=1)
         gaps = {key: ~np.isfinite(lanes[key]) for key in whole}
         values = [np.zeros((v, n)) if key == ASSEMBLED else lanes[key] for key in keys]
         for key, here in zip(keys, values, strict=True):
             if gaps[closed[key]].any():
                 leave_out(here, gaps[closed[key]])
-        return values, near
+        return values, apart
 
     def _entering(self, name: str, rows: NDArray[np.intp] | slice) -> Any:
         """An input of the tape for some variants: a number, or what broadcasts to (v, n)."""
