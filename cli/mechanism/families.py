@@ -160,6 +160,8 @@ class Families:
         asked = [number.key for number in shown(self.analysis, self.forces)]
         if self.json:
             asked += [number.key for number in shown(self.analysis, False)]
+            assert self.solver.written is not None
+            asked += [("margin", group.name) for group in self.solver.written.closed]
             if self.analysis.only is None:
                 asked += [SIZE, *(key for row in of_loops(self.solver) for key in row)]
         elif self.forces and self.analysis.only is not None:
@@ -171,6 +173,8 @@ class Families:
     @property
     def pays(self) -> bool:
         """Whether the formulas take all that is asked."""
+        if self.solver.written is None:
+            return False
         if self.forces and not self.solver.takes([("effort", 0), ("newton-euler", 0)]):
             return False
         return self.solver.takes(self.keys)
@@ -179,12 +183,15 @@ class Families:
         """Some variants."""
         solver = Solver(part, self.solver)
         v, n = part.shape
-        (there, *values), alone = solver.lanes([ASSEMBLED, *self.keys], MARKED if self.json else 0.0)
+        (there, *values), alone = solver.lanes([ASSEMBLED, *self.keys])
         assembled = np.isfinite(there)
         for d, numbers in zip(part.dimensions, part.values.T, strict=True):
             # of a link without mass there may be something to say
             if self.forces and d.kind in ("mass", "inertia"):
                 alone |= numbers == 0
+        for key, found in zip(self.keys, values, strict=True):
+            if self.json and key[0] == "margin":
+                alone |= (np.abs(found) < MARKED).any(axis=1)
         if self.forces:
             for found in values:
                 alone |= (assembled & ~np.isfinite(found)).any(axis=1)
