@@ -7,22 +7,18 @@ what is more than rows of poses or forces, one by one.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.errors import DataError
 from cli.mechanism.asked import Asked, Said
 from cli.mechanism.families import Families
+from cli.mechanism.parted import Solved, solved
 from cli.mechanism.solve import Analysis
 from cli.mechanism.variants import Variants
-from cli.read.options import processes
 from cli.show.columns import Column, Result, Table, Written
-from cli.show.progress import progress
-from dalembert.arithmetic.parts import LostPart, in_parts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,13 +29,6 @@ if TYPE_CHECKING:
 # solved one by one, of a table and of documents, where a row takes some kilobytes; variants of a part that are described
 # alone only to say why poses are not assembled
 FEW, TOGETHER, ONE_BY_ONE, EXPLAINED = 32, (1 << 16, 1 << 12), (64, (1 << 14, 1 << 12)), 50
-
-
-class Solved(NamedTuple):
-    """What a part gives."""
-
-    written: Written
-    said: Said
 
 
 def one(asked: Asked, row: NDArray[np.float64], name: str, json: bool, said: Said) -> Any:
@@ -64,16 +53,16 @@ def one(asked: Asked, row: NDArray[np.float64], name: str, json: bool, said: Sai
 
 
 def documents(
-    asked: Asked, like: NDArray[np.float64] | None, form: Form, first: int, shown: NDArray[np.float64]
+    asked: Asked, home: NDArray[np.float64] | None, form: Form, first: int, shown: NDArray[np.float64]
 ) -> Solved:
-    """The documents of some variants, which are called from `first` on; `like`: one that can be put together."""
+    """The documents of some variants, which are called from `first` on; `home`: one that can be put together."""
     said = Said()
     found = [one(asked, row, str(first + i), True, said) for i, row in enumerate(shown)]
-    return Solved(form(_named(asked, like, first, shown, found), first - 1), said)
+    return Solved(form(_named(asked, home, first, shown, found), first - 1), said)
 
 
 def documents_together(
-    asked: Asked, like: NDArray[np.float64] | None, form: Form, first: int, shown: NDArray[np.float64]
+    asked: Asked, home: NDArray[np.float64] | None, form: Form, first: int, shown: NDArray[np.float64]
 ) -> Solved:
     """The same, of variants that are solved at once."""
     said = Said()
@@ -83,20 +72,20 @@ def documents_together(
     for i, document in _alone(asked, first, shown, assembled, alone, True, said):
         found[i] = document
     said.any_assembled |= bool(assembled[~alone].any())
-    return Solved(form(_named(asked, like, first, shown, found), first - 1), said)
+    return Solved(form(_named(asked, home, first, shown, found), first - 1), said)
 
 
 def _named(
     asked: Asked,
-    like: NDArray[np.float64] | None,
+    home: NDArray[np.float64] | None,
     first: int,
     shown: NDArray[np.float64],
     found: list[Any],
 ) -> list[Document]:
     """The documents with the variants' names and numbers; None is one that cannot be put together."""
     blank: list[Any] = []
-    if like is not None and any(d is None for d in found):
-        blank = _blank(one(asked, like, "", True, Said())["poses"])
+    if home is not None and any(d is None for d in found):
+        blank = _blank(one(asked, home, "", True, Said())["poses"])
     return [
         {"variant": str(first + i), "set": asked.set(row)}
         | ({"poses": blank} if d is None else {k: v for k, v in d.items() if k != "name"})
@@ -133,7 +122,7 @@ def rows(asked: Asked, pattern: Table, form: Form, first: int, shown: NDArray[np
     parts: list[tuple[Table, list[bool] | bool]] = []
     for i, row in enumerate(shown):
         found = one(asked, row, str(first + i), False, said)
-        parts.append((_empty(pattern), False) if found is None else (_like(pattern, found[0]), found[1]))
+        parts.append((empty(pattern), False) if found is None else (like(pattern, found[0]), found[1]))
     tables = [
         _with_variant(asked, str(first + i), row, *part)
         for i, (row, part) in enumerate(zip(shown, parts, strict=True))
@@ -149,12 +138,12 @@ def rows_together(asked: Asked, pattern: Table, form: Form, first: int, shown: N
     table, assembled, alone = _families(asked, shown, False).of(asked.part(shown))
     said = Said()
     v, n = assembled.shape
-    columns: list[list[Any]] = [list(c.values) for c in _like(pattern, table).columns]
+    columns: list[list[Any]] = [list(c.values) for c in like(pattern, table).columns]
     whole = assembled.ravel().tolist()
     for i, found in _alone(asked, first, shown, assembled, alone, False, said):
         here = slice(i * n, (i + 1) * n)
-        its, there = (_empty(pattern), False) if found is None else found
-        for values, column in zip(columns, _like(pattern, its).columns, strict=True):
+        its, there = (empty(pattern), False) if found is None else found
+        for values, column in zip(columns, like(pattern, its).columns, strict=True):
             values[here] = list(column.values)
         whole[here] = there if isinstance(there, list) else [there] * n
     said.any_assembled |= any(whole)
@@ -180,24 +169,10 @@ class Many:
     workers: int = 1
     said: Said = field(default_factory=Said)
 
-    def _solved(self, function: Any, each: int) -> Iterator[Written]:
+    def _solved(self, function: Any, each: int) -> Iterator[Any]:
         """What a function gives of all parts, in their order, each of so many variants."""
         self.said = Said()
-        count = self.variants.count
-        starts = range(0, count, each)
-        work = ((a + 1, self.variants.part(a, a + each)) for a in starts)
-        workers = min(self.workers, len(starts))
-        with processes(workers) as pool:
-            try:
-                with closing(in_parts(function, work, pool, 2 * workers)) as parts:
-                    for written, said in progress(parts, count, "variants", each):
-                        self.said.join(said)
-                        yield written
-            except LostPart as lost:
-                first, last = (lost.number - 1) * each + 1, min(lost.number * each, count)
-                raise DataError(
-                    f"variants {first} to {last}: the process that solved them died, and died again when it was done once more"
-                ) from None
+        return solved(function, self.variants, each, self.workers, self.said)
 
     def analyses(self) -> list[tuple[str, Analysis]]:
         """What is asked of each variant whose parts can be put together."""
@@ -358,7 +333,7 @@ def _keys(asked: Asked, table: Table) -> tuple[str, ...]:
     return ("variant", *(d.header for d in asked.dimensions), *table.keys)
 
 
-def _like(pattern: Table, table: Table) -> Table:
+def like(pattern: Table, table: Table) -> Table:
     """A table with the columns of the first."""
     columns = {c.header: c for c in table.columns}
     empty: list[Cell] = [None] * len(table.columns[0].values)
@@ -367,7 +342,7 @@ def _like(pattern: Table, table: Table) -> Table:
     )
 
 
-def _empty(pattern: Table) -> Table:
+def empty(pattern: Table) -> Table:
     """The rows of a variant that cannot be put together."""
     return Table(
         [

@@ -110,11 +110,17 @@ class ShowOptions:
 
     @property
     def streams(self) -> bool:
-        """Whether one table, or one JSON document, is all that is asked for, so that it can be written part by part."""
-        others = self.text or self.plot or self.expect or self.report or (self.json and self.output)
-        # what --digits says of the table stands in the document too
-        others = others or (self.digits and self.form == ".json")
-        return self.form in (".csv", ".parquet", ".xlsx", ".json") and not others
+        """Whether a table is all that is asked for, so that it can be written block by block."""
+        return self.form in (".csv", ".parquet", ".xlsx") and not (self.json or self._others)
+
+    @property
+    def streams_json(self) -> bool:
+        """Whether one JSON document is: what --digits says of the table would stand in it too."""
+        return self.form == ".json" and not (self.json and self.output) and not (self.digits or self._others)
+
+    @property
+    def _others(self) -> bool:
+        return bool(self.text or self.plot or self.expect or self.report)
 
     @property
     def as_json(self) -> bool:
