@@ -232,6 +232,14 @@ def chosen(tape: Tape, n: int) -> str:
     return "llvm" if _done[tape] > PAYS else "numpy"
 
 
+def anew() -> None:
+    """Forget the work done so far: which engine does what follows hangs on that alone, in whatever process."""
+    from dalembert.arithmetic.engines import rounds
+
+    _done.clear()
+    rounds.forget()
+
+
 def compiled_code() -> bool:
     """Whether LLVM's code may run here, as far as is known without loading it."""
     from importlib.util import find_spec
