@@ -32,13 +32,13 @@ def arm(row: dict[str, str]) -> dict[str, float]:
 
 
 def sledge(row: dict[str, str]) -> dict[str, float]:
-    """Weight and friction along the incline, spring, damper, the child that pulls; what presses on the runners."""
+    """Weight and friction along the incline, spring, damper, the child that pulls; what acts on the runners."""
     x = float(row["input_m"])
     across, along = 60 * G * cos(pi / 6), 0.2 * 60 * G * cos(pi / 6)
     return {
         "input_force_N": 60 * G * sin(pi / 6) + along + 150 * (x + 0.4 - 0.6) + 40 * 0.8 - 20,
-        "B_ground_on_sledge_fx_N": -across * sin(pi / 6),
-        "B_ground_on_sledge_fy_N": across * cos(pi / 6),
+        "B_ground_on_sledge_fx_N": -across * sin(pi / 6) - along * cos(pi / 6),
+        "B_ground_on_sledge_fy_N": across * cos(pi / 6) - along * sin(pi / 6),
     }
 
 

@@ -7,6 +7,7 @@ formulas themselves are right is tested elsewhere.
 
 from __future__ import annotations
 
+from copy import copy
 from importlib.resources import files
 from typing import Any
 
@@ -15,7 +16,8 @@ import numpy as np
 import pytest
 
 from benchmarks.stress.tapes import DIGITS, Digits
-from virtualwork import Link, Mechanism, Spring, TorsionSpring
+from benchmarks.truth.mechanism import Exact
+from virtualwork import Gear, Guess, Input, Link, Mechanism, Spring, TorsionSpring
 from virtualwork.describe.dimensions import dimensions, value
 from virtualwork.describe.loads import Force, Torque
 from virtualwork.family.sensitivity import Sensitivities
@@ -127,3 +129,55 @@ def test_beside_a_limit() -> None:
         worst, condition = compare(m, motion)
         assert condition > 30
         assert worst <= 4e-16 * condition**2
+
+
+class _Nudged:
+    """A motion whose mechanism has a gear of another ratio, given in many digits."""
+
+    def __init__(self, motion: Any, gear: int, ratio: Any) -> None:
+        self.motion, self.mechanism = motion, copy(motion.mechanism)
+        gears = list(motion.mechanism.gears)
+        gears[gear] = copy(gears[gear])
+        object.__setattr__(gears[gear], "ratio", ratio)
+        object.__setattr__(self.mechanism, "gears", tuple(gears))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.motion, name)
+
+
+def geared() -> Mechanism:
+    """A sun and an arm are driven; a planet and an idler on the arm mesh with the sun, a wheel on the ground with the arm."""
+    return Mechanism(
+        {"O": 0j, "W": 0.1},
+        {
+            "arm": Link({"O": 0j, "P": 0.06, "Q": 0.02 + 0.03j}, 0.4, 0.03, 2e-4),
+            "sun": Link({"O": 0j, "S": 0.02}, 0.5, 0.005 + 0.001j, 1e-4),
+            "planet": Link({"P": 0j, "T": 0.04}, 0.3, 0.01 - 0.02j, 3e-4),
+            "idler": Link({"Q": 0j, "U": 0.015}, 0.2, 0.004 + 0.007j, 2e-5),
+            "wheel": Link({"W": 0j, "V": 0.03}, 0.6, 0.002 - 0.01j, 4e-5),
+        },
+        gears=[
+            Gear(("sun", "planet"), -0.5, "arm"),
+            Gear(("sun", "idler"), 2.3, "arm"),
+            Gear(("arm", "wheel"), -0.7),
+        ],
+        inputs=[Input(link="arm"), Input(link="sun")],
+        guess=Guess(at=(0.1, 0.2)),
+        gravity=-9.81j,
+        torques=[Torque("idler", 0.3)],
+    )
+
+
+@pytest.mark.parametrize("gear", [0, 1, 2])
+def test_torques_to_the_ratios_of_gears(gear: int) -> None:
+    """The efforts by both ways, against all multipliers of all constraints in fifty digits: another formulation."""
+    m = geared()
+    motion = m.motion([[0.7, -0.4]], [[1.5, 2.0]], [[-0.7, 0.3]])
+    with mp.workdps(50):
+        h, ratio = mp.mpf(10) ** -15, mp.mpf(m.gears[gear].ratio)
+        below, above = (Exact(_Nudged(motion, gear, ratio + s * h)).forces() for s in (-1, 1))
+        true = [float((above["input", j, 0] - below["input", j, 0]) / (2 * h)) for j in "01"]
+    assert max(map(abs, true)) > 1e-3
+    for way in "effort", "newton-euler":
+        found = [motion.derivative((way, j), f"gears.{gear + 1}.ratio")[0] for j in (0, 1)]
+        assert found == pytest.approx(true, rel=1e-12, abs=1e-13)

@@ -62,15 +62,13 @@ class JointForces:
 
     def joint_force(self, block: Block, joint: Joint, body: str) -> Number:
         """The force of a joint on a body over a block, without the force of an input that drives it."""
-        value = plus(self.on_side(block, (joint.key, body)), self.rubbed(block, joint, body))
-        if (
-            joint.guide is not None
-            and value is not None
-            and self.mechanism.driver_of(joint.guide) is not None
-        ):
-            rail = self.rail(block, joint.guide)
+        value = self.on_side(block, (joint.key, body))
+        guide = joint.guide
+        if guide is not None and value is not None and self.mechanism.driver_of(guide) is not None:
+            # along a driven guide the joint's own equilibrium leaves the effort, which is given apart
+            rail = self.rail(block, guide)
             value = value - dot(value, rail) * rail
-        return value
+        return plus(value, self.rubbed(block, joint, body))
 
     def rubbed(self, block: Block, joint: Joint, body: str) -> Number:
         """The friction force along a guide belongs to its reaction."""

@@ -5,16 +5,12 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import MechanismError
 from virtualwork.describe.parts import GROUND
 from virtualwork.plan.joints import Joint, joints, relations
 from virtualwork.plan.steps import Group, Plan
 
-Reals = NDArray[np.float64]
 # the force of a joint on a body, (joint, body); a joint is "pin:B" or "guide:0"
 Side = tuple[str, str]
 
@@ -79,57 +75,64 @@ class Order:
         return found
 
     @cached_property
-    def couples(self) -> tuple[list[tuple[str, int]], Reals, Reals | None]:
-        """The unknown torques (guides, gears, inputs), how they act on the bodies, and how ΣM = 0 gives them.
+    def couples(self) -> tuple[list[tuple[str, int]], list[dict[str, Any]] | None]:
+        """The unknown torques (guides, gears, inputs), and how the bodies' ΣM = 0 gives each: body -> factor.
 
-        Returns (unknowns, pattern (bodies, unknowns), inverse or None where the torques are not all determined).
+        None in place of the factors where the torques are not all determined.
         """
         bodies = list(self.mechanism.links)
-        unknowns: list[tuple[str, int]] = []
-        columns_: list[Reals] = []
-
-        for relation in sorted(relations(self.mechanism), key=lambda r: r.kind == "input"):
-            column = np.zeros(len(bodies))
-            for body, factor in relation.shares.items():
-                if body != GROUND:
-                    # of a ratio that varies, its number
-                    column[bodies.index(body)] += complex(factor).real
-            unknowns.append((relation.kind, relation.number))
-            columns_.append(column)
-        pattern = np.array(columns_).reshape(len(unknowns), len(bodies)).T
-        return unknowns, pattern, self._rows_of(pattern)
-
-    @staticmethod
-    def _rows_of(pattern: Reals) -> Reals | None:
-        """A left inverse of the pattern that uses as few bodies as there are unknowns, found by pivoting."""
-        n, k = pattern.shape
-        inverse = np.zeros((k, n))
-        if not k:
-            return inverse
-        left, chosen = pattern.copy(), []
-        for _ in range(k):
-            size = np.abs(left).max(axis=1)
-            row = int(np.argmax(size))
-            if not size[row] > 1e-12:
-                return None
-            column = int(np.argmax(np.abs(left[row])))
-            chosen.append(row)
-            left = left - np.outer(left[:, column] / left[row, column], left[row])
-            left[row] = 0.0
-        inverse[:, chosen] = np.linalg.inv(pattern[chosen])
-        return inverse
+        tied = sorted(relations(self.mechanism), key=lambda r: r.kind == "input")
+        pattern = [[r.shares.get(body, 0.0) for r in tied] for body in bodies]
+        inverse = left_inverse(pattern)
+        factors = None
+        if inverse is not None:
+            factors = [{body: f for body, f in zip(bodies, row, strict=True) if f} for row in inverse]
+        return [(r.kind, r.number) for r in tied], factors
 
     @cached_property
     def redundant(self) -> bool:
         """Whether statics cannot give every joint force: more unknowns than equations."""
         square = all(2 * len(g.closures) == len(g.angles) + len(g.slides) for g in self.plan.groups)
         every = all(side in self.recipes for sides in self.sides.values() for side in sides)
-        return not square or not every or self.couples[2] is None or bool(self.plan.blocks.redundant)
+        return not square or not every or self.couples[1] is None or bool(self.plan.blocks.redundant)
 
-    def couple(self, kind: str, i: int) -> dict[str, float]:
+    def couple(self, kind: str, i: int) -> dict[str, Any]:
         """How the torque of a guide, a gear or an input follows from what the bodies' ΣM leaves: body -> factor."""
-        unknowns, _, inverse = self.couples
-        if inverse is None:
+        unknowns, factors = self.couples
+        if factors is None:
             raise MechanismError("the torques of its guides are not determined by statics")
-        row = inverse[unknowns.index((kind, i))]
-        return {body: float(f) for body, f in zip(self.mechanism.links, row, strict=True) if f}
+        return factors[unknowns.index((kind, i))]
+
+
+def left_inverse(pattern: list[list[Any]]) -> list[list[Any]] | None:
+    """A left inverse that uses as few rows as there are columns, by Gauss and Jordan; None where there is none.
+
+    Its numbers are floats, or constants that vary: a pivot is chosen by the number.
+
+    Examples
+    --------
+    >>> left_inverse([[1.0, -2.0], [0.0, 4.0], [0.0, 1.0]])
+    [[1.0, 0.5, 0.0], [0.0, 0.25, 0.0]]
+    """
+    n, k = len(pattern), len(pattern[0]) if pattern else 0
+    # columns are combined until each has one of the chosen rows to itself; below them, how
+    columns = [[*(row[c] for row in pattern), *(float(c == d) for d in range(k))] for c in range(k)]
+    chosen: dict[int, int] = {}
+    while len(chosen) < k:
+        free = [c for c in range(k) if c not in chosen.values()]
+        left = [(i, c) for i in range(n) if i not in chosen for c in free]
+        row, pivot = max(left, key=lambda at: _size(columns[at[1]][at[0]]), default=(-1, 0))
+        if row < 0 or not _size(columns[pivot][row]) > 1e-12:
+            return None
+        chosen[row] = pivot
+        own = columns[pivot] = [v / columns[pivot][row] if v else 0.0 for v in columns[pivot]]
+        for c in range(k):
+            share = columns[c][row]
+            if c != pivot and share:
+                columns[c] = [v - share * w if w else v for v, w in zip(columns[c], own, strict=True)]
+                columns[c][row] = 0.0
+    return [[columns[chosen[i]][n + d] if i in chosen else 0.0 for i in range(n)] for d in range(k)]
+
+
+def _size(number: Any) -> float:
+    return abs(complex(number))
