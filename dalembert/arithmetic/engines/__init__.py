@@ -174,7 +174,7 @@ def run_grid(
     rows = [tests.get(k, x).reshape(r * c) for k, x in enumerate(table)]
     _lanes(tape, flat, rows, r * c, engine)
     for k, test in tests.items():
-        table[k][:] = (test > 0).all(axis=1)
+        table[k][:] = test[:, 0] > 0 if c == 1 else (test > 0).all(axis=1)
     return table
 
 
