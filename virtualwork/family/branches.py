@@ -48,11 +48,13 @@ def chosen(
     if not all(informed(m, group) for group in written.closed):
         return {}, np.zeros(n, dtype=bool)
     one = len(m.inputs) == 1
-    way = _wide(m, low, high) if one and n else np.empty((0, 1))
-    # at the guess it is looked at anyhow
-    way = way[[not (q == m.at[0]).all() for q in way]]
-    at_once = len(way) <= AT_ONCE
-    tape = written.told(len(way) if at_once else 0)
+    way = np.empty((0, 1))
+    at_once = not one or n == 0 or _count(m, low, high) <= AT_ONCE * WIDER
+    if one and n and at_once:
+        way = _wide(m, low, high)
+        # at the guess it is looked at anyhow
+        way = way[[not (q == m.at[0]).all() for q in way]]
+    tape = written.told(len(way))
     table, (told, clear) = np.empty((len(written.closed), n, 1)), np.empty((2, n), dtype=bool)
     enters = {**_across(given), **_inputs(m)} | {f"way {i}": q[:, None] for i, q in enumerate(way)}
     run_grid(tape, enters, (n, 1), [*table, told, clear])
@@ -123,8 +125,8 @@ def meet_on_the_way(
         return found
     for here, some, q in _along(m, known, n, low, high):
         count = len(found[here])
-        wide, clear = q[_every_other(len(q))].T, np.empty(count, dtype=bool)
-        run_grid(written.clear, _across(some) | {"q0": wide}, (count, wide.shape[1]), [clear])
+        clear = np.empty(count, dtype=bool)
+        run_grid(written.clear, _across(some) | {"q0": q.T}, (count, len(q)), [clear])
         left = np.flatnonzero(~clear)
         if len(left):
             its, near = _of(some, left), q if q.shape[1] == 1 else q[:, left]

@@ -19,7 +19,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed
 from virtualwork.describe.errors import MechanismError
-from virtualwork.family.branches import LANES, chosen, stays_within
+from virtualwork.family.branches import chosen, stays_within
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import COMPLEX, FORCES, Key, over_blocks, quantity
 from virtualwork.formulas.dynamics import Dynamics
@@ -33,6 +33,8 @@ Mask = NDArray[np.bool_]
 ASSEMBLED: Key = ("assembled",)
 # rad: a torsion spring that is twisted by no more all along its way counts no whole turns
 HALF = 2.6
+# lanes of a part: what is got ready for each is little beside them
+LANES = 1 << 19
 # variants described one by one whose poses are kept for the next question
 KEPT = 500
 

@@ -111,8 +111,8 @@ class Written:
 
     @cached_property
     def clear(self) -> Tape:
-        """The tape of `clear`: positive where no radicand is near zero, by the input and the signs."""
-        depths = [self.recording.value(key) - CLEAR for key in self.margins]
+        """The tape of `clear`: positive where no radicand dips down to zero, by the input and the signs."""
+        depths = [self.recording.value(key) - DIP for key in self.margins]
         return self.recording.recorder.tape({"clear": every(depths)})
 
     def told(self, samples: int) -> Tape:
