@@ -55,10 +55,10 @@ def chosen(
         # at the guess it is looked at anyhow
         way = way[[not (q == m.at[0]).all() for q in way]]
     tape = written.told(len(way))
-    table, (told, clear) = np.empty((len(written.closed), n, 1)), np.empty((2, n), dtype=bool)
     enters = {**_across(given), **_inputs(m)} | {f"way {i}": q[:, None] for i, q in enumerate(way)}
-    run_grid(tape, enters, (n, 1), [*table, told, clear])
-    found = {group.name: sign for group, sign in zip(written.closed, table[:, :, 0], strict=True)}
+    *table, level = (row[:, 0] for row in run_grid(tape, enters, (n, 1)))
+    found = {group.name: sign for group, sign in zip(written.closed, table, strict=True)}
+    told, clear = level > 0, level > 1
     if not told.all():
         rest = np.flatnonzero(~told)
         again, told[rest] = signs(written, m, _of(given, rest), len(rest))

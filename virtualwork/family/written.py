@@ -118,9 +118,9 @@ class Written:
     def told(self, samples: int) -> Tape:
         """The tape of how all closed forms close at the inputs of the guess, and whether that is told plainly.
 
-        `sign GROUP`; `told`, positive where the guess is far from a change point and much nearer to one assembly; `clear`,
-        positive where the radicands are far from zero there and at further inputs `way 0`, `way 1` …, so many. Where it is
-        not told the signs mean nothing.
+        `sign GROUP`; and `told`: positive where the guess is far from a change point and much nearer to one assembly, 2 where
+        the radicands are far from zero there and at further inputs `way 0`, `way 1` …, so many. Where it is not told the
+        signs mean nothing.
         """
         if samples not in self._told:
             recorder = Recorder()
@@ -134,7 +134,7 @@ class Written:
             for i in range(samples):
                 depths = _again(margins, recorder, signs | {"q0": recorder.input(f"way {i}")})
                 clear += [depth - CLEAR for depth in depths.values()]
-            outputs = signs | {"told": every(self._plain(found)), "clear": every(clear)}
+            outputs = signs | {"told": every(self._plain(found), every(clear, 2.0, 1.0))}
             self._told[samples] = recorder.tape(outputs)
         return self._told[samples]
 
@@ -225,11 +225,10 @@ class Written:
         return recorder.tape(outputs)
 
 
-def every(conditions: Sequence[Number]) -> Number:
-    """A number that is positive where all of these are."""
-    found: Number = 1.0
+def every(conditions: Sequence[Number], found: Number = 1.0, otherwise: float = -1.0) -> Number:
+    """A number where all of these are positive, and another one where they are not."""
     for condition in reversed(conditions):
-        found = RECORDED.select(condition, found, -1.0)
+        found = RECORDED.select(condition, found, otherwise)
     return found
 
 
