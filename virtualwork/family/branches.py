@@ -48,10 +48,11 @@ def chosen(
     if not all(informed(m, group) for group in written.closed):
         return {}, np.zeros(n, dtype=bool)
     one = len(m.inputs) == 1
-    way = np.empty((0, 1))
-    at_once = not one or n == 0 or _count(m, low, high) <= AT_ONCE * WIDER
-    if one and n and at_once:
-        way = _wide(m, low, high)
+    # steps of a way, each as wide as lets `CLEAR` tell that there is no dip
+    steps = -(-(_count(m, low, high) - 1) // WIDER) if one and n else 0
+    at_once, way = steps < AT_ONCE, np.empty((0, 1))
+    if steps and at_once:
+        way = _way(m, low, high, steps + 1)
         # at the guess it is looked at anyhow
         way = way[[not (q == m.at[0]).all() for q in way]]
     tape = written.told(len(way))
@@ -180,17 +181,6 @@ def _way(m: Description, low: Reals, high: Reals, count: int) -> Reals:
     if len(low) > 1 and (low == low[0]).all() and (high == high[0]).all():
         low, high = low[:1], high[:1]
     return np.linspace(low, np.minimum(high, low + (np.inf if m.inputs[0].is_slide else 2 * np.pi)), count)
-
-
-def _wide(m: Description, low: Reals, high: Reals) -> Reals:
-    """The samples of the ways in wider steps, (samples, n or 1)."""
-    count = _count(m, low, high)
-    return _way(m, low, high, count)[_every_other(count)]
-
-
-def _every_other(count: int) -> NDArray[np.intp]:
-    """Which samples are looked at in wider steps: the first and the last among them."""
-    return np.append(np.arange(0, count - 1, WIDER), count - 1)
 
 
 def _of(known: Mapping[str, Any], rows: Any) -> dict[str, Any]:
