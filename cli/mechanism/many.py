@@ -216,8 +216,6 @@ class Many:
         """The result: as one table alone, written part by part, or the forms asked for, at once."""
         if streams:
             return Result(
-                document=dict,
-                tables={},
                 blocks=self.blocks,
                 blocks_name="variants",
                 shared=self.workers > 1,
