@@ -190,9 +190,11 @@ def run(
         clash += options.given(tolerance=spreads)
         if clash:
             raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
-        if vary or variants is not None:
-            told_of = "expected one mechanism with --time, and no --vary or --variants"
-            options.refuse(told_of, html=html, digits=show.digits, workers=workers)
+        if html is not None and until is not None and (vary or variants is not None):
+            told_of = (
+                "expected no --until beside variants: a page has one clock for all; --set shows one of them"
+            )
+            raise options.bad("--html", told_of)
     elif accuracy is not None or until is not None:
         raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
     if html is not None:
@@ -213,17 +215,25 @@ def run(
             home.warnings += said
             home.check_names()
             motion = InTime(home, *times_and_accuracy(time, accuracy), until, bare, forces)
-            if several is not None:
-                from cli.mechanism.variants_in_time import VariantsInTime
-
-                found_all = VariantsInTime(motion, several, names, branch)
-                return replace(found_all.result(about), within=lambda: told(file))
             if html is not None:
-                refuse_long(len(motion.times))
-            result = _with_page(
-                motion.result(about), html, lambda: animation.page_in_time(motion, show.units)
-            )
-            return replace(result, within=lambda: told(file))
+                refuse_long(len(motion.times) * (1 if several is None else several.count))
+            if several is not None:
+                from cli.mechanism.variants_in_time import AskedInTime, VariantsInTime
+
+                every = AskedInTime(
+                    file, mechanism, several.dimensions, motion.times, motion.accuracy, until, bare, forces, names,
+                    branch, show.digits,
+                )  # fmt: skip
+                let_go = VariantsInTime(every, several, workers or 1, home.warnings)
+                result = let_go.result(show.streams, about)
+            else:
+                result = motion.result(about)
+
+            def page() -> Page:
+                them = [("", motion)] if several is None else let_go.runs()
+                return animation.page_in_time(them, show.units)
+
+            return replace(_with_page(result, html, page), within=lambda: told(file))
         q = wanted(mechanism, at, sweep, inputs, bare)
         rates = None if order is None else ORDERS.index(order)
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)
@@ -236,7 +246,8 @@ def run(
             return _long(analysis, forces, states, show.digits)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not show.json or show.expect is not None or show.output is not None
-        times = 1 if several is None or show.streams else several.count
+        streams = show.streams or show.streams_json
+        times = 1 if several is None or streams else several.count
         analysis.check_size(
             json=show.as_json, table=table, states=states is not None, forces=forces, times=times
         )
@@ -257,7 +268,7 @@ def run(
         )  # fmt: skip
         found = Many(question, several, workers or 1)
         result = _with_page(
-            found.result(show.streams, show.as_json, table),
+            found.result(streams, show.as_json, table),
             html,
             lambda: animation.page(found.analyses(), forces, show.units),
         )

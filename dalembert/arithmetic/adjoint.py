@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from dalembert.arithmetic.engines.blocks import NUMPY
+from dalembert.arithmetic.arrays import NUMPY
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
 from dalembert.arithmetic.tape import Kind, Tape
 
@@ -247,10 +247,14 @@ class _Bounds:
             if name == "sqrt" and needed[number] and not _norm(tape, arguments[0]):
                 self._root(number, arguments[0])
         found: dict[str, Number] = {}
+        # outputs may be one operation, as entries of a symmetric matrix are
+        known: dict[int, Number] = {}
         for name, number in tape.outputs:
             found[name] = self.sweep.values[number]
             if name in wanted:
-                found[f"error({name})"] = self.error(number)
+                if number not in known:
+                    known[number] = self.error(number)
+                found[f"error({name})"] = known[number]
         largest: Number = 0.0
         for share in self.shares.values():
             # what is no number counts as none: the bound is none either
