@@ -19,8 +19,8 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
-from dalembert.arithmetic.adjoint import UNIT_ROUNDOFF
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
+from dalembert.arithmetic.rounding import UNIT_ROUNDOFF
 from dalembert.arithmetic.varied import made
 from virtualwork.formulas.dynamics import applied_loads, reduced
 from virtualwork.formulas.effort import generalized_force

@@ -100,6 +100,7 @@ class Recording:
             self._along = Rates(plan, self.st, given)
         self._done: set[tuple[int, int, int]] = set()
         self._values: dict[Key, Number] = {}
+        self._groups: dict[Key, tuple[str, ...]] = {}
         self._forces: tuple[LoadPaths, JointForces, Block] | None = None
 
     # --- solving ------------------------------------------------------------------------------------------------
@@ -355,7 +356,11 @@ class Recording:
 
         What cancels is not on the tape: a platform that stays level has the angle 0 there, whatever carries it.
         """
-        kind, *of = key
+        if key not in self._groups:
+            self._groups[key] = self._hung_on(*key)
+        return self._groups[key]
+
+    def _hung_on(self, kind: str, *of: Any) -> tuple[str, ...]:
         targets: Iterable[str] = [key for g in self.plan.groups for key in self.plan.writes(g)]
         if kind in ("point", "dpoint"):
             targets = self._path_reads(self._path(*of[:3]))
