@@ -66,11 +66,12 @@ def _slide_error(motion: Motion, name: str, order: int) -> Reals:
 
 def _together(analysis: Analysis, motion: Motion) -> None:
     """Form the bounds of all places and rates of a motion that its table shows."""
-    parts = [*map(motion.point, analysis.points), *map(motion.slide, analysis.slides)]
+    orders = range(analysis.order + 1)
+    keys = [motion.point(name).key(k) for name in analysis.points for k in orders]
+    keys += [motion.slide(name).key(k) for name in analysis.slides for k in orders]
+    # an angle that was given is as it was given
     given = {name for name in analysis.links if analysis.given(name) is not None}
-    keys = [part.key(k) for part in parts for k in range(analysis.order + 1)]
-    for name in analysis.links:
-        keys += [motion.link(name).key(k) for k in range(name in given, analysis.order + 1)]
+    keys += [motion.link(name).key(k) for name in analysis.links for k in orders if k or name not in given]
     motion.rounding.together(keys)
 
 

@@ -11,9 +11,10 @@ terms of a sum share its adjoint. So the sum over v is one over far fewer adjoin
 are the same for many outputs (`_Pattern`).
 
 A root of what may cancel is not smooth where its argument a is no more than the argument's own error κ. There the
-first order is not enough: the slope 1/2√a is taken as that of the chord to a − κ, and where that is negative as 2/√κ,
-for √a errs by √κ then, and its sign may be the other. What hangs on 1/√a needs τ = κ/2a too, the share of the second
-order in the first.
+first order is not enough. The true argument is within κ of a, and that of the engine whose answer is judged within κ of
+the true one: no step between the two is steeper than the chord from a to a − 3κ, which has it in its middle. That is the
+root's slope here. Where a < 3κ it is 4/√κ: the sign of √a may be the other then, and √3κ + √4κ < 4√κ. What hangs on 1/√a
+needs τ = 3κ/2a too, the share of the second order in the first.
 """
 
 from __future__ import annotations
@@ -227,10 +228,10 @@ class _Bounds:
         error = self.error(argument)
         if isinstance(error, float) and error == 0:
             return
-        apart = a - error
+        apart = a - 3.0 * error
         chord = 1.0 / (self.values[number] + kind.sqrt(kind.select(apart, apart, 0.0)))
-        self.slopes[number] = kind.select(apart, chord, 2.0 / kind.sqrt(error))
-        self.shares[number] = 0.5 * error / a
+        self.slopes[number] = kind.select(apart, chord, 4.0 / kind.sqrt(error))
+        self.shares[number] = 1.5 * error / a
 
 
 class _Pattern(NamedTuple):

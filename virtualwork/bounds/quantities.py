@@ -3,9 +3,9 @@
 A quantity y is a list of real operations (`virtualwork.formulas.recording`); each rounds, and the adjoint says how much
 of that arrives at y (`dalembert.arithmetic.rounding`). What enters the tape and is not exact brings its own error: the
 input, where it was swept; the constant of an angle, a sum of others; what a table gives; and the unknowns x of a group
-without a closed form, which an iteration found. These leave in each loop of the group a gap, as computed and with the
-rounding of computing it, ρ together: then to first order J·δx = −ρ and componentwise |δx| ≤ |J⁻¹|·ρ (N. J. Higham,
-Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM 2002, §7.1 and §7.2), groups one after the other.
+without a closed form, which an iteration found. They are off by δx = −J⁻¹·gap to first order (N. J. Higham, Accuracy and
+Stability of Numerical Algorithms, 2nd ed., SIAM 2002, §7.1), the gap that they leave in the group's loops, as computed
+and with the roundings of computing it. That step is on the tape, groups one after the other.
 
 Close to a limit the second order counts too: see `virtualwork.bounds.second_order`. Dimensions, loads and inputs are
 taken as exact. A bound is infinite where no digit is known, NaN where the pose is not assembled.
@@ -155,19 +155,16 @@ class Bounds:
         self,
         keys: Sequence[Key],
         more: Iterable[Key] = (),
-        exact: str = "",
         known: Mapping[str, Reals] = EMPTY,
         values: bool = True,
     ) -> Mapping[str, Any]:
         """Bounds of quantities, `error(name)`, and their τ, `tau(name)`; more by its names, the quantities too if `values`.
 
-        The unknowns of the group `exact` are taken as they are; `known` enters, exact, besides.
+        `known` enters, exact, besides.
         """
         tape = taped(self.branch, self.recording, (*keys, *more))
-        given = {**known} | self._entering((name for name in tape.inputs if name not in known), exact)
-        errors = self._errors(
-            name for name in tape.inputs if not exact or not name.startswith(f"open {exact} ")
-        )
+        given = {**known} | self._entering(name for name in tape.inputs if name not in known)
+        errors = self._errors(tape.inputs)
         inputs = {name: f"error {name}" for name in errors}
         given |= {inputs[name]: error for name, error in errors.items()}
         wanted = tuple(name for key in keys for name in names(key))
@@ -196,33 +193,30 @@ class Bounds:
                 tau = np.maximum(tau, self._solution(group.name).tau)
         return tau
 
-    def residual(
-        self, keys: Sequence[Key], known: Mapping[str, Reals] = EMPTY, exact: str = ""
-    ) -> tuple[Reals, Reals]:
+    def residual(self, keys: Sequence[Key], known: Mapping[str, Reals] = EMPTY) -> tuple[Reals, Reals]:
         """The size of what should be zero, as computed and with its rounding, (n, rows), and τ, (n,)."""
-        found = self.run(keys, exact=exact, known=known)
+        found = self.run(keys, known=known)
         rows = [row for key in keys for row in names(key)]
         left = np.empty((self.n, len(rows)))
         for i, row in enumerate(rows):
             left[:, i] = found[f"error({row})"] + np.abs(found[row])
-        tau = _largest(found, keys)
-        if not exact:
-            tau = np.maximum(tau, self._tau(keys[0], found))
+        # a gap is what the unknowns of its own group leave
+        tau = _largest(found, keys) if keys[0][0] == "gap" else self._tau(keys[0], found)
         return left, np.broadcast_to(tau, self.n)
 
     # --- what enters -------------------------------------------------------------------------------------------------
-    def _entering(self, inputs: Iterable[str], exact: str) -> dict[str, Any]:
+    def _entering(self, inputs: Iterable[str]) -> dict[str, Any]:
         found: dict[str, Any] = {}
         rest = []
         for name in inputs:
             kind, _, of = name.partition(" ")
             if name in self.recording.constants:
                 found[name] = self.recording.constants[name][0]
-            elif kind == "open":
-                found[name] = 0.0
+            elif name == "step":
+                found[name] = 1.0
             elif kind == "inverse":
                 group, i, r = of.rsplit(" ", 2)
-                found[name] = 0.0 if group == exact else self._solution(group).inverse[:, int(i), int(r)]
+                found[name] = self._solution(group).inverse[:, int(i), int(r)]
             else:
                 rest.append(name)
         return found | self.lanes.entering(rest)
@@ -237,9 +231,9 @@ class Bounds:
                 error = self.recording.constants[name][1]
                 if error:
                     found[name] = error
-            elif kind == "open":
-                group, row = of.rsplit(" ", 1)
-                found[name] = self._solution(group).residual[:, int(row)]
+            elif name == "step":
+                # none of it is made
+                found[name] = 1.0
             elif kind == "table":
                 found[name] = self._table(int(of.split()[0]))
             elif not of and kind[0] == "q" and given[:, int(kind[1:])].any():
@@ -251,7 +245,7 @@ class Bounds:
         if name not in self._solutions:
             group = next(g for g in self.branch.plan.groups if g.name == name)
             keys: list[Key] = [("gap", name, i) for i in range(len(group.closures))]
-            left, _ = self.residual(keys, exact=name)
+            left, _ = self.residual(keys)
             self._solutions[name] = solution(group, self.poses, left)
         return self._solutions[name]
 

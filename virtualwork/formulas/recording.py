@@ -113,12 +113,16 @@ class Recording:
         n = len(group.angles) + len(group.slides)
         return [self.recorder.input(f"x {group.name} {i}") for i in range(n)]
 
+    def step(self, group: Group, st: State) -> list[Number] | None:
+        """By how much a group's unknowns that enter are off, to first order; None where they are exact."""
+        return None if self.settled else WRITTEN.solve(columns(group, st), gaps(group, st))
+
     def _close(self, group: Group, st: State) -> None:
         if self.enters(group):
             x = self.unknowns(group)
             put_unknowns(group, st, x)
-            if not self.settled:
-                step = WRITTEN.solve(columns(group, st), gaps(group, st))
+            step = self.step(group, st)
+            if step is not None:
                 put_unknowns(group, st, [a + b for a, b in zip(x, step, strict=True)])
             return
         sign: Number = self.signs[group.name]
