@@ -31,28 +31,24 @@ app = typer.Typer(
     help="Measure the program; docs/benchmarks.md holds its tables.",
 )
 
-Docs = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE.md",
-        help="Write tables into FILE.md, between its marks <!-- bench:DOMAIN --> (stress: <!-- bench:stress -->) and "
-        "<!-- end -->, and pictures into the folder pictures beside it.",
-        dir_okay=False,
-    ),
-]
+Docs = Annotated[Path | None, typer.Option(dir_okay=False)]
+DOCS = """docs FILE.md  Write tables into FILE.md, between its marks <!-- bench:DOMAIN --> (stress: <!-- bench:stress -->) and \
+<!-- end -->, and pictures into the folder pictures beside it."""
 
 
 @app.command()
-@command
+@command(
+    f"""
+Arguments:
+  name [NAME]...  Domains: {", ".join(DOMAINS)}.
+Options:
+  quick  Smaller sizes.
+  peers  The same work with other packages, where they are installed.
+  {DOCS}
+"""
+)
 def speed(
-    name: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help=f"Domains: {', '.join(DOMAINS)}.")
-    ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Smaller sizes.")] = False,
-    peers: Annotated[
-        bool, typer.Option("--peers", help="The same work with other packages, where they are installed.")
-    ] = False,
-    docs: Docs = None,
+    name: list[str] | None = None, quick: bool = False, peers: bool = False, docs: Docs = None
 ) -> Result:
     """Measure run time against error, for each method the program offers.
 
@@ -125,17 +121,20 @@ def _measure(domains: list[str], quick: bool, peers: bool) -> Iterator[Measureme
 
 
 @app.command()
-@command
+@command(
+    f"""
+Arguments:
+  name [NAME]...  Campaigns, by the names of the table.
+Options:
+  given --time TIME  Run them for this long, such as 10min.
+  seed  The seed of the first case; without --time this one case of each.
+  {DOCS}
+"""
+)
 def stress(
-    name: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help="Campaigns, by the names of the table.")
-    ] = None,
-    given: Annotated[
-        str | None, typer.Option("--time", metavar="TIME", help="Run them for this long, such as 10min.")
-    ] = None,
-    seed: Annotated[
-        int, typer.Option(min=0, help="The seed of the first case; without --time this one case of each.")
-    ] = 0,
+    name: list[str] | None = None,
+    given: str | None = None,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
     docs: Docs = None,
 ) -> Result:
     """Run random campaigns at singular places; status 1 if errors lie beyond the program's own estimate too often."""
@@ -175,11 +174,17 @@ def stress(
 
 
 @app.command()
-@command
+@command("""
+Arguments:
+  inputs N  How many damaged inputs.
+Options:
+  seed  The seed of the first: `1 --seed S` is one again.
+  workers  Processes.
+""")
 def fuzz(
-    inputs: Annotated[int, typer.Argument(metavar="N", min=1, help="How many damaged inputs.")],
-    seed: Annotated[int, typer.Option(min=0, help="The seed of the first: `1 --seed S` is one again.")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+    inputs: Annotated[int, typer.Argument(min=1)],
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    workers: Annotated[int, typer.Option(min=1)] = 1,
 ) -> Result:
     """Run damaged inputs through the commands; status 1 if one is not handled as it should be."""
     from shlex import join

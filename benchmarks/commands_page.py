@@ -10,8 +10,7 @@ from typer.core import TyperGroup
 
 from cli.app import COMMANDS, build
 from cli.examples.command import describe
-from cli.help import Command
-from cli.show.output import PANELS
+from cli.show.commands import SHARED, Command, told
 
 _HEAD = """# Commands and options
 
@@ -26,6 +25,7 @@ def page() -> Iterator[str]:
     """Yield the lines of the page."""
     yield from _HEAD.splitlines()
     shared: dict[str, list[tuple[str, str]]] = {}
+    of_all = {said.heading for said in told(SHARED).values()}
     for name, (_, line) in COMMANDS.items():
         group = typer.main.get_command(build(name))
         assert isinstance(group, TyperGroup)
@@ -36,9 +36,9 @@ def page() -> Iterator[str]:
         yield from ("", *inspect.cleandoc(command.help or "").replace("*", r"\*").splitlines())
         panels = command.panels_of(context)
         solves = any(param.name == "json" for param in command.get_params(context))
-        shared |= {heading: records for heading, records in panels.items() if solves and heading in PANELS}
+        shared |= {heading: records for heading, records in panels.items() if solves and heading in of_all}
         for heading, records in panels.items():
-            if solves and heading in PANELS and heading != "What":
+            if solves and heading in of_all and heading != "What":
                 continue
             yield from _table(heading, records)
         if command.example:

@@ -10,8 +10,6 @@ from importlib import import_module
 import typer
 
 from cli.errors import DataError, one_line
-from cli.help import with_panels
-from cli.read.files import forget
 
 # name -> (module with a function `run`, the line shown by `dalembert --help`)
 COMMANDS = {
@@ -68,8 +66,11 @@ def build(called: str | None) -> typer.Typer:
     app.callback()(_front)
     for name, (module, line) in COMMANDS.items():
         if name == called:
+            # the front door's own help is shown without it
+            from cli.show.commands import with_help
+
             file = import_module(module)
-            kind = with_panels(getattr(file, "PANELS", {}), getattr(file, "EXAMPLE", ""))
+            kind = with_help(getattr(file, "OPTIONS", ""), getattr(file, "EXAMPLE", ""))
             app.command(name, short_help=line, cls=kind)(file.run)
         else:
             app.command(name, short_help=line)(_elsewhere)
@@ -93,8 +94,11 @@ def main(front: Callable[[str | None], Callable[..., object]] = build) -> None:
     """
     # Small matrices only: a pool of BLAS threads costs more to start than it gives. The user's word goes first.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    forget()
     called = next((word for word in _words() if not word.startswith("-")), None)
+    if called is not None:
+        from cli.read.files import forget
+
+        forget()
     try:
         front(called)(prog_name="dalembert")
     except DataError as error:

@@ -11,18 +11,17 @@ axis of the difference ω - Ω; here Ḣ is always the true rate, I α + ω × (
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.bounded import read
 from dalembert.arithmetic.records import components, numbers, record, table
-from rigidbody3d import rounding
 from rigidbody3d.inertia import shift
-from rigidbody3d.rounding import BodyError
+from rigidbody3d.rounding import BodyError, of_body
+from rigidbody3d.rounding_in_time import require
 from rigidbody3d.states import BLOCK
 
 if TYPE_CHECKING:
@@ -39,43 +38,9 @@ class Wrench(NamedTuple):
     moment: Array
 
 
-@record
-@dataclass(frozen=True, init=False, eq=False, repr=False)
-class Motion:
-    """A rigid body in motion, one state or many: what its momentum is and what forces the motion asks for.
-
-    Each quantity is computed when it is first asked for. All components are along one set of axes, in which the
-    tensor is given: the fixed axes at the instant looked at, or axes turning with the body.
-
-    Parameters
-    ----------
-    inertia
-        The tensor at the centre of mass, (3, 3) or (..., 3, 3), kg·m²; the products enter as -I_xy.
-    omega
-        Angular velocity of the body, (..., 3), rad/s.
-    alpha
-        Rate of the components of ω in the axes given by `frame_omega`, (..., 3), rad/s².
-    frame_omega
-        Angular velocity Ω of axes that do not turn with the body, (..., 3), rad/s; None: they turn with it.
-    mass
-        (...), kg.
-    center
-        Position of the centre of mass, (..., 3), m.
-    velocity, acceleration
-        Of the centre of mass in fixed space, (..., 3), m/s, m/s².
-
-    Examples
-    --------
-    Riul's example 3: a disk of 3.63 kg, here 0.2 m in radius, spins at 12 rad/s about z on an arm that turns at
-    4 rad/s about y.
-
-    >>> from rigidbody3d import inertia_of
-    >>> disk = Motion(inertia_of("disk", 3.63, radius=0.2), [0, 4, 12.0], frame_omega=[0, 4.0, 0])
-    >>> disk.momentum.round(6)
-    array([0.    , 0.1452, 0.8712])
-    >>> disk.rate.round(6)
-    array([3.4848, 0.    , 0.    ])
-    """
+@dataclass(frozen=True, eq=False, repr=False)
+class _Formulas:
+    """The formulas of a body in motion, on arrays of any kind of number, recorded ones for bounds too."""
 
     inertia: Array
     omega: Array
@@ -87,50 +52,6 @@ class Motion:
     acceleration: Array
     pivot: Array | None
     """The point fixed in space that velocity and acceleration were worked out from; None: they are given."""
-
-    def __init__(
-        self,
-        inertia: ArrayLike,
-        omega: ArrayLike,
-        alpha: ArrayLike = (0.0, 0.0, 0.0),
-        frame_omega: ArrayLike | None = None,
-        mass: ArrayLike = 0.0,
-        center: ArrayLike = (0.0, 0.0, 0.0),
-        velocity: ArrayLike = (0.0, 0.0, 0.0),
-        acceleration: ArrayLike = (0.0, 0.0, 0.0),
-    ) -> None:
-        def keep(name: str, given: ArrayLike, *wanted: int) -> None:
-            value = np.asarray(given, dtype=float)
-            if value.shape[value.ndim - len(wanted) :] != wanted:
-                shape = ", ".join(map(str, ("...", *wanted)))
-                raise ValueError(f"{name} must have the shape ({shape}), found {value.shape}")
-            object.__setattr__(self, name, value)
-
-        keep("inertia", inertia, 3, 3)
-        keep("mass", mass)
-        keep("omega", omega, 3)
-        keep("alpha", alpha, 3)
-        keep("center", center, 3)
-        keep("velocity", velocity, 3)
-        keep("acceleration", acceleration, 3)
-        object.__setattr__(self, "pivot", None)
-        object.__setattr__(self, "frame_omega", None)
-        if frame_omega is not None:
-            keep("frame_omega", frame_omega, 3)
-
-    def __repr__(self) -> str:
-        states = np.broadcast_shapes(self.inertia.shape[:-2], self.omega.shape[:-1], self.mass.shape)
-        if states:
-            return f"<Motion: {np.prod(states)} states, omega {numbers(self.omega)} rad/s>"
-        return f"<Motion: omega {numbers(self.omega)} rad/s, momentum {numbers(self.momentum)} kg·m²/s>"
-
-    def to_frame(self) -> pd.DataFrame:
-        """Return a table with a row per state: ω, H and its rate, d'Alembert's inertia force, kinetic energy."""
-        columns = components("omega_*_rad_s", self.omega)
-        columns |= components("momentum_*_kg_m2_s", self.momentum)
-        columns |= components("momentum_rate_*_N_m", self.rate)
-        columns |= components("inertia_force_*_N", self.inertia_force)
-        return table(columns | {"energy_J": self.energy}, ("state",))
 
     @cached_property
     def momentum(self) -> Array:
@@ -207,13 +128,94 @@ class Motion:
 
     def momentum_about(self, point: ArrayLike) -> Array:
         """Return H about a point, H_G + (G - P) × m v_G, (..., 3), kg·m²/s."""
-        return np.asarray(
-            self.momentum + np.cross(self.center - np.asarray(point, dtype=float), self.linear_momentum)
-        )
+        return np.asarray(self.momentum + np.cross(self.center - np.asarray(point), self.linear_momentum))
 
     def rate_about(self, point: ArrayLike) -> Array:
         """Return Ḣ about a point fixed in space, Ḣ_G + (G - P) × m a_G, (..., 3), N·m: the moment needed there."""
-        return np.asarray(self.rate + np.cross(self.center - np.asarray(point, dtype=float), self.force))
+        return np.asarray(self.rate + np.cross(self.center - np.asarray(point), self.force))
+
+
+@record
+@dataclass(frozen=True, init=False, eq=False, repr=False)
+class Motion(_Formulas):
+    """A rigid body in motion, one state or many: what its momentum is and what forces the motion asks for.
+
+    Each quantity is computed when it is first asked for. All components are along one set of axes, in which the
+    tensor is given: the fixed axes at the instant looked at, or axes turning with the body.
+
+    Parameters
+    ----------
+    inertia
+        The tensor at the centre of mass, (3, 3) or (..., 3, 3), kg·m²; the products enter as -I_xy.
+    omega
+        Angular velocity of the body, (..., 3), rad/s.
+    alpha
+        Rate of the components of ω in the axes given by `frame_omega`, (..., 3), rad/s².
+    frame_omega
+        Angular velocity Ω of axes that do not turn with the body, (..., 3), rad/s; None: they turn with it.
+    mass
+        (...), kg.
+    center
+        Position of the centre of mass, (..., 3), m.
+    velocity, acceleration
+        Of the centre of mass in fixed space, (..., 3), m/s, m/s².
+
+    Examples
+    --------
+    Riul's example 3: a disk of 3.63 kg, here 0.2 m in radius, spins at 12 rad/s about z on an arm that turns at
+    4 rad/s about y.
+
+    >>> from rigidbody3d import inertia_of
+    >>> disk = Motion(inertia_of("disk", 3.63, radius=0.2), [0, 4, 12.0], frame_omega=[0, 4.0, 0])
+    >>> disk.momentum.round(6)
+    array([0.    , 0.1452, 0.8712])
+    >>> disk.rate.round(6)
+    array([3.4848, 0.    , 0.    ])
+    """
+
+    def __init__(
+        self,
+        inertia: ArrayLike,
+        omega: ArrayLike,
+        alpha: ArrayLike = (0.0, 0.0, 0.0),
+        frame_omega: ArrayLike | None = None,
+        mass: ArrayLike = 0.0,
+        center: ArrayLike = (0.0, 0.0, 0.0),
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        acceleration: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        def keep(name: str, given: ArrayLike, *wanted: int) -> None:
+            value = np.asarray(given, dtype=float)
+            if value.shape[value.ndim - len(wanted) :] != wanted:
+                shape = ", ".join(map(str, ("...", *wanted)))
+                raise ValueError(f"{name} must have the shape ({shape}), found {value.shape}")
+            object.__setattr__(self, name, value)
+
+        keep("inertia", inertia, 3, 3)
+        keep("mass", mass)
+        keep("omega", omega, 3)
+        keep("alpha", alpha, 3)
+        keep("center", center, 3)
+        keep("velocity", velocity, 3)
+        keep("acceleration", acceleration, 3)
+        object.__setattr__(self, "pivot", None)
+        object.__setattr__(self, "frame_omega", None)
+        if frame_omega is not None:
+            keep("frame_omega", frame_omega, 3)
+
+    def __repr__(self) -> str:
+        states = np.broadcast_shapes(self.inertia.shape[:-2], self.omega.shape[:-1], self.mass.shape)
+        if states:
+            return f"<Motion: {np.prod(states)} states, omega {numbers(self.omega)} rad/s>"
+        return f"<Motion: omega {numbers(self.omega)} rad/s, momentum {numbers(self.momentum)} kg·m²/s>"
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with a row per state: ω, H and its rate, d'Alembert's inertia force, kinetic energy."""
+        columns = components("omega_*_rad_s", self.omega)
+        columns |= components("momentum_*_kg_m2_s", self.momentum)
+        columns |= components("momentum_rate_*_N_m", self.rate)
+        columns |= components("inertia_force_*_N", self.inertia_force)
+        return table(columns | {"energy_J": self.energy}, ("state",))
 
     def error_estimate(
         self,
@@ -243,18 +245,21 @@ class Motion:
         >>> bool((disk.error_estimate("rate") < 1e-12).all())
         True
         """
-        frame, pivot = (None if x is None else read(x, given) for x in (self.frame_omega, self.pivot))
-        return rounding.motion(
-            of,
-            rounding.numbers(self.mass, self.center, self.inertia, body),
-            read(self.omega, given),
-            read(self.alpha, given),
-            frame,
-            read(self.velocity, given),
-            read(self.acceleration, given),
-            pivot,
-            read(np.nan if point is None else point, given),
-        )
+        from dalembert.arithmetic.bounds import bounds, read
+
+        require(of, *ESTIMATED)
+        vectors = {
+            "omega": self.omega,
+            "alpha": self.alpha,
+            "frame_omega": self.frame_omega,
+            "velocity": self.velocity,
+            "acceleration": self.acceleration,
+            "pivot": self.pivot,
+            "point": point,
+        }
+        entering = of_body(self.mass, self.center, self.inertia, body)
+        entering |= {name: read(v, 1, given) for name, v in vectors.items() if v is not None}
+        return bounds(_quantity, entering, of)[0]
 
     @classmethod
     def about_fixed_point(
@@ -269,15 +274,53 @@ class Motion:
         frame_omega: ArrayLike | None = None,
     ) -> Motion:
         """Return the motion of a body that turns about a point fixed in space: v = ω × r, a = α × r + ω × v."""
-        w, pivot = np.asarray(omega, dtype=float), np.asarray(point, dtype=float)
-        r = np.asarray(center, dtype=float) - pivot
-        true = np.asarray(alpha, dtype=float)
-        if frame_omega is not None:
-            true = true + np.cross(np.asarray(frame_omega, dtype=float), w)
-        v = np.cross(w, r)
-        motion = cls(inertia, w, alpha, frame_omega, mass, center, v, np.cross(true, r) + np.cross(w, v))
-        object.__setattr__(motion, "pivot", pivot)
+        motion, pivot = cls(inertia, omega, alpha, frame_omega, mass, center), np.asarray(point, dtype=float)
+        velocity, acceleration = _about_pivot(motion, pivot)
+        for name, value in (("velocity", velocity), ("acceleration", acceleration), ("pivot", pivot)):
+            object.__setattr__(motion, name, value)
         return motion
+
+
+ESTIMATED = (
+    "momentum",
+    "true_alpha",
+    "rate",
+    "transport",
+    "relative",
+    "tensor_rate",
+    "linear_momentum",
+    "force",
+    "inertia_force",
+    "inertia_moment",
+    "energy",
+    "momentum_about",
+    "rate_about",
+)
+"""What a motion has estimates of."""
+
+
+def _quantity(
+    of: str,
+    *,
+    frame_omega: Array | None = None,
+    pivot: Array | None = None,
+    point: Array | None = None,
+    **given: Array,
+) -> list[Array]:
+    """A quantity of a motion, from the numbers it is worked out of."""
+    motion = _Formulas(frame_omega=frame_omega, pivot=pivot, **given)
+    if pivot is not None:
+        velocity, acceleration = _about_pivot(motion, pivot)
+        motion = replace(motion, velocity=velocity, acceleration=acceleration)
+    found = getattr(motion, "rate" if of == "inertia_moment" else of)
+    return [found(point) if of.endswith("_about") else found]
+
+
+def _about_pivot(motion: _Formulas, pivot: Array) -> tuple[Array, Array]:
+    """Velocity and acceleration of the centre of mass of a body that turns about a point fixed in space."""
+    arm = motion.center - pivot
+    velocity = np.cross(motion.omega, arm)
+    return velocity, np.cross(motion.true_alpha, arm) + np.cross(motion.omega, velocity)
 
 
 def _times(I: Array, w: Array) -> Array:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,9 @@ from dalembert.arithmetic.bounded import Bounded, apply, stack
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
 from rigidbody3d.shapes import SHAPES
+
+if TYPE_CHECKING:
+    from dalembert.arithmetic.bounds import Given
 
 Array = NDArray[np.float64]
 
@@ -41,6 +44,22 @@ class BodyError(NamedTuple):
     mass: Array
     center: Array
     inertia: Array
+
+
+class MassProperties(NamedTuple):
+    """Mass (...), centre of mass (..., 3) and tensor at it (..., 3, 3) alone, of any kind of number."""
+
+    mass: Array
+    center: Array
+    inertia: Array
+
+
+def of_body(mass: Array, center: Array, inertia: Array, error: BodyError | None = None) -> dict[str, Given]:
+    """Return mass properties as numbers that enter a formula; None: they are exact."""
+    from dalembert.arithmetic.bounds import Given
+
+    m, c, I = error or (0.0, 0.0, 0.0)
+    return {"mass": Given(mass, 0, m), "center": Given(center, 1, c), "inertia": Given(inertia, 2, I)}
 
 
 class Numbers(NamedTuple):
@@ -152,125 +171,6 @@ def principal(moments: Array, axes: Array, tensor: ArrayLike) -> tuple[Array, Ar
     torn = (rivals & (axes > 0)).any(axis=-1) & (rivals & (axes < 0)).any(axis=-1)
     torn[..., 2] = torn[..., :2].any(axis=-1)
     return own.copy(), np.minimum(np.where(torn[..., None], 2.0, bound), 2.0)
-
-
-# --- momentum ---
-
-
-def motion(
-    what: str,
-    body: Numbers,
-    omega: Bounded,
-    own: Bounded,
-    frame: Bounded | None,
-    velocity: Bounded,
-    acceleration: Bounded,
-    pivot: Bounded | None,
-    point: Bounded,
-) -> Array:
-    """Bound a quantity of a motion, (...) or (..., 3): its formula on numbers with errors.
-
-    `own` is the rate of ω's components in axes that turn at `frame` (None: at ω); where a `pivot` is fixed in space
-    the centre of mass follows the body.
-    """
-    m, center, I = body
-    w, v, a = omega, velocity, acceleration
-    alpha = own if frame is None else own + cross(frame, w)
-    if pivot is not None:
-        r = center - pivot
-        v = cross(w, r)
-        a = cross(alpha, r) + cross(w, v)
-    m3 = m[..., None]
-    slip = w - (w if frame is None else frame)
-
-    def momentum() -> Bounded:
-        return times(I, w)
-
-    def rate() -> Bounded:
-        return times(I, alpha) + cross(w, momentum())
-
-    def change() -> Bounded:
-        return cross(slip, momentum()) - times(I, cross(slip, w))
-
-    formulas: dict[str, Callable[[], Bounded]] = {
-        "momentum": momentum,
-        "true_alpha": lambda: alpha,
-        "rate": rate,
-        "transport": lambda: cross(w if frame is None else frame, momentum()),
-        "relative": lambda: times(I, own) if frame is None else times(I, own) + change(),
-        "tensor_rate": lambda: momentum() * 0.0 if frame is None else change(),
-        "linear_momentum": lambda: m3 * v,
-        "force": lambda: m3 * a,
-        "inertia_force": lambda: m3 * a,
-        "inertia_moment": rate,
-        "energy": lambda: m * (v * v).sum() / 2 + (w * momentum()).sum() / 2,
-        "momentum_about": lambda: momentum() + cross(center - point, m3 * v),
-        "rate_about": lambda: rate() + cross(center - point, m3 * a),
-    }
-    return _named(formulas, what)
-
-
-def _named(formulas: dict[str, Callable[[], Bounded]], what: str) -> Array:
-    if what not in formulas:
-        raise ValueError(f"no estimate for '{what}': expected one of {', '.join(formulas)}")
-    return np.array(formulas[what]().error)
-
-
-# --- shafts ---
-
-
-def shaft(
-    what: str, body: Numbers, bearings: Bounded, speed: Bounded, speed_rate: Bounded, gravity: Bounded
-) -> Array:
-    """Bound a quantity of a shaft, in its shape; of a complex one: the size of its error."""
-    m, c, I = body
-    z1, z2 = (bearings[..., i] for i in range(2))
-    weight = m[..., None] * gravity
-    # x and y as the last axis
-    U = m[..., None] * c[..., :2]
-    push, pull = -(speed**2), speed_rate
-
-    def moment(z: Bounded) -> Bounded:
-        products = -stack([I[..., 0, 2], I[..., 1, 2]])
-        return products + U * (c[..., 2] - z)[..., None]
-
-    def unbalance() -> Bounded:
-        first = moment(z2) / (z1 - z2)[..., None]
-        second = moment(z1) / (z2 - z1)[..., None]
-        return stack([first, second], axis=-2)
-
-    def size(vector: Bounded) -> Bounded:
-        return vector.moved(lambda x: np.hypot(x[..., 0], x[..., 1]))
-
-    def dynamic() -> Bounded:
-        x, y = (unbalance()[..., i] for i in range(2))
-        p, q = push[..., None], pull[..., None]
-        return stack([p * x - q * y, p * y + q * x])
-
-    def static() -> Bounded:
-        forces = []
-        for here, other in ((z1, z2), (z2, z1)):
-            lever = (c[..., 2] - other)[..., None]
-            turning = weight[..., :2] * lever - c[..., :2] * weight[..., 2:]
-            forces.append(turning / (here - other)[..., None])
-        return stack(forces, axis=-2)
-
-    def drive() -> Bounded:
-        x, y = c[..., 0], c[..., 1]
-        about_z = I[..., 2, 2] + m * (x**2 + y**2)
-        return about_z * pull - (x * weight[..., 1] - y * weight[..., 0])
-
-    return _named(
-        {
-            "static_unbalance": lambda: size(U),
-            "unbalance": lambda: size(unbalance()),
-            "dynamic": dynamic,
-            "static": static,
-            "axial": lambda: weight[..., 2],
-            "drive_torque": drive,
-        },
-        what,
-    )
 
 
 # --- gyroscopes ---

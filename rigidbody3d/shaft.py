@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.bounded import read
 from dalembert.arithmetic.records import components, numbers, record, table
-from rigidbody3d import rounding
 from rigidbody3d.body import Body
+from rigidbody3d.rounding import MassProperties, of_body
+from rigidbody3d.rounding_in_time import require
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,9 +32,78 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class _Formulas:
+    """The formulas of a shaft, on arrays of any kind of number, recorded ones for bounds too."""
+
+    body: Body | MassProperties
+    bearings: Array
+    speed: Array
+    speed_rate: Array
+    gravity: Array
+
+    @property
+    def _turning(self) -> Complex:
+        """-ω² + i ω̇: what the acceleration of a point is to its place across the shaft."""
+        return np.asarray(-np.square(self.speed) + 1j * self.speed_rate)
+
+    @property
+    def _weight(self) -> Array:
+        return np.asarray(self.body.mass[..., None] * self.gravity)
+
+    @property
+    def static_unbalance(self) -> Complex:
+        """U = ∫ (x + iy) dm, (...), kg·m."""
+        return np.asarray(self.body.mass * _across(self.body.center))
+
+    def moment_unbalance(self, z: ArrayLike) -> Complex:
+        """Return V(z) = ∫ (x + iy)(z' - z) dm about a plane, (...), kg·m²: the products I_xz + i I_yz about it."""
+        I, c = self.body.inertia, self.body.center
+        central = -I[..., 0, 2] - 1j * I[..., 1, 2]
+        return np.asarray(central + self.static_unbalance * (c[..., 2] - np.asarray(z)))
+
+    @cached_property
+    def unbalance(self) -> Complex:
+        """The dynamic unbalance as two unbalances in the planes of the bearings, (..., 2), kg·m."""
+        z1, z2 = self.bearings[..., 0], self.bearings[..., 1]
+        return np.stack(
+            np.broadcast_arrays(
+                self.moment_unbalance(z2) * (1 / (z1 - z2)), self.moment_unbalance(z1) * (1 / (z2 - z1))
+            ),
+            axis=-1,
+        )
+
+    @cached_property
+    def dynamic(self) -> Array:
+        """Forces of the bearings on the shaft that the turning asks for, (..., 2, 2): bearing, then x and y, N."""
+        return _parts(self._turning[..., None] * self.unbalance)
+
+    @cached_property
+    def static(self) -> Array:
+        """Forces of the bearings on the shaft that carry the weight, (..., 2, 2): bearing, then x and y, N."""
+        weight, c, z = self._weight, self.body.center, self.bearings
+        across = _across(weight)
+        # the moment of the weight about each bearing, its part along the shaft included
+        lever = across[..., None] * (c[..., 2:] - z[..., ::-1]) - (_across(c) * weight[..., 2])[..., None]
+        span = np.stack([z[..., 0] - z[..., 1], z[..., 1] - z[..., 0]], axis=-1)
+        return _parts(-lever * (1 / span))
+
+    @property
+    def axial(self) -> Array:
+        """Force along z of the bearings on the shaft, (...), N."""
+        return np.asarray(0.0 - self._weight[..., 2])
+
+    @property
+    def drive_torque(self) -> Array:
+        """Torque about z that drives the shaft: I_zz ω̇ less the moment of the weight, (...), N·m."""
+        c, weight = self.body.center, self._weight
+        about = self.body.inertia[..., 2, 2] + self.body.mass * (c[..., 0] ** 2 + c[..., 1] ** 2)
+        return np.asarray(about * self.speed_rate - (c[..., 0] * weight[..., 1] - c[..., 1] * weight[..., 0]))
+
+
 @record
 @dataclass(frozen=True, init=False, eq=False, repr=False)
-class Shaft:
+class Shaft(_Formulas):
     """A body turning about the z-axis on two bearings, in the position drawn.
 
     Parameters
@@ -69,10 +138,6 @@ class Shaft:
     """
 
     body: Body
-    bearings: Array
-    speed: Array
-    speed_rate: Array
-    gravity: Array
 
     def __init__(
         self,
@@ -118,62 +183,6 @@ class Shaft:
         forces = ({"static": self.static} if self.gravity.any() else {}) | {"dynamic": self.dynamic}
         return views.shaft(self.body.solids(), names, self.body.whole(), self.bearings, forces, figure=figure)
 
-    @property
-    def _turning(self) -> Complex:
-        """-ω² + i ω̇: what the acceleration of a point is to its place across the shaft."""
-        return np.asarray(-np.square(self.speed) + 1j * self.speed_rate)
-
-    @property
-    def _weight(self) -> Array:
-        return np.asarray(self.body.mass[..., None] * self.gravity)
-
-    @property
-    def static_unbalance(self) -> Complex:
-        """U = ∫ (x + iy) dm, (...), kg·m."""
-        return np.asarray(self.body.mass * _across(self.body.center))
-
-    def moment_unbalance(self, z: ArrayLike) -> Complex:
-        """Return V(z) = ∫ (x + iy)(z' - z) dm about a plane, (...), kg·m²: the products I_xz + i I_yz about it."""
-        I, c = self.body.inertia, self.body.center
-        central = -I[..., 0, 2] - 1j * I[..., 1, 2]
-        return np.asarray(central + self.static_unbalance * (c[..., 2] - np.asarray(z, dtype=float)))
-
-    @cached_property
-    def unbalance(self) -> Complex:
-        """The dynamic unbalance as two unbalances in the planes of the bearings, (..., 2), kg·m."""
-        z1, z2 = self.bearings[..., 0], self.bearings[..., 1]
-        return np.stack(
-            np.broadcast_arrays(self.moment_unbalance(z2) / (z1 - z2), self.moment_unbalance(z1) / (z2 - z1)),
-            axis=-1,
-        )
-
-    @cached_property
-    def dynamic(self) -> Array:
-        """Forces of the bearings on the shaft that the turning asks for, (..., 2, 2): bearing, then x and y, N."""
-        return _parts(self._turning[..., None] * self.unbalance)
-
-    @cached_property
-    def static(self) -> Array:
-        """Forces of the bearings on the shaft that carry the weight, (..., 2, 2): bearing, then x and y, N."""
-        weight, c, z = self._weight, self.body.center, self.bearings
-        across = _across(weight)
-        # the moment of the weight about each bearing, its part along the shaft included
-        lever = across[..., None] * (c[..., 2:] - z[..., ::-1]) - (_across(c) * weight[..., 2])[..., None]
-        span = np.stack([z[..., 0] - z[..., 1], z[..., 1] - z[..., 0]], axis=-1)
-        return _parts(-lever / span)
-
-    @property
-    def axial(self) -> Array:
-        """Force along z of the bearings on the shaft, (...), N."""
-        return np.asarray(0.0 - self._weight[..., 2])
-
-    @property
-    def drive_torque(self) -> Array:
-        """Torque about z that drives the shaft: I_zz ω̇ less the moment of the weight, (...), N·m."""
-        c, weight = self.body.center, self._weight
-        about = self.body.inertia[..., 2, 2] + self.body.mass * (c[..., 0] ** 2 + c[..., 1] ** 2)
-        return np.asarray(about * self.speed_rate - (c[..., 0] * weight[..., 1] - c[..., 1] * weight[..., 0]))
-
     def error_estimate(self, of: str, given: float = 0.0) -> Array:
         """Return a bound of the rounding error of a quantity, in its shape and unit; of a complex one: of its size.
 
@@ -195,10 +204,14 @@ class Shaft:
         >>> bool((Shaft(rotor, (0.0, 2.0), 100.0).error_estimate("dynamic") < 1e-13).all())
         True
         """
-        bearings, speed, speed_rate, gravity = (
-            read(x, given) for x in (self.bearings, self.speed, self.speed_rate, self.gravity)
-        )
-        return rounding.shaft(of, self.body.numbers(), bearings, speed, speed_rate, gravity)
+        from dalembert.arithmetic.bounds import bounds, read
+
+        require(of, *ESTIMATED)
+        body = self.body
+        entering = of_body(body.mass, body.center, body.inertia, body.error_estimate())
+        for name, axes in (("bearings", 1), ("speed", 0), ("speed_rate", 0), ("gravity", 1)):
+            entering[name] = read(getattr(self, name), axes, given)
+        return bounds(_quantity, entering, of)[0]
 
     def with_masses(self, unbalance: ArrayLike, z: ArrayLike) -> Array:
         """Return the dynamic forces with further unbalances (..., k) at z (k,) on the shaft, (..., 2, 2), N.
@@ -217,9 +230,22 @@ class Shaft:
         return _parts(self._turning[..., None] * (self.unbalance + share))
 
 
+ESTIMATED = ("static_unbalance", "unbalance", "dynamic", "static", "axial", "drive_torque")
+"""What a shaft has estimates of."""
+
+
+def _quantity(of: str, *, mass: Array, center: Array, inertia: Array, **given: Array) -> list[Array]:
+    """A quantity of a shaft, from the numbers it is worked out of."""
+    return [getattr(_Formulas(MassProperties(mass, center, inertia), **given), of)]
+
+
 def _across(vector: Array) -> Complex:
     return np.asarray(vector[..., 0] + 1j * vector[..., 1])
 
 
 def _parts(z: Complex) -> Array:
-    return np.stack([z.real, z.imag], axis=-1) + 0.0
+    x, y = _recorded_parts(z) if z.dtype == object else (z.real, z.imag)
+    return np.stack([x, y], axis=-1) + 0.0
+
+
+_recorded_parts = np.frompyfunc(lambda z: (z.real, z.imag), 1, 2)

@@ -71,7 +71,6 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "cli": (
         ("__main__",),
         ("app",),
-        ("help",),
         ("exports", "imports"),
         (
             "balance",

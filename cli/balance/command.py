@@ -16,61 +16,44 @@ if TYPE_CHECKING:
 
 
 EXAMPLE = "riul-rotor"
-PANELS = {
-    "What": "plane planes gravity",
-    "How": "remove round_mass round_angle workers",
-    "How: the tolerance": "grade speed rotor_mass permissible bearings center_z",
-}
+OPTIONS = """
+Arguments:
+  table TABLE  CSV of eccentric masses; - is standard input.
+What:
+  plane NAME[:Z]:RADIUS  A correction plane, such as A:0mm:20mm; once: static balancing.
+  planes FILE.csv  The planes as a table: plane, z_*, radius_*, rotor.
+  gravity G  g for weights, m/s².
+How:
+  remove  Corrections as material to remove, not to add.
+  round_mass MASS  Round the corrections to this step, such as 0.1g.
+  round_angle ANGLE  Round the angles to this step, such as 1deg.
+  workers N  Processes that solve many rotors.
+How: the tolerance:
+  center_z Z  Where the centre of mass lies: for the couple and the tolerance.
+  grade GRADE  Balance quality grade of ISO 21940-11, such as G2.5.
+  speed SPEED  Highest service speed, such as 3000rpm.
+  rotor_mass MASS  Mass of the rotor, such as 12kg.
+  permissible UNBALANCE  Permissible residual unbalance, such as 30g_mm, in place of a grade.
+  bearings Z1:Z2  The bearing planes, where the tolerance holds.
+"""
 
 
-@command
+@command(OPTIONS)
 def run(
-    table: Annotated[
-        str, typer.Argument(metavar="TABLE", help="CSV of eccentric masses; - is standard input.")
-    ],
-    plane: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME[:Z]:RADIUS", help="A correction plane, such as A:0mm:20mm; once: static balancing."
-        ),
-    ] = None,
-    planes: Annotated[
-        str | None,
-        typer.Option(metavar="FILE.csv", help="The planes as a table: plane, z_*, radius_*, rotor."),
-    ] = None,
-    gravity: Annotated[float, typer.Option(metavar="G", help="g for weights, m/s².")] = 9.80665,
-    remove: Annotated[
-        bool, typer.Option("--remove", help="Corrections as material to remove, not to add.")
-    ] = False,
-    round_mass: Annotated[
-        str | None, typer.Option(metavar="MASS", help="Round the corrections to this step, such as 0.1g.")
-    ] = None,
-    round_angle: Annotated[
-        str | None, typer.Option(metavar="ANGLE", help="Round the angles to this step, such as 1deg.")
-    ] = None,
-    center_z: Annotated[
-        str | None,
-        typer.Option(metavar="Z", help="Where the centre of mass lies: for the couple and the tolerance."),
-    ] = None,
-    grade: Annotated[
-        str | None, typer.Option(metavar="GRADE", help="Balance quality grade of ISO 21940-11, such as G2.5.")
-    ] = None,
-    speed: Annotated[
-        str | None, typer.Option(metavar="SPEED", help="Highest service speed, such as 3000rpm.")
-    ] = None,
-    rotor_mass: Annotated[
-        str | None, typer.Option(metavar="MASS", help="Mass of the rotor, such as 12kg.")
-    ] = None,
-    permissible: Annotated[
-        str | None,
-        typer.Option(
-            metavar="UNBALANCE", help="Permissible residual unbalance, such as 30g_mm, in place of a grade."
-        ),
-    ] = None,
-    bearings: Annotated[
-        str | None, typer.Option(metavar="Z1:Z2", help="The bearing planes, where the tolerance holds.")
-    ] = None,
-    workers: Annotated[int, typer.Option(min=1, metavar="N", help="Processes that solve many rotors.")] = 1,
+    table: str,
+    plane: list[str] | None = None,
+    planes: str | None = None,
+    gravity: float = 9.80665,
+    remove: bool = False,
+    round_mass: str | None = None,
+    round_angle: str | None = None,
+    center_z: str | None = None,
+    grade: str | None = None,
+    speed: str | None = None,
+    rotor_mass: str | None = None,
+    permissible: str | None = None,
+    bearings: str | None = None,
+    workers: Annotated[int, typer.Option(min=1)] = 1,
 ) -> Result:
     """Balance rotors from a table of known eccentric masses, in one, two or more planes.
 

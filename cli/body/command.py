@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from cli.read import options
 from cli.show.output import command
@@ -19,66 +17,44 @@ _VECTOR = "X,Y,Z"
 
 
 EXAMPLE = "riul-rod"
-PANELS = {
-    "What": "omega alpha frame_omega about fixed velocity acceleration",
-    "What: a robot": "check_inertias",
-    "What: a shaft": "shaft speed speed_rate gravity correct",
-}
+OPTIONS = """
+Arguments:
+  parts PARTS  CSV of parts; - is standard input.
+What:
+  omega X,Y,Z  Angular velocity, rad/s, such as 0,4,12.
+  alpha X,Y,Z  Its rate, rad/s²; with --frame-omega: that of its components there.
+  frame_omega X,Y,Z  Angular velocity of axes that do not turn with the body, rad/s.
+  about X,Y,Z  A point fixed in space to take the momentum about, m.
+  fixed X,Y,Z  The body turns about this point, m: the centre of mass follows.
+  velocity X,Y,Z  Velocity of the centre of mass, m/s.
+  acceleration X,Y,Z  Acceleration of the centre of mass, m/s².
+What: a robot:
+  check_inertias  PARTS is a robot (URDF, SDF, MJCF): can bodies have its tensors?
+What: a shaft:
+  shaft Z1:Z2  The parts turn about z on bearings there, such as 0mm:400mm.
+  speed SPEED  Speed of the shaft, such as 1200rpm.
+  speed_rate RATE  Its rate, such as 10rad_s2.
+  gravity X,Y,Z  Gravity on the shaft, m/s², such as 0,-9.81,0.
+  correct NAME:Z:RADIUS  A correction plane of the shaft, such as A:0mm:20mm.
+"""
 
 
-@command
+@command(OPTIONS)
 def run(
-    parts: Annotated[str, typer.Argument(metavar="PARTS", help="CSV of parts; - is standard input.")],
-    omega: Annotated[
-        str | None, typer.Option(metavar=_VECTOR, help="Angular velocity, rad/s, such as 0,4,12.")
-    ] = None,
-    alpha: Annotated[
-        str | None,
-        typer.Option(
-            metavar=_VECTOR, help="Its rate, rad/s²; with --frame-omega: that of its components there."
-        ),
-    ] = None,
-    frame_omega: Annotated[
-        str | None,
-        typer.Option(metavar=_VECTOR, help="Angular velocity of axes that do not turn with the body, rad/s."),
-    ] = None,
-    about: Annotated[
-        str | None,
-        typer.Option(metavar=_VECTOR, help="A point fixed in space to take the momentum about, m."),
-    ] = None,
-    fixed: Annotated[
-        str | None,
-        typer.Option(metavar=_VECTOR, help="The body turns about this point, m: the centre of mass follows."),
-    ] = None,
-    velocity: Annotated[
-        str | None, typer.Option(metavar=_VECTOR, help="Velocity of the centre of mass, m/s.")
-    ] = None,
-    acceleration: Annotated[
-        str | None, typer.Option(metavar=_VECTOR, help="Acceleration of the centre of mass, m/s².")
-    ] = None,
-    shaft: Annotated[
-        str | None,
-        typer.Option(metavar="Z1:Z2", help="The parts turn about z on bearings there, such as 0mm:400mm."),
-    ] = None,
-    speed: Annotated[
-        str | None, typer.Option(metavar="SPEED", help="Speed of the shaft, such as 1200rpm.")
-    ] = None,
-    speed_rate: Annotated[
-        str | None, typer.Option(metavar="RATE", help="Its rate, such as 10rad_s2.")
-    ] = None,
-    gravity: Annotated[
-        str | None, typer.Option(metavar=_VECTOR, help="Gravity on the shaft, m/s², such as 0,-9.81,0.")
-    ] = None,
-    correct: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME:Z:RADIUS", help="A correction plane of the shaft, such as A:0mm:20mm."),
-    ] = None,
-    check_inertias: Annotated[
-        bool,
-        typer.Option(
-            "--check-inertias", help="PARTS is a robot (URDF, SDF, MJCF): can bodies have its tensors?"
-        ),
-    ] = False,
+    parts: str,
+    omega: str | None = None,
+    alpha: str | None = None,
+    frame_omega: str | None = None,
+    about: str | None = None,
+    fixed: str | None = None,
+    velocity: str | None = None,
+    acceleration: str | None = None,
+    shaft: str | None = None,
+    speed: str | None = None,
+    speed_rate: str | None = None,
+    gravity: str | None = None,
+    correct: list[str] | None = None,
+    check_inertias: bool = False,
 ) -> Result:
     """Put a body together from parts: mass, centre of mass, inertia; its angular momentum and what its motion asks for.
 

@@ -6,9 +6,7 @@ import tomllib
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from cli.errors import DataError, nearest
 from cli.show.reported import reported
@@ -27,9 +25,15 @@ METHOD = (
 )
 
 
-@reported
+OPTIONS = """
+Arguments:
+  name [NAME]  The example to write here.
+"""
+
+
+@reported(OPTIONS)
 def run(
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="The example to write here.")] = None,
+    name: str | None = None,
 ) -> Result:
     """List the worked examples; with NAME, write its input files into the current folder and show its command."""
     from cli.show.columns import Result, Sheet

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -28,22 +28,20 @@ METHOD = (
 )
 
 
-@reported
+OPTIONS = """
+Arguments:
+  file FILE.toml  The mechanism; - is standard input.
+Options:
+  output --output -o FILE  Ends in .dxf, .svg, .csv, .urdf, .sdf or .xml (MJCF).
+  at INPUT  The start pose, such as 60deg or crank=60deg,arm=30deg; else the file's own.
+"""
+
+
+@reported(OPTIONS)
 def run(
-    file: Annotated[str, typer.Argument(metavar="FILE.toml", help="The mechanism; - is standard input.")],
-    output: Annotated[
-        Path,
-        typer.Option(
-            "--output", "-o", metavar="FILE", help="Ends in .dxf, .svg, .csv, .urdf, .sdf or .xml (MJCF)."
-        ),
-    ],
-    at: Annotated[
-        str | None,
-        typer.Option(
-            metavar="INPUT",
-            help="The start pose, such as 60deg or crank=60deg,arm=30deg; else the file's own.",
-        ),
-    ] = None,
+    file: str,
+    output: Path,
+    at: str | None = None,
 ) -> Result:
     """Write a mechanism for other programs: a drawing (DXF, SVG), curves (CSV), a robot (URDF, SDF, MJCF).
 

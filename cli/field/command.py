@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from cli.read import options
-from cli.show.output import command, suffix_among
+from cli.show.commands import suffix_among
+from cli.show.output import command
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,151 +22,81 @@ if TYPE_CHECKING:
 
 
 EXAMPLE = "fan-one-plane"
-PANELS = {
-    "What": "influence runout phase_lag rotation signal pulses exclude workers",
-    "How": "method fit robust objective max_mass max_residual from_here ridge reading_error monte_carlo",
-    "How: the tolerance, the first trial mass": "grade speed rotor_mass permissible radius suggest_trial planes",
-    "Output: where masses go, the next run": "blades positions first predict suggest save_influence",
-}
+OPTIONS = """
+Arguments:
+  runs RUNS  CSV of runs; - is standard input.
+What:
+  influence COEFFICIENTS.csv  Stored coefficients in place of trial runs; of several machines (repeatable), or with uncertainties: prior knowledge of a fit.
+  runout FILE.csv  Run-out vectors: sensor, amplitude_*, phase_deg.
+  phase_lag  The instrument's phase lags.
+  rotation  Seen against +z: phases lead in that sense, mass angles are ccw.
+  exclude RUN  Leave a run out of the fit; repeatable.
+  signal FILE.csv  Once-per-turn vectors of a recording: t_s, mark, A_um …; no RUNS.
+  pulses  Pulses of the mark in a turn, for --signal.
+  workers N  Processes that solve what each of many machines needs alone.
+How:
+  objective  Least sum of squares of the residuals, or the smallest largest one.
+  max_mass [PLANE=]MASS  Limit of each correction (5g), or of one plane's (A=5g).
+  max_residual AMPLITUDE  No residual beyond this, such as 76um.
+  from_here  What to add to the rotor as it stands, kept trial masses on.
+  reading_error 2%,2deg  Standard deviations of amplitude and phase: adds uncertainties.
+  monte_carlo N  Uncertainties from N drawn sets of readings.
+  method  By influence coefficients, or by amplitudes only in one plane.
+  ridge NUMBER  Damp the corrections of nearly dependent planes, such as 0.1.
+  fit  Fit all runs at once, the initial one too (implied where runs are more than unknowns).
+  robust  Beside the fit one that hardly counts outliers (Huber).
+How: the tolerance, the first trial mass:
+  grade GRADE  Balance quality grade of ISO 21940-11, such as G6.3.
+  speed SPEED  Highest service speed, such as 3000rpm.
+  rotor_mass MASS  Mass of the rotor, such as 120kg.
+  permissible UNBALANCE  Permissible residual unbalance in place of a grade.
+  radius LENGTH  Radius of the trial masses: for the tolerance.
+  suggest_trial  Suggest a trial mass for --rotor-mass, --speed, --radius and --planes; no RUNS.
+  planes N  Number of planes, for --suggest-trial.
+Output: where masses go, the next run:
+  save_influence FILE.csv  Store the coefficients.
+  blades N  Split the corrections onto so many places, evenly spaced.
+  positions ANGLES  Split them onto these places: 0deg,30deg,60deg.
+  first ANGLE  Angle of the first of --blades.
+  predict [PLANE=]MASS@ANGLE,…  What a run with these masses should read: 10kg@-90deg.
+  suggest  The run within --max-mass that would tell most about the correction.
+"""
 
 
-@command
+@command(OPTIONS)
 def run(
-    runs: Annotated[
-        str | None,
-        typer.Argument(metavar="RUNS", help="CSV of runs; - is standard input.", show_default=False),
-    ] = None,
-    influence: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="COEFFICIENTS.csv",
-            help="Stored coefficients in place of trial runs; of several machines (repeatable), or with uncertainties: prior "
-            "knowledge of a fit.",
-        ),
-    ] = None,
-    save_influence: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.csv", help="Store the coefficients.", callback=suffix_among(".csv")),
-    ] = None,
-    objective: Annotated[
-        Literal["least-squares", "minimax"],
-        typer.Option(help="Least sum of squares of the residuals, or the smallest largest one."),
-    ] = "least-squares",
-    max_mass: Annotated[
-        list[str] | None,
-        typer.Option(metavar="[PLANE=]MASS", help="Limit of each correction (5g), or of one plane's (A=5g)."),
-    ] = None,
-    max_residual: Annotated[
-        str | None, typer.Option(metavar="AMPLITUDE", help="No residual beyond this, such as 76um.")
-    ] = None,
-    from_here: Annotated[
-        bool, typer.Option("--from-here", help="What to add to the rotor as it stands, kept trial masses on.")
-    ] = False,
-    runout: Annotated[
-        str | None, typer.Option(metavar="FILE.csv", help="Run-out vectors: sensor, amplitude_*, phase_deg.")
-    ] = None,
-    reading_error: Annotated[
-        str | None,
-        typer.Option(
-            metavar="2%,2deg", help="Standard deviations of amplitude and phase: adds uncertainties."
-        ),
-    ] = None,
-    monte_carlo: Annotated[
-        int,
-        typer.Option(metavar="N", min=0, max=100_000, help="Uncertainties from N drawn sets of readings."),
-    ] = 0,
-    method: Annotated[
-        Literal["influence", "four-run"],
-        typer.Option(help="By influence coefficients, or by amplitudes only in one plane."),
-    ] = "influence",
-    ridge: Annotated[
-        float,
-        typer.Option(
-            metavar="NUMBER", min=0.0, help="Damp the corrections of nearly dependent planes, such as 0.1."
-        ),
-    ] = 0.0,
-    phase_lag: Annotated[bool, typer.Option("--phase-lag", help="The instrument's phase lags.")] = False,
-    rotation: Annotated[
-        Literal["ccw", "cw"] | None,
-        typer.Option(help="Seen against +z: phases lead in that sense, mass angles are ccw."),
-    ] = None,
-    grade: Annotated[
-        str | None, typer.Option(metavar="GRADE", help="Balance quality grade of ISO 21940-11, such as G6.3.")
-    ] = None,
-    speed: Annotated[
-        str | None, typer.Option(metavar="SPEED", help="Highest service speed, such as 3000rpm.")
-    ] = None,
-    rotor_mass: Annotated[
-        str | None, typer.Option(metavar="MASS", help="Mass of the rotor, such as 120kg.")
-    ] = None,
-    permissible: Annotated[
-        str | None,
-        typer.Option(metavar="UNBALANCE", help="Permissible residual unbalance in place of a grade."),
-    ] = None,
-    radius: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Radius of the trial masses: for the tolerance.")
-    ] = None,
-    suggest_trial: Annotated[
-        bool,
-        typer.Option(
-            "--suggest-trial",
-            help="Suggest a trial mass for --rotor-mass, --speed, --radius and --planes; no RUNS.",
-        ),
-    ] = False,
-    planes: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Number of planes, for --suggest-trial.")
-    ] = 1,
-    blades: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            min=1,
-            max=options.PLACES,
-            help="Split the corrections onto so many places, evenly spaced.",
-        ),
-    ] = None,
-    positions: Annotated[
-        str | None, typer.Option(metavar="ANGLES", help="Split them onto these places: 0deg,30deg,60deg.")
-    ] = None,
-    first: Annotated[str, typer.Option(metavar="ANGLE", help="Angle of the first of --blades.")] = "0deg",
-    fit: Annotated[
-        bool,
-        typer.Option(
-            "--fit",
-            help="Fit all runs at once, the initial one too (implied where runs are more than unknowns).",
-        ),
-    ] = False,
-    exclude: Annotated[
-        list[str] | None, typer.Option(metavar="RUN", help="Leave a run out of the fit; repeatable.")
-    ] = None,
-    predict: Annotated[
-        str | None,
-        typer.Option(
-            metavar="[PLANE=]MASS@ANGLE,…", help="What a run with these masses should read: 10kg@-90deg."
-        ),
-    ] = None,
-    suggest: Annotated[
-        bool,
-        typer.Option(
-            "--suggest", help="The run within --max-mass that would tell most about the correction."
-        ),
-    ] = False,
-    robust: Annotated[
-        bool, typer.Option("--robust", help="Beside the fit one that hardly counts outliers (Huber).")
-    ] = False,
-    signal: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE.csv", help="Once-per-turn vectors of a recording: t_s, mark, A_um …; no RUNS."
-        ),
-    ] = None,
-    pulses: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Pulses of the mark in a turn, for --signal.")
-    ] = 1,
-    workers: Annotated[
-        int,
-        typer.Option(min=1, metavar="N", help="Processes that solve what each of many machines needs alone."),
-    ] = 1,
+    runs: Annotated[str | None, typer.Argument(show_default=False)] = None,
+    influence: list[str] | None = None,
+    save_influence: Annotated[Path | None, typer.Option(callback=suffix_among(".csv"))] = None,
+    objective: Literal["least-squares", "minimax"] = "least-squares",
+    max_mass: list[str] | None = None,
+    max_residual: str | None = None,
+    from_here: bool = False,
+    runout: str | None = None,
+    reading_error: str | None = None,
+    monte_carlo: Annotated[int, typer.Option(min=0, max=100000)] = 0,
+    method: Literal["influence", "four-run"] = "influence",
+    ridge: Annotated[float, typer.Option(min=0.0)] = 0.0,
+    phase_lag: bool = False,
+    rotation: Literal["ccw", "cw"] | None = None,
+    grade: str | None = None,
+    speed: str | None = None,
+    rotor_mass: str | None = None,
+    permissible: str | None = None,
+    radius: str | None = None,
+    suggest_trial: bool = False,
+    planes: Annotated[int, typer.Option(min=1)] = 1,
+    blades: Annotated[int | None, typer.Option(min=1, max=options.PLACES)] = None,
+    positions: str | None = None,
+    first: str = "0deg",
+    fit: bool = False,
+    exclude: list[str] | None = None,
+    predict: str | None = None,
+    suggest: bool = False,
+    robust: bool = False,
+    signal: str | None = None,
+    pulses: Annotated[int, typer.Option(min=1, max=10000)] = 1,
+    workers: Annotated[int, typer.Option(min=1)] = 1,
 ) -> Result:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -25,18 +25,20 @@ METHOD = (
 )
 
 
-@reported
+OPTIONS = """
+Arguments:
+  file FILE  The other program's file or link; - is standard input.
+Options:
+  output --output -o FILE.toml  Where to write it; else standard output.
+  kind --from  The program it is from; else told by the content.
+"""
+
+
+@reported(OPTIONS)
 def run(
-    file: Annotated[
-        str, typer.Argument(metavar="FILE", help="The other program's file or link; - is standard input.")
-    ],
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="FILE.toml", help="Where to write it; else standard output."),
-    ] = None,
-    kind: Annotated[
-        Kind | None, typer.Option("--from", help="The program it is from; else told by the content.")
-    ] = None,
+    file: str,
+    output: Path | None = None,
+    kind: Kind | None = None,
 ) -> Result:
     """Read a mechanism of another program: PMKS text and links, PMKS+ links, MotionGen, Linkage, linkage_sim, planar robots (URDF, SDF, MJCF).
 

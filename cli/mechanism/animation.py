@@ -34,8 +34,22 @@ def page(analyses: Sequence[tuple[str, Analysis]], forces: bool, units: str | No
     return moving_page(series[0].mechanism.name, series)
 
 
-def page_in_time(found: InTime, units: str | None) -> Page:
-    """Return the page of a motion under forces: all points and links over time, whatever --only names."""
+def page_in_time(found: Sequence[tuple[str, InTime]], units: str | None) -> Page:
+    """Return the page of motions under forces: all points and links over time, whatever --only names.
+
+    Parameters
+    ----------
+    found : sequence of (variant, motion)
+        That which goes on for longest is drawn in full, the others as ghosts.
+    """
+    if not found:
+        raise MechanismError("--html: no variant can be let go, and there is nothing to draw")
+    series = [_in_time(name, one, units) for name, one in found]
+    series.sort(key=lambda one: -one.poses.n)
+    return moving_page(series[0].mechanism.name, series, time="t_s")
+
+
+def _in_time(variant: str, found: InTime, units: str | None) -> Series:
     home = found.analysis
     every = replace(home, only=[*home.mechanism.links, *replace(home, only=None).points])
     every.assemblies = home.assemblies
@@ -43,7 +57,10 @@ def page_in_time(found: InTime, units: str | None) -> Page:
     whole.run = found.run
     arrows = rows_of(every, found.run.first_motion) if found.forces else ()
     columns = shown(whole.table(), units)
-    return found.run.page(columns, ["t_s", *home.input_columns], [JointForce.of(*row) for row in arrows])
+    name = f"variant {variant}" if variant else ""
+    return found.run.series(
+        columns, ["t_s", *home.input_columns], [JointForce.of(*row) for row in arrows], name
+    )
 
 
 def _series(variant: str, analysis: Analysis, forces: bool, units: str | None) -> Iterator[Series]:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from cli.read import options
-from cli.show.output import ShowOptions, command, suffix_among
+from cli.show.commands import ShowOptions, suffix_among
+from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.mechanism.solve import Analysis
@@ -29,188 +30,92 @@ def _print_schema(asked: bool) -> None:
 
 
 EXAMPLE = "klann"
-PANELS = {
-    "What": "at sweep inputs only branch",
-    "Variants": "change vary variants tolerance draws seed distribution workers",
-    "Fitting": "fit point link slide free weight starts best",
-    "How": "order newton time accuracy until",
-    "Output: of the mechanism": "check explain forces equilibrium flywheel counterweights graph states html schema",
-}
+OPTIONS = """
+Arguments:
+  file FILE.toml  The mechanism; - is standard input.
+What:
+  at INPUT  A pose, such as 60deg, 20mm or crank=60deg,arm=30deg; repeatable.
+  sweep START:STOP:STEP  Such as 0deg:360deg:1deg or 0deg:360deg/3600.
+  inputs FILE.csv  The inputs as a table: crank_deg, ..., perhaps time_s.
+  only NAME,...  These links and points; nothing else is computed.
+  branch all|NUMBER  Every assembly, or one of them.
+Variants:
+  change --set PATH=VALUE  Another number in place of the file's, such as links.crank.B.x=62mm; repeatable.
+  vary PATH=FROM:TO:STEP  Variants over a range, such as links.crank.B.x=50mm:60mm:1mm; repeatable: the grid of all.
+  variants FILE.csv  Variants as a table: a column for each path, links.crank.B.x_mm, a row for each variant.
+  tolerance  What [tolerances] of the file do to every number shown.
+  draws N  Draw so many mechanisms within the tolerances, and solve each.
+  seed  Of what is drawn, and of --fit.
+  distribution  Of what is drawn: a limit is three standard deviations, or the end.
+  workers N  Processes that solve variants, draws, or the starts of a fit.
+Fitting:
+  fit TARGET.csv  Dimensions that come nearest to these places; repeatable.
+  point NAME  Of --fit: x and y of a point; repeatable.
+  link NAME  Of --fit: the angle of a link; repeatable.
+  slide NAME  Of --fit: the travel along the guide at a point; repeatable.
+  free PATH=LOW:HIGH  With --fit: a dimension and its bounds; repeatable.
+  weight NAME=NUMBER  Of --fit: a row counts so often; repeatable.
+  starts N  Of --fit: where it begins (default 256).
+  best N  Of --fit: the best distinct solutions.
+How:
+  order  How far to differentiate (default: as the file's input gives it).
+  newton  All loops at once by Newton-Raphson from the guess, with its iterates.
+  time START:STOP:STEP  Let go of the inputs: the motion under the loads, such as 0:10:0.01 (seconds).
+  accuracy NUMBER  With --time: the wanted error of the inputs (default 1e-9).
+  until INPUT=VALUE  With --time: end where an input has a value, crank=90deg.
+Output: of the mechanism:
+  check  Mobility, Grashof classes, limits, dead and change points, groups.
+  explain  The order of solution, and what was skipped.
+  forces  The input's effort, every joint reaction, the shaking force.
+  equilibrium  Where the loads balance without effort, and whether stably.
+  flywheel COEFFICIENT  Inertia for this speed fluctuation, such as 0.02.
+  counterweights LINK,...  Counterweights on these links that leave the least shaking force.
+  graph NAME.QUANTITY,...  --plot draws these against the input, such as H.x,coupler.omega.
+  states FILE.csv  Write a row for each pose and link to FILE: what `dalembert work` reads.
+  html FILE.html  Write a page that moves to FILE: play, slider, curves, values; with --forces their arrows.
+  schema  Print the JSON Schema of FILE.toml, for editors; needs no FILE.
+"""
 
 
-@command
+@command(OPTIONS)
 def run(
-    file: Annotated[str, typer.Argument(metavar="FILE.toml", help="The mechanism; - is standard input.")],
-    at: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="INPUT", help="A pose, such as 60deg, 20mm or crank=60deg,arm=30deg; repeatable."
-        ),
-    ] = None,
-    sweep: Annotated[
-        str | None,
-        typer.Option(metavar="START:STOP:STEP", help="Such as 0deg:360deg:1deg or 0deg:360deg/3600."),
-    ] = None,
-    inputs: Annotated[
-        str | None,
-        typer.Option(metavar="FILE.csv", help="The inputs as a table: crank_deg, ..., perhaps time_s."),
-    ] = None,
-    only: Annotated[
-        str | None, typer.Option(metavar="NAME,...", help="These links and points; nothing else is computed.")
-    ] = None,
-    order: Annotated[
-        Literal["position", "velocity", "acceleration", "jerk"] | None,
-        typer.Option(help="How far to differentiate (default: as the file's input gives it)."),
-    ] = None,
-    branch: Annotated[
-        str | None, typer.Option(metavar="all|NUMBER", help="Every assembly, or one of them.")
-    ] = None,
-    newton: Annotated[
-        bool,
-        typer.Option(
-            "--newton", help="All loops at once by Newton-Raphson from the guess, with its iterates."
-        ),
-    ] = False,
-    check: Annotated[
-        bool,
-        typer.Option("--check", help="Mobility, Grashof classes, limits, dead and change points, groups."),
-    ] = False,
-    explain: Annotated[
-        bool, typer.Option("--explain", help="The order of solution, and what was skipped.")
-    ] = False,
-    forces: Annotated[
-        bool, typer.Option("--forces", help="The input's effort, every joint reaction, the shaking force.")
-    ] = False,
-    equilibrium: Annotated[
-        bool,
-        typer.Option("--equilibrium", help="Where the loads balance without effort, and whether stably."),
-    ] = False,
-    flywheel: Annotated[
-        float | None,
-        typer.Option(metavar="COEFFICIENT", help="Inertia for this speed fluctuation, such as 0.02."),
-    ] = None,
-    counterweights: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LINK,...", help="Counterweights on these links that leave the least shaking force."
-        ),
-    ] = None,
-    graph: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME.QUANTITY,...",
-            help="--plot draws these against the input, such as H.x,coupler.omega.",
-        ),
-    ] = None,
-    time: Annotated[
-        str | None,
-        typer.Option(
-            metavar="START:STOP:STEP",
-            help="Let go of the inputs: the motion under the loads, such as 0:10:0.01 (seconds).",
-        ),
-    ] = None,
-    accuracy: Annotated[
-        str | None,
-        typer.Option(metavar="NUMBER", help="With --time: the wanted error of the inputs (default 1e-9)."),
-    ] = None,
-    until: Annotated[
-        str | None,
-        typer.Option(metavar="INPUT=VALUE", help="With --time: end where an input has a value, crank=90deg."),
-    ] = None,
-    states: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.csv",
-            help="Write a row for each pose and link to FILE: what `dalembert work` reads.",
-            callback=suffix_among(".csv"),
-        ),
-    ] = None,
-    html: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.html",
-            help="Write a page that moves to FILE: play, slider, curves, values; with --forces their arrows.",
-            callback=suffix_among(".html"),
-        ),
-    ] = None,
-    change: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="PATH=VALUE",
-            help="Another number in place of the file's, such as links.crank.B.x=62mm; repeatable.",
-        ),
-    ] = None,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PATH=FROM:TO:STEP",
-            help="Variants over a range, such as links.crank.B.x=50mm:60mm:1mm; repeatable: the grid of all.",
-        ),
-    ] = None,
-    variants: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE.csv",
-            help="Variants as a table: a column for each path, links.crank.B.x_mm, a row for each variant.",
-        ),
-    ] = None,
-    tolerance: Annotated[
-        bool,
-        typer.Option("--tolerance", help="What [tolerances] of the file do to every number shown."),
-    ] = False,
-    draws: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Draw so many mechanisms within the tolerances, and solve each."),
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn, and of --fit.")] = 0,
-    distribution: Annotated[
-        Literal["normal", "uniform"],
-        typer.Option(help="Of what is drawn: a limit is three standard deviations, or the end."),
-    ] = "normal",
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            min=1, metavar="N", help="Processes that solve variants, draws, or the starts of a fit."
-        ),
-    ] = None,
-    fit: Annotated[
-        list[str] | None,
-        typer.Option(metavar="TARGET.csv", help="Dimensions that come nearest to these places; repeatable."),
-    ] = None,
-    point: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Of --fit: x and y of a point; repeatable.")
-    ] = None,
-    link: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Of --fit: the angle of a link; repeatable.")
-    ] = None,
-    slide: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME", help="Of --fit: the travel along the guide at a point; repeatable."),
-    ] = None,
-    free: Annotated[
-        list[str] | None,
-        typer.Option(metavar="PATH=LOW:HIGH", help="With --fit: a dimension and its bounds; repeatable."),
-    ] = None,
-    weight: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=NUMBER", help="Of --fit: a row counts so often; repeatable."),
-    ] = None,
-    starts: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Of --fit: where it begins (default 256).")
-    ] = None,
-    best: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Of --fit: the best distinct solutions.")
-    ] = None,
-    schema: Annotated[
-        bool,
-        typer.Option(
-            "--schema",
-            help="Print the JSON Schema of FILE.toml, for editors; needs no FILE.",
-            is_eager=True,
-            callback=_print_schema,
-        ),
-    ] = False,
+    file: str,
+    at: list[str] | None = None,
+    sweep: str | None = None,
+    inputs: str | None = None,
+    only: str | None = None,
+    order: Literal["position", "velocity", "acceleration", "jerk"] | None = None,
+    branch: str | None = None,
+    newton: bool = False,
+    check: bool = False,
+    explain: bool = False,
+    forces: bool = False,
+    equilibrium: bool = False,
+    flywheel: float | None = None,
+    counterweights: str | None = None,
+    graph: str | None = None,
+    time: str | None = None,
+    accuracy: str | None = None,
+    until: str | None = None,
+    states: Annotated[Path | None, typer.Option(callback=suffix_among(".csv"))] = None,
+    html: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
+    change: list[str] | None = None,
+    vary: list[str] | None = None,
+    variants: str | None = None,
+    tolerance: bool = False,
+    draws: int | None = None,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    distribution: Literal["normal", "uniform"] = "normal",
+    workers: Annotated[int | None, typer.Option(min=1)] = None,
+    fit: list[str] | None = None,
+    point: list[str] | None = None,
+    link: list[str] | None = None,
+    slide: list[str] | None = None,
+    free: list[str] | None = None,
+    weight: list[str] | None = None,
+    starts: Annotated[int | None, typer.Option(min=1)] = None,
+    best: Annotated[int | None, typer.Option(min=1)] = None,
+    schema: Annotated[bool, typer.Option(is_eager=True, callback=_print_schema)] = False,
     *,
     show: ShowOptions,
 ) -> Result:
@@ -283,10 +188,11 @@ def run(
         clash = [flag for flag, value in beside.items() if value and flag != "--forces"]
         if clash:
             raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
-        lonely: dict[str, object] = {"--html": html, "--digits": show.digits, "--workers": workers}
-        single = [flag for flag, value in lonely.items() if value]
-        if single and (vary or variants is not None):
-            raise options.bad(single[0], "expected one mechanism with --time, and no --vary or --variants")
+        if html is not None and until is not None and (vary or variants is not None):
+            told_of = (
+                "expected no --until beside variants: a page has one clock for all; --set shows one of them"
+            )
+            raise options.bad("--html", told_of)
     elif accuracy is not None or until is not None:
         raise options.bad("--accuracy" if accuracy is not None else "--until", "expected --time too")
     if html is not None:
@@ -307,17 +213,25 @@ def run(
             home.warnings += said
             home.check_names()
             motion = InTime(home, *times_and_accuracy(time, accuracy), until, bare, forces)
-            if several is not None:
-                from cli.mechanism.variants_in_time import VariantsInTime
-
-                found_all = VariantsInTime(motion, several, names, branch)
-                return replace(found_all.result(about), within=lambda: told(file))
             if html is not None:
-                refuse_long(len(motion.times))
-            result = _with_page(
-                motion.result(about), html, lambda: animation.page_in_time(motion, show.units)
-            )
-            return replace(result, within=lambda: told(file))
+                refuse_long(len(motion.times) * (1 if several is None else several.count))
+            if several is not None:
+                from cli.mechanism.variants_in_time import AskedInTime, VariantsInTime
+
+                every = AskedInTime(
+                    file, mechanism, several.dimensions, motion.times, motion.accuracy, until, bare, forces, names,
+                    branch, show.digits,
+                )  # fmt: skip
+                let_go = VariantsInTime(every, several, workers or 1, home.warnings)
+                result = let_go.result(show.streams, about)
+            else:
+                result = motion.result(about)
+
+            def page() -> Page:
+                them = [("", motion)] if several is None else let_go.runs()
+                return animation.page_in_time(them, show.units)
+
+            return replace(_with_page(result, html, page), within=lambda: told(file))
         q = wanted(mechanism, at, sweep, inputs, bare)
         rates = None if order is None else ORDERS.index(order)
         analysis = Analysis.of(file, mechanism, q, rates, names, branch)

@@ -16,7 +16,9 @@ from cli.mechanism.poses import LINK, POINT, SLIDE, cells
 from cli.mechanism.read import until_inputs
 from cli.mechanism.solve import Analysis
 from cli.read import options
+from cli.read.units import read_degrees
 from cli.show.columns import Result, Table
+from virtualwork.describe.parts import GROUND
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -87,9 +89,20 @@ class InTime:
         found: Parts = {"inputs": self._inputs(way), "energy": {"": {"energy_J": way.energy(run.t)}}}
         motion = way.motion(run.t)
         if a.only is not None:
+            given = {e.link: e.name for e in a.mechanism.inputs if not e.is_slide and e.on == GROUND}
             found["links"] = {
                 name: dict(
-                    zip(LINK, (np.degrees(way.link_angle(name, run.t)), link.omega, link.alpha), strict=False)
+                    zip(
+                        LINK,
+                        (
+                            found["inputs"][given[name]]["angle_deg"]
+                            if name in given
+                            else np.degrees(way.link_angle(name, run.t)),
+                            link.omega,
+                            link.alpha,
+                        ),
+                        strict=False,
+                    )
                 )
                 for name, link in ((name, motion.link(name)) for name in a.links)
             }
@@ -137,17 +150,32 @@ class InTime:
     def table(self) -> Table:
         """A row for each time."""
         several = len(self.analysis.mechanism.inputs) > 1
-        return Table(columns_of(self.run.t, self.fine, several, self._error), keys=("t_s",))
+        return Table(columns_of(self.run.t, self.shown, several, self._error), keys=("t_s",))
+
+    @cached_property
+    def shown(self) -> Parts:
+        """The answer as far as any digit of it is known."""
+        return known(self.fine, self.run.unknown)
 
     def _error(self, kind: str, name: Any, key: str) -> list[float]:
-        spread = self.run.spread(self.fine[kind][name][key], self.coarse[kind][name][key])
-        return bounds_of(np.where(self.run.unknown, np.inf, spread))
+        return bounds_of(self.run.spread(self.fine[kind][name][key], self.coarse[kind][name][key]))
+
+    @property
+    def errors(self) -> dict[tuple[str, Any, str], list[float]]:
+        """The bounds of the errors of all that has one, worked out."""
+        return {
+            (kind, name, key): self._error(kind, name, key)
+            for kind, entries in self.fine.items()
+            for name, of in entries.items()
+            for key in of
+            if not key.startswith("error")
+        }
 
     def document(self) -> Document:
         """The JSON document."""
         return {
             "name": self.analysis.mechanism.name,
-            "time": rows_of_time(self.run.t, self.fine),
+            "time": rows_of_time(self.run.t, self.shown),
             "energy_drift_J": largest(self.run.energy_drift),
             "methods": self.run.fine.methods,
             "steps": self.run.fine.steps,
@@ -205,12 +233,38 @@ def inputs_of(m: Mechanism, q: Reals, v: Reals, a: Reals, error: Reals) -> dict[
             }
         else:
             found[entry.name] = {
-                "angle_deg": np.degrees(q[:, j]),
+                "angle_deg": _degrees(q[:, j]),
                 "speed_rad_s": v[:, j],
                 "acceleration_rad_s2": a[:, j],
                 "error_estimate_deg": np.degrees(error[:, j]),
             }
     return found
+
+
+def _degrees(q: Reals) -> Reals:
+    """An input in degrees; where it starts, and where it may have been told to end, as it was written."""
+    angle = np.degrees(q)
+    for i in {0, len(q) - 1}:
+        angle[i] = read_degrees(float(q[i]))
+    return np.asarray(angle)
+
+
+def known(parts: Parts, unknown: NDArray[np.bool_]) -> Parts:
+    """Parts without what no digit is known of: what stays are the errors, and the energy, which has one of its own."""
+    if not unknown.any():
+        return parts
+    return {
+        kind: {
+            name: {
+                key: values
+                if kind == "energy" or key.startswith("error")
+                else np.where(unknown, np.nan, values)
+                for key, values in of.items()
+            }
+            for name, of in entries.items()
+        }
+        for kind, entries in parts.items()
+    }
 
 
 def columns_of(

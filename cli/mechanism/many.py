@@ -7,22 +7,18 @@ what is more than rows of poses or forces, one by one.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.errors import DataError
 from cli.mechanism.asked import Asked, Said
 from cli.mechanism.families import Families
+from cli.mechanism.parted import Solved, solved
 from cli.mechanism.solve import Analysis
 from cli.mechanism.variants import Variants
-from cli.read.options import processes
 from cli.show.columns import Column, Result, Table, Written
-from cli.show.progress import progress
-from dalembert.arithmetic.parts import LostPart, in_parts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,13 +28,6 @@ if TYPE_CHECKING:
 # variants from which on it pays to write the formulas down; rows of a part solved together; variants and rows of a
 # part solved one by one; variants of a part that are described alone only to say why poses are not assembled
 FEW, TOGETHER, ONE_BY_ONE, EXPLAINED = 32, 1 << 16, (64, 1 << 14), 50
-
-
-class Solved(NamedTuple):
-    """What a part gives: what is written of its table, or its documents."""
-
-    found: Any
-    said: Said
 
 
 def one(asked: Asked, row: NDArray[np.float64], name: str, json: bool, said: Said) -> Any:
@@ -74,7 +63,7 @@ def rows(asked: Asked, pattern: Table, form: Form, first: int, shown: NDArray[np
     parts: list[tuple[Table, list[bool] | bool]] = []
     for i, row in enumerate(shown):
         found = one(asked, row, str(first + i), False, said)
-        parts.append((_empty(pattern), False) if found is None else (_like(pattern, found[0]), found[1]))
+        parts.append((empty(pattern), False) if found is None else (like(pattern, found[0]), found[1]))
     tables = [
         _with_variant(asked, str(first + i), row, *part)
         for i, (row, part) in enumerate(zip(shown, parts, strict=True))
@@ -91,7 +80,7 @@ def rows_together(asked: Asked, pattern: Table, form: Form, first: int, shown: N
     table, assembled, alone = families.rows(asked.part(shown))
     said = Said()
     v, n = assembled.shape
-    columns: list[list[Any]] = [list(c.values) for c in _like(pattern, table).columns]
+    columns: list[list[Any]] = [list(c.values) for c in like(pattern, table).columns]
     whole = assembled.ravel().tolist()
     told = 0
     for i in np.flatnonzero(alone | ~assembled.all(axis=1)).tolist():
@@ -105,8 +94,8 @@ def rows_together(asked: Asked, pattern: Table, form: Form, first: int, shown: N
         found = one(asked, shown[i], str(first + i), False, said)
         if not alone[i]:
             continue
-        its, there = (_empty(pattern), False) if found is None else found
-        for values, column in zip(columns, _like(pattern, its).columns, strict=True):
+        its, there = (empty(pattern), False) if found is None else found
+        for values, column in zip(columns, like(pattern, its).columns, strict=True):
             values[here] = list(column.values)
         whole[here] = there if isinstance(there, list) else [there] * n
     said.any_assembled |= any(whole)
@@ -135,21 +124,7 @@ class Many:
     def _solved(self, function: Any, each: int) -> Iterator[Any]:
         """What a function gives of all parts, in their order, each of so many variants."""
         self.said = Said()
-        count = self.variants.count
-        starts = range(0, count, each)
-        work = ((a + 1, self.variants.part(a, a + each)) for a in starts)
-        workers = min(self.workers, len(starts))
-        with processes(workers) as pool:
-            try:
-                with closing(in_parts(function, work, pool, 2 * workers)) as parts:
-                    for found, said in progress(parts, count, "variants", each):
-                        self.said.join(said)
-                        yield found
-            except LostPart as lost:
-                first, last = (lost.number - 1) * each + 1, min(lost.number * each, count)
-                raise DataError(
-                    f"variants {first} to {last}: the process that solved them died, and died again when it was done once more"
-                ) from None
+        return solved(function, self.variants, each, self.workers, self.said)
 
     def analyses(self) -> list[tuple[str, Analysis]]:
         """What is asked of each variant whose parts can be put together."""
@@ -310,7 +285,7 @@ def _keys(asked: Asked, table: Table) -> tuple[str, ...]:
     return ("variant", *(d.header for d in asked.dimensions), *table.keys)
 
 
-def _like(pattern: Table, table: Table) -> Table:
+def like(pattern: Table, table: Table) -> Table:
     """A table with the columns of the first."""
     columns = {c.header: c for c in table.columns}
     empty: list[Cell] = [None] * len(table.columns[0].values)
@@ -319,7 +294,7 @@ def _like(pattern: Table, table: Table) -> Table:
     )
 
 
-def _empty(pattern: Table) -> Table:
+def empty(pattern: Table) -> Table:
     """The rows of a variant that cannot be put together."""
     return Table(
         [

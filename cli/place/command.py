@@ -10,85 +10,62 @@ import typer
 from cli.place.corrections import Correction, read_corrections
 from cli.place.read import Request, read_drill, read_planes, read_ratio, read_stock
 from cli.read import options
-from cli.show.output import ShowOptions, command
+from cli.show.commands import ShowOptions
+from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.columns import Result, Table
 
 
 EXAMPLE = "blades"
-PANELS = {
-    "What": "rotor plane positions blades first stock pieces max_pieces max_mass",
-    "How: elsewhere": "at_radius to_radius at_z to_z",
-    "How: drilling": "drill density drill_point max_depth remove",
-}
+OPTIONS = """
+Arguments:
+  corrections MASS@ANGLE ...  Corrections to ADD, such as 83.5g@308.87deg; or a FILE that dalembert field wrote (CSV, JSON, workbook).
+What:
+  rotor NAME  The rotor, of a file.
+  plane NAME  The plane, of a file.
+  positions ANGLES  Where masses can go, such as 292.5deg,315deg.
+  blades N  So many places, evenly spaced, numbered from 1.
+  first ANGLE  Angle of the first blade.
+  max_mass MASS  Limit of each place, such as 5g.
+  stock MASSES  Weights in stock, such as 1g,2g,5g; one a place.
+  pieces N  How many weights from stock go on one place.
+  max_pieces N  How many weights from stock altogether.
+How: elsewhere:
+  at_radius R  Radius the corrections were found for.
+  to_radius R  Radius the masses go to.
+  at_z Z  Where along the shaft the corrections were found for.
+  to_z Z1:Z2  Carry them over to these planes, with the same force and moment.
+How: drilling:
+  drill DIAMETER  Remove material instead, by drilling opposite.
+  density DENSITY  Density of the material drilled, such as 7850kg_m3.
+  drill_point ANGLE  Point angle of the drill, such as 118deg; 180deg is flat.
+  max_depth DEPTH  Deepest hole; more are drilled at a place if needed.
+  remove  The vectors are material to REMOVE already: drill there, not opposite.
+"""
 
 
-@command
+@command(OPTIONS)
 def run(
-    corrections: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="MASS@ANGLE ...",
-            help="Corrections to ADD, such as 83.5g@308.87deg; or a FILE that dalembert field wrote (CSV, JSON, workbook).",
-        ),
-    ],
-    rotor: Annotated[str | None, typer.Option(metavar="NAME", help="The rotor, of a file.")] = None,
-    plane: Annotated[str | None, typer.Option(metavar="NAME", help="The plane, of a file.")] = None,
-    positions: Annotated[
-        str | None, typer.Option(metavar="ANGLES", help="Where masses can go, such as 292.5deg,315deg.")
-    ] = None,
-    blades: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", min=1, max=options.PLACES, help="So many places, evenly spaced, numbered from 1."
-        ),
-    ] = None,
-    first: Annotated[str, typer.Option(metavar="ANGLE", help="Angle of the first blade.")] = "0deg",
-    max_mass: Annotated[
-        str | None, typer.Option(metavar="MASS", help="Limit of each place, such as 5g.")
-    ] = None,
-    stock: Annotated[
-        str | None, typer.Option(metavar="MASSES", help="Weights in stock, such as 1g,2g,5g; one a place.")
-    ] = None,
-    pieces: Annotated[
-        int, typer.Option(metavar="N", min=1, help="How many weights from stock go on one place.")
-    ] = 1,
-    max_pieces: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="How many weights from stock altogether.")
-    ] = None,
-    at_radius: Annotated[
-        str | None, typer.Option(metavar="R", help="Radius the corrections were found for.")
-    ] = None,
-    to_radius: Annotated[str | None, typer.Option(metavar="R", help="Radius the masses go to.")] = None,
-    at_z: Annotated[
-        str | None, typer.Option(metavar="Z", help="Where along the shaft the corrections were found for.")
-    ] = None,
-    to_z: Annotated[
-        str | None,
-        typer.Option(
-            metavar="Z1:Z2", help="Carry them over to these planes, with the same force and moment."
-        ),
-    ] = None,
-    drill: Annotated[
-        str | None, typer.Option(metavar="DIAMETER", help="Remove material instead, by drilling opposite.")
-    ] = None,
-    density: Annotated[
-        str | None,
-        typer.Option(metavar="DENSITY", help="Density of the material drilled, such as 7850kg_m3."),
-    ] = None,
-    drill_point: Annotated[
-        str, typer.Option(metavar="ANGLE", help="Point angle of the drill, such as 118deg; 180deg is flat.")
-    ] = "180deg",
-    max_depth: Annotated[
-        str | None, typer.Option(metavar="DEPTH", help="Deepest hole; more are drilled at a place if needed.")
-    ] = None,
-    remove: Annotated[
-        bool,
-        typer.Option(
-            "--remove", help="The vectors are material to REMOVE already: drill there, not opposite."
-        ),
-    ] = False,
+    corrections: list[str],
+    rotor: str | None = None,
+    plane: str | None = None,
+    positions: str | None = None,
+    blades: Annotated[int | None, typer.Option(min=1, max=options.PLACES)] = None,
+    first: str = "0deg",
+    max_mass: str | None = None,
+    stock: str | None = None,
+    pieces: Annotated[int, typer.Option(min=1)] = 1,
+    max_pieces: Annotated[int | None, typer.Option(min=1)] = None,
+    at_radius: str | None = None,
+    to_radius: str | None = None,
+    at_z: str | None = None,
+    to_z: str | None = None,
+    drill: str | None = None,
+    density: str | None = None,
+    drill_point: str = "180deg",
+    max_depth: str | None = None,
+    remove: bool = False,
     *,
     show: ShowOptions,
 ) -> Result:

@@ -1,231 +1,34 @@
-"""The options that every command shares, and what they do with its result."""
+"""What the options that every command shares do with its result."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cache, wraps
-from inspect import Parameter, signature
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from shutil import get_terminal_size
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from cli.errors import one_line
 from cli.read.files import named, refuse_inputs
 from cli.show.colour import coloured
+from cli.show.commands import FORMS, ShowOptions, with_options
 
 if TYPE_CHECKING:
     from cli.show.columns import Document, Result, Table
     from cli.show.expect import Comparison
 
 
-PANELS = {
-    "What": "column",
-    "Output": "json output units digits plot report expect rtol",
-    "Head of the report": "title machine customer date author",
-    "Terminal": "text no_color help",
-}
-"""Heading of the help -> the options below it that every command shares."""
-
-
-FORMS = (".csv", ".json", ".xlsx", ".parquet", ".md", ".tex", ".html")
-"""Suffixes of what every result can be written as."""
-
-
-def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
-    """Return the check of a file's option: its suffix is one of these."""
-
-    def check(path: Path | None) -> Path | None:
-        if path is not None and path.suffix.lower() not in suffixes:
-            raise typer.BadParameter(f"'{path}' has no known suffix: expected {', '.join(suffixes)}")
-        return path
-
-    return check
-
-
-def _tolerance(value: float) -> float:
-    if not 0 <= value < float("inf"):
-        raise typer.BadParameter(f"{value}: expected a number from 0 on, such as 1e-6")
-    return value
-
-
-# each method that dataclass makes costs a tenth of a millisecond at every start
-@dataclass(eq=False, repr=False)
-class ShowOptions:
-    """The options that every command shares, in the order in which its help lists them."""
-
-    json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON document, SI units, full precision.")
-    ] = False
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            help="Write the result to FILE (.csv, .json, .xlsx, .parquet, .md, .tex or .html).",
-            callback=suffix_among(*FORMS, ".toml"),
-        ),
-    ] = None
-    plot: Annotated[
-        Path | None,
-        typer.Option(
-            "--plot",
-            metavar="FILE",
-            help="Write a picture to FILE (.svg, .png or .pdf).",
-            callback=suffix_among(".svg", ".png", ".pdf"),
-        ),
-    ] = None
-    expect: Annotated[
-        Path | None,
-        typer.Option(
-            "--expect",
-            metavar="FILE.csv",
-            help="Check the result against expected values under the same column names.",
-        ),
-    ] = None
-    rtol: Annotated[
-        float,
-        typer.Option(
-            "--rtol",
-            metavar="NUMBER",
-            help="Relative tolerance of --expect (for angles: radians).",
-            callback=_tolerance,
-        ),
-    ] = 1e-3
-    text: Annotated[bool, typer.Option("--text", help="Print the aligned table even into a pipe.")] = False
-    digits: Annotated[
-        bool,
-        typer.Option("--digits", help="In tables and CSV print only the digits that hold against rounding."),
-    ] = False
-    column: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=HEADER",
-            help="Read the column HEADER of a table as NAME, such as mass_kg=Masse; repeatable.",
-        ),
-    ] = None
-    units: Annotated[
-        str | None,
-        typer.Option(
-            metavar="UNIT,...", help="Units of the columns, such as mm,g,deg,N_mm,rpm; JSON stays SI."
-        ),
-    ] = None
-    report: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Write a report to hand on to FILE (.html or .md): what was given, found, drawn, and how.",
-            callback=suffix_among(".html", ".htm", ".md"),
-        ),
-    ] = None
-    title: Annotated[str | None, typer.Option(metavar="TEXT", help="The report's title.")] = None
-    machine: Annotated[str | None, typer.Option(metavar="TEXT", help="The machine it is about.")] = None
-    customer: Annotated[str | None, typer.Option(metavar="TEXT", help="Whom it is for.")] = None
-    date: Annotated[str | None, typer.Option(metavar="TEXT", help="Its date, if not today's.")] = None
-    author: Annotated[str | None, typer.Option(metavar="TEXT", help="Who made it.")] = None
-    no_color: Annotated[
-        bool,
-        typer.Option("--no-color", help="No colours on a terminal; so does NO_COLOR in the environment."),
-    ] = False
-
-    @property
-    def head(self) -> dict[str, str]:
-        """What the options say for the head of the report."""
-        names = PANELS["Head of the report"].split()
-        return {name: text for name in names if (text := getattr(self, name)) is not None}
-
-    @property
-    def form(self) -> str:
-        """The suffix of what is written to a file, or to a pipe; empty for the terminal's table and for checks."""
-        if self.output is not None:
-            return self.output.suffix.lower()
-        if self.json:
-            return ".json"
-        return "" if self.text or self.expect is not None or sys.stdout.isatty() else ".csv"
-
-    @property
-    def holds_one(self) -> bool:
-        """Whether what is written holds one table."""
-        return self.form in (".csv", ".parquet")
-
-    @property
-    def streams(self) -> bool:
-        """Whether a table is all that is asked for, so that it can be written block by block."""
-        others = self.json or self.text or self.plot or self.expect or self.report
-        return self.form in (".csv", ".parquet", ".xlsx") and not others
-
-    @property
-    def as_json(self) -> bool:
-        """Whether the JSON document is formed."""
-        return self.json or (self.output is not None and self.output.suffix.lower() == ".json")
-
-
-def command(find: Callable[..., Result]) -> Callable[..., None]:
+def command(options: str) -> Callable[[Callable[..., Result]], Callable[..., None]]:
     """Make a command of a function that returns its result: it takes the shared options too, and shows the result.
 
-    Where the function has a parameter `show`, it is given them.
+    `options` is what the help says of its own (`told`). Where the function has a parameter `show`, it is given the
+    shared ones.
     """
-    return with_options(find, None, show)
-
-
-def with_options(
-    find: Callable[..., Result],
-    chosen: Sequence[str] | None,
-    hand_on: Callable[[Result, ShowOptions, Mapping[str, str]], None],
-) -> Callable[..., None]:
-    """Make a command that takes these of the shared options too, None for all, and hands on what it has found."""
-    own, shared = (_parameters(of) for of in (find, ShowOptions))
-    shared = {name: p for name, p in shared.items() if chosen is None or name in chosen}
-
-    @wraps(find)
-    def run(**given: object) -> None:
-        from cli.read.headers import rename
-
-        options = ShowOptions(**{name: given.pop(name) for name in shared})  # type: ignore[arg-type]
-        if options.report is None and (unused := next(iter(options.head), None)) is not None:
-            raise typer.BadParameter("expected --report FILE too", param_hint=f"--{unused}")
-        rename(options.column)
-        asked = {
-            name.replace("_", " "): _said(value)
-            for name, value in given.items()
-            if value != own[name].default and value is not None
-        }
-        if "show" in own:
-            given["show"] = options
-        result = find(**given)
-        with result.within():
-            hand_on(result, options, asked)
-
-    parameters = [*(p for name, p in own.items() if name != "show"), *shared.values()]
-    run.__signature__ = signature(find).replace(parameters=parameters, return_annotation=None)  # type: ignore[attr-defined]
-    run.__annotations__ = {p.name: p.annotation for p in parameters}
-    return run
-
-
-def _said(value: object) -> str:
-    """Return an option's value as the user gave it."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return (
-        ", ".join(map(str, value))
-        if isinstance(value, (list, tuple))
-        else str(getattr(value, "value", value))
-    )
-
-
-def _parameters(of: Callable[..., object]) -> dict[str, Parameter]:
-    """Return the parameters with their types; what is returned is not looked at, nor loaded for it."""
-    names = getattr(of, "__globals__", globals())
-    return {
-        name: p.replace(
-            kind=Parameter.KEYWORD_ONLY, annotation=eval(p.annotation, names) if name != "show" else None
-        )
-        for name, p in signature(of).parameters.items()
-    }
+    return lambda find: with_options(find, options, None, show)
 
 
 def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:

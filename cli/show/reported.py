@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 from cli.errors import one_line
 from cli.read.about import HEAD
 from cli.read.files import refuse_inputs
-from cli.show.output import ShowOptions, with_options
+from cli.show.commands import ShowOptions, with_options
 from cli.show.output import reported as pages_of
 
 if TYPE_CHECKING:
     from cli.show.columns import Result
 
 
-def reported(find: Callable[..., Result]) -> Callable[..., None]:
+def reported(options: str) -> Callable[[Callable[..., Result]], Callable[..., None]]:
     """Make a command of a function that returns the files to be written and what a report says of them.
 
-    The files are `beside` of its result, `notes` is what goes to standard output, `warnings` are the remarks.
+    `options` is what the help says of its own. The files are `beside` of its result, `notes` is what goes to standard output, `warnings` are the remarks.
     """
-    return with_options(find, ("report", *HEAD), _hand_on)
+    return lambda find: with_options(find, options, ("report", *HEAD), _hand_on)
 
 
 def _hand_on(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.read import options
-from cli.show.output import ShowOptions, command, suffix_among
+from cli.show.commands import ShowOptions, suffix_among
+from cli.show.output import command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,36 +33,28 @@ class Integrator(StrEnum):
 
 
 EXAMPLE = "tennis-racket"
-PANELS = {"What": "time at", "How": "method integrator", "Output: of the rotation": "html"}
+OPTIONS = """
+Arguments:
+  body BODY.toml  The body and its state; - is standard input.
+What:
+  time START:STOP:STEP  Times in seconds, such as 0:10:0.01 or 0:10/1000.
+  at T  A time, s; may be repeated.
+How:
+  method  Default: exact wherever a closed form exists, else integrate.
+  integrator  For integration; the splitting is for a symmetric top.
+Output: of the rotation:
+  html FILE.html  Write a page that moves to FILE: play, slider, curves, values.
+"""
 
 
-@command
+@command(OPTIONS)
 def run(
-    body: Annotated[
-        str, typer.Argument(metavar="BODY.toml", help="The body and its state; - is standard input.")
-    ],
-    time: Annotated[
-        str | None,
-        typer.Option(metavar="START:STOP:STEP", help="Times in seconds, such as 0:10:0.01 or 0:10/1000."),
-    ] = None,
-    at: Annotated[list[str] | None, typer.Option(metavar="T", help="A time, s; may be repeated.")] = None,
-    method: Annotated[
-        Method | None,
-        typer.Option(
-            help="Default: exact wherever a closed form exists, else integrate.", show_default=False
-        ),
-    ] = None,
-    integrator: Annotated[
-        Integrator, typer.Option(help="For integration; the splitting is for a symmetric top.")
-    ] = Integrator.dop853,
-    html: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.html",
-            help="Write a page that moves to FILE: play, slider, curves, values.",
-            callback=suffix_among(".html"),
-        ),
-    ] = None,
+    body: str,
+    time: str | None = None,
+    at: list[str] | None = None,
+    method: Annotated[Method | None, typer.Option(show_default=False)] = None,
+    integrator: Integrator = Integrator.dop853,
+    html: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
     *,
     show: ShowOptions,
 ) -> Result:

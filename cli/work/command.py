@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from cli.read import options
 from cli.show.output import command
@@ -16,23 +14,21 @@ if TYPE_CHECKING:
 
 
 EXAMPLE = "riul-slider-crank"
-PANELS = {"What": "gravity", "Output: of the balance": "ledger"}
+OPTIONS = """
+Arguments:
+  states STATES  CSV of link states, the unknown marked ?; - is standard input.
+What:
+  gravity GX,GY  Gravity, m/s², such as 0,-9.81 (default: none).
+Output: of the balance:
+  ledger  Show the power of every term instead of the unknowns.
+"""
 
 
-@command
+@command(OPTIONS)
 def run(
-    states: Annotated[
-        str,
-        typer.Argument(
-            metavar="STATES", help="CSV of link states, the unknown marked ?; - is standard input."
-        ),
-    ],
-    gravity: Annotated[
-        str | None, typer.Option(metavar="GX,GY", help="Gravity, m/s², such as 0,-9.81 (default: none).")
-    ] = None,
-    ledger: Annotated[
-        bool, typer.Option("--ledger", help="Show the power of every term instead of the unknowns.")
-    ] = False,
+    states: str,
+    gravity: str | None = None,
+    ledger: bool = False,
 ) -> Result:
     """Find the unknown force or torque that balances a table of link states, by virtual power.
 

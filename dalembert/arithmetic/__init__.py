@@ -2,6 +2,6 @@
 
 `exact`: sums and products with their rounding errors; `doubled`: numbers of twice as many digits, `doubled_functions`
 their sine and its like; `bounded`: numbers that carry a bound of their error. `recorded`: numbers that write down what
-is done with them; `tape`: what they write, as data; `adjoint`: its derivatives and rounding bounds; `engines`: what
-runs it. Each is imported by its own name, so that nobody loads more than he uses.
+is done with them; `tape`: what they write, as data; `adjoint`: its derivatives and rounding bounds; `bounds`: those of
+formulas on arrays; `engines`: what runs a tape. Each is imported by its own name, so that nobody loads more than he uses.
 """

@@ -138,6 +138,7 @@ class _Bounds:
         self.shares: dict[int, Number] = {}
         self._sums: dict[tuple[tuple[int, float], ...], Number] = {}
         self._own: dict[int, Number] = {}
+        self._errors: dict[int, Number] = {}
 
     def of(self, names: Iterable[str] | None) -> dict[str, Number]:
         """The outputs, the bounds of some, and their τ."""
@@ -165,7 +166,12 @@ class _Bounds:
         return largest
 
     def error(self, output: int) -> Number:
-        """The bound of one operation's value."""
+        """The bound of one operation's value, formed once: outputs may be one, as entries of a symmetric matrix are."""
+        if output not in self._errors:
+            self._errors[output] = self._error(output)
+        return self._errors[output]
+
+    def _error(self, output: int) -> Number:
         pattern = _pattern(self.tape, output, frozenset(self.errors), frozenset(self.slopes), self.constants)
         operations, values = self.tape.operations, self.values
         bars: dict[int, Number] = {output: 1.0}

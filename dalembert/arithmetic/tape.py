@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import or_
 from typing import Any, Protocol
 
 Operation = tuple[str, *tuple[Any, ...]]
@@ -127,6 +128,22 @@ class Tape:
             names.append(f"v{number}")
             lines.append(f"v{number} = {SIGNS[kind].format(*(names[a] for a in arguments))}")
         return "\n".join([*lines, *(f"{name}: {names[number]}" for name, number in self.outputs)])
+
+    def hang(self, on: Mapping[str, int]) -> list[int]:
+        """What each operation hangs on, as bits that its inputs have by their names.
+
+        >>> from dalembert.arithmetic.recorded import Recorder
+        >>> recorder = Recorder()
+        >>> recorder.tape({"x": recorder.input("a") + recorder.input("b")}).hang({"a": 1, "b": 2})
+        [1, 2, 3]
+        """
+        hangs: list[int] = []
+        for kind, *arguments in self.operations:
+            if kind == "input":
+                hangs.append(on[arguments[0]])
+            else:
+                hangs.append(0 if kind == "const" else reduce(or_, (hangs[a] for a in arguments)))
+        return hangs
 
     def pruned(self, names: Iterable[str]) -> Tape:
         """The tape of some of the outputs, in the order asked for, with only what they hang on.

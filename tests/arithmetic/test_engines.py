@@ -209,7 +209,7 @@ def test_a_very_long_tape_is_not_compiled() -> None:
         y = y + x * (1.0 / (k + 3))
     tape = recorder.tape({"y": y})
     columns, out = [np.ones(10)], np.empty((1, 10))
-    assert not llvm.run(tape, columns, out)
+    assert not llvm.run(tape, columns, out, (1, out.shape[1]))
     exact = 1 + math.fsum(1.0 / (k + 3) for k in range(60_000))
     for engine in ENGINES:
         np.testing.assert_allclose(run(tape, {"x": np.ones(10)}, engine)["y"], exact, rtol=1e-11)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dalembert.arithmetic.engines import grids, run, run_grid
+from dalembert.arithmetic.engines import ENGINES, grids, run, run_grid
 from dalembert.arithmetic.recorded import RECORDED, Recorder
 
 
@@ -42,17 +42,42 @@ def test_a_grid_is_all_its_lanes(shape):
     lanes = run(
         tape, {n: np.broadcast_to(x, shape).ravel() if np.ndim(x) else x for n, x in inputs.items()}, "numpy"
     )
-    found = grids.run(tape, inputs, shape)
+    found = np.empty((len(tape.outputs), *shape))
+    grids.run(tape, [np.asarray(inputs[name]) for name in tape.inputs], shape, found)
     for name, table in zip(tape.names, found, strict=True):
         np.testing.assert_allclose(table.ravel(), lanes[name], rtol=4e-16, err_msg=name)
-    either = run_grid(tape, inputs, shape)
-    for name in tape.names:
-        np.testing.assert_allclose(either[name], lanes[name], rtol=4e-16, err_msg=name)
+    for name, table in zip(tape.names, run_grid(tape, inputs, shape), strict=True):
+        np.testing.assert_allclose(table.ravel(), lanes[name], rtol=4e-16, err_msg=name)
 
 
-def test_inputs_that_hang_on_both_are_lanes_of_their_own():
+@pytest.mark.parametrize("engine", ENGINES)
+def test_inputs_that_hang_on_both_are_lanes_of_their_own(monkeypatch, engine):
+    monkeypatch.setenv("DALEMBERT_ENGINE", engine)
     tape, q = taped(), np.arange(80.0).reshape(2, 40)
     a = np.array([[1.0], [2.0]])
-    found = run_grid(tape, {"a": a, "b": 3.0, "q": q, "c": 0.5}, (2, 40))
+    found = run_grid(tape, {"a": a, "b": 3.0, "q": q, "c": 0.5}, (2, 40))[tape.rows["both"]]
     expected = np.sqrt((a * np.cos(q) - 3.0) ** 2 + 0.5)
-    np.testing.assert_allclose(found["both"].reshape(2, 40), expected, rtol=1e-15)
+    np.testing.assert_allclose(found, expected, rtol=2e-15)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("shape", [(4, 3), (4, 1), (3, 8), (5, 45), (2, 20_001), (40, 360)])
+def test_outputs_go_to_their_place_and_a_test_says_one_thing_of_a_row(monkeypatch, engine, shape):
+    r, c = shape
+    recorder = Recorder()
+    a, q, p = (recorder.input(name) for name in "aqp")
+    x, y = a * RECORDED.cos(q), a * RECORDED.sin(q) + p
+    root = RECORDED.sqrt(x)
+    tape = recorder.tape({"x": x, "y": y, "both": x * y, "clear": root + 1.0, "row": a, "far": x + 1e3})
+    angle = np.linspace(-1.5, 1.5, c)[None]
+    # the cosine of one row is negative somewhere, and its root not a number
+    size = np.where(np.arange(r) == r // 2, -1.0, np.arange(r) + 1.0)[:, None]
+    z, both, tests = np.empty((r, c), complex), np.empty((r, c)), [np.empty(r, bool) for _ in range(3)]
+    monkeypatch.setenv("DALEMBERT_ENGINE", engine)
+    given = {"a": size, "q": angle, "p": np.linspace(0, 1, r * c).reshape(shape)}
+    run_grid(tape, given, shape, [z.real, z.imag, both, *tests])
+    expected = size * np.exp(1j * angle) + 1j * given["p"]
+    np.testing.assert_allclose(z, expected, rtol=1e-15, atol=1e-15 * r)
+    np.testing.assert_allclose(both, z.real * z.imag, rtol=1e-15)
+    assert tests[0].tolist() == tests[1].tolist() == (size[:, 0] > 0).tolist()
+    assert tests[2].all()

@@ -150,8 +150,113 @@ def test_variants_with_an_end_and_points_in_json(dalembert: Dalembert, pendulum:
     assert "variant 1: no mass moves with input 'bob'" in done.stderr
 
 
-def test_what_variants_in_time_do_not_have_is_refused(dalembert: Dalembert, pendulum: Path) -> None:
-    for flag in (["--digits"], ["--workers", "2"], ["--html", "x.html"]):
-        done = dalembert("mechanism", pendulum, "--time", "0:1:1", "--vary", "links.bob.mass=1:2:1", *flag)
-        assert done.returncode == 2
-        assert "expected one mechanism with --time" in done.stderr
+def test_variants_by_several_processes_give_the_same_bytes(
+    dalembert: Dalembert, pendulum: Path, tmp_path: Path
+) -> None:
+    """In parts of fixed size: as CSV, each variant to its own event, and as a folder of Parquet."""
+    vary = "--vary", "links.bob.center.x=0.5:2:0.00125", "--time", "0:1:1"
+    one, two = tmp_path / "one.csv", tmp_path / "two.csv"
+    for path, workers in ((one, "1"), (two, "2")):
+        done = dalembert("mechanism", pendulum, *vary, "--until", "bob=-90", "--workers", workers, "-o", path)
+        assert done.returncode == 0, done.stderr
+    assert one.read_bytes() == two.read_bytes()
+    rows = list(csv.DictReader(io.StringIO(one.read_text())))
+    assert len(rows) == 2 * 1201
+    for row in (rows[1], rows[1001], rows[2401]):
+        quarter = 1.854074677301371918 * math.sqrt(float(row["links.bob.center.x_m"]) / 9.81)
+        assert float(row["t_s"]) == pytest.approx(quarter, abs=1e-9)
+    parquet = pytest.importorskip("pyarrow.parquet")
+    folder = tmp_path / "variants.parquet"
+    done = dalembert("mechanism", pendulum, *vary, "--workers", "2", "-o", folder)
+    assert done.returncode == 0, done.stderr
+    assert parquet.read_table(folder).num_rows == 2 * 1201
+    assert len(list(folder.iterdir())) == 3
+
+
+def test_digits_of_variants_one_by_one_and_by_processes(dalembert: Dalembert, pendulum: Path) -> None:
+    more = (
+        "--time",
+        "0:1:1",
+        "--accuracy",
+        "1e-5",
+        "--vary",
+        "links.bob.mass=0:9:1",
+        "--digits",
+        "--only",
+        "P",
+    )
+    done = dalembert("mechanism", pendulum, *more)
+    assert done.returncode == 0, done.stderr
+    assert dalembert("mechanism", pendulum, *more, "--workers", "2").stdout == done.stdout
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    assert len(rows) == 1 + 2 * 9
+    assert rows[0]["P_x_m"] == rows[0]["t_s"] == ""
+    assert all(len(row["P_x_m"].lstrip("-")) < 13 for row in rows[2::2])
+    assert all(float(row["P_x_m"]) == pytest.approx(-0.98629175, abs=1e-5) for row in rows[2::2])
+    assert "variant 1: no mass moves with input 'bob'" in done.stderr
+
+
+def test_a_page_of_variants_in_time(dalembert: Dalembert, pendulum: Path, tmp_path: Path) -> None:
+    page = tmp_path / "variants.html"
+    vary = "--time", "0:1:0.1", "--vary", "links.bob.mass=0:2:1", "--vary", "input.speed=0:1:1"
+    done = dalembert("mechanism", pendulum, *vary, "--html", page)
+    assert done.returncode == 0, done.stderr
+    text = page.read_text()
+    assert "variant 3" in text
+    assert "variant 6" in text
+    assert "variant 1" not in text
+    done = dalembert("mechanism", pendulum, *vary, "--html", page, "--until", "bob=-90")
+    assert done.returncode == 2
+    assert "expected no --until beside variants" in " ".join(done.stderr.split())
+
+
+def test_the_first_row_is_as_it_was_given(dalembert: Dalembert, pendulum: Path) -> None:
+    """60° is 59.99999999999999° on the way through radians and back."""
+    pendulum.write_text(PENDULUM.replace("angle = 0", "angle = 60"))
+    done = dalembert("mechanism", pendulum, "--time", "0:1:1", "--only", "bob")
+    first = next(csv.DictReader(io.StringIO(done.stdout)))
+    assert (first["input_deg"], first["bob_angle_deg"]) == ("60.0", "60.0")
+    done = dalembert("mechanism", pendulum, "--time", "0:1:1", "--vary", "input.angle=60:61:1", "--json")
+    shown = [of["time"][0]["inputs"]["bob"]["angle_deg"] for of in json.loads(done.stdout)["variants"]]
+    assert shown == [60.0, 61.0]
+
+
+# a double pendulum let go above: no motion keeps a digit for a minute
+CHAOS = (
+    PENDULUM.replace("[input]", "[[input]]").replace("angle = 0", "angle = 115")
+    + """
+[links.lower]
+points = { P = [0, 0], Q = [1, 0] }
+mass = 1
+center = [1, 0]
+[[input]]
+link = "lower"
+angle = 145
+speed = 0
+"""
+)
+
+
+@pytest.mark.parametrize("more", [(), ("--digits",), ("--vary", "input.1.speed=0:0:1")])
+def test_where_no_digit_is_known_cells_are_empty_with_one_warning(
+    dalembert: Dalembert, pendulum: Path, more: tuple[str, ...]
+) -> None:
+    pendulum.write_text(CHAOS)
+    done = dalembert("mechanism", pendulum, "--time", "0:60:12", "--only", "Q", *more)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    lost = [name for name, cell in rows[-1].items() if not cell]
+    assert {"upper" in name or "lower" in name or name.startswith(("bob", "Q")) for name in lost} == {True}
+    assert len(lost) == 2 * 3 + 6
+    # the energy is known as long as it is kept
+    assert float(rows[-1]["energy_J"]) == pytest.approx(float(rows[0]["energy_J"]), abs=1e-6)
+    assert float(rows[-1]["lower_input_error_estimate_deg"]) > 5
+    assert all(rows[1].values())
+    (line,) = done.stderr.splitlines()
+    assert "no digit is known from" in line
+    if not more:
+        done = dalembert("mechanism", pendulum, "--time", "0:60:12", "--json")
+        found = json.loads(done.stdout)
+        assert found["time"][-1]["inputs"]["lower"]["angle_deg"] is None
+        assert found["time"][-1]["inputs"]["lower"]["error_estimate_deg"] > 5
+        assert len(found["warnings"]) == 1

@@ -10,7 +10,8 @@ import pytest
 
 from tests.virtualwork.test_in_time import four_bar
 from virtualwork import Friction, Input, Link, Mechanism
-from virtualwork.intime.variants import Runs, Variants
+from virtualwork.intime.runs import Runs
+from virtualwork.intime.variants import Variants
 
 G = 9.81
 
@@ -103,3 +104,70 @@ def test_a_variant_that_cannot_move_says_so_and_the_others_do() -> None:
 def test_wrong_questions(wrong: dict[str, object], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         pendulum().vary({"links.bob.mass": [1.0, 2.0]}).simulate(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("engine", ["numpy", "llvm"])
+def test_every_lane_ends_at_its_own_event(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pendulums of several lengths from the side down to the lowest place: K(sin² π/4)·√(l/g), and then the turn back."""
+    if engine == "llvm":
+        pytest.importorskip("llvmlite")
+    lengths = np.array([0.25, 0.5, 1.0, 2.0, 4.0, 400.0])
+    family = pendulum().vary({"links.bob.P.x": lengths, "links.bob.center.x": lengths})
+    t = np.linspace(0, 2, 9)
+    with monkeypatch.context() as m:
+        m.setenv("DALEMBERT_ENGINE", engine)
+        runs = family.simulate(t, angle=0.0, until={"bob": -math.pi / 2})
+    quarter = 1.854074677301371918433850347195 * np.sqrt(lengths / G)
+    for i, end in enumerate(quarter[:-1]):
+        n = int(np.isfinite(runs.times[i]).sum())
+        assert runs.times[i, : n - 1].tolist() == t[t < end].tolist()
+        assert runs.times[i, n - 1] == pytest.approx(end, abs=2e-10)
+        assert runs.angle[i, n - 1, 0] == pytest.approx(-math.pi / 2, abs=4e-16)
+        assert np.isnan(runs.angle[i, n:]).all()
+        one = type(family.mechanism).simulate(family[i], t, angle=0.0, until={"bob": -math.pi / 2})  # type: ignore[attr-defined]
+        assert one.t == pytest.approx(runs.times[i, :n], rel=1e-14)
+        assert one.angle == pytest.approx(runs.angle[i, :n], abs=1e-14)
+        assert one.energy_drift == pytest.approx(runs.energy_drift[i, :n], abs=1e-11)
+        assert (runs.error_estimate[i, :n] >= 0.5 * one.error_estimate).all()
+    assert runs.times[-1].tolist() == t.tolist()
+    assert runs.warnings == {5: ("bob: the event is not met before 2 s",)}
+
+
+def test_lanes_and_single_runs_end_alike_where_one_of_two_inputs_does() -> None:
+    """A double pendulum: the lower bar passes the level upwards, in some variants only after a turn of the upper one."""
+    m = Mechanism(
+        {"O": 0j},
+        {
+            "upper": Link({"O": 0j, "P": 1 + 0j}, mass=1, center=1 + 0j),
+            "lower": Link({"P": 0j, "Q": 1 + 0j}, mass=1, center=1 + 0j),
+        },
+        inputs=[Input(link="upper", value=0.0), Input(link="lower", value=-0.5)],
+        gravity=-1j * G,
+    )
+    family = m.vary({"links.lower.mass": [0.5, 1.0, 3.0], "links.upper.mass": [1.0, 0.2, 2.0]})
+    runs = family.simulate([0, 1.0, 2.0, 5.0], until={"lower": -2.5, "upper": -1.75})
+    for i in range(3):
+        one = type(family.mechanism).simulate(  # type: ignore[attr-defined]
+            family[i], [0, 1.0, 2.0, 5.0], until={"lower": -2.5, "upper": -1.75}
+        )
+        assert one.ended == "until"
+        n = len(one.t)
+        assert runs.times[i, :n] == pytest.approx(one.t, abs=1e-12)
+        assert np.isnan(runs.times[i, n:]).all()
+        assert runs.angle[i, :n] == pytest.approx(one.angle, abs=1e-12)
+
+
+def test_an_event_ends_lanes_that_are_let_go_singly_too() -> None:
+    """A rocker that passes its dead point: no lane can, and each is let go alone."""
+    family = four_bar("rocker").vary({"links.coupler.mass": [1.0, 2.0]})
+    runs = family.simulate([0, 0.5, 1.0], speed=3.0, until={"rocker": 1.7})
+    assert np.isfinite(runs.times).sum(axis=1).tolist() == [2, 2]
+    assert runs.angle[:, 1, 0] == pytest.approx([1.7, 1.7], abs=1e-14)
+    with pytest.raises(ValueError, match="no input is named 'bab'"):
+        family.simulate([0, 1.0], until={"bab": 1.0})
+
+
+def test_variants_at_their_first_time_alone() -> None:
+    runs = pendulum().vary({"links.bob.mass": [1.0, 2.0]}).simulate([0.5], angle=0.25, speed=2.0)
+    assert runs.angle[:, 0, 0].tolist() == [0.25, 0.25]
+    assert runs.acceleration[:, 0, 0] == pytest.approx([-G * math.cos(0.25)] * 2, rel=1e-14)

@@ -16,23 +16,56 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.engines import run, run_grid
 from virtualwork.branch.guess import BESIDE, informed
 from virtualwork.describe.description import Description
-from virtualwork.family.written import CHOICE, Written
-from virtualwork.formulas.asked import Key, names
+from virtualwork.family.written import CHOICE, CLOSE, TOLD, Written
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Reals
 
 Mask = NDArray[np.bool_]
-# radicand (a squared sine) below which a guess stands at a change point or a limit, or nearly so
-CLOSE = 1e-9
-# of two assemblies the nearer one is told from the farther if its squared distance is below this share
-TOLD = 0.5
 # rad, or of the mechanism's size: how finely the way to the poses is looked through, and what is a dip of a radicand
 STEP, DIP = 2 * np.pi / 90, 0.05
-# so many times wider are the steps that tell where no dip can be
-WIDER = 2
+# so many times wider are the steps at which `CLEAR` tells that no dip can be; and samples of these that are told at once
+WIDER, AT_ONCE = 2, 8
 # what a dip has to go down to for two branches to meet there
 MEETS = 1e-8
 # lanes worked on together
 LANES = 1 << 18
+
+
+def chosen(
+    written: Written, m: Description, given: Mapping[str, Reals], low: Reals, high: Reals
+) -> tuple[dict[str, Reals], Mask]:
+    """The sign of each closed form of each variant, (n,), and which variants go by them over their inputs, (n,).
+
+    Parameters
+    ----------
+    written : Written
+        With the signs as inputs.
+    m : Description
+    given : mapping of path to array (n,)
+    low, high : array (n,)
+        The least and the largest input that is asked for, and the guess's. Of several inputs no way is looked along.
+    """
+    n = len(low)
+    if not all(informed(m, group) for group in written.closed):
+        return {}, np.zeros(n, dtype=bool)
+    one = len(m.inputs) == 1
+    way = _wide(m, low, high) if one and n else np.empty((0, 1))
+    at_once = len(way) <= AT_ONCE
+    tape = written.told(len(way) if at_once else 0)
+    table, (told, clear) = np.empty((len(written.closed), n, 1)), np.empty((2, n), dtype=bool)
+    enters = {**_across(given), **_inputs(m)} | {f"way {i}": q[:, None] for i, q in enumerate(way)}
+    run_grid(tape, enters, (n, 1), [*table, told, clear])
+    found = {group.name: sign for group, sign in zip(written.closed, table[:, :, 0], strict=True)}
+    rest = np.flatnonzero(~told)
+    if len(rest):
+        again, told[rest] = signs(written, m, _of(given, rest), len(rest))
+        for name, sign in again.items():
+            found[name][rest] = sign
+    rest = np.flatnonzero(told & ~clear if at_once else told)
+    if one and len(rest):
+        known = _of({**given, **{f"sign {name}": sign for name, sign in found.items()}}, rest)
+        told[rest] = ~meet_on_the_way(written, m, known, len(rest), low[rest], high[rest])
+    return found, told
 
 
 def signs(
@@ -84,11 +117,18 @@ def meet_on_the_way(
     than its neighbours, the dip is followed down.
     """
     found = np.zeros(n, dtype=bool)
-    if written.closed:
-        for here, some, q in _along(m, known, n, low, high):
+    if not written.closed:
+        return found
+    for here, some, q in _along(m, known, n, low, high):
+        count = len(found[here])
+        wide, clear = q[_every_other(len(q))].T, np.empty(count, dtype=bool)
+        run_grid(written.clear, _across(some) | {"q0": wide}, (count, wide.shape[1]), [clear])
+        left = np.flatnonzero(~clear)
+        if len(left):
+            its, near = _of(some, left), q if q.shape[1] == 1 else q[:, left]
             for group in written.closed:
                 radicand = partial(_sampled, written, ("margin", group.name))
-                found[here] |= _meet(radicand, some, q, len(found[here]))
+                found[left + here.start] |= _meets(its, near, radicand, len(left))
     return found
 
 
@@ -118,46 +158,53 @@ def _along(
     m: Description, known: Mapping[str, Any], n: int, low: Reals, high: Reals
 ) -> Iterator[tuple[slice, dict[str, Any], Reals]]:
     """Some variants at a time, what is known of them, and inputs on their way, (samples, variants or 1)."""
-    span = float(np.max(high - low, initial=0.0))
-    slide = m.inputs[0].is_slide
-    turn = np.inf if slide else 2 * np.pi
-    count = samples(m, span)
-    alike = bool((low == low[0]).all() and (high == high[0]).all())
+    count = _count(m, low, high)
     each = max(1, LANES // count)
     for a in range(0, n, each):
         here = slice(a, min(a + each, n))
-        some = {name: values if np.ndim(values) == 0 else values[here] for name, values in known.items()}
-        # where all share their inputs one list of them will do
-        first, last = (end[here][: 1 if alike else None] for end in (low, high))
-        yield here, some, np.linspace(first, np.minimum(last, first + turn), count)
+        yield here, _of(known, here), _way(m, low[here], high[here], count)
 
 
-def _meet(radicand: Callable[..., Reals], known: Mapping[str, Any], q: Reals, n: int) -> Mask:
-    """Which variants may have a change point of a group at inputs (samples, n or 1)."""
-    found = np.zeros(n, dtype=bool)
-    # about a change point the radicand grows with the square of the distance: at a wider step a dip is higher
-    wide = np.unique([*range(0, len(q), WIDER), len(q) - 1])
-    depth = radicand(known, q[wide], n)
-    left = np.flatnonzero(~(depth > DIP * WIDER**2).all(axis=0))
-    if len(left):
-        some = {name: values if np.ndim(values) == 0 else values[left] for name, values in known.items()}
-        near = q if q.shape[1] == 1 else q[:, left]
-        found[left] = _meets(some, near, radicand, len(left))
-    return found
+def _count(m: Description, low: Reals, high: Reals) -> int:
+    """How many samples of the longest way are looked at."""
+    return samples(m, float(np.max(high - low, initial=0.0)))
+
+
+def _way(m: Description, low: Reals, high: Reals, count: int) -> Reals:
+    """Inputs from low to high, of a turn at most: (count, n), or (count, 1) where all share them."""
+    if (low == low[0]).all() and (high == high[0]).all():
+        low, high = low[:1], high[:1]
+    return np.linspace(low, np.minimum(high, low + (np.inf if m.inputs[0].is_slide else 2 * np.pi)), count)
+
+
+def _wide(m: Description, low: Reals, high: Reals) -> Reals:
+    """The samples of the ways in wider steps, (samples, n or 1)."""
+    count = _count(m, low, high)
+    return _way(m, low, high, count)[_every_other(count)]
+
+
+def _every_other(count: int) -> NDArray[np.intp]:
+    """Which samples are looked at in wider steps: the first and the last among them."""
+    return np.unique([*range(0, count, WIDER), count - 1])
+
+
+def _of(known: Mapping[str, Any], rows: Any) -> dict[str, Any]:
+    """What is known of some variants."""
+    return {name: values[rows] if np.ndim(values) else values for name, values in known.items()}
 
 
 def _across(known: Mapping[str, Any]) -> dict[str, Any]:
-    """What is known of each variant, as the columns of a grid."""
-    return {name: values[None] if np.ndim(values) else values for name, values in known.items()}
+    """What is known of each variant, as the rows of a grid."""
+    return {name: values[:, None] if np.ndim(values) else values for name, values in known.items()}
 
 
 def _sampled(written: Written, key: Key, known: Mapping[str, Any], q: Reals, n: int) -> Reals:
     """A quantity at inputs (samples, n or 1): (samples, n)."""
     tape = written.tape([key])
     shape = len(q), n
+    across = {name: values[None] if np.ndim(values) else values for name, values in known.items()}
     with np.errstate(all="ignore"):
-        found = run_grid(tape, _across(known) | {"q0": q}, shape)[names(key)[0]]
-    return np.broadcast_to(found, len(q) * n).reshape(shape)
+        return run_grid(tape, across | {"q0": q}, shape)[0]
 
 
 def _meets(known: Mapping[str, Any], q: Reals, radicand: Callable[..., Reals], n: int) -> Mask:

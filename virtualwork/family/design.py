@@ -18,8 +18,9 @@ from dalembert.arithmetic.engines import run
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.describe.errors import DescriptionError, hint
-from virtualwork.family.branches import CLOSE, DIP, TOLD, meet_on_the_way, samples, signs
+from virtualwork.family.branches import DIP, meet_on_the_way, samples, signs
 from virtualwork.family.part import Part, Solver
+from virtualwork.family.written import CLOSE, TOLD
 from virtualwork.formulas.asked import COMPLEX, Key, names
 from virtualwork.formulas.numbers import Reals
 

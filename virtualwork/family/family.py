@@ -63,7 +63,8 @@ class Family:
                 i = int(np.argmin(np.isfinite(column)))
                 raise ValueError(f"{dimension.path}: found {column[i]} at {i}, expected finite numbers")
         self.dimensions = tuple(columns)
-        self.values = np.stack(list(columns.values()), axis=1)
+        # a column beside the other: each is in one piece
+        self.values = np.array(list(columns.values())).T
 
     def __len__(self) -> int:
         return len(self.values)

@@ -17,7 +17,7 @@ from virtualwork.branch.shortfall import shortfall
 from virtualwork.describe.errors import DescriptionError, MechanismError
 from virtualwork.describe.parts import Point, as_point
 from virtualwork.family.branches import LANES
-from virtualwork.family.part import ASSEMBLED, Part, answer, forget
+from virtualwork.family.part import ASSEMBLED, Part, answer, forget, room
 from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Complexes, Reals
 from virtualwork.plan.joints import joints
@@ -165,16 +165,18 @@ class FamilyMotion:
         new = tuple(key for key in keys if key not in self._known)
         if new:
             rows = [rows for _, rows in self.parts()]
-            work = ((self._name, number, self.part.some(rows), new) for number, rows in self.parts())
-            found: list[list[Any]] = [[] for _ in new]
-            for i, (values, reasons) in enumerate(in_parts(answer, work, self.executor)):
-                for columns, value in zip(found, values, strict=True):
-                    columns.append(value)
-                self._reasons |= {rows[i].start + place: reason for place, reason in reasons.items()}
-            self._known |= {
-                key: columns[0] if len(columns) == 1 else np.concatenate(columns)
-                for key, columns in zip(new, found, strict=True)
-            }
+            out = room(new, *self.part.shape)
+            here = self.executor is None
+            work = (
+                (self._name, number, self.part.some(some), new, [x[some] for x in out] if here else None)
+                for number, some in self.parts()
+            )
+            for some, (values, reasons) in zip(rows, in_parts(answer, work, self.executor), strict=True):
+                if not here:
+                    for x, value in zip(out, values, strict=True):
+                        x[some] = value
+                self._reasons |= {some.start + place: reason for place, reason in reasons.items()}
+            self._known |= zip(new, out, strict=True)
         return [self._known[key] for key in keys]
 
     @cached_property

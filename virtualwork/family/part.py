@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.engines import run_grid
+from dalembert.arithmetic.engines import Outputs, run_grid
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed
 from virtualwork.describe.errors import MechanismError
-from virtualwork.family.branches import LANES, meet_on_the_way, signs, stays_within
+from virtualwork.family.branches import LANES, chosen, stays_within
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import COMPLEX, FORCES, Key, over_blocks, quantity
 from virtualwork.formulas.dynamics import Dynamics
@@ -141,26 +141,21 @@ class Solver:
 
     @cached_property
     def _given(self) -> dict[str, Reals]:
-        columns = np.ascontiguousarray(self.part.values.T)
-        return {d.path: column for d, column in zip(self.part.dimensions, columns, strict=True)}
+        return {
+            d.path: np.ascontiguousarray(self.part.values[:, i]) for i, d in enumerate(self.part.dimensions)
+        }
 
     @cached_property
     def _signs(self) -> tuple[dict[str, Reals], Mask]:
         """The sign of each closed form, and which variants are on the tape."""
         part, written = self.part, self.written
-        v, _ = part.shape
         if written is None:
-            return {}, np.zeros(v, dtype=bool)
-        m = part.mechanism
-        found, told = signs(written, m, self._given, v)
+            return {}, np.zeros(part.shape[0], dtype=bool)
+        found, told = chosen(written, part.mechanism, self._given, *self._span)
         for d in part.dimensions:
             if d.kind in ("mass", "inertia"):
                 # what a description refuses
                 told &= self._given[d.path] >= 0
-        if len(m.inputs) == 1 and told.any():
-            low, high = self._span
-            known = self._given | {f"sign {name}": sign for name, sign in found.items()}
-            told &= ~meet_on_the_way(written, m, known, v, low, high)
         return found, told
 
     @cached_property
@@ -187,32 +182,31 @@ class Solver:
         """Which variants are on the tape, (v,)."""
         return self._signs[1]
 
-    def values(self, keys: Sequence[Key]) -> list[Any]:
-        """Quantities by their keys (`Recording.value`), each (v, n); NaN where a pose is not assembled."""
-        out, alone = self.lanes(keys)
-        for place in np.flatnonzero(alone):
-            self._one(int(place), keys, out)
-        return out
+    def values(self, keys: Sequence[Key], out: Sequence[NDArray[Any]] | None = None) -> list[Any]:
+        """Quantities by their keys (`Recording.value`), each (v, n); NaN where a pose is not assembled.
 
-    def lanes(self, keys: Sequence[Key]) -> tuple[list[Any], Mask]:
+        `out`: where to write them, as `room` has it.
+        """
+        found, alone = self.lanes(keys, out)
+        for place in np.flatnonzero(alone):
+            self._one(int(place), keys, found)
+        return found
+
+    def lanes(self, keys: Sequence[Key], out: Sequence[NDArray[Any]] | None = None) -> tuple[list[Any], Mask]:
         """The quantities of the variants that are on the tape; and which are not, (v,): of those they are NaN."""
         v, n = self.part.shape
         there = self._taken(keys) if self.takes(keys) else np.zeros(v, dtype=bool)
         alone = ~there
+        found = list(room(keys, v, n) if out is None else out)
         each = max(1, LANES // max(n, 1))
-        if not alone.any() and v <= each:
-            return self._on_tape(keys, slice(None))
-        out = [np.empty((v, n), complex if key[0] in COMPLEX else float) for key in keys]
         places = np.flatnonzero(there)
         for i in range(0, len(places), each):
             rows = places[i : i + each]
-            found, near = self._on_tape(keys, rows)
-            alone[rows[near]] = True
-            for to, values in zip(out, found, strict=True):
-                to[rows] = values
-        for to in out:
-            to[alone] = np.nan
-        return out, alone
+            alone[rows] = self._on_tape(keys, rows, found)
+        if alone.any():
+            for to in found:
+                to[alone] = np.nan
+        return found, alone
 
     def takes(self, keys: Sequence[Key]) -> bool:
         """Whether the tape has such quantities: friction iterates, redundant statics and twists are of each variant."""
@@ -244,10 +238,39 @@ class Solver:
             found &= stays_within(self.written, m, self._known, ("twist", number), HALF, low, high)
         return found
 
-    def _on_tape(self, keys: Sequence[Key], rows: NDArray[np.intp] | slice) -> tuple[list[Any], Mask]:
+    def _on_tape(self, keys: Sequence[Key], rows: NDArray[np.intp], out: list[Any]) -> Mask:
         """Work out some variants on the tape; and which of them are better described alone."""
         assert self.written is not None
-        v, n = len(self.part.values[rows]), self.part.shape[1]
+        v, n = len(rows), self.part.shape[1]
+        asked = list(dict.fromkeys(key for key in keys if key != ASSEMBLED))
+        tape = self.written.tested(asked, [ASSEMBLED] if ASSEMBLED in keys else [])
+        # straight to their place where that is in one piece
+        together = rows[-1] - rows[0] == v - 1
+        here: Any = slice(rows[0], rows[-1] + 1) if together else rows
+        to = [x[here] for x in out] if together else room(keys, v, n)
+        first = dict(zip(reversed(keys), reversed(to), strict=True))
+        parts = [part for key in asked for part in _parts(first[key])]
+        sound = np.empty(v, dtype=bool)
+        run_grid(tape, {name: self._entering(name, here) for name in tape.inputs}, (v, n), [*parts, sound])
+        for key, x in zip(keys, to, strict=True):
+            if key == ASSEMBLED:
+                x[:] = 0.0
+            elif x is not first[key]:
+                x[:] = first[key]
+        near, unsound = np.zeros(v, dtype=bool), np.flatnonzero(~sound)
+        if len(unsound):
+            values, near[unsound] = self._with_gaps(keys, rows[unsound])
+            for x, value in zip(to, values, strict=True):
+                x[unsound] = value
+        if not together:
+            for x, value in zip(out, to, strict=True):
+                x[rows] = value
+        return near
+
+    def _with_gaps(self, keys: Sequence[Key], rows: NDArray[np.intp]) -> tuple[list[Any], Mask]:
+        """Some variants on the tape of which a pose is not assembled; and which of them are better described alone."""
+        assert self.written is not None
+        v, n = len(rows), self.part.shape[1]
         written = self.written
         closed = {key: ("closed", *written.recording.hangs_on(key)) for key in keys}
         forces = any(key[0] in FORCES for key in keys)
@@ -255,9 +278,9 @@ class Solver:
         asked = [key for key in keys if key != ASSEMBLED]
         whole = list(dict.fromkeys(closed.values()))
         tape = written.tape((*asked, *whole, *margins))
-        with np.errstate(all="ignore"):
-            found = run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n))
-            lanes = {key: quantity(found, key, v * n).reshape(v, n) for key in (*asked, *whole, *margins)}
+        table = run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n))
+        found = Outputs(tape, np.reshape(table, (-1, v * n)))
+        lanes = {key: quantity(found, key, v * n).reshape(v, n) for key in (*asked, *whole, *margins)}
         near = np.zeros(v, dtype=bool)
         for key in margins:
             near |= (np.abs(lanes[key]) < NEAR).any(axis=1)
@@ -317,6 +340,15 @@ class Solver:
                         values[i] = over_blocks(poses, key, forces)
 
 
+def room(keys: Sequence[Key], v: int, n: int) -> list[NDArray[Any]]:
+    """Arrays (v, n) for quantities, real or complex."""
+    return [np.empty((v, n), complex if key[0] in COMPLEX else float) for key in keys]
+
+
+def _parts(x: NDArray[Any]) -> list[Reals]:
+    return [x.real, x.imag] if np.iscomplexobj(x) else [x]
+
+
 _assembled: dict[int, Assembly] = {}
 # mechanisms of which a process keeps what it has written down
 MECHANISMS = 8
@@ -342,10 +374,16 @@ _solvers: dict[tuple[str, int], Solver] = {}
 PARTS = 16
 
 
-def answer(family: str, number: int, part: Part, keys: Sequence[Key]) -> tuple[list[Any], dict[int, str]]:
+def answer(
+    family: str,
+    number: int,
+    part: Part,
+    keys: Sequence[Key],
+    out: Sequence[NDArray[Any]] | None = None,
+) -> tuple[list[Any], dict[int, str]]:
     """Quantities of a part, and why some of its variants have none; what a process has solved of it is kept.
 
-    `family` names what has been asked of which variants, and `number` the part.
+    `family` names what has been asked of which variants, and `number` the part; `out` is where to write them.
     """
     solver = _solvers.get((family, number))
     if solver is None:
@@ -353,7 +391,7 @@ def answer(family: str, number: int, part: Part, keys: Sequence[Key]) -> tuple[l
             _solvers.pop(next(iter(_solvers)), None)
         before = next((s for (name, _), s in list(_solvers.items()) if name == family), None)
         solver = _solvers[family, number] = Solver(part, before)
-    return solver.values(keys), solver.reasons
+    return solver.values(keys, out), solver.reasons
 
 
 def forget(family: str) -> None:

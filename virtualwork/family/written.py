@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import sys
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 
 from dalembert.arithmetic.adjoint import derivatives
@@ -13,17 +14,23 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import distance, sign_of_angles
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, value
-from virtualwork.formulas.asked import Key
+from virtualwork.formulas.asked import FORCES, Key
 from virtualwork.formulas.kinds import WRITTEN
 from virtualwork.formulas.numbers import Number
 from virtualwork.formulas.positions import Case, State, run
-from virtualwork.formulas.recording import Recording
+from virtualwork.formulas.recording import NEAR, Recording
 from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Step, Turn
 
 # what the tape of the choice says of each group
 CHOICE = ("margin", "plus", "minus", "guessed", "sign")
+# radicand (a squared sine) below which a guess stands at a change point or a limit, or nearly so
+CLOSE = 1e-9
+# of two assemblies the nearer one is told from the farther if its squared distance is below this share
+TOLD = 0.5
+# the radicand above which no change point is within two steps of `branches.STEP`: it grows with the square of the distance
+CLEAR = 0.2
 
 
 class Written:
@@ -64,6 +71,8 @@ class Written:
             self.mechanism, self.plan, signs, moves, turning, assembly.geared, settled, recorder
         )
         self._tapes: dict[tuple[Key, ...], Tape] = {}
+        self._tested: dict[tuple[tuple[Key, ...], tuple[Key, ...]], Tape] = {}
+        self._told: dict[int, Tape] = {}
         self._slopes: dict[tuple[tuple[Key, ...], tuple[str, ...]], Tape] = {}
 
     @cached_property
@@ -77,6 +86,50 @@ class Written:
         if asked not in self._tapes:
             self._tapes[asked] = self.recording.tape(asked)
         return self._tapes[asked]
+
+    def tested(self, keys: Sequence[Key], also: Sequence[Key] = ()) -> Tape:
+        """The tape of quantities, and `sound`: positive where all is assembled that they, and others, hang on.
+
+        And where forces among them have digits.
+        """
+        asked = tuple(keys), tuple(also)
+        if asked not in self._tested:
+            closed = [("closed", *self.recording.hangs_on(key)) for key in (*keys, *also)]
+            sound = [sys.float_info.max - abs(self.recording.value(key)) for key in dict.fromkeys(closed)]
+            if any(key[0] in FORCES for key in keys):
+                sound += [abs(self.recording.value(("margin", g.name))) - NEAR for g in self.closed]
+            self._tested[asked] = self.recording.tape(keys, {"sound": every(sound)})
+        return self._tested[asked]
+
+    @cached_property
+    def clear(self) -> Tape:
+        """The tape of `clear`: positive where no radicand is near zero, by the input and the signs."""
+        margins = [self.recording.value(("margin", group.name)) for group in self.closed]
+        return self.recording.recorder.tape({"clear": every([margin - CLEAR for margin in margins])})
+
+    def told(self, samples: int) -> Tape:
+        """The tape of how all closed forms close at the inputs of the guess, and whether that is told plainly.
+
+        `sign GROUP`; `told`, positive where the guess is far from a change point and much nearer to one assembly; `clear`,
+        positive where the radicands are far from zero at further inputs `way 0`, `way 1` …, so many.
+        """
+        if samples not in self._told:
+            recorder = Recorder()
+            chosen = _again(self.choice, recorder, {})
+            told = []
+            for name in (group.name for group in self.closed):
+                plus, minus = chosen[f"plus {name}"], chosen[f"minus {name}"]
+                told.append(chosen[f"margin {name}"] - CLOSE)
+                told.append(RECORDED.select(TOLD * plus - minus, 1.0, TOLD * minus - plus))
+            signs = {f"sign {group.name}": chosen[f"sign {group.name}"] for group in self.closed}
+            margins = self.tape([("margin", group.name) for group in self.closed])
+            clear = []
+            for i in range(samples):
+                depths = _again(margins, recorder, signs | {"q0": recorder.input(f"way {i}")})
+                clear += [depth - CLEAR for depth in depths.values()]
+            outputs = signs | {"told": every(told), "clear": every(clear)}
+            self._told[samples] = recorder.tape(outputs)
+        return self._told[samples]
 
     def slopes(self, keys: Sequence[Key], enters: tuple[str, ...]) -> Tape:
         """The tape of quantities' derivatives to what enters, as far as they hang on that; written once."""
@@ -123,6 +176,20 @@ class Written:
 
         run(self.plan.steps, st, close)
         return recorder.tape(outputs)
+
+
+def every(conditions: Sequence[Number]) -> Number:
+    """A number that is positive where all of these are."""
+    found: Number = 1.0
+    for condition in reversed(conditions):
+        found = RECORDED.select(condition, found, -1.0)
+    return found
+
+
+def _again(tape: Tape, recorder: Recorder, known: Mapping[str, Number]) -> dict[str, Number]:
+    """The outputs of a tape on another one, where some of what enters is known."""
+    enters = {name: known[name] if name in known else recorder.input(name) for name in tape.inputs}
+    return tape.on(enters, RECORDED)
 
 
 def _turns(step: Step) -> tuple[Turn, ...]:

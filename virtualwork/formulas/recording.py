@@ -255,8 +255,8 @@ class Recording:
             return False
         return kinds.isdisjoint(JOINTS) or not self.forces[0].order.redundant
 
-    def tape(self, keys: Iterable[Key]) -> Tape:
-        """The tape of quantities: outputs are called as `names` says."""
+    def tape(self, keys: Iterable[Key], more: Mapping[str, Number] | None = None) -> Tape:
+        """The tape of quantities: outputs are called as `names` says; and of `more` numbers by name."""
         outputs: dict[str, Number] = {}
         for key in keys:
             value = self.value(key)
@@ -264,7 +264,7 @@ class Recording:
             if key[0] in FORCES:
                 parts = [RECORDED.unsigned(part) for part in parts]
             outputs.update(zip(names(key), parts, strict=True))
-        return self.recorder.tape(outputs)
+        return self.recorder.tape({**outputs, **(more or {})})
 
     def _point(self, body: str, z: complex, node: str | None, order: int) -> Number:
         path = self._path(body, z, node)

@@ -31,7 +31,7 @@ from virtualwork.intime.equations import Equations, Lost
 from virtualwork.intime.explicit import DormandPrince, names
 from virtualwork.intime.marching import ROUNDS, beginning, follow, loop, march, over
 from virtualwork.intime.step import Method, Step
-from virtualwork.intime.watch import Check, Floats, Watch
+from virtualwork.intime.watch import Check, Floats, Watch, between
 
 # steps of one simulation
 MOST = 200_000
@@ -332,7 +332,9 @@ class Node:
         return first
 
     def _value(self, watch: Watch, h: float, done: Step, share: float) -> float:
-        return watch.value(self.t + share * h, *_between(self.q, self.v, self.rates, h, done, share))
+        return watch.value(
+            self.t + share * h, *between(self.q, self.v, self.rates, h, done.dq, done.dv, done.rates, share)
+        )
 
     def _bisected(self, watch: Watch, level: float, h: float, done: Step, high: float) -> float:
         """Where in a step a level lies, to seven digits."""
@@ -371,18 +373,3 @@ class Node:
         except (Lost, ZeroDivisionError, ValueError, OverflowError):
             return None
         return h, done
-
-
-def _between(
-    q: Floats, v: Floats, rates: Floats, h: float, done: Step, share: float
-) -> tuple[Floats, Floats]:
-    """A state within a step, roughly: of the polynomial of degree 5 through q, q̇ and q̈ at both ends."""
-    x = share
-    places, speeds = [], []
-    for a, b, c, d, e, f in zip(q, v, rates, done.dq, done.dv, done.rates, strict=False):
-        # what is left to fit after the Taylor polynomial of degree 2 at the beginning
-        p, r, s = d - h * (b + 0.5 * h * c), h * (e - h * c), h * h * (f - c)
-        c3, c4, c5 = 10 * p - 4 * r + 0.5 * s, -15 * p + 7 * r - s, 6 * p - 3 * r + 0.5 * s
-        places.append(a + x * (h * b + x * (0.5 * h * h * c + x * (c3 + x * (c4 + x * c5)))))
-        speeds.append(b + x * h * c + x * x * (3 * c3 + x * (4 * c4 + x * 5 * c5)) / h)
-    return places, speeds

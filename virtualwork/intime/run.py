@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
     from dalembert.page import Page, Shown
-    from virtualwork.animation import JointForce
+    from virtualwork.animation import JointForce, Series
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +158,7 @@ class Run:
         >>> "P_vx_m_s" in pendulum.simulate([0, 0.1, 0.2], angle=0.0).animate().html
         True
         """
-        from virtualwork.animation import JointForce, force_columns, plain
+        from virtualwork.animation import JointForce, force_columns, moving_page, plain
         from virtualwork.table import moving_columns
 
         m = self.assembly.mechanism
@@ -169,14 +169,21 @@ class Run:
         table |= moving_columns(m, self.motion.poses, 3)
         pairs = self.first_motion.dynamics.reactions.order.pairs if forces else ()
         table |= force_columns(self.motion.dynamics, pairs)
-        return self.page(plain(table), ["t_s", *inputs], [JointForce.of(*pair) for pair in pairs])
+        series = self.series(plain(table), ["t_s", *inputs], [JointForce.of(*pair) for pair in pairs])
+        return moving_page(m.name, [series], time="t_s")
 
-    def page(self, columns: Mapping[str, Shown], over: Sequence[str], arrows: Sequence[JointForce]) -> Page:
-        """Return the page of columns of this run, `t_s` and `over` among them; see `virtualwork.animation.Series`.
+    def series(
+        self,
+        columns: Mapping[str, Shown],
+        over: Sequence[str],
+        arrows: Sequence[JointForce],
+        name: str = "",
+    ) -> Series:
+        """Return this run for a page, with columns (`t_s` and `over` among them); see `virtualwork.animation.Series`.
 
         They have every place and rate, for a page solves nothing of a motion whose coordinates change on the way.
         """
-        from virtualwork.animation import Series, moving_page
+        from virtualwork.animation import Series
         from virtualwork.picture.shapes import shapes_of
 
         home = self.fine.legs[0].coordinates
@@ -184,8 +191,7 @@ class Run:
         drawing = shapes_of(self.first_motion.poses, self.motion.poses)
         # beyond a dead point the inputs have another pose
         fine = len(self.fine.legs) == 1
-        series = Series(poses, drawing, columns, over, arrows, fine=fine)
-        return moving_page(poses.mechanism.name, [series], time="t_s")
+        return Series(poses, drawing, columns, over, arrows, name, fine)
 
 
 def simulate(
@@ -207,7 +213,7 @@ def simulate(
     equations = own.equations
     equations.refuse(float(t[0]), q, v)
     scale = np.array(equations.scale)
-    levels = _levels(m.inputs, until)
+    levels = levels_of(m.inputs, until)
     tolerance = max(LEAST, FIRST * accuracy)
     start = float(t[0]), q, v
     fine = travel(own, start, float(t[-1]), tolerance, levels, DormandPrince())
@@ -221,7 +227,7 @@ def simulate(
         fine = travel(ways, start, float(t[-1]), tolerance / (GAIN + 1), levels, method, coarse)
         coarse.backwards()
         part = 1.0 if equations.crosses else share(tolerance)
-        found = Run(assembly, _reached(t, fine), fine, coarse, part)
+        found = Run(assembly, reached(t, fine.end), fine, coarse, part)
         worst = float((found.error_estimate / scale).max())
         if worst <= accuracy or tolerance <= LEAST or tries == TRIES - 1 or fine.steps > MOST / 2:
             break
@@ -263,7 +269,7 @@ def _state(
     return np.broadcast_to(value, (k,)).tolist()  # type: ignore[no-any-return]
 
 
-def _levels(inputs: Sequence[Input], until: Mapping[str, float] | None) -> dict[int, float]:
+def levels_of(inputs: Sequence[Input], until: Mapping[str, float] | None) -> dict[int, float]:
     """The values of inputs that end the motion."""
     names = [e.name for e in inputs]
     for name in until or ():
@@ -272,12 +278,17 @@ def _levels(inputs: Sequence[Input], until: Mapping[str, float] | None) -> dict[
     return {names.index(name): float(level) for name, level in (until or {}).items()}
 
 
-def _reached(t: Reals, way: Travel) -> Reals:
-    """The times up to the end of a way; where it ends before the last, its end is the last."""
-    if way.end >= t[-1]:
+def reached(t: Reals, end: float) -> Reals:
+    """The times up to the end of a motion; where it ends before the last, its end is the last."""
+    if end >= t[-1]:
         return t
-    near = 1e-8 * (way.end - t[0])
-    return np.append(t[t < way.end - near], way.end)
+    near = 1e-8 * (end - t[0])
+    return np.append(t[t < end - near], end)
+
+
+def not_met(until: Iterable[str], last: float) -> str:
+    """What is said where no input has its value up to the last time."""
+    return f"{', '.join(until)}: the event is not met before {last:g} s"
 
 
 def _said(
@@ -286,7 +297,7 @@ def _said(
     """What must be said of the answer."""
     found = []
     if run.fine.ended == "end" and until:
-        found.append(f"{', '.join(until)}: the event is not met before {asked[-1]:g} s")
+        found.append(not_met(until, float(asked[-1])))
     if run.fine.ended == "budget":
         found.append(f"ends at {run.fine.end:.9g} s, after {MOST} steps: a lower accuracy takes fewer")
     elif run.fine.ended not in ("end", "until"):

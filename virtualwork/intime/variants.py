@@ -8,8 +8,7 @@ whose branch is not told by a comparison.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,17 +19,19 @@ from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.errors import MechanismError
 from virtualwork.family.family import Family
-from virtualwork.family.motion import FamilyMotion
 from virtualwork.family.part import Part, Solver
 from virtualwork.family.written import Written
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
+from virtualwork.intime.ends import events, passed
 from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, rounding, share, spread
 from virtualwork.intime.explicit import names
 from virtualwork.intime.marching import beginning, follow, march, over
 from virtualwork.intime.powers import motion_of, places_and_speeds
-from virtualwork.intime.run import Run, rising, simulate
+from virtualwork.intime.run import levels_of, not_met, reached, rising, simulate
+from virtualwork.intime.runs import Runs
+from virtualwork.intime.watch import Levels
 
 Mask = NDArray[np.bool_]
 # steps of one variant; beyond them it is done singly
@@ -52,6 +53,7 @@ class Variants(Family):
         angle: ArrayLike | None = None,
         speed: ArrayLike | None = None,
         accuracy: float = 1e-9,
+        until: Mapping[str, float] | None = None,
     ) -> Runs:
         """Let go of the inputs of every variant; see `Mechanism.simulate`.
 
@@ -63,6 +65,8 @@ class Variants(Family):
             The inputs at the first time, rad or m, and their speeds. Default: each description's own.
         accuracy : float
             The wanted error of the inputs at every time, relative to one radian or the mechanism's size.
+        until : mapping of an input's name to its value, optional
+            Each motion ends where an input has it, at that time to rounding.
 
         Returns
         -------
@@ -71,7 +75,7 @@ class Variants(Family):
         Raises
         ------
         ValueError
-            Times that do not rise; an accuracy that is none.
+            Times that do not rise; an accuracy that is none; an input that is none.
 
         Examples
         --------
@@ -93,16 +97,17 @@ class Variants(Family):
             np.stack(self.own(name), axis=-1) if given is None else _starts(what, given, len(self), k)
             for what, name, given in (("angle", "value", angle), ("speed", "speed", speed))
         )
-        runs = Runs(
-            self, t, np.full((4, len(self), len(t), k), np.nan), np.full((2, len(self), len(t)), np.nan)
-        )
+        levels = levels_of(self.mechanism.inputs, until)
+        runs = Runs.of(self, t)
         alone = np.ones(len(self), dtype=bool)
-        lanes = _Lanes.of(self, t, q, v)
+        lanes = _Lanes.of(self, t, q, v, levels)
         if lanes is not None:
             alone = lanes.fill(runs, accuracy) | lanes.meet()
+            for i in np.flatnonzero(lanes.late & ~alone):
+                runs.warnings[int(i)] = (not_met(until or (), float(t[-1])),)
         for i in np.flatnonzero(alone):
             try:
-                own = simulate(Assembly.from_guess(self[int(i)]), t, q[i], v[i], accuracy)
+                own = simulate(Assembly.from_guess(self[int(i)]), t, q[i], v[i], accuracy, until)
             except MechanismError as error:
                 runs.warnings[int(i)] = (str(error),)
                 continue
@@ -117,80 +122,6 @@ def _starts(name: str, given: ArrayLike, v: int, k: int) -> Reals:
             f"{name}: expected a number, or shape ({k},) or ({v}, {k}), all finite; found {value.shape}"
         )
     return np.array(np.broadcast_to(value, (v, k)))
-
-
-@dataclass(frozen=True, eq=False)
-class Runs:
-    """What `Variants.simulate` has found: every array has a leading axis of variants.
-
-    Attributes
-    ----------
-    t : array (n,)
-        The times, s.
-    warnings : dict of a variant's place to what must be said of it
-        After the end of a motion that ends before the last time, and where a variant cannot be put together, is NaN.
-    """
-
-    family: Family
-    t: Reals
-    inputs: Reals = field(repr=False)
-    energies: Reals = field(repr=False)
-    warnings: dict[int, tuple[str, ...]] = field(default_factory=dict)
-
-    @property
-    def angle(self) -> Reals:
-        """(v, n, k): the inputs, rad or m."""
-        return np.asarray(self.inputs[0])
-
-    @property
-    def speed(self) -> Reals:
-        """(v, n, k): their speeds."""
-        return np.asarray(self.inputs[1])
-
-    @property
-    def acceleration(self) -> Reals:
-        """(v, n, k): their accelerations."""
-        return np.asarray(self.inputs[2])
-
-    @property
-    def error_estimate(self) -> Reals:
-        """(v, n, k): how far the inputs may be from the truth, rad or m."""
-        return np.asarray(self.inputs[3])
-
-    @property
-    def energy(self) -> Reals:
-        """(v, n): kinetic energy and that of gravity and springs, J."""
-        return np.asarray(self.energies[0])
-
-    @property
-    def energy_drift(self) -> Reals:
-        """(v, n): the change of energy since the first time that the work of the loads does not explain, J."""
-        return np.asarray(self.energy - self.energy[:, :1] - self.energies[1])
-
-    @cached_property
-    def motion(self) -> FamilyMotion:
-        """The motion of every variant through all times: points, links, slides, joint forces."""
-        f = self.family
-        rates = [[of[:, :, j] for j in range(of.shape[2])] for of in (self.speed, self.acceleration)]
-        return FamilyMotion(
-            Part(f.mechanism, f.dimensions, f.values, self.angle, [*rates, [0.0] * len(rates[0])])
-        )
-
-    def put(self, i: int, own: Run) -> None:
-        """Take over a variant that was let go singly."""
-        self.inputs[:, i], self.energies[:, i] = np.nan, np.nan
-        there = np.searchsorted(self.t, own.t)
-        there, rows = (
-            x[self.t[np.minimum(there, len(self.t) - 1)] == own.t] for x in (there, np.arange(len(own.t)))
-        )
-        for of, values in zip(
-            self.inputs, (own.angle, own.speed, own.acceleration, own.error_estimate), strict=False
-        ):
-            of[i, there] = values[rows]
-        self.energies[0, i, there] = own.energy[rows]
-        self.energies[1, i, there] = (own.energy - own.energy[0] - own.energy_drift)[rows]
-        if own.warnings:
-            self.warnings[i] = own.warnings
 
 
 @dataclass
@@ -208,13 +139,16 @@ class _Lanes:
     q: Reals
     v: Reals
     scale: Reals
+    levels: Levels
 
     def __post_init__(self) -> None:
+        # which lanes do not meet the level that ends them
+        self.late = np.zeros(len(self.q), dtype=bool)
         # the first input's least and largest value so far
         self.low, self.high = self.q[:, 0].copy(), self.q[:, 0].copy()
 
     @classmethod
-    def of(cls, family: Variants, t: Reals, q: Reals, v: Reals) -> _Lanes | None:
+    def of(cls, family: Variants, t: Reals, q: Reals, v: Reals, levels: Levels) -> _Lanes | None:
         """The lanes of a family; None where its motion is not on one tape."""
         m = family.mechanism
         k = q.shape[1]
@@ -240,7 +174,9 @@ class _Lanes:
         slides = [j for j, e in enumerate(m.inputs) if e.is_slide]
         if slides:
             scale[:, slides] = np.array([family[i].size for i in range(len(q))])[:, None]
-        return cls(family, solver, solver.written, rates, energy, given, solver.together, t, q, v, scale)
+        return cls(
+            family, solver, solver.written, rates, energy, given, solver.together, t, q, v, scale, levels
+        )
 
     @property
     def k(self) -> int:
@@ -259,8 +195,10 @@ class _Lanes:
         nodes = self.way(rows, tolerance, alone)
         for tries in range(TRIES):
             coarse, nodes = nodes, self.halved(rows, nodes)
-            found = self._at(rows, nodes, self._error(coarse, nodes, share(tolerance)))
-            worst = (found["error"] / self.scale[rows, None]).max(axis=(1, 2), initial=0.0)
+            times = self.times(rows, nodes, alone)
+            found = self._at(rows, nodes, times, self._error(coarse, nodes, times, share(tolerance)))
+            past = np.isnan(times)[:, :, None]
+            worst = np.where(past, 0.0, found["error"] / self.scale[rows, None]).max(axis=(1, 2), initial=0.0)
             holds = worst <= accuracy
             self._put(runs, rows[holds], {name: x[holds] for name, x in found.items()})
             tolerance /= GAIN + 1
@@ -301,8 +239,22 @@ class _Lanes:
             state = found.state
             nodes.append(found.nodes)
             taken += len(found.nodes["t"])
+            if self.levels:
+                # one step beyond the event is enough
+                last = {
+                    name: np.concatenate([*(part[name] for part in nodes[-2:-1]), found.nodes[name]])
+                    for name in kept
+                }
+                state["left"] = np.where(passed(last, self.levels, k)[:-1].any(axis=0), 0.0, state["left"])
         whole = {name: np.concatenate([part[name] for part in nodes]) for name in kept}
-        alone[rows[~(whole["t"][-1] >= t[-1])]] = True
+        ended = whole["t"][-1] >= t[-1]
+        if self.levels:
+            hits = passed(whole, self.levels, k)
+            ended |= hits.any(axis=0)
+            beyond = np.where(hits.any(axis=0), np.argmax(hits, axis=0) + 2, len(whole["t"]))
+            at = np.minimum(np.arange(len(whole["t"]))[:, None], beyond)
+            whole = {name: np.take_along_axis(x, at, axis=0) for name, x in whole.items()}
+        alone[rows[~ended]] = True
         alone[rows[self._folds(rows, whole)]] = True
         return whole
 
@@ -326,21 +278,39 @@ class _Lanes:
         found = follow(k, self.rates, self.some(rows), state, times).nodes
         return {name: np.concatenate([x[None], found[name]]) for name, x in first.items()}
 
-    def _error(self, coarse: Mapping[str, Reals], fine: Mapping[str, Reals], of: float) -> Reals:
+    def times(self, rows: NDArray[np.intp], nodes: Mapping[str, Reals], alone: Mask) -> Reals:
+        """The times up to each lane's event, it the last, (lanes, n); then NaN."""
+        found = np.tile(self.t, (len(rows), 1))
+        if self.levels:
+            ends = events(self.k, self.rates, self.some(rows), nodes, self.levels)
+            self.late[rows] = np.isnan(ends)
+            # the level that the coarser way passed at its very end
+            alone[rows[np.isnan(ends) & (nodes["t"][-1] < self.t[-1])]] = True
+            for row, end in zip(found, ends, strict=True):
+                if end < self.t[-1]:
+                    its = reached(self.t, end)
+                    row[: len(its)], row[len(its) :] = its, np.nan
+        return found
+
+    def _error(
+        self, coarse: Mapping[str, Reals], fine: Mapping[str, Reals], times: Reals, of: float
+    ) -> Reals:
         """The error of the inputs at all times, (lanes, n, k): that of the coarser way's next node."""
         places, speeds, rates = names(self.k)
         q, v, a = (np.stack([fine[name][::2].T for name in x], axis=-1) for x in (places, speeds, rates[:-1]))
         other = np.stack([coarse[name].T for name in places], axis=-1)
         found = spread(q, other, of) + rounding(coarse["t"].T, q, v, a)
-        at = np.stack([(coarse["t"] < x).sum(axis=0) for x in self.t], axis=1)
+        at = np.stack([(coarse["t"] < x).sum(axis=0) for x in times.T], axis=1)
         at = np.minimum(at, len(coarse["t"]) - 1)
         return np.asarray(found[np.arange(len(found))[:, None], at])
 
-    def _at(self, rows: NDArray[np.intp], nodes: Mapping[str, Reals], error: Reals) -> dict[str, Reals]:
-        """The states at all times, from the node before each."""
-        k, t = self.k, self.t
+    def _at(
+        self, rows: NDArray[np.intp], nodes: Mapping[str, Reals], t: Reals, error: Reals
+    ) -> dict[str, Reals]:
+        """The states at all times (lanes, n), from the node before each; NaN where the time is."""
+        k = self.k
         places, speeds, rates = names(k)
-        before = np.stack([(nodes["t"] <= x).sum(axis=0) - 1 for x in t], axis=1)
+        before = np.stack([(nodes["t"] <= x).sum(axis=0) - 1 for x in t.T], axis=1)
         lanes = np.arange(len(rows))[:, None]
         state = {name: x[np.maximum(before, 0), lanes] for name, x in nodes.items()}
         q, v, slopes = (np.stack([state[name] for name in of], axis=-1) for of in (places, speeds, rates))
@@ -352,7 +322,10 @@ class _Lanes:
             q[lane, on] += dq
             v[lane, on] += dv
             work[lane, on] += dw
-        return {"q": q, "v": v, "work": work, "error": error}
+        past = np.isnan(t)
+        for x in (q, v, work, error):
+            x[past] = np.nan
+        return {"t": t, "q": q, "v": v, "work": work, "error": error}
 
     def _folds(self, rows: NDArray[np.intp], nodes: Mapping[str, Reals]) -> Mask:
         """In which lanes a loop folds on the way."""
@@ -399,3 +372,4 @@ class _Lanes:
             runs.inputs[of, rows] = values
         runs.energies[0, rows] = np.broadcast_to(energy["energy"], len(rows) * n).reshape(-1, n)
         runs.energies[1, rows] = found["work"]
+        runs.times[rows] = found["t"]

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from virtualwork.formulas.numbers import EPS, Reals
+from virtualwork.formulas.numbers import EPS, Number, Reals
 
 Floats = list[float]
+Several = Sequence[Number]
+Levels = Mapping[int, float]
+"""An input's number → its value that ends the motion."""
+# how far a level must be from where a step begins, relative to what is watched, and that at least
+APART, SMALL = 64 * EPS, 1e-3
 
 
 class Check(Protocol):
@@ -41,8 +46,8 @@ class Watch:
     def passed(self, before: float, after: float, left: float | None) -> float | None:
         """The first level between two values; not the first value's own, nor that which was left just now."""
         low, high = min(before, after), max(before, after)
-        near = 64 * EPS * max(abs(low), abs(high), 1e-3)
-        inside = [x for x in self._inside(low, high) if abs(x - before) > near and x != left]
+        apart = APART * max(abs(low), abs(high), SMALL)
+        inside = [x for x in self._inside(low, high) if abs(x - before) > apart and x != left]
         return min(inside, key=lambda x: abs(x - before), default=None)
 
     def _inside(self, low: float, high: float) -> list[float]:
@@ -52,3 +57,21 @@ class Watch:
         last = math.floor((high - self.levels[0]) / self.period)
         shifts = (turn * self.period for turn in range(first, last + 1))
         return [x + shift for shift in shifts for x in self.levels if low <= x + shift <= high]
+
+
+def between(
+    q: Several, v: Several, rates: Several, h: Number, dq: Several, dv: Several, after: Several, share: Number
+) -> tuple[list[Number], list[Number]]:
+    """A state within a step, roughly: of the polynomial of degree 5 through q, q̇ and q̈ at both ends.
+
+    Of one motion or of many: numbers or arrays. `after` are the rates at the step's end.
+    """
+    x = share
+    places, speeds = [], []
+    for a, b, c, d, e, f in zip(q, v, rates, dq, dv, after, strict=False):
+        # what is left to fit after the Taylor polynomial of degree 2 at the beginning
+        p, r, s = d - h * (b + 0.5 * h * c), h * (e - h * c), h * h * (f - c)
+        c3, c4, c5 = 10 * p - 4 * r + 0.5 * s, -15 * p + 7 * r - s, 6 * p - 3 * r + 0.5 * s
+        places.append(a + x * (h * b + x * (0.5 * h * h * c + x * (c3 + x * (c4 + x * c5)))))
+        speeds.append(b + x * h * c + x * x * (3 * c3 + x * (4 * c4 + x * 5 * c5)) / h)
+    return places, speeds

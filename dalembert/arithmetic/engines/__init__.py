@@ -18,8 +18,10 @@ from dalembert.arithmetic.tape import Tape
 
 Reals = NDArray[np.float64]
 Rows = Sequence[Reals] | Reals
+Tables = Sequence[NDArray[Any]] | NDArray[Any]
 ENGINES = ("python", "numpy", "llvm")
 NARROW = 32  # columns from which on a grid is worked on as one
+WIDEST = 8  # columns from which on compiled code takes a grid: its longest vector
 FEW = 4  # lanes up to which Python's floats are faster than numpy's calls
 PAYS = 3e8  # operations × lanes of one tape from which compiling it pays (some 0.1 s with the import)
 
@@ -112,12 +114,8 @@ def run(
     engine = engine or chosen(tape, n)
     if engine not in ENGINES:
         raise ValueError(f"engine '{engine}': expected {', '.join(ENGINES)}")
-    first = frozenset(tape.rows[name] for name in pairs)
-    table = _table(len(tape.outputs), n, first)
-    if engine == "python" and floats.takes(tape):
-        _on_floats(tape, columns, table, n)
-    elif not (engine == "llvm" and _on_llvm(tape, columns, table, first)):
-        blocks.run(tape, columns, table)
+    table = _table(len(tape.outputs), n, frozenset(tape.rows[name] for name in pairs))
+    _lanes(tape, columns, table, n, engine)
     return Outputs(
         tape, table if any(column.ndim for column in columns) else np.array([row[0] for row in table])
     )
@@ -138,7 +136,9 @@ def _table(rows: int, n: int, pairs: frozenset[int]) -> Rows:
     return found
 
 
-def run_grid(tape: Tape, inputs: Mapping[str, Any], shape: tuple[int, int]) -> Outputs:
+def run_grid(
+    tape: Tape, inputs: Mapping[str, Any], shape: tuple[int, int], out: Tables | None = None
+) -> Tables:
     """Run a tape over a grid, every row with every column, such as variants with poses.
 
     Parameters
@@ -147,24 +147,35 @@ def run_grid(tape: Tape, inputs: Mapping[str, Any], shape: tuple[int, int]) -> O
     inputs : mapping of name to number, or array that broadcasts to the shape
         What hangs on the row alone is (r, 1), on the column alone (1, c).
     shape : (r, c)
+    out : sequence of array, optional
+        Where to write each output: (r, c), in one piece, or the parts of a complex array of one piece, one after the
+        other. Or of bool, (r,): whether the output is positive in every column of the row.
 
     Returns
     -------
-    Outputs
-        The lanes of a row lie side by side: (r c,), or a number where all inputs are numbers.
+    sequence of array
+        `out`, or new arrays (r, c).
     """
-    given = {name: inputs[name] for name in tape.inputs}
     r, c = shape
-    both = any(np.size(x) > max(np.shape(x)) for x in given.values() if np.ndim(x))
-    engine = os.environ.get("DALEMBERT_ENGINE")
-    if c < NARROW or r < 2 or both or (engine or chosen(tape, r * c)) != "numpy":
-        return run(
-            tape,
-            {n: np.broadcast_to(x, shape).ravel() if np.ndim(x) else x for n, x in given.items()},
-        )
-    from dalembert.arithmetic.engines import grids
+    table: Tables = np.empty((len(tape.outputs), r, c)) if out is None else out
+    given = [np.asarray(inputs[name], dtype=float) for name in tape.inputs]
+    given = [x.reshape(()) if x.size == 1 else x for x in given]
+    engine = os.environ.get("DALEMBERT_ENGINE") or chosen(tape, r * c)
+    if r > 1 and engine == "llvm" and c >= WIDEST and _on_llvm(tape, given, table, shape):
+        return table
+    if r > 1 and engine != "python" and c >= NARROW:
+        from dalembert.arithmetic.engines import grids
 
-    return Outputs(tape, grids.run(tape, given, shape).reshape(len(tape.outputs), r * c))
+        grids.run(tape, given, shape, table)
+        return table
+    # every lane by itself
+    flat = [np.broadcast_to(x, shape).ravel() if x.ndim else x for x in given]
+    tests = {k: np.empty((r, c)) for k, x in enumerate(table) if x.dtype == bool}
+    rows = [tests.get(k, x).reshape(r * c) for k, x in enumerate(table)]
+    _lanes(tape, flat, rows, r * c, engine)
+    for k, test in tests.items():
+        table[k][:] = (test > 0).all(axis=1)
+    return table
 
 
 def chosen(tape: Tape, n: int) -> str:
@@ -175,11 +186,27 @@ def chosen(tape: Tape, n: int) -> str:
     return "llvm" if _done[tape] > PAYS else "numpy"
 
 
+def anew() -> None:
+    """Forget the work done so far: which engine does what follows hangs on that alone, in whatever process."""
+    from dalembert.arithmetic.engines import rounds
+
+    _done.clear()
+    rounds.forget()
+
+
 def compiled_code() -> bool:
     """Whether LLVM's code may run here, as far as is known without loading it."""
     from importlib.util import find_spec
 
     return find_spec("llvmlite") is not None
+
+
+def _lanes(tape: Tape, columns: list[Reals], table: Rows, n: int, engine: str) -> None:
+    """Run a tape on lanes: inputs (n,) or (), a row an output."""
+    if engine == "python" and floats.takes(tape):
+        _on_floats(tape, columns, table, n)
+    elif not (engine == "llvm" and _on_llvm(tape, columns, table, (1, n))):
+        blocks.run(tape, columns, table)
 
 
 def _on_floats(tape: Tape, columns: list[Reals], table: Rows, n: int) -> None:
@@ -192,8 +219,8 @@ def _on_floats(tape: Tape, columns: list[Reals], table: Rows, n: int) -> None:
             blocks.run(tape, [np.array([value]) for value in values], [row[lane : lane + 1] for row in table])
 
 
-def _on_llvm(tape: Tape, columns: list[Reals], table: Rows, pairs: frozenset[int]) -> bool:
+def _on_llvm(tape: Tape, inputs: list[Reals], table: Tables, shape: tuple[int, int]) -> bool:
     # llvmlite takes some 0.1 s to load: only where it works
     from dalembert.arithmetic.engines import llvm
 
-    return llvm.run(tape, columns, table, pairs)
+    return llvm.run(tape, inputs, table, shape)

@@ -21,30 +21,19 @@ WIDE, BLOCK = 16384, 8192
 
 
 class Grid(Blocks):
-    """A tape prepared for a grid; `rows` and `columns` name the inputs that hang on them."""
+    """A tape prepared for a grid; `rows` and `columns` name the inputs that hang on them, or on both."""
 
     def __init__(self, tape: Tape, rows: frozenset[str], columns: frozenset[str]) -> None:
         self.by = {name: (name in rows) + 2 * (name in columns) for name in tape.inputs}
-        super().__init__(tape, frozenset(tape.inputs))
+        super().__init__(tape, frozenset(name for name, on in self.by.items() if on < 3))
 
     def lanes_of(self, tape: Tape, uniform: frozenset[str]) -> list[bool]:
         """Which operations hang on the row and on the column."""
-        hangs: list[int] = []
-        for kind, *arguments in tape.operations:
-            if kind == "input":
-                hangs.append(self.by[arguments[0]])
-            elif kind == "const":
-                hangs.append(0)
-            else:
-                on = 0
-                for a in arguments:
-                    on |= hangs[a]
-                hangs.append(on)
-        return [on == 3 for on in hangs]
+        return [on == 3 for on in tape.hang(self.by)]
 
-    def over(self, inputs: Mapping[str, Any], out: Sequence[Reals]) -> None:
-        """Run: inputs are numbers, (r, 1) or (1, c); `out` has a table (r, c) for each output."""
-        r, c = out[0].shape
+    def over(self, inputs: Mapping[str, Any], out: Sequence[NDArray[Any]], shape: tuple[int, int]) -> None:
+        """Run: inputs are numbers, (r, 1), (1, c) or (r, c); of each output (r, c), or for a test (r,)."""
+        r, c = shape
         values: list[Any] = []
         for number, (kind, *arguments) in enumerate(self.tape.operations):
             if kind == "const":
@@ -55,28 +44,39 @@ class Grid(Blocks):
                 values.append(None)
             else:
                 values.append(performed(kind, [values[a] for a in arguments], NUMPY))
-        known = [np.asarray(values[number]) for number in self.read]
+        known = [inputs[name] for name in self.varying] + [np.asarray(values[number]) for number in self.read]
+        tests = [k for k, row in enumerate(self.written) if out[row].ndim == 1]
         tall, wide = max(1, BLOCK // c), min(c, BLOCK)
-        room = np.empty((self.slots, tall * wide + 8))
+        room = np.empty((self.slots + len(tests), tall * wide + 8))
         decided = np.empty(tall * wide, dtype=bool)
         for i in range(0, r if self.parts else 0, tall):
             for j in range(0, c, wide):
                 high, broad = min(tall, r - i), min(wide, c - j)
-                here = [_cut(x, slice(i, i + high), slice(j, j + broad)) for x in known]
-                tables = [out[row][i : i + high, j : j + broad] for row in self.written]
+                rows, columns = slice(i, i + high), slice(j, j + broad)
+                here = [_cut(x, rows, columns) for x in known]
                 slots = [slot[: high * broad].reshape(high, broad) for slot in room]
+                tried = dict(zip(tests, slots[self.slots :], strict=True))
+                tables = [
+                    tried[k] if k in tried else out[row][rows, columns] for k, row in enumerate(self.written)
+                ]
                 mask = decided[: high * broad].reshape(high, broad)
                 for part in self.parts:
-                    part(*here, *tables, *slots, mask)
+                    part(*here, *tables, *slots[: self.slots], mask)
+                for k, table in tried.items():
+                    out[self.written[k]][rows] &= (table > 0).all(axis=1)
         for row, kind, source in self.fill:
-            out[row][:] = values[source] if kind == "common" else out[source]
+            value = values[source] if kind == "common" else inputs[source] if kind == "input" else out[source]
+            if out[row].ndim == 2:
+                out[row][:] = value
+            else:
+                out[row][:] &= value if value.dtype == bool else (value > 0).all(axis=-1)
 
 
 def _cut(x: Reals, rows: slice, columns: slice) -> Any:
-    """What a block sees of a value that hangs on the row, on the column, or on neither."""
+    """What a block sees of a value that hangs on the row, on the column, on both or on neither."""
     if not x.ndim:
         return x[()]
-    return x[rows] if x.shape[0] > 1 else x[:, columns] if x.shape[1] > 1 else x
+    return x[rows if x.shape[0] > 1 else slice(None), columns if x.shape[1] > 1 else slice(None)]
 
 
 @lru_cache(maxsize=64)
@@ -85,38 +85,44 @@ def compiled(tape: Tape, rows: frozenset[str], columns: frozenset[str]) -> Grid:
     return Grid(tape, rows, columns)
 
 
-def run(tape: Tape, inputs: Mapping[str, Any], shape: tuple[int, int]) -> Reals:
+def run(
+    tape: Tape, inputs: Sequence[Reals], shape: tuple[int, int], out: Sequence[NDArray[Any]] | NDArray[Any]
+) -> None:
     """Run a tape over a grid.
 
     Parameters
     ----------
     tape : Tape
-    inputs : mapping of name to number, array (r, 1) or array (1, c)
+    inputs : sequence of array
+        In the order of the tape's: (), (r, 1), (1, c) or (r, c).
     shape : (r, c)
-
-    Returns
-    -------
-    array (outputs, r, c)
-        In the order of the tape's outputs.
+    out : sequence of array
+        Of each output (r, c), or (r,) of bool: whether it is positive in every column. Such are the last.
 
     Examples
     --------
     >>> from dalembert.arithmetic.recorded import RECORDED, Recorder
     >>> recorder = Recorder()
     >>> tape = recorder.tape({"x": recorder.input("r") * RECORDED.cos(recorder.input("q"))})
-    >>> run(tape, {"r": np.array([[1.0], [2.0]]), "q": np.array([[0.0, np.pi, 0.0]])}, (2, 3))[0]
+    >>> out = np.empty((1, 2, 3))
+    >>> run(tape, [np.array([[1.0], [2.0]]), np.array([[0.0, np.pi, 0.0]])], (2, 3), out)
+    >>> out[0]
     array([[ 1., -1.,  1.],
            [ 2., -2.,  2.]])
     """
     r, c = shape
-    out = np.empty((len(tape.outputs), r, c))
-    given = {name: np.asarray(inputs[name], dtype=float) for name in tape.inputs}
+    given = dict(zip(tape.inputs, inputs, strict=True))
     # a grid of one row or one column has both kinds all the same
-    rows = frozenset(name for name, x in given.items() if x.ndim and x.shape == (r, 1) and (r > 1 or c > 1))
-    columns = frozenset(name for name, x in given.items() if x.ndim and name not in rows)
+    rows = frozenset(name for name, x in given.items() if x.ndim and len(x) == r and (r > 1 or c > 1))
+    columns = frozenset(name for name, x in given.items() if x.ndim and (name not in rows or x.shape[1] == c))
     grid = compiled(tape, rows, columns)
+    for table in out:
+        if table.ndim == 1:
+            table[:] = True
     with np.errstate(all="ignore"):
         for j in range(0, c, WIDE):
-            part = {name: x[:, j : j + WIDE] if name in columns else x for name, x in given.items()}
-            grid.over(part, out[:, :, j : j + WIDE])  # type: ignore[arg-type]
-    return out
+            wide = min(WIDE, c - j)
+            part = {name: x[:, j : j + wide] if name in columns else x for name, x in given.items()}
+            grid.over(
+                part, [table[:, j : j + wide] if table.ndim == 2 else table for table in out], (r, wide)
+            )

@@ -26,13 +26,13 @@ from dalembert.arithmetic.tape import Tape
 
 Reals = NDArray[np.float64]
 LONGEST = 8000  # operations: about a second to compile; numpy runs what is longer
-FORMAT = "3"  # of the code below: another number makes old files on disk useless
+FORMAT = "4"  # of the code below: another number makes old files on disk useless
 
 _FUNCTION = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
 # kept for the life of the process: compiled code holds their addresses
 _EXACT = {"sin": _FUNCTION(circular.sin), "cos": _FUNCTION(circular.cos)}
 _lock = threading.Lock()
-_compiled: dict[tuple[Tape, frozenset[str], frozenset[int]], Code | None] = {}
+_compiled: dict[tuple[Tape, str, str], Code | None] = {}
 _unusable: list[str] = []
 
 
@@ -42,57 +42,102 @@ class Code:
     def __init__(self, width: int, keeper: Any, address: int) -> None:
         self.width, self._keeper = width, keeper
         pointer = ctypes.POINTER(ctypes.c_void_p)
-        kind = ctypes.CFUNCTYPE(None, ctypes.c_int64, pointer, ctypes.c_void_p, ctypes.c_int64)
-        self._call = kind(address)
+        self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, pointer, pointer)(address)
 
-    def __call__(self, columns: Sequence[Reals], out: Sequence[Reals] | Reals, pairs: frozenset[int]) -> None:
-        """Run: `out` is as `run` takes it. At least one vector is done, and the last may do lanes again."""
-        n, table = len(out[0]), out[0]
-        columns = [np.ascontiguousarray(c) if c.ndim else c for c in columns]
-        if n < self.width:
-            table = np.empty(len(out) * self.width)
-            columns = [c if c.ndim == 0 else np.resize(c, self.width) for c in columns]
+    def __call__(self, inputs: Sequence[Reals], out: Sequence[Reals] | Reals, shape: tuple[int, int]) -> None:
+        """Run: arrays as `run` takes them. At least one vector is done, and the last may do lanes again."""
+        rows, columns = shape
+        if columns < self.width:
+            # the pieces that complex numbers are of lie apart here, as any two outputs
+            wide = np.empty((len(out), 2 * self.width))
+            inputs = [np.resize(x, self.width) if x.ndim else x for x in inputs]
+            to = [
+                row[::2] if x.strides[-1] == 16 else row[: self.width]
+                for row, x in zip(wide, out, strict=True)
+            ]
+            for k in _pairs(out):
+                to[k + 1] = wide[k, 1::2]
+            self(inputs, to, (1, self.width))
+            for x, row in zip(out, to, strict=True):
+                x[:] = row[:columns]
+            return
+        inputs = [np.ascontiguousarray(x) if x.ndim else x for x in inputs]
         # numbers that all lanes share stand side by side: an address of each array's own costs more than the work
-        shared = np.array([c.item() for c in columns if not c.ndim])
-        places = count(shared.ctypes.data, shared.itemsize)
-        pointers = (ctypes.c_void_p * max(len(columns), 1))(
-            *(c.ctypes.data if c.ndim else next(places) for c in columns)
-        )
-        lanes = max(n, self.width)
-        self._call(lanes, pointers, table.ctypes.data, lanes)
-        if lanes > n:
-            for row, to in enumerate(out):
-                first = row - (row - 1 in pairs)
-                both = table[first * lanes : (first + 2) * lanes]
-                to[:] = both[row - first :: 2][:n] if first in pairs else both[:n]
+        shared = np.array([x.item() for x in inputs if not x.ndim])
+        places = count(address(shared), shared.itemsize)
+        given = [address(x) if x.ndim else next(places) for x in inputs]
+        if isinstance(out, np.ndarray):
+            first, step = address(out), out.strides[0]
+            results = list(range(first, first + step * len(out), step))
+        else:
+            results = list(map(address, out))
+        self._call(rows, columns, _pointers(given), _pointers(results))
 
 
-def run(
-    tape: Tape, columns: Sequence[Reals], out: Sequence[Reals] | Reals, pairs: frozenset[int] = frozenset()
-) -> bool:
+def address(x: Reals) -> int:
+    """Where an array begins."""
+    return int(x.__array_interface__["data"][0])
+
+
+def _pointers(places: list[int]) -> Any:
+    return (ctypes.c_void_p * max(len(places), 1))(*places)
+
+
+def _pairs(out: Sequence[Reals] | Reals) -> list[int]:
+    """The outputs that lie in turn with the next one."""
+    found: list[int] = []
+    if not isinstance(out, np.ndarray):
+        for k, x in enumerate(out):
+            if x.strides[-1] == 16 and k - 1 not in found:
+                found.append(k)
+    return found
+
+
+def run(tape: Tape, inputs: Sequence[Reals], out: Sequence[Any] | Reals, shape: tuple[int, int]) -> bool:
     """Run a tape; False where this machine or this tape is not for compiled code.
 
-    `out` has a row an output, one after the other in memory; those of `pairs` and the ones after them in turn.
+    Parameters
+    ----------
+    tape : Tape
+    inputs : sequence of array
+        (), (r, 1), (1, c) or (r, c); of one row also (c,).
+    out : sequence of array
+        Of each output (r, c), in one piece; or a bool of each row: whether it is positive in every column. Of one row also
+        (c,). What lies in memory in turn with the next output is a part of a complex number.
+    shape : (r, c)
+        More than one row, and bools, take as many columns as a vector has.
     """
-    if len(tape.operations) > LONGEST or _unusable or not len(out) or not len(out[0]):
+    if len(tape.operations) > LONGEST or _unusable or not len(out) or not min(shape):
         return False
-    uniform = frozenset(name for name, x in zip(tape.inputs, columns, strict=True) if not x.ndim)
+    kinds = [_kind(x, *shape) for x in inputs]
+    pairs = _pairs(out)
+    results = ["h" if x.dtype == bool else "p" if k in pairs else "l" for k, x in enumerate(out)]
+    key = (tape, "".join(kinds), "".join(results))
     with _lock:
-        key = (tape, uniform, pairs)
         if key not in _compiled:
-            _compiled[key] = _code(tape, uniform, pairs)
+            _compiled[key] = _code(*key)
         code = _compiled[key]
     if code is None:
         return False
-    code(columns, out, pairs)
+    code(inputs, out, shape)
     return True
 
 
-def _code(tape: Tape, uniform: frozenset[str], pairs: frozenset[int]) -> Code | None:
+def _kind(x: Reals, rows: int, columns: int) -> str:
+    """What an input is (see `lowered`); a grid of one row has columns alone."""
+    if not x.ndim:
+        return "u"
+    if rows == 1 or len(x) < rows:
+        return "c"
+    return "r" if x.shape[1] < columns else "b"
+
+
+def _code(tape: Tape, inputs: str, outputs: str) -> Code | None:
     from dalembert.arithmetic.engines.lowered import lowered
 
-    name = "|".join([tape.key, ",".join(sorted(uniform)), ",".join(map(str, sorted(pairs)))])
-    found = loaded(name, "tape", lambda width: lowered(tape, uniform, pairs, width))
+    found = loaded(
+        f"{tape.key}|{inputs}|{outputs}", "tape", lambda width: lowered(tape, inputs, outputs, width)
+    )
     return None if found is None else Code(*found)
 
 

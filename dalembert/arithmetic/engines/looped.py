@@ -93,7 +93,7 @@ def _inner(loop: Loop, v: Vectors) -> ir.Function:
     function.attributes.add("noinline")
     b = ir.IRBuilder(function.append_basic_block())
     given = dict(zip(tape.inputs, function.args, strict=True))
-    values = body(tape, v, b, lambda name, _: given[name])
+    values = body(tape, v, [b] * len(tape.operations), lambda name, _: given[name])
     whole: ir.Value = ir.Constant(result, ir.Undefined)
     for i, (_, number) in enumerate(tape.outputs):
         whole = b.insert_value(whole, values[number], i)
@@ -121,4 +121,4 @@ def _round(
             found[number] = b.call(inner, arguments)
         return b.extract_value(found[number], loop.inner.rows[what])
 
-    return body(loop.body, v, b, enter)
+    return body(loop.body, v, [b] * len(loop.body.operations), enter)

@@ -1,13 +1,14 @@
-"""A tape as LLVM's language: one loop over vectors of lanes, every value in a register.
+"""A tape as LLVM's language: every row of a grid with every column, a vector of columns at a time, in registers.
 
-`void tape(long n, double **inputs, double *outputs, long stride)`: inputs are columns of n doubles, or single ones where
-uniform; output k begins at outputs + k·stride, and one of `pairs` has the next in turn with its own. n is at least one
-vector; the last vector ends with the last lane.
+`void tape(long rows, long columns, double **inputs, double **outputs)`: an input is one number (`u`), or one of each row
+(`r`), of each column (`c`), of each lane of the grid (`b`), row by row. An output is a number of each lane (`l`), two in turn with
+the next one's (`p`), or of each row a byte (`h`): whether it is positive in every column. What hangs on no column is worked
+out once for each row. There is at least a vector of columns; the last one ends with the last column. Lanes alone are one row.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import llvmlite.ir as ir
 
@@ -15,60 +16,80 @@ from dalembert.arithmetic.engines.vectors import Vectors
 from dalembert.arithmetic.tape import Tape
 
 
-def lowered(tape: Tape, uniform: frozenset[str], pairs: frozenset[int], width: int) -> ir.Module:
-    """The module of a tape."""
+def lowered(tape: Tape, inputs: str, outputs: str, width: int) -> ir.Module:
+    """The module of a tape; a letter says of each input and output what it is."""
     module = ir.Module("tape")
     v = Vectors(module, width)
-    pointer = v.double.as_pointer()
-    kind = ir.FunctionType(ir.VoidType(), [v.long, pointer.as_pointer(), pointer, v.long])
+    pointer, byte = v.double.as_pointer(), ir.IntType(8)
+    kind = ir.FunctionType(ir.VoidType(), [v.long, v.long, *[pointer.as_pointer()] * 2])
     function = ir.Function(module, kind, "tape")
-    n, inputs, outputs, stride = function.args
-    outputs.add_attribute("noalias")
+    rows, columns, given, results = function.args
+    once, row, lane, after, end = (
+        ir.IRBuilder(function.append_basic_block(name)) for name in ("once", "row", "lane", "after", "end")
+    )
 
-    entry, loop, end = (function.append_basic_block(name) for name in ("entry", "loop", "end"))
-    b = ir.IRBuilder(entry)
-    columns = [b.load(b.gep(inputs, [ir.Constant(v.long, k)])) for k in range(len(tape.inputs))]
-    rows = [b.gep(outputs, [b.mul(stride, ir.Constant(v.long, k))]) for k in range(len(tape.outputs))]
-    once: dict[str, ir.Value] = {}
-    for name, column in zip(tape.inputs, columns, strict=True):
-        if name in uniform:
-            once[name] = _everywhere(b, v, b.load(column))
-    last = b.sub(n, ir.Constant(v.long, width))
-    b.branch(loop)
+    def number(value: int) -> ir.Constant:
+        return ir.Constant(v.long, value)
 
-    b.position_at_end(loop)
-    i = b.phi(v.long)
-    i.add_incoming(ir.Constant(v.long, 0), entry)
-    place = dict(zip(tape.inputs, columns, strict=True))
+    def vector_at(b: ir.IRBuilder, base: ir.Value, at: ir.Value) -> ir.Value:
+        return b.bitcast(b.gep(base, [at]), v.vector.as_pointer())
+
+    r, i = row.phi(v.long), lane.phi(v.long)
+    so_far = {k: lane.phi(v.bits) for k, what in enumerate(outputs) if what == "h"}
+    begin = row.mul(r, columns)
+    sources = [once.load(once.gep(given, [number(k)])) for k in range(len(inputs))]
+    targets = [once.load(once.gep(results, [number(k)])) for k in range(len(outputs))]
+    bases = [row.gep(at, [begin]) if what == "b" else at for what, at in zip(inputs, sources, strict=True)]
+    last = once.sub(columns, number(width))
 
     def enter(name: str, _: list[ir.Value]) -> ir.Value:
-        if name in once:
-            return once[name]
-        return b.load(b.bitcast(b.gep(place[name], [i]), v.vector.as_pointer()), align=8)
+        k = tape.inputs.index(name)
+        if inputs[k] == "u":
+            return _everywhere(once, v, once.load(sources[k]))
+        if inputs[k] == "r":
+            return _everywhere(row, v, row.load(row.gep(sources[k], [r])))
+        return lane.load(vector_at(lane, bases[k], i), align=8)
 
-    values = body(tape, v, b, enter)
-    found = [values[number] for _, number in tape.outputs]
+    hangs = tape.hang(dict(zip(tape.inputs, ("urcb".index(what) for what in inputs), strict=True)))
+    values = body(tape, v, [(once, row, lane, lane)[on] for on in hangs], enter)
+    found = [values[place] for _, place in tape.outputs]
 
-    def store(value: ir.Value, row: ir.Value, at: ir.Value) -> None:
-        b.store(value, b.bitcast(b.gep(row, [at]), v.vector.as_pointer()), align=8)
-
-    for k, row in enumerate(rows):
-        if k in pairs:
-            twice = b.add(i, i)
-            for half, at in enumerate((twice, b.add(twice, ir.Constant(v.long, width)))):
+    now: dict[int, ir.Value] = {}
+    for k, what in enumerate(outputs):
+        if what == "h":
+            now[k] = lane.and_(so_far[k], lane.fcmp_ordered(">", found[k], v.constant(0.0)))
+        elif what == "p":
+            twice = lane.add(i, i)
+            base = row.gep(targets[k], [row.add(begin, begin)])
+            for half, at in enumerate((twice, lane.add(twice, number(width)))):
                 turn = [j // 2 + (width if j % 2 else 0) for j in range(half * width, (half + 1) * width)]
                 mask = ir.Constant(ir.VectorType(ir.IntType(32), width), turn)
-                store(b.shuffle_vector(found[k], found[k + 1], mask), row, at)
-        elif k - 1 not in pairs:
-            store(found[k], row, i)
-    following = b.add(i, ir.Constant(v.long, width))
-    over = b.icmp_signed(">", following, last)
-    clipped = b.select(over, last, following)
-    i.add_incoming(clipped, b.block)
-    b.cbranch(b.icmp_signed("<", i, last), loop, end)
+                both = lane.shuffle_vector(found[k], found[k + 1], mask)
+                lane.store(both, vector_at(lane, base, at), align=8)
+        elif outputs[k - 1 : k] != "p":
+            lane.store(found[k], vector_at(lane, row.gep(targets[k], [begin]), i), align=8)
 
-    b.position_at_end(end)
-    b.ret_void()
+    following = lane.add(i, number(width))
+    over = lane.icmp_signed(">", following, last)
+    i.add_incoming(number(0), row.block)
+    i.add_incoming(lane.select(over, last, following), lane.block)
+    for k, phi in so_far.items():
+        phi.add_incoming(ir.Constant(v.bits, [1] * width), row.block)
+        phi.add_incoming(now[k], lane.block)
+    lane.cbranch(lane.icmp_signed("<", i, last), i.parent, after.block)
+
+    for k, held in now.items():
+        packed = after.bitcast(held, ir.IntType(width))
+        all_ = after.icmp_signed("==", packed, ir.Constant(ir.IntType(width), -1))
+        place = after.gep(after.bitcast(targets[k], byte.as_pointer()), [r])
+        after.store(after.zext(all_, byte), place)
+    next_row = after.add(r, number(1))
+    r.add_incoming(number(0), once.block)
+    r.add_incoming(next_row, after.block)
+    after.cbranch(after.icmp_signed("<", next_row, rows), r.parent, end.block)
+    once.branch(r.parent)
+    row.branch(i.parent)
+    end.ret_void()
     return module
 
 
@@ -83,9 +104,15 @@ def _everywhere(b: ir.IRBuilder, v: Vectors, value: ir.Value) -> ir.Value:
 
 
 def body(
-    tape: Tape, v: Vectors, b: ir.IRBuilder, enter: Callable[[str, list[ir.Value]], ir.Value]
+    tape: Tape,
+    v: Vectors,
+    builders: Sequence[ir.IRBuilder],
+    enter: Callable[[str, list[ir.Value]], ir.Value],
 ) -> list[ir.Value]:
-    """The values of all operations; `enter` gives an input by its name and the values of all operations before it."""
+    """The values of all operations, each written by its own builder.
+
+    `enter` gives an input by its name and the values of all operations before it.
+    """
     uses = [0] * len(tape.operations)
     for kind, *arguments in tape.operations:
         if kind not in ("const", "input"):
@@ -101,7 +128,7 @@ def body(
         kind, *factors = tape.operations[number]
         return (values[factors[0]], values[factors[1]]) if kind == "mul" and uses[number] == 1 else None
 
-    for kind, *arguments in tape.operations:
+    for b, (kind, *arguments) in zip(builders, tape.operations, strict=True):
         if kind == "const":
             values.append(v.constant(arguments[0]))
             continue

@@ -136,6 +136,11 @@ def _spent(loop: Loop, each: float) -> None:
     _time[loop] = _time.get(loop, 0.0) + each * loop.cost
 
 
+def forget() -> None:
+    """Forget the time that has gone into loops."""
+    _time.clear()
+
+
 def compiled(loop: Loop) -> Code | None:
     """The code of a loop, made once; None where this machine or this loop is not for compiled code."""
     if loop.cost > 100 * llvm.LONGEST or max(loop.body.cost, loop.inner.cost) > llvm.LONGEST:
@@ -181,4 +186,4 @@ def _on_blocks(loop: Loop, given: Reals, state: Reals, fed: Reals) -> tuple[Real
         going = going[found[places["left"]] > 0]
         if not len(going):
             break
-    return state, np.array(kept)
+    return state, np.reshape(kept, (-1, len(loop.kept), state.shape[1]))

@@ -1,0 +1,257 @@
+"""How a command is made of a function: its options as its help lists them, and those that every command shares."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass
+from functools import wraps
+from inspect import Parameter, signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args
+
+import typer
+from typer.core import TyperCommand
+
+from cli.read.about import HEAD
+
+if TYPE_CHECKING:
+    from cli.show.columns import Result
+
+
+SHARED = """
+What:
+  column NAME=HEADER  Read the column HEADER of a table as NAME, such as mass_kg=Masse; repeatable.
+Output:
+  json  Print one JSON document, SI units, full precision.
+  output -o --output FILE  Write the result to FILE (.csv, .json, .xlsx, .parquet, .md, .tex or .html).
+  plot FILE  Write a picture to FILE (.svg, .png or .pdf).
+  expect FILE.csv  Check the result against expected values under the same column names.
+  rtol NUMBER  Relative tolerance of --expect (for angles: radians).
+  digits  In tables and CSV print only the digits that hold against rounding.
+  units UNIT,...  Units of the columns, such as mm,g,deg,N_mm,rpm; JSON stays SI.
+  report FILE  Write a report to hand on to FILE (.html or .md): what was given, found, drawn, and how.
+Head of the report:
+  title TEXT  The report's title.
+  machine TEXT  The machine it is about.
+  customer TEXT  Whom it is for.
+  date TEXT  Its date, if not today's.
+  author TEXT  Who made it.
+Terminal:
+  text  Print the aligned table even into a pipe.
+  no_color  No colours on a terminal; so does NO_COLOR in the environment.
+  help  Show this message and exit.
+"""
+"""What the help says of the options that every command shares."""
+
+
+FORMS = (".csv", ".json", ".xlsx", ".parquet", ".md", ".tex", ".html")
+"""Suffixes of what every result can be written as."""
+
+
+def suffix_among(*suffixes: str) -> Callable[[Path | None], Path | None]:
+    """Return the check of a file's option: its suffix is one of these."""
+
+    def check(path: Path | None) -> Path | None:
+        if path is not None and path.suffix.lower() not in suffixes:
+            raise typer.BadParameter(f"'{path}' has no known suffix: expected {', '.join(suffixes)}")
+        return path
+
+    return check
+
+
+def _tolerance(value: float) -> float:
+    if not 0 <= value < float("inf"):
+        raise typer.BadParameter(f"{value}: expected a number from 0 on, such as 1e-6")
+    return value
+
+
+# each method that dataclass makes costs a tenth of a millisecond at every start
+@dataclass(eq=False, repr=False)
+class ShowOptions:
+    """The options that every command shares, in the order in which its help lists them."""
+
+    json: bool = False
+    output: Annotated[Path | None, typer.Option(callback=suffix_among(*FORMS, ".toml"))] = None
+    plot: Annotated[Path | None, typer.Option(callback=suffix_among(".svg", ".png", ".pdf"))] = None
+    expect: Path | None = None
+    rtol: Annotated[float, typer.Option(callback=_tolerance)] = 1e-3
+    text: bool = False
+    digits: bool = False
+    column: list[str] | None = None
+    units: str | None = None
+    report: Annotated[Path | None, typer.Option(callback=suffix_among(".html", ".htm", ".md"))] = None
+    title: str | None = None
+    machine: str | None = None
+    customer: str | None = None
+    date: str | None = None
+    author: str | None = None
+    no_color: bool = False
+
+    @property
+    def head(self) -> dict[str, str]:
+        """What the options say for the head of the report."""
+        return {name: text for name in HEAD if (text := getattr(self, name)) is not None}
+
+    @property
+    def form(self) -> str:
+        """The suffix of what is written to a file, or to a pipe; empty for the terminal's table and for checks."""
+        if self.output is not None:
+            return self.output.suffix.lower()
+        if self.json:
+            return ".json"
+        return "" if self.text or self.expect is not None or sys.stdout.isatty() else ".csv"
+
+    @property
+    def holds_one(self) -> bool:
+        """Whether what is written holds one table."""
+        return self.form in (".csv", ".parquet")
+
+    @property
+    def streams(self) -> bool:
+        """Whether a table is all that is asked for, so that it can be written block by block."""
+        others = self.json or self.text or self.plot or self.expect or self.report
+        return self.form in (".csv", ".parquet", ".xlsx") and not others
+
+    @property
+    def as_json(self) -> bool:
+        """Whether the JSON document is formed."""
+        return self.json or (self.output is not None and self.output.suffix.lower() == ".json")
+
+
+class Told(NamedTuple):
+    """What the help says of a parameter, and below which heading."""
+
+    heading: str
+    flags: Sequence[str]
+    metavar: str | None
+    help: str
+
+
+def told(options: str) -> dict[str, Told]:
+    """Read what a command's help is to say of its parameters.
+
+    Below each heading a line is a parameter's name as the function has it, its flags where they are others than that
+    name, what stands for its value, and behind two blanks what is said of it.
+    """
+    found = {}
+    heading = ""
+    for line in options.strip().splitlines():
+        if not line.startswith(" "):
+            heading = line.removesuffix(":")
+            continue
+        head, _, words = line.strip().partition("  ")
+        name, *others = head.split(" ")
+        flags = [word for word in others if word.startswith("-")]
+        metavar = " ".join(others[len(flags) :])
+        found[name] = Told(heading, flags or [f"--{name.replace('_', '-')}"], metavar or None, words)
+    return found
+
+
+def with_options(
+    find: Callable[..., Result],
+    options: str,
+    chosen: Sequence[str] | None,
+    hand_on: Callable[[Result, ShowOptions, Mapping[str, str]], None],
+) -> Callable[..., None]:
+    """Make a command that takes these of the shared options too, None for all, and hands on what it has found.
+
+    `options` is what its help says of its own, as `told` reads it.
+    """
+    own, shared = _parameters(find, options), _parameters(ShowOptions, SHARED)
+    shared = {name: p for name, p in shared.items() if chosen is None or name in chosen}
+
+    @wraps(find)
+    def run(**given: object) -> None:
+        from cli.read.headers import rename
+
+        options = ShowOptions(**{name: given.pop(name) for name in shared})  # type: ignore[arg-type]
+        if options.report is None and (unused := next(iter(options.head), None)) is not None:
+            raise typer.BadParameter("expected --report FILE too", param_hint=f"--{unused}")
+        rename(options.column)
+        asked = {
+            name.replace("_", " "): _said(value)
+            for name, value in given.items()
+            if value != own[name].default and value is not None
+        }
+        if "show" in own:
+            given["show"] = options
+        result = find(**given)
+        with result.within():
+            hand_on(result, options, asked)
+
+    parameters = [*(p for name, p in own.items() if name != "show"), *shared.values()]
+    run.__signature__ = signature(find).replace(parameters=parameters, return_annotation=None)  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in parameters}
+    return run
+
+
+def _said(value: object) -> str:
+    """Return an option's value as the user gave it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return (
+        ", ".join(map(str, value))
+        if isinstance(value, (list, tuple))
+        else str(getattr(value, "value", value))
+    )
+
+
+def _parameters(of: Callable[..., object], options: str) -> dict[str, Parameter]:
+    """Return the parameters with their types and help; what is returned is not looked at, nor loaded for it."""
+    names, said = getattr(of, "__globals__", globals()), told(options)
+    return {
+        name: p.replace(
+            kind=Parameter.KEYWORD_ONLY,
+            annotation=_annotated(eval(p.annotation, names), said[name]) if name != "show" else None,
+        )
+        for name, p in signature(of).parameters.items()
+    }
+
+
+def _annotated(kind: Any, said: Told) -> object:
+    """Add to a parameter's type what the help says of it."""
+    argument = said.heading == "Arguments"
+    kind, given = get_args(kind) if hasattr(kind, "__metadata__") else (kind, None)
+    info = copy(given) or (typer.Argument() if argument else typer.Option())
+    info.param_decls = None if argument else said.flags
+    info.metavar, info.help = said.metavar, said.help
+    return Annotated[kind, info]
+
+
+class Command(TyperCommand):
+    """A command whose help has the options below headings: what, how, output."""
+
+    told: Mapping[str, Told] = {}
+    example = ""
+
+    def panels_of(self, ctx: Any) -> dict[str, list[tuple[str, str]]]:
+        """Return the rows of help below their headings."""
+        place = {name: said.heading for name, said in {**self.told, **told(SHARED)}.items()}
+        headings = ("Arguments", "Options", *place.values())
+        rows: dict[str, list[tuple[str, str]]] = {heading: [] for heading in headings}
+        for param in self.get_params(ctx):
+            record = param.get_help_record(ctx)
+            if record is not None:
+                heading = "Arguments" if param.param_type_name == "argument" else "Options"
+                rows[place.get(param.name or "", heading)].append(record)
+        return {heading: records for heading, records in rows.items() if records}
+
+    def format_options(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
+        for heading, records in self.panels_of(ctx).items():
+            with formatter.section(heading):
+                formatter.write_dl(records)
+
+    def format_epilog(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
+        if not self.example:
+            return
+        from cli.examples.command import describe
+
+        with formatter.section(f"Example (dalembert examples {self.example} writes its files here)"):
+            formatter.write(f"  {describe(self.example)['command']}\n")
+
+
+def with_help(options: str, example: str) -> type[Command]:
+    """Return the kind of command whose help says this of its options, and ends in this example."""
+    return type("Command", (Command,), {"told": told(options), "example": example})
