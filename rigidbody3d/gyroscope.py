@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.exact import UNIT
 from dalembert.arithmetic.records import record
-from rigidbody3d import rounding
 
 Array = NDArray[np.float64]
 
@@ -37,15 +37,22 @@ class Steady(_Rates):
     """The two rates of steady precession, `.slow` and `.fast`, rad/s; NaN where the spin is too slow for any."""
 
     given: tuple[Array, ...]
-    """I1, I3, m g l, tilt and spin."""
+    """I1, I3, m g l, the tilt's cosine, the spin, and the sign of its momentum."""
 
     def error_estimate(self) -> tuple[Array, Array]:
         """Return bounds of the rounding errors of both rates, (...), rad/s.
 
         Where the two nearly coincide, at the least spin that allows them, the square root leaves half the digits.
         """
-        slow, fast = rounding.steady(*self.given)
-        return slow.error, fast.error
+        from dalembert.arithmetic.bounds import bounds
+
+        given = {
+            name: (x, 0, 0.0)
+            for name, x in zip(("I1", "I3", "mgl", "c", "spin", "side"), self.given, strict=True)
+        }
+        # a cosine errs by one unit in its last place
+        slow, fast = bounds(_rates, given | {"c": (self.given[3], 0, 2 * UNIT * np.abs(self.given[3]))})
+        return np.where(self.given[2] == 0, 0.0, slow), fast
 
 
 def steady_precession(
@@ -76,18 +83,22 @@ def steady_precession(
     [5.07653596218304..., 20.980370319014...]
     """
     I1, I3, a, theta, w = (np.asarray(x, dtype=float) for x in (transverse, axial, mgl, tilt, spin))
-    B = I3 * w
     c = np.cos(theta)
     # a right angle given in radians is one to rounding
     c = np.where(np.abs(c) < 1e-16, 0.0, c)
-    square = B * B - 4 * I1 * a * c
+    side = np.where(I3 * w < 0, -1.0, 1.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        large = B + np.where(B < 0, -1.0, 1.0) * np.sqrt(np.where(square < 0, np.nan, square))
-        slow = np.where(a == 0, 0.0 * large, 2 * a / large)
-        fast = large / (2 * I1 * c)
-    found = Steady(np.asarray(slow), np.asarray(fast))
-    found.given = I1, I3, a, theta, w
+        slow, fast = _rates(I1, I3, a, c, w, side)
+    found = Steady(np.where((a == 0) & (w == 0), 0.0, slow), np.asarray(fast))
+    found.given = I1, I3, a, c, w, side
     return found
+
+
+def _rates(I1: Array, I3: Array, mgl: Array, c: Array, spin: Array, side: Array) -> tuple[Array, Array]:
+    """On arrays of any kind of number, recorded ones for bounds too."""
+    B = I3 * spin
+    large = B + side * np.sqrt(B * B - 4 * I1 * mgl * c)
+    return 2 * mgl / large, large / (2 * I1 * c)
 
 
 def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) -> Array:
@@ -120,12 +131,10 @@ class Cones(_Cones):
     about its axis relative to the precessing plane, ω3 (I1 - I3)/I1.
     """
 
-    given: tuple[Array, ...]
-    """I1, I3 and ω."""
-
     def error_estimate(self) -> tuple[Array, ...]:
         """Return bounds of the rounding errors of the four, (...): small beside each, since nothing here cancels."""
-        return tuple(x.error for x in rounding.cones(*self.given))
+        roundings = (16, 6, 8, 4)
+        return tuple(n * UNIT * np.abs(x) for n, x in zip(roundings, self, strict=True))
 
 
 def cones(transverse: ArrayLike, axial: ArrayLike, omega: ArrayLike) -> Cones:
@@ -153,11 +162,9 @@ def cones(transverse: ArrayLike, axial: ArrayLike, omega: ArrayLike) -> Cones:
     w = np.asarray(omega, dtype=float)
     across, along = np.hypot(w[..., 0], w[..., 1]), w[..., 2]
     space = np.arctan2(np.abs(I1 - I3) * across * np.abs(along), I1 * across**2 + I3 * along**2)
-    found = Cones(
+    return Cones(
         space,
         np.arctan2(across, np.abs(along)),
         np.hypot(across, I3 * along / I1),
         np.asarray(along * (I1 - I3) / I1),
     )
-    found.given = I1, I3, w
-    return found

@@ -244,7 +244,8 @@ def run(
             return _long(analysis, forces, states, show.digits)
         # the table of a long sweep costs as much as its solution: JSON alone does not ask for it
         table = not show.json or show.expect is not None or show.output is not None
-        times = 1 if several is None or show.streams else several.count
+        streams = show.streams or show.streams_json
+        times = 1 if several is None or streams else several.count
         analysis.check_size(
             json=show.as_json, table=table, states=states is not None, forces=forces, times=times
         )
@@ -265,7 +266,7 @@ def run(
         )  # fmt: skip
         found = Many(question, several, workers or 1)
         result = _with_page(
-            found.result(show.streams, show.as_json, table),
+            found.result(streams, show.as_json, table),
             html,
             lambda: animation.page(found.analyses(), forces, show.units),
         )

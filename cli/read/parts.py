@@ -268,28 +268,29 @@ def _reading(
     inertia: Array,
 ) -> BodyError:
     """Bound what is off in the parts before they are turned: numbers as read, and their shapes' formulas."""
-    from dalembert.arithmetic.bounded import Bounded
-    from rigidbody3d.rounding import BodyError, shaped
+    from dalembert.arithmetic.bounds import bounds, read
+    from rigidbody3d.rounding import BodyError
+    from rigidbody3d.shapes import weighed
 
     masses, tensors = READ * np.abs(mass), READ * np.abs(inertia)
     centers = READ * np.abs(center)
+    alike: dict[tuple[str, str], list[int]] = {}
     for i, (shape, row) in enumerate(zip(shapes, rows, strict=True)):
         if i in meshes:
             rough, reach = meshes[i]()
             masses[i] += rough * np.abs(mass[i])
             centers[i] += rough * reach
             tensors[i] += rough * np.abs(mass[i]) * reach**2
-        if shape not in SHAPES:
-            continue
-        known = SHAPES[shape]
-        names = known.dimensions + known.optional
-        given = {key: Bounded(row[key], READ * row[key]) for key in names if key in row}
-        given |= {key: Bounded(0.0) for key in known.optional if key not in row}
-        m = Bounded(mass[i], masses[i])
-        if "mass" not in row and known.measure is not None:
-            m = Bounded(row[DENSITIES[known.thin]], masses[i] / mass[i] * row[DENSITIES[known.thin]])
-            m = m * known.measure(**given)
-        masses[i], tensors[i] = m.error, shaped(shape, m, given).error
+        if shape in SHAPES:
+            amount = "mass" if "mass" in row else DENSITIES[SHAPES[shape].thin]
+            alike.setdefault((shape, amount), []).append(i)
+    for (shape, amount), places in alike.items():
+        names = SHAPES[shape].dimensions + SHAPES[shape].optional
+        given = {
+            name: read([rows[i].get(key, 0.0) for i in places], 0, READ)
+            for name, key in (("amount", amount), *zip(names, names, strict=True))
+        }
+        masses[places], tensors[places] = bounds(weighed, given, shape, amount != "mass")
     return BodyError(masses, centers, tensors)
 
 
@@ -317,7 +318,7 @@ def _solids(
 
 def _turning(drawn: Body, rotation: Array, table: Table, kept: NDArray[np.intp]) -> BodyError:
     """Bound the parts as turned: a matrix of zeros and ones is exact, another has its angles' own rounding."""
-    from rigidbody3d.rounding import turned
+    from rigidbody3d.body import turned_error
 
     angle = np.zeros(table.rows)
     for name in ("rx", "ry", "rz"):
@@ -326,7 +327,7 @@ def _turning(drawn: Body, rotation: Array, table: Table, kept: NDArray[np.intp])
             angle += np.abs(np.nan_to_num(to_si(column.values, "angle", column.unit)))
     plain = np.isin(rotation, (-1.0, 0.0, 1.0)).all(axis=(-1, -2))
     off = np.where(plain, 0.0, READ * (4 + angle[kept]))
-    return turned(drawn.numbers, rotation, None, np.broadcast_to(off[:, None, None], rotation.shape))
+    return turned_error(drawn, rotation, np.broadcast_to(off[:, None, None], rotation.shape))
 
 
 def _turns(table: Table) -> Array:

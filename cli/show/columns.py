@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from pathlib import Path
+    from typing import TypeAlias
 
     import numpy as np
     from matplotlib.figure import Figure
@@ -17,10 +18,11 @@ if TYPE_CHECKING:
     Cell = str | float | None
     Values = Sequence[Cell] | NDArray[np.float64]
     Bounds = Sequence[float] | NDArray[np.float64]
-    # a part of a table -> what is written of it
-    Form = Callable[["Table", int], "Written"]
     Json = None | str | float | Sequence["Json"] | Mapping[str, "Json"]
     Document = dict[str, Json]
+    # of a table, or of a list of the JSON document; and what is written of it
+    Part: TypeAlias = "Table | list[Document]"
+    Form = Callable[[Part, int], "Written"]
 
 
 @dataclass(eq=False, repr=False)
@@ -55,9 +57,9 @@ class Table:
 
 
 class Written(NamedTuple):
-    """What is written of a part of a table: its bytes, or the table as it is shown, or nothing where it has a file."""
+    """What is written of a part: its bytes, or the part as it is shown, or nothing where it has a file."""
 
-    data: bytes | Table
+    data: bytes | Part
     unknown: int
     """Of how many of its numbers --digits knows no digit."""
 
@@ -112,14 +114,14 @@ class Result:
     failed: Callable[[], bool] = lambda: False
     """Whether nothing that was asked for could be found: status 1, once all is shown."""
     blocks: Callable[[Form], Iterator[Written]] | None = None
-    """The table in parts, where it is too long to be held: written as CSV, Parquet or a workbook, and nothing else.
+    """The table or the JSON's list in parts, where it is too long to be held: nothing else is written then.
 
     Whoever works a part out, perhaps another process, makes what is written of it too.
     """
     shared: bool = False
     """Whether the parts are worked out by several processes."""
     blocks_name: str = "poses"
-    """What the table in parts is called."""
+    """What the table in parts is called, or the list in JSON, which stands behind what else is in the document."""
     within: Callable[[], AbstractContextManager[None]] = nullcontext
     """What the forms are made within: it turns errors of a library into those that a user is told."""
     toml: Callable[[], bytes] | None = None

@@ -148,6 +148,12 @@ class Real:
             return abs(Real(self.recorder, of[0]))
         return Real(self.recorder, self.recorder.node("sqrt", self.settled))
 
+    def sin(self) -> Real:
+        return Real(self.recorder, self.recorder.node("sin", self.number), self.negative)
+
+    def cos(self) -> Real:
+        return Real(self.recorder, self.recorder.node("cos", self.number))
+
     def __add__(self, other: Number) -> Number:
         if isinstance(other, (Complex, complex)):
             if isinstance(other, Constant):
@@ -327,13 +333,11 @@ class Recorded:
 
     @staticmethod
     def sin(x: Number) -> Number:
-        if isinstance(x, Real):
-            return Real(x.recorder, x.recorder.node("sin", x.number), x.negative)
-        return math.sin(x)
+        return x.sin() if isinstance(x, Real) else math.sin(x)
 
     @staticmethod
     def cos(x: Number) -> Number:
-        return Real(x.recorder, x.recorder.node("cos", x.number)) if isinstance(x, Real) else math.cos(x)
+        return x.cos() if isinstance(x, Real) else math.cos(x)
 
     @staticmethod
     def atan2(y: Number, x: Number) -> Number:

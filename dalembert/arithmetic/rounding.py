@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dalembert.arithmetic.adjoint import PARTIALS, times
-from dalembert.arithmetic.engines.blocks import NUMPY
+from dalembert.arithmetic.arrays import NUMPY
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
 from dalembert.arithmetic.tape import Kind, Operation, Tape
 

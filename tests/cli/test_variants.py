@@ -208,7 +208,7 @@ def test_a_bad_table_of_variants_is_one_line_and_nothing_is_written(dalembert, f
 
 
 def test_more_than_memory_holds_is_refused_where_it_has_to_be_held(dalembert, files):
-    vary = ("--vary", "links.crank.B.x=38mm:42mm/999999", "--sweep", "0:360/99999", "--json")
+    vary = ("--vary", "links.crank.B.x=38mm:42mm/999999", "--sweep", "0:360/99999", "--text")
     found = dalembert("mechanism", files(), *vary)
     assert found.returncode == 1
     assert "1000000 variants" in found.stderr

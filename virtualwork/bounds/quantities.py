@@ -37,7 +37,7 @@ CONSTANT = 1.0
 # units by which the cosine of an input of an even sweep errs besides, where e^{iq} is a product of three factors
 SWEPT = 3.0
 # quantities × operations of a tape of theirs: its sweep is some two times as long
-LONGEST = 2500
+LONGEST, LONGEST_OF_ONE = 2500, 700
 # lanes that a sweep on numbers costs as much as, however few they are
 EACH = 100
 EMPTY: Mapping[str, Any] = MappingProxyType({})
@@ -75,7 +75,7 @@ class Bounds:
         cost = taped(self.branch, self.recording, tuple(new)).cost
         while new:
             # as many as one tape is fit for
-            here = new[: max(1, LONGEST // max(cost, 1))]
+            here = new[: max(1, (LONGEST if self.n > 1 else LONGEST_OF_ONE) // max(cost, 1))]
             new = new[len(here) :]
             self._known |= self._formed(here)
             if self._beside is not None:

@@ -17,6 +17,7 @@ Inputs of a tape
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
 from typing import Any
 
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
@@ -38,6 +39,7 @@ from virtualwork.formulas.poses import chain_rule
 from virtualwork.formulas.positions import Case, State, columns, run
 from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import JointForces
+from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
 
 # sin² of a transmission angle below which a force may have no digit left
@@ -239,6 +241,8 @@ class Recording:
         ("closed", groups' names …)                  a finite number where these groups are assembled
         ("margin", group's name)                     the radicand of a closed form, relative
         ("twist", number)                            of a torsion spring, within half a turn of free
+        ("column", loop, unknown)                    of the Jacobian of all loops (`loops`), complex; as their columns
+        ("size",)                                    the mechanism's characteristic length
         ("regularity", group's name)                 of a larger group: how far its Jacobian is from singular, of 1
         """
         if key not in self._values:
@@ -366,7 +370,9 @@ class Recording:
 
     def _hung_on(self, kind: str, *of: Any) -> tuple[str, ...]:
         targets: Iterable[str] = [key for g in self.plan.groups for key in self.plan.writes(g)]
-        if kind in ("point", "dpoint"):
+        if kind in ("margin", "size"):
+            targets = ()
+        elif kind in ("point", "dpoint"):
             targets = self._path_reads(self._path(*of[:3]))
         elif kind in ("angle", "dangle", "turn"):
             targets = [f"angle:{of[0]}"]
@@ -393,6 +399,22 @@ class Recording:
         self.solve(self.plan.writes(of), 0)
         cols = columns(of, self.st)
         return regularity([[part(c) for c in row] for row in cols for part in PARTS])
+
+    @cached_property
+    def loops(self) -> Group | None:
+        """All loops at once: one group of every unknown; None where there is no loop."""
+        return next(iter(plan(self.mechanism, merged=True).groups), None)
+
+    def _column(self, loop: int, unknown: int) -> Number:
+        assert self.loops is not None
+        self.solve([key for s in self.plan.steps for key in self.plan.writes(s)], 0)
+        return columns(self.loops, self.st)[loop][unknown]
+
+    def _size(self) -> Number:
+        longest: Number = 0.0
+        for span in map(bare, self.mechanism.spans):
+            longest = RECORDED.select(span - longest, span, longest)
+        return longest
 
     def _margin(self, group: str) -> Number:
         of = next(g for g in self.plan.groups if g.name == group)
