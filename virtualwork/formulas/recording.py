@@ -102,6 +102,7 @@ class Recording:
             self._along = Rates(plan, self.st, given)
         self._done: set[tuple[int, int, int]] = set()
         self._values: dict[Key, Number] = {}
+        self._groups: dict[Key, tuple[str, ...]] = {}
         self._forces: tuple[LoadPaths, JointForces, Block] | None = None
 
     # --- solving ------------------------------------------------------------------------------------------------
@@ -114,12 +115,16 @@ class Recording:
         n = len(group.angles) + len(group.slides)
         return [self.recorder.input(f"x {group.name} {i}") for i in range(n)]
 
+    def step(self, group: Group, st: State) -> list[Number] | None:
+        """By how much a group's unknowns that enter are off, to first order; None where they are exact."""
+        return None if self.settled else WRITTEN.solve(columns(group, st), gaps(group, st))
+
     def _close(self, group: Group, st: State) -> None:
         if self.enters(group):
             x = self.unknowns(group)
             put_unknowns(group, st, x)
-            if not self.settled:
-                step = WRITTEN.solve(columns(group, st), gaps(group, st))
+            step = self.step(group, st)
+            if step is not None:
                 put_unknowns(group, st, [a + b for a, b in zip(x, step, strict=True)])
             return
         sign: Number = self.signs[group.name]
@@ -359,7 +364,11 @@ class Recording:
 
         What cancels is not on the tape: a platform that stays level has the angle 0 there, whatever carries it.
         """
-        kind, *of = key
+        if key not in self._groups:
+            self._groups[key] = self._hung_on(*key)
+        return self._groups[key]
+
+    def _hung_on(self, kind: str, *of: Any) -> tuple[str, ...]:
         targets: Iterable[str] = [key for g in self.plan.groups for key in self.plan.writes(g)]
         if kind in ("margin", "size"):
             targets = ()
