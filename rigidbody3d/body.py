@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -193,6 +193,10 @@ class Body:
         """
         if about is not None:
             return _error(_about, self.given, {"point": np.asarray(about, dtype=float)})
+        return self._own_error
+
+    @cached_property
+    def _own_error(self) -> BodyError:
         if self.rounding is not None:
             return self.rounding()
         return BodyError(*(np.zeros_like(x) for x in (self.mass, self.center, self.inertia)))
