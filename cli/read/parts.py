@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.errors import DataError, nearest, quote
+from cli.errors import DataError, nearest, needs, quote
 from cli.read.files import note
 from cli.read.tables import Table, read
 from cli.read.units import UNITS, cosine_sine, to_si
@@ -216,9 +216,7 @@ def _mesh(
         vertices = to_si(vertices, "length", unit)
         volume, center, inertia = mesh(vertices, faces)
     except ImportError:
-        raise DataError(
-            f"{table.file}: a mesh needs trimesh: install dalembert with its extra, dalembert[mesh]"
-        ) from None
+        raise needs(f"{table.file}: a mesh", "trimesh", "mesh") from None
     except ValueError as error:
         raise table.error(index, "file", cell, f"a closed mesh: {error}") from None
     density = row["density"] if "density" in row else row["mass"] / float(volume)
