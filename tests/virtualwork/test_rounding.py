@@ -295,6 +295,25 @@ def test_nothing_is_loaded_for_estimates_unless_asked() -> None:
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.parametrize("poses", [1, 40, 5000])
+@pytest.mark.parametrize("name", ["stephenson-six-bar", "engine", "two-disc-four-bar"])
+def test_together_bounds_are_what_they_are_one_by_one(name: str, poses: int) -> None:
+    """A few on numbers, many on a tape; groups without a closed form, slides, loads."""
+    m = example(name)
+    last = list(m.links)[-1]
+    names = [f"links.{last}.{k}" for k in ("angle", "omega", "alpha")] + ["effort", "shaking.force"]
+    names += [f"points.{point}.acceleration" for point in m.links[last].points]
+    q = m.at[0] + np.linspace(-0.02, 0.03, poses)
+    together = m.motion(q, 3.0, 1.0).error_estimates(*names)
+    assert list(together) == names
+    for one in names:
+        alone = m.motion(q, 3.0, 1.0).error_estimates(one)[one]
+        assert alone.shape == (poses,)
+        assert np.isfinite(alone).all()
+        np.testing.assert_allclose(together[one], alone, rtol=1e-9)
+    assert (together["effort"] == m.motion(q, 3.0, 1.0).dynamics.error_estimate().effort[:, 0]).all()
+
+
 @pytest.mark.parametrize(
     ("campaign", "seed"),
     [

@@ -24,6 +24,7 @@ from typing import Any
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
 from dalembert.arithmetic.rounding import UNIT_ROUNDOFF
 from dalembert.arithmetic.varied import made
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.dynamics import applied_loads, reduced
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.lanes import Turning
@@ -132,6 +133,7 @@ class Doubted(Recording):
         constants = Constants(branch.plan, [[*of.values(), *through[body]] for body, of in m.bodies.items()])
         self.constants, self.entered = constants.numbers, entered
         self._left: dict[str, list[Number]] = {}
+        self._groups: dict[Key, tuple[str, ...]] = {}
         super().__init__(
             branch.mechanism,
             constants.plan,
@@ -155,6 +157,12 @@ class Doubted(Recording):
             -sum((enter(f"inverse {name} {i} {r}") * row for r, row in enumerate(rows)), 0.0)
             for i in range(len(group.angles) + len(group.slides))
         ]
+
+    def hangs_on(self, key: Key) -> tuple[str, ...]:
+        """The groups that a quantity hangs on; looked for once, which one pose after the other would pay for."""
+        if key not in self._groups:
+            self._groups[key] = super().hangs_on(key)
+        return self._groups[key]
 
     def _generalized(self, j: int) -> Number:
         paths, _, block = self.forces

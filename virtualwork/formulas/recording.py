@@ -40,7 +40,7 @@ from virtualwork.formulas.positions import Case, State, columns, run
 from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import JointForces
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
+from virtualwork.plan.steps import Group, Plan, Term, path_reads
 
 # sin² of a transmission angle below which a force may have no digit left
 NEAR = 1e-18
@@ -102,7 +102,6 @@ class Recording:
             self._along = Rates(plan, self.st, given)
         self._done: set[tuple[int, int, int]] = set()
         self._values: dict[Key, Number] = {}
-        self._groups: dict[Key, tuple[str, ...]] = {}
         self._forces: tuple[LoadPaths, JointForces, Block] | None = None
 
     # --- solving ------------------------------------------------------------------------------------------------
@@ -149,15 +148,13 @@ class Recording:
             for number, rates in ways:
                 for step in steps:
                     key = id(step), k, number
-                    if key not in self._done:
-                        self._done.add(key)
-                        self._advance(step, rates, k)
-
-    def _advance(self, step: Step, rates: Rates | None, k: int) -> None:
-        if rates is None:
-            run([step], self.st, self._close)
-        else:
-            rates.advance([step], k)
+                    if key in self._done:
+                        continue
+                    self._done.add(key)
+                    if rates is None:
+                        run([step], self.st, self._close)
+                    else:
+                        rates.advance([step], k)
 
     @property
     def along(self) -> Rates:
@@ -185,8 +182,8 @@ class Recording:
             self._forces = paths, JointForces(paths, set()), _Block(self)
         return self._forces
 
-    def _places(self, order: int = 1) -> None:
-        """Solve what the places of all joints hang on."""
+    def _places(self, order: int = 1) -> tuple[LoadPaths, JointForces, Block]:
+        """The forces, with everything solved that the places of all joints hang on."""
         paths, *_ = self.forces
         keys: set[str] = {f"slide:{i}" for i in range(len(self.mechanism.guides))}
         for body in self.mechanism.links:
@@ -194,6 +191,7 @@ class Recording:
         for group in self.plan.groups:
             keys |= self.plan.reads(group) | set(self.plan.writes(group))
         self.solve(sorted(keys), max((load.order for load in paths.case.loads), default=order))
+        return self.forces
 
     def efforts(self) -> list[Number]:
         """The effort at each input by virtual work, through the carriers of motors."""
@@ -332,13 +330,11 @@ class Recording:
         return self.efforts()[j]
 
     def _newton_euler(self, j: int) -> Number:
-        self._places()
-        _, of, block = self.forces
+        _, of, block = self._places()
         return of.effort(block, j)
 
     def _force(self, joint: str, body: str) -> Number:
-        self._places()
-        _, of, block = self.forces
+        _, of, block = self._places()
         return of.joint_force(block, of.by_key[joint], body)
 
     def _reaction(self, joint: str, body: str) -> Number:
@@ -346,29 +342,23 @@ class Recording:
         return sum((self.value(("force", j.key, body)) for j in of), 0.0)
 
     def _moment(self, joint: str, body: str) -> Number:
-        self._places()
-        _, of, block = self.forces
+        _, of, block = self._places()
         guide = of.by_key[joint].guide
         return None if guide is None else of.guide_moment(block, guide, body)
 
-    def _shaking(self) -> Number:
+    def _shaking(self, part: int = 0) -> Number:
         paths, _, block = self.forces
-        return resultant(shaking_loads(paths.case.loads), block)[0]
+        return resultant(shaking_loads(paths.case.loads), block)[part]
 
     def _shaking_moment(self) -> Number:
-        paths, _, block = self.forces
-        return resultant(shaking_loads(paths.case.loads), block)[1]
+        return self._shaking(1)
 
     def hangs_on(self, key: Key) -> tuple[str, ...]:
         """The groups that a quantity hangs on, by name: where one of them is not assembled, it has no value.
 
         What cancels is not on the tape: a platform that stays level has the angle 0 there, whatever carries it.
         """
-        if key not in self._groups:
-            self._groups[key] = self._hung_on(*key)
-        return self._groups[key]
-
-    def _hung_on(self, kind: str, *of: Any) -> tuple[str, ...]:
+        kind, *of = key
         targets: Iterable[str] = [key for g in self.plan.groups for key in self.plan.writes(g)]
         if kind in ("margin", "size"):
             targets = ()
