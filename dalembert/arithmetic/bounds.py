@@ -1,7 +1,7 @@
 """Bounds of the rounding errors of formulas on arrays: run once on recorded numbers, a formula leaves its tape.
 
 A formula does with its arrays what numpy does with any kind of number: sums, products, quotients, roots, matrices.
-The adjoint of its tape (`adjoint`) bounds its own rounding and carries on what its numbers are off by.
+The adjoint of its tape (`rounding`) bounds its own rounding and carries on what its numbers are off by.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.adjoint import FEW, bounds_of_few, rounding_bounds
 from dalembert.arithmetic.recorded import Recorder
+from dalembert.arithmetic.rounding import FEW, bounds_of_few, rounding_bounds
 from dalembert.arithmetic.tape import Tape
 
 Array = NDArray[np.float64]
