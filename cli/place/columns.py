@@ -58,9 +58,7 @@ def several(found: Sequence[tuple[Correction, Placing]]) -> Table:
 
     names = [
         Column(
-            what,
-            "",
-            [getattr(of, what) for (of, _), n in zip(found, lengths, strict=True) for _ in range(n)],
+            what, "", [getattr(of, what) for (of, _), n in zip(found, lengths, strict=True) for _ in range(n)]
         )
         for what in ("rotor", "plane")
     ]
