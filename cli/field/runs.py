@@ -170,6 +170,11 @@ class Runs:
     """What the file itself states of it, sensor -> vector as read."""
     warnings: list[str] = field(default_factory=list)
 
+    @property
+    def per_si(self) -> str:
+        """The SI unit of the trials, as keys and headers have it."""
+        return "kg" if self.per == "mass" else "kg_m"
+
     def warn(self, text: str) -> None:
         """Say something of the table once."""
         if text not in self.warnings:
@@ -202,7 +207,9 @@ def more_than_unknowns(table: Table) -> bool:
     def count(codes: Rows, of: Rows) -> Rows:
         """Count what differs, rotor by rotor."""
         many = int(codes.max(initial=0)) + 1
-        return np.bincount(np.unique(of * many + codes) // many, minlength=int(rotor.max()) + 1)
+        # with indices: without them numpy loads its masked arrays, which takes longer than a small table
+        each, _ = np.unique(of * many + codes, return_index=True)
+        return np.bincount(each // many, minlength=int(rotor.max()) + 1)
 
     most = max(map(len, each))
     several = np.array([one + one[-1:] * (most - len(one)) if one else [-1] * most for one in each])[plane]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 from uuid import uuid4
 
 import numpy as np
@@ -19,6 +20,9 @@ from virtualwork import Mechanism
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.family import Family
 from virtualwork.family.part import Part, Solver
+
+if TYPE_CHECKING:
+    from cli.show.columns import Document
 
 # of these kinds of remark each is printed, and of each the first so many variants are named
 REMARKS, NAMED = 10, 5
@@ -75,6 +79,10 @@ class Asked:
         """
         return self.analysis(with_numbers(self.mechanism, self.dimensions, row.tolist()))
 
+    def set(self, row: NDArray[np.float64]) -> Document:
+        """A variant's numbers as they are shown, by the names that they have in JSON and tables."""
+        return {d.header: value for d, value in zip(self.dimensions, row.tolist(), strict=True)}
+
     def part(self, shown: NDArray[np.float64]) -> Part:
         """Variants as a part of a family."""
         numbers = {
@@ -86,12 +94,14 @@ class Asked:
             return family.motion().part
         return family.motion(q.values, q.speed, q.acceleration).part
 
-    def families(self, shown: NDArray[np.float64]) -> Families | None:
-        """How variants are solved together; None where they are not."""
+    def families(self, shown: NDArray[np.float64], json: bool) -> Families | None:
+        """How variants are solved together, for documents or for a table; None where they are not."""
         plain = self.branch is None and self.request.tables in ([], ["--forces"])
-        if not plain or self.digits:
+        # a cycle of work, which stands in the document only, is of each variant
+        cycle = json and self.request.forces and self.request.swept and len(self.mechanism.inputs) == 1
+        if not plain or self.digits or cycle:
             return None
-        found = Families(self.analysis(self.mechanism), self.request.forces, Solver(self.part(shown)))
+        found = Families(self.analysis(self.mechanism), self.request.forces, Solver(self.part(shown)), json)
         return found if found.pays else None
 
 

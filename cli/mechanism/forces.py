@@ -28,6 +28,11 @@ def rows_of(analysis: Analysis, motion: Motion) -> list[tuple[Joint, str, str]]:
     ]
 
 
+def with_forces(listed: list[dict[str, Any]], analysis: Analysis) -> list[dict[str, Any]]:
+    """The JSON's poses, with the forces of each."""
+    return [pose | part for pose, part in zip(listed, poses(analysis), strict=True)]
+
+
 def poses(analysis: Analysis) -> list[dict[str, Any]]:
     """Effort, reactions and shaking force of every pose, in the order of the JSON's poses."""
     parts = [_motion_parts(analysis, motion) for motion in analysis.motions]

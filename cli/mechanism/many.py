@@ -23,11 +23,12 @@ from cli.show.columns import Column, Result, Table, Written
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cli.show.columns import Cell, Form
+    from cli.show.columns import Cell, Document, Form, Part
 
-# variants from which on it pays to write the formulas down; rows of a part solved together; variants and rows of a
-# part solved one by one; variants of a part that are described alone only to say why poses are not assembled
-FEW, TOGETHER, ONE_BY_ONE, EXPLAINED = 32, 1 << 16, (64, 1 << 14), 50
+# variants from which on it pays to write the formulas down; rows of a part solved together, and variants and rows of one
+# solved one by one, of a table and of documents, where a row takes some kilobytes; variants of a part that are described
+# alone only to say why poses are not assembled
+FEW, TOGETHER, ONE_BY_ONE, EXPLAINED = 32, (1 << 16, 1 << 12), (64, (1 << 14, 1 << 12)), 50
 
 
 def one(asked: Asked, row: NDArray[np.float64], name: str, json: bool, said: Said) -> Any:
@@ -51,10 +52,68 @@ def one(asked: Asked, row: NDArray[np.float64], name: str, json: bool, said: Sai
     return found
 
 
-def _documents(asked: Asked, first: int, shown: NDArray[np.float64]) -> Solved:
-    """The documents of some variants, which are called from `first` on."""
+def documents(
+    asked: Asked, home: NDArray[np.float64] | None, form: Form, first: int, shown: NDArray[np.float64]
+) -> Solved:
+    """The documents of some variants, which are called from `first` on; `home`: one that can be put together."""
     said = Said()
-    return Solved([one(asked, row, str(first + i), True, said) for i, row in enumerate(shown)], said)
+    found = [one(asked, row, str(first + i), True, said) for i, row in enumerate(shown)]
+    return Solved(form(_named(asked, home, first, shown, found), first - 1), said)
+
+
+def documents_together(
+    asked: Asked, home: NDArray[np.float64] | None, form: Form, first: int, shown: NDArray[np.float64]
+) -> Solved:
+    """The same, of variants that are solved at once."""
+    said = Said()
+    listed, assembled, alone = _families(asked, shown, True).of(asked.part(shown))
+    v, n = assembled.shape
+    found: list[Any] = [{"poses": listed[i * n : (i + 1) * n]} for i in range(v)]
+    for i, document in _alone(asked, first, shown, assembled, alone, True, said):
+        found[i] = document
+    said.any_assembled |= bool(assembled[~alone].any())
+    return Solved(form(_named(asked, home, first, shown, found), first - 1), said)
+
+
+def _named(
+    asked: Asked,
+    home: NDArray[np.float64] | None,
+    first: int,
+    shown: NDArray[np.float64],
+    found: list[Any],
+) -> list[Document]:
+    """The documents with the variants' names and numbers; None is one that cannot be put together."""
+    blank: list[Any] = []
+    if home is not None and any(d is None for d in found):
+        blank = _blank(one(asked, home, "", True, Said())["poses"])
+    return [
+        {"variant": str(first + i), "set": asked.set(row)}
+        | ({"poses": blank} if d is None else {k: v for k, v in d.items() if k != "name"})
+        for i, (row, d) in enumerate(zip(shown, found, strict=True))
+    ]
+
+
+def _alone(
+    asked: Asked,
+    first: int,
+    shown: NDArray[np.float64],
+    assembled: NDArray[np.bool_],
+    alone: NDArray[np.bool_],
+    json: bool,
+    said: Said,
+) -> Iterator[tuple[int, Any]]:
+    """Of variants solved together those that are left, as `one` gives them; of others it is said why poses are missing."""
+    told = 0
+    for i in np.flatnonzero(alone | ~assembled.all(axis=1)).tolist():
+        if not alone[i]:
+            # its rows are there: only why poses are not is still to be said
+            if told >= EXPLAINED:
+                said.further += 1
+                continue
+            told += 1
+        found = one(asked, shown[i], str(first + i), json and bool(alone[i]), said)
+        if alone[i]:
+            yield i, found
 
 
 def rows(asked: Asked, pattern: Table, form: Form, first: int, shown: NDArray[np.float64]) -> Solved:
@@ -76,24 +135,13 @@ def rows(asked: Asked, pattern: Table, form: Form, first: int, shown: NDArray[np
 
 def rows_together(asked: Asked, pattern: Table, form: Form, first: int, shown: NDArray[np.float64]) -> Solved:
     """The same, of variants that are solved at once."""
-    families = _families(asked, shown)
-    table, assembled, alone = families.rows(asked.part(shown))
+    table, assembled, alone = _families(asked, shown, False).of(asked.part(shown))
     said = Said()
     v, n = assembled.shape
     columns: list[list[Any]] = [list(c.values) for c in like(pattern, table).columns]
     whole = assembled.ravel().tolist()
-    told = 0
-    for i in np.flatnonzero(alone | ~assembled.all(axis=1)).tolist():
+    for i, found in _alone(asked, first, shown, assembled, alone, False, said):
         here = slice(i * n, (i + 1) * n)
-        if not alone[i]:
-            # its rows are there: only why poses are not is still to be said
-            if told >= EXPLAINED:
-                said.further += 1
-                continue
-            told += 1
-        found = one(asked, shown[i], str(first + i), False, said)
-        if not alone[i]:
-            continue
         its, there = (empty(pattern), False) if found is None else found
         for values, column in zip(columns, like(pattern, its).columns, strict=True):
             values[here] = list(column.values)
@@ -138,26 +186,35 @@ class Many:
                 self.said.add(str(error), [str(i + 1)])
         return found
 
-    # --- as tables --------------------------------------------------------------------------------------------
-    @cached_property
-    def pattern(self) -> Table | None:
-        """The columns that all tables have: those of the first variant that has any."""
+    # --- in parts ---------------------------------------------------------------------------------------------
+    def _first(self, json: bool) -> tuple[NDArray[np.float64], Any] | None:
+        """The first variant that can be put together, its numbers and what `one` gives of it."""
         for i in range(self.variants.count):
-            found = one(self.asked, self.variants.part(i, i + 1)[0], "", False, Said())
+            (row,) = self.variants.part(i, i + 1)
+            found = one(self.asked, row, "", json, Said())
             if found is not None:
-                table: Table = found[0]
-                return replace(table, columns=[replace(c, error=None) for c in table.columns])
+                return row, found
         return None
 
-    def blocks(self, form: Form) -> Iterator[Written]:
-        """What is written of the table, part by part."""
-        count, pattern = self.variants.count, self.pattern
+    def blocks(self, form: Form, json: bool = False) -> Iterator[Written]:
+        """What is written of the table, or of the documents, part by part."""
+        count, whole = self.variants.count, self._first(json)
         poses = 1 if self.asked.inputs is None else self.asked.inputs.n
         together = (
-            pattern is not None and count >= FEW and self.asked.families(self.variants.part(0, 1)) is not None
+            whole is not None
+            and count >= FEW
+            and self.asked.families(self.variants.part(0, 1), json) is not None
         )
-        size = TOGETHER // poses if together else min(ONE_BY_ONE[0], ONE_BY_ONE[1] // poses)
-        work = partial(rows_together if together else rows, self.asked, pattern or Table([]), form)
+        if json:
+            work = partial(
+                documents_together if together else documents, self.asked, whole and whole[0], form
+            )
+        else:
+            # the columns that all tables have
+            table: Table = Table([]) if whole is None else whole[1][0]
+            table = replace(table, columns=[replace(c, error=None) for c in table.columns])
+            work = partial(rows_together if together else rows, self.asked, table, form)
+        size = TOGETHER[json] // poses if together else min(ONE_BY_ONE[0], ONE_BY_ONE[1][json] // poses)
         yield from self._solved(work, max(1, size))
 
     @cached_property
@@ -165,7 +222,7 @@ class Many:
         """All of them, one below the other."""
         # bounds of rounding errors are worked out when they are asked for, and cannot be sent
         here = replace(self, workers=1) if self.asked.digits else self
-        tables = [written.data for written in here.blocks(as_table)]
+        tables = [written.data for written in here.blocks(as_it_is)]
         self.said = here.said
         return joined([table for table in tables if isinstance(table, Table)])
 
@@ -173,27 +230,16 @@ class Many:
     @cached_property
     def documents(self) -> list[dict[str, Any]]:
         """What the JSON document says of each variant."""
-        parts = self._solved(partial(_documents, self.asked), ONE_BY_ONE[0])
-        found = [document for part in parts for document in part]
-        pattern: list[Any] = next((d["poses"] for d in found if d is not None), [])
-        return [
-            {"variant": str(i + 1), "set": self._set(i)}
-            | ({"poses": _blank(pattern)} if d is None else {k: v for k, v in d.items() if k != "name"})
-            for i, d in enumerate(found)
-        ]
-
-    def _set(self, i: int) -> dict[str, float]:
-        (row,) = self.variants.part(i, i + 1).tolist()
-        return {d.header: value for d, value in zip(self.variants.dimensions, row, strict=True)}
+        parts = (written.data for written in self.blocks(as_it_is, json=True))
+        return [document for part in parts if isinstance(part, list) for document in part]
 
     # --- in every form ------------------------------------------------------------------------------------------
     def result(self, streams: bool, json: bool, table: bool) -> Result:
-        """The result: as one table alone, written part by part, or the forms asked for, at once."""
+        """The result: as one table or document alone, written part by part, or the forms asked for, at once."""
         if streams:
             return Result(
-                document=dict,
-                tables={},
-                blocks=self.blocks,
+                document=lambda: {"name": self.asked.mechanism.name},
+                blocks=partial(self.blocks, json=json),
                 blocks_name="variants",
                 shared=self.workers > 1,
                 late_warnings=lambda: self.said.lines(),
@@ -210,22 +256,23 @@ class Many:
         )
 
 
-_known: dict[str, Families] = {}
+_known: dict[tuple[str, bool], Families] = {}
 
 
-def _families(asked: Asked, shown: NDArray[np.float64]) -> Families:
+def _families(asked: Asked, shown: NDArray[np.float64], json: bool) -> Families:
     """The formulas of a question, which a process writes down once."""
-    if asked.name not in _known:
-        found = asked.families(shown[:1])
+    name = asked.name, json
+    if name not in _known:
+        found = asked.families(shown[:1], json)
         assert found is not None
         _known.clear()
-        _known[asked.name] = found
-    return _known[asked.name]
+        _known[name] = found
+    return _known[name]
 
 
-def as_table(table: Table, number: int) -> Written:
-    """The form of a part that stays a table."""
-    return Written(table, 0)
+def as_it_is(part: Part, number: int) -> Written:
+    """The form of a part that stays a table, or documents."""
+    return Written(part, 0)
 
 
 def joined(tables: list[Table]) -> Table:

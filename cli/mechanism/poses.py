@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -109,7 +110,9 @@ def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
     return found
 
 
-def document(analysis: Analysis) -> list[dict[str, Any]]:
+def document(
+    analysis: Analysis, marks_of: Callable[[Analysis, Motion], list[list[str]]] = marks_of
+) -> list[dict[str, Any]]:
     """The poses as INTERFACE's JSON has them, every assembly after the other at each input."""
     shown = inputs_of(analysis)
     columns = []

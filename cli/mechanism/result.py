@@ -46,7 +46,7 @@ def result_of(
     def document() -> Document:
         listed = poses.document(analysis)
         if request.forces:
-            listed = [pose | part for pose, part in zip(listed, of_forces.poses(analysis), strict=True)]
+            listed = of_forces.with_forces(listed, analysis)
         return {"name": analysis.mechanism.name, "poses": listed, **found}
 
     def figure() -> Figure:

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 
 from cli.errors import DataError
 from cli.show.columns import Table, Written
+from cli.show.digits import finished
 
 if TYPE_CHECKING:
-    from cli.show.columns import Result
+    from cli.show.columns import Part, Result
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Form:
     Attributes
     ----------
     suffix : str
-        Of the file; CSV's parts are their bytes, others' the tables as they are shown.
+        Of the file; CSV's and JSON's parts are their bytes, others' the tables as they are shown.
     folder : Path, optional
         Where each part of Parquet gets a file of its own.
     """
@@ -35,17 +36,13 @@ class Form:
     digits: bool = False
     folder: Path | None = None
 
-    def __call__(self, table: Table, number: int) -> Written:
+    def __call__(self, table: Part, number: int) -> Written:
         """Make it of the part of this number, from 0 on."""
-        unknown = 0
-        if self.units is not None:
-            from cli.show.in_units import chosen_units, in_units
+        if isinstance(table, list):
+            from cli.show.documents import json_elements
 
-            table = in_units(table, chosen_units(self.units))
-        if self.digits:
-            from cli.show.digits import digits_that_hold
-
-            table, unknown = digits_that_hold(table)
+            return Written(json_elements(table, first=number == 0).encode(), 0)
+        table, unknown = finished(table, self.units, self.digits)
         if self.suffix == ".csv":
             from cli.show.text import csv_text
 
@@ -73,7 +70,7 @@ def stream(result: Result, suffix: str, output: Path | None, units: str | None, 
     assert result.blocks is not None
     unknown = 0
 
-    def made(form: Form, blocks: Callable[[Form], Iterator[Written]]) -> Iterator[bytes | Table]:
+    def made(form: Form, blocks: Callable[[Form], Iterator[Written]]) -> Iterator[bytes | Part]:
         nonlocal unknown
         # what is left of the work is called off when the writing ends
         with closing(blocks(form)) as parts:  # type: ignore[type-var]
@@ -87,8 +84,9 @@ def stream(result: Result, suffix: str, output: Path | None, units: str | None, 
                 pass
         return unknown
     found = made(Form(suffix, units, digits), result.blocks)
-    if suffix == ".csv":
-        text = (data for data in found if isinstance(data, bytes))
+    if suffix in (".csv", ".json"):
+        data = (data for data in found if isinstance(data, bytes))
+        text = _document(result, data) if suffix == ".json" else data
         if output is not None:
             write(output, text)
         else:
@@ -98,6 +96,17 @@ def stream(result: Result, suffix: str, output: Path | None, units: str | None, 
         tables = (data for data in found if isinstance(data, Table))
         write(output, parquet(tables) if suffix == ".parquet" else workbook({result.blocks_name: tables}))
     return unknown
+
+
+def _document(result: Result, parts: Iterator[bytes]) -> Iterator[bytes]:
+    """The JSON document around its list."""
+    from cli.show.documents import json_members
+
+    yield f'{{{json_members(result.document())},\n "{result.blocks_name}": ['.encode()
+    yield from parts
+    # what there is to say is known by now
+    said = [*result.warnings, *result.late_warnings()]
+    yield f"\n ],{json_members({'warnings': said})}\n}}\n".encode()
 
 
 @contextmanager

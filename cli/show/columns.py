@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from pathlib import Path
+    from typing import TypeAlias
 
     import numpy as np
     from matplotlib.figure import Figure
@@ -17,10 +19,16 @@ if TYPE_CHECKING:
     Cell = str | float | None
     Values = Sequence[Cell] | NDArray[np.float64]
     Bounds = Sequence[float] | NDArray[np.float64]
-    # a part of a table -> what is written of it
-    Form = Callable[["Table", int], "Written"]
     Json = None | str | float | Sequence["Json"] | Mapping[str, "Json"]
     Document = dict[str, Json]
+    # of a table, or of a list of the JSON document; and what is written of it
+    Part: TypeAlias = "Table | list[Document]"
+    Form = Callable[[Part, int], "Written"]
+
+
+def finite(value: float) -> float | None:
+    """Return a number as JSON can have it: None for what is not finite."""
+    return float(value) if isfinite(value) else None
 
 
 @dataclass(eq=False, repr=False)
@@ -55,9 +63,9 @@ class Table:
 
 
 class Written(NamedTuple):
-    """What is written of a part of a table: its bytes, or the table as it is shown, or nothing where it has a file."""
+    """What is written of a part: its bytes, or the part as it is shown, or nothing where it has a file."""
 
-    data: bytes | Table
+    data: bytes | Part
     unknown: int
     """Of how many of its numbers --digits knows no digit."""
 
@@ -83,9 +91,9 @@ class Sheet:
 class Result:
     """What a command has found, in every form it can be shown in; each is formed when it is asked for."""
 
-    document: Callable[[], Document]
+    document: Callable[[], Document] = dict
     """The JSON document, without its warnings."""
-    tables: Mapping[str, Callable[[], Table]]
+    tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
     """Name -> table; the first is the CSV."""
     companions: Sequence[str] = ()
     """Which further tables go beside a file that holds one table, as FILE-name.csv."""
@@ -112,14 +120,14 @@ class Result:
     failed: Callable[[], bool] = lambda: False
     """Whether nothing that was asked for could be found: status 1, once all is shown."""
     blocks: Callable[[Form], Iterator[Written]] | None = None
-    """The table in parts, where it is too long to be held: written as CSV, Parquet or a workbook, and nothing else.
+    """The table or the JSON's list in parts, where it is too long to be held: nothing else is written then.
 
     Whoever works a part out, perhaps another process, makes what is written of it too.
     """
     shared: bool = False
     """Whether the parts are worked out by several processes."""
     blocks_name: str = "poses"
-    """What the table in parts is called."""
+    """What the table in parts is called, or the list in JSON, which stands behind what else is in the document."""
     within: Callable[[], AbstractContextManager[None]] = nullcontext
     """What the forms are made within: it turns errors of a library into those that a user is told."""
     toml: Callable[[], bytes] | None = None

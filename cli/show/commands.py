@@ -111,8 +111,16 @@ class ShowOptions:
     @property
     def streams(self) -> bool:
         """Whether a table is all that is asked for, so that it can be written block by block."""
-        others = self.json or self.text or self.plot or self.expect or self.report
-        return self.form in (".csv", ".parquet", ".xlsx") and not others
+        return self.form in (".csv", ".parquet", ".xlsx") and not (self.json or self._others)
+
+    @property
+    def streams_json(self) -> bool:
+        """Whether one JSON document is: what --digits says of the table would stand in it too."""
+        return self.form == ".json" and not (self.json and self.output) and not (self.digits or self._others)
+
+    @property
+    def _others(self) -> bool:
+        return bool(self.text or self.plot or self.expect or self.report)
 
     @property
     def as_json(self) -> bool:

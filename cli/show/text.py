@@ -1,13 +1,13 @@
-"""Columns as text: CSV with every digit, an aligned table with six; documents as JSON."""
+"""Columns as text: CSV with every digit, an aligned table with six."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from cli.show.columns import Cell, Document, Values
+    from cli.show.columns import Cell, Values
 
 GOOD, BAD = ("ok", "within", "stable"), ("WRONG", "beyond", "unstable")
 """Verdicts, as they stand in cells and sentences."""
@@ -103,17 +103,6 @@ def angle_text(degrees: float, spec: str) -> str:
 def paragraphs(*parts: str) -> str:
     """Join what is not empty with a blank line between."""
     return "\n".join(part.rstrip("\n") + "\n" for part in parts if part)
-
-
-def json_parts(document: Document) -> Iterator[str]:
-    """Yield a document in parts: the text of a long sweep is three times the size of its numbers."""
-    import json
-
-    encoder = json.JSONEncoder(
-        ensure_ascii=False, indent=1, allow_nan=False, default=lambda array: array.tolist()
-    )
-    yield from encoder.iterencode(document)
-    yield "\n"
 
 
 def transposed(rows: Sequence[Mapping[str, Cell]]) -> dict[str, list[Cell]]:

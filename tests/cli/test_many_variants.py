@@ -14,7 +14,7 @@ import pytest
 
 from cli.errors import DataError
 from cli.mechanism.asked import Asked
-from cli.mechanism.many import Many, as_table
+from cli.mechanism.many import Many, as_it_is
 from cli.mechanism.read import wanted
 from cli.mechanism.studies import Request
 from cli.mechanism.variants import Variants
@@ -141,11 +141,54 @@ def test_workers_write_parquet_into_a_folder_that_reads_as_one_table(dalembert, 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["m.toml", "one.parquet", "parts.parquet"]
 
 
-def test_json_of_several_workers_is_that_of_one(dalembert, table):
-    call = ("mechanism", "m.toml", "--at", "40deg", "--json", "--variants", table("v.csv", 0, 40))
-    alone, shared = dalembert(*call), dalembert(*call, "--workers", "2")
+def test_json_of_several_workers_is_that_of_one(dalembert, table, tmp_path):
+    call = ("mechanism", "m.toml", "--sweep", "0deg:720deg:6deg", "--json", "--variants")
+    # 121 poses each: a part holds 33 of the variants
+    alone, shared = (dalembert(*call, table("v.csv", 0, 40), *more) for more in ((), ("--workers", "2")))
     assert shared.stdout == alone.stdout
     assert [v["variant"] for v in json.loads(shared.stdout)["variants"]] == [str(i) for i in range(1, 41)]
+    words = [word for word in call if word != "--json"]
+    written = dalembert(*words, "v.csv", "-o", "v.json")
+    assert written.stderr == alone.stderr
+    assert (tmp_path / "v.json").read_text() == alone.stdout
+
+
+@pytest.mark.parametrize(
+    "asked", [(), ("--only", "H,rocker"), ("--forces", "--at", "40deg", "--at", "100deg")]
+)
+def test_documents_of_many_are_those_of_a_few_described_one_by_one(dalembert, table, asked):
+    poses = () if "--at" in asked else ("--sweep", "0deg:720deg:24deg")
+    call = ("mechanism", "m.toml", *poses, *asked, "--json", "--variants")
+    many = json.loads(dalembert(*call, table("all.csv", 0, 40)).stdout)["variants"]
+    few = [json.loads(dalembert(*call, table("f.csv", a, a + 20)).stdout)["variants"] for a in (0, 20)]
+    expected = [{**v, "variant": str(i)} for i, v in enumerate([*few[0], *few[1]], 1)]
+    marks, numbers, apart = set(), 0, 0
+
+    def same(found, its, at):
+        nonlocal numbers, apart
+        if isinstance(its, dict):
+            assert list(found) == list(its), at
+            for key in its:
+                same(found[key], its[key], (*at, key))
+        elif isinstance(its, list):
+            marks.update(its if at[-1] == "marks" else ())
+            assert len(found) == len(its), at
+            for i, pair in enumerate(zip(found, its, strict=True)):
+                same(*pair, (*at, i))
+        elif isinstance(its, float):
+            difference = found - its
+            if at[-1].endswith("_deg"):
+                difference = math.remainder(difference, 360)
+            # close to a limit digits are lost, to either way
+            assert abs(difference) <= 1e-9 * max(abs(its), 1.0), at
+            numbers, apart = numbers + 1, apart + (found != its)
+        else:
+            assert found == its, at
+
+    same(many, expected, ("variants",))
+    # the formulas were written down: not every digit is that of the other way
+    assert 0 < apart < numbers
+    assert not poses or "change point" in marks
 
 
 class Sent:
@@ -169,10 +212,10 @@ def question(v):
 def test_a_part_whose_worker_died_is_done_again(tmp_path):
     flag = tmp_path / "died"
     dies_once = f"(p := __import__('pathlib').Path({str(flag)!r})).exists() or (p.touch(), __import__('os')._exit(1)) and None"
-    form = Sent(f"(None, {dies_once}, __import__('cli.mechanism.many', fromlist=['as_table']).as_table)[2]")
+    form = Sent(f"(None, {dies_once}, __import__('cli.mechanism.many', fromlist=['as_it_is']).as_it_is)[2]")
     found = [row for part in question(130).blocks(form) for row in part.data.columns[0].values]
     assert flag.exists()
-    expected = [row for part in question(130).blocks(as_table) for row in part.data.columns[0].values]
+    expected = [row for part in question(130).blocks(as_it_is) for row in part.data.columns[0].values]
     assert found == expected
     assert len(set(found)) == 130
 

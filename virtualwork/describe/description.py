@@ -116,9 +116,13 @@ class Description(Record):
 
         Every tolerance is relative to it.
         """
+        return max(self.spans, default=0.0) or 1.0
+
+    @property
+    def spans(self) -> list[float]:
+        """Distances of two points of one link or of the ground, and of guides from their bodies' axes, m."""
         spans = [abs(a - b) for body in self.bodies.values() for a in body.values() for b in body.values()]
-        rooms = [abs(g.through) for g in self.guides if not isinstance(g.through, str)]
-        return max(spans + rooms, default=0.0) or 1.0
+        return spans + [abs(g.through) for g in self.guides if not isinstance(g.through, str)]
 
     @cached_property
     def bodies(self) -> Mapping[str, Mapping[str, complex]]:

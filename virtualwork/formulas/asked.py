@@ -32,7 +32,7 @@ FORCES = {
 # what the joints carry
 JOINTS = {"newton-euler", "force", "moment", "reaction"}
 # what has two parts
-COMPLEX = {"point", "turn", "dpoint", "force", "reaction", "shaking", "applied", "gap"}
+COMPLEX = {"point", "turn", "dpoint", "force", "reaction", "shaking", "applied", "gap", "column"}
 # times that one pose is asked for, and poses, from which on the tape pays
 OFTEN = 50
 MANY_POSES = 1_000_000

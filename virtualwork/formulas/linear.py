@@ -72,6 +72,14 @@ def inverse_norm(jacobian: Reals) -> Reals:
     return out
 
 
+def condition(cols: list[list[Number]], angles: int, size: Number, n: int) -> Reals:
+    """‖J⁻¹‖∞ of each pose from complex columns, those of so many angles divided by the mechanism's size."""
+    with np.errstate(all="ignore"):
+        jacobian = stack(cols, n)
+        jacobian[:, :, :angles] /= np.reshape(size, (-1, 1, 1))
+        return inverse_norm(jacobian)
+
+
 def singular_values(cols: list[list[Number]], angles: int, n: int) -> Reals:
     """The singular values of the Jacobian (lengths scaled) at each pose; NaN where it is not assembled."""
     jacobian = stack(cols, n)

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.linear import inverse_norm, stack
+from virtualwork.formulas.linear import condition
 from virtualwork.formulas.numbers import Complexes, Number, Reals
 from virtualwork.formulas.positions import BLOCK, SWEEP, Case, State, columns, run
 from virtualwork.formulas.rates import Passage, Rates
@@ -175,13 +175,9 @@ class Poses:
         size = self.mechanism.size
         whole = np.empty(self.n)
         for rows, st in self.rows():
-            length = rows.stop - rows.start
-            with np.errstate(all="ignore"):
-                jacobian = stack(columns(group, st), length)
-                jacobian[:, :, : len(group.angles)] /= size
-                whole[rows] = inverse_norm(jacobian)
-                if st.folded:
-                    whole[rows][np.isfinite(whole[rows])] = np.inf
+            whole[rows] = condition(columns(group, st), len(group.angles), size, rows.stop - rows.start)
+            if st.folded:
+                whole[rows][np.isfinite(whole[rows])] = np.inf
         return whole
 
     # --- solving ----------------------------------------------------------------------------------------------
