@@ -36,6 +36,11 @@ class DataError(Exception):
     """Bad data: shown as one line, status 1."""
 
 
+def needs(what: str, package: str, extra: str) -> DataError:
+    """Say what is missing where a package of an extra is not installed."""
+    return DataError(f"{what} needs {package}: install dalembert with its extra, dalembert[{extra}]")
+
+
 def cell_error(file: str, row: int, line: int, column: str, found: str, expected: str) -> DataError:
     """Name file, row, column, the value found and what was expected.
 

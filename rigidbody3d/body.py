@@ -7,24 +7,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.exact import UNIT
 from dalembert.arithmetic.records import components, numbers, record, table
-from rigidbody3d import rounding, solids
-from rigidbody3d.inertia import Principal, principal, products, shift, turn
-from rigidbody3d.rounding import BodyError, Numbers
-from rigidbody3d.shapes import inertia_of
+from rigidbody3d import solids
+from rigidbody3d.inertia import Principal, point_tensor, principal, products, turned_tensor
+from rigidbody3d.rounding import BodyError, MassProperties, of_body
+from rigidbody3d.shapes import inertia_of, shape_tensor
 from rigidbody3d.solids import Solid, Whole
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import FigureBase
 
+    from dalembert.arithmetic.bounds import Given
+
 Array = NDArray[np.float64]
+Formula = Callable[..., MassProperties]
+"""Mass, centre and tensor of a body from those of another, on arrays of any kind of number, recorded ones for bounds too."""
 
 
 @record
@@ -73,35 +78,40 @@ class Body:
     ) -> Body:
         """Return a body of a shape (see `shapes.SHAPES`) along its own axes."""
         m, c = np.asarray(mass, dtype=float), np.asarray(center, dtype=float)
+        given: dict[str, Given] = {"mass": (m, 0, 0.0), "center": (c, 1, 0.0)}
+        given |= {name: (x, 0, 0.0) for name, x in dimensions.items()}
         return cls(
             m,
             c,
             inertia_of(shape, mass, **dimensions),
-            partial(rounding.of_shape, shape, m, c, dimensions),
+            partial(_error, _shaped, dict, given, shape),
             partial(solids.of_shape, shape, m, c, dimensions),
         )
 
     def moved(self, offset: ArrayLike) -> Body:
         """Return the body moved by an offset (..., 3), m: its tensor stays as it is, digit for digit."""
         by = np.asarray(offset, dtype=float)
-        error, form = partial(rounding.moved, self.numbers, by), partial(solids.moved, self.solids, by)
-        return Body(self.mass, self.center + by, self.inertia, error, form)
+        return self._made(_moved, partial(solids.moved, self.solids, by), offset=(by, 1, 0.0))
 
-    def turned(self, rotation: ArrayLike, about: ArrayLike | None = None) -> Body:
-        """Return the body turned by a rotation matrix (..., 3, 3) about a point (default: its centre of mass)."""
+    def turned(self, rotation: ArrayLike, about: ArrayLike | None = None, error: ArrayLike = 0.0) -> Body:
+        """Return the body turned by a rotation matrix (..., 3, 3) about a point (default: its centre of mass).
+
+        `error` bounds what the entries of the matrix are off by, for `error_estimate`.
+        """
         R = np.asarray(rotation, dtype=float)
-        center, point = self.center, None if about is None else np.asarray(about, dtype=float)
-        if point is not None:
-            center = point + np.einsum("...ij,...j->...i", R, center - point)
-        error, form = (
-            partial(rounding.turned, self.numbers, R, point),
-            partial(solids.turned, self.solids, R, point),
-        )
-        return Body(self.mass, center, turn(self.inertia, R), error, form)
+        point = None if about is None else np.asarray(about, dtype=float)
+        there: dict[str, Given] = {} if point is None else {"point": (point, 1, 0.0)}
+        form = partial(solids.turned, self.solids, R, point)
+        return self._made(_turned, form, rotation=(R, 2, error), **there)
+
+    def _made(self, formula: Formula, form: Callable[[], list[Solid]], **given: Given) -> Body:
+        numbers = {name: np.asarray(x) for name, (x, _, _) in given.items()}
+        made = formula(self.mass, self.center, self.inertia, **numbers)
+        return Body(*made, partial(_error, formula, self.given, given), form)
 
     def about(self, point: ArrayLike) -> Array:
         """Return the tensor about a point (..., 3): the parallel axis theorem, (..., 3, 3), kg·m²."""
-        return np.asarray(self.inertia + shift(self.mass, self.center - np.asarray(point, dtype=float)))
+        return _about(self.mass, self.center, self.inertia, np.asarray(point, dtype=float)).inertia
 
     def to_frame(self) -> pd.DataFrame:
         """Return a table with a row per body: mass_kg, x_m …, and the tensor at the centre of mass, ixx_kg_m2 … iyz_kg_m2."""
@@ -164,9 +174,9 @@ class Body:
         moments, axes = self.principal
         return Whole(self.center, np.sqrt(np.clip(moments, 0, None) / self.mass), axes)
 
-    def numbers(self) -> Numbers:
+    def given(self) -> dict[str, Given]:
         """Return mass, centre of mass and tensor with the errors of how the body was made."""
-        return rounding.numbers(self.mass, self.center, self.inertia, self.error_estimate())
+        return of_body(self.mass, self.center, self.inertia, self.error_estimate())
 
     def error_estimate(self, about: ArrayLike | None = None) -> BodyError:
         """Return bounds of the rounding errors of `.mass`, `.center` and `.inertia`, in their shapes.
@@ -178,8 +188,8 @@ class Body:
 
         Notes
         -----
-        Zero for a body as given; where it was moved, turned or put together its formula is worked out again on
-        numbers with bounds, so that what a hole all but cancels shows. The given numbers count as exact.
+        Zero for a body as given; where it was moved, turned or put together the adjoint of its formula says what
+        each rounding becomes, so that what a hole all but cancels shows. The given numbers count as exact.
 
         Examples
         --------
@@ -189,7 +199,11 @@ class Body:
         True
         """
         if about is not None:
-            return rounding.about(self.numbers(), np.asarray(about, dtype=float))
+            return _error(_about, self.given, {"point": (about, 1, 0.0)})
+        return self._own_error
+
+    @cached_property
+    def _own_error(self) -> BodyError:
         if self.rounding is not None:
             return self.rounding()
         return BodyError(*(np.zeros_like(x) for x in (self.mass, self.center, self.inertia)))
@@ -217,16 +231,80 @@ def compose(parts: Body, axis: int = -1) -> Body:
     array([0.66666667, 0.66666667, 0.        ])
     """
     at = axis % parts.mass.ndim
-    mass = np.moveaxis(parts.mass, at, 0)
-    center = np.moveaxis(parts.center, at, 0)
-    inertia = np.moveaxis(parts.inertia, at, 0)
+    mass, center, inertia = (np.moveaxis(x, at, 0) for x in (parts.mass, parts.center, parts.inertia))
     total = mass.sum(axis=0)
     if not (total > 0).all():
         raise ValueError(f"the total mass must be positive, found {np.min(total):g} kg")
     middle = center[0] + (mass[..., None] * (center - center[0])).sum(axis=0) / total[..., None]
+    total, moment, own, shifted = (x.sum(axis=0) for x in _shares(mass, center, inertia, middle))
+    whole = _whole(total, moment, own, shifted, middle)
+    return Body(*whole, partial(_composed_error, parts.given, at, middle), parts.solids)
+
+
+def _moved(mass: Array, center: Array, inertia: Array, offset: Array) -> MassProperties:
+    return MassProperties(mass, center + offset, inertia)
+
+
+def _turned(
+    mass: Array, center: Array, inertia: Array, rotation: Array, point: Array | None = None
+) -> MassProperties:
+    if point is not None:
+        center = point + np.einsum("...ij,...j->...i", rotation, center - point)
+    return MassProperties(mass, center, turned_tensor(inertia, rotation))
+
+
+def _shaped(shape: str, mass: Array, center: Array, **dimensions: Array) -> MassProperties:
+    return MassProperties(mass, center, shape_tensor(shape, mass, dimensions))
+
+
+def _about(mass: Array, center: Array, inertia: Array, point: Array) -> MassProperties:
+    return MassProperties(mass, center, np.asarray(inertia + point_tensor(mass, center - point)))
+
+
+def _shares(mass: Array, center: Array, inertia: Array, middle: Array) -> list[Array]:
+    """What each part adds to the whole: mass, its moment about the middle, its own tensor, and the shift there."""
     offset = center - middle
-    slip = (mass[..., None] * offset).sum(axis=0) / total[..., None]
-    whole = inertia.sum(axis=0) + shift(mass, offset).sum(axis=0) - shift(total, slip)
-    return Body(
-        total, middle + slip, whole, partial(rounding.composed, parts.numbers, at, middle), parts.solids
-    )
+    return [mass, mass[..., None] * offset, inertia, point_tensor(mass, offset)]
+
+
+def _whole(mass: Array, moment: Array, inertia: Array, shifted: Array, middle: Array) -> MassProperties:
+    """The body of these sums; the middle counts as exact: what it is off from the centre is taken out again."""
+    slip = moment / mass[..., None]
+    return MassProperties(mass, middle + slip, inertia + shifted - point_tensor(mass, slip))
+
+
+# --- bounds of rounding errors ---
+
+
+def _error(
+    formula: Formula, body: Callable[[], Mapping[str, Given]], given: Mapping[str, Given], *options: str
+) -> BodyError:
+    """Bound what a formula makes of a body, or of nothing but what is given."""
+    from dalembert.arithmetic.bounds import bounds
+
+    return BodyError(*bounds(formula, {**body(), **given}, *options))
+
+
+def _composed_error(parts: Callable[[], dict[str, Given]], axis: int, middle: Array) -> BodyError:
+    """Bound the body of all parts."""
+    from dalembert.arithmetic.bounds import bounds
+
+    there: dict[str, Given] = {"middle": (middle, 1, 0.0)}
+    for name, (x, axes, error) in parts().items():
+        by_part = (np.moveaxis(y, axis, 0) for y in np.broadcast_arrays(np.asarray(x, dtype=float), error))
+        there[name] = next(by_part), axes, next(by_part)
+    shares = _shares(**{name: np.asarray(x) for name, (x, _, _) in there.items()})
+    sums: dict[str, Given] = {"middle": (middle, 1, 0.0)}
+    for name, share, error in zip(SUMMED, shares, bounds(_shares, there), strict=True):
+        # added up in whatever order
+        rounded = UNIT * (len(share) - 1) * np.abs(share).sum(axis=0)
+        sums[name] = share.sum(axis=0), SUMMED[name], error.sum(axis=0) + rounded
+    mass, center, inertia = bounds(_whole, sums)
+    # the division by the mass, beyond the first order
+    part = mass / shares[0].sum(axis=0)
+    grown = np.divide(1.0, 1.0 - part, out=np.full(part.shape, np.inf), where=part < 1)
+    return BodyError(mass, center * grown[..., None], inertia * grown[..., None, None])
+
+
+SUMMED = {"mass": 0, "moment": 1, "inertia": 2, "shifted": 2}
+"""What is summed over parts, and how many axes it has."""

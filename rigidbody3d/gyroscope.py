@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.exact import UNIT
 from dalembert.arithmetic.records import record
-from rigidbody3d import rounding
+
+if TYPE_CHECKING:
+    from dalembert.arithmetic.bounds import Given
 
 Array = NDArray[np.float64]
 
@@ -36,16 +39,18 @@ class _Rates(NamedTuple):
 class Steady(_Rates):
     """The two rates of steady precession, `.slow` and `.fast`, rad/s; NaN where the spin is too slow for any."""
 
-    given: tuple[Array, ...]
-    """I1, I3, m g l, tilt and spin."""
+    given: dict[str, Given]
+    """I1, I3, m g l, the tilt's cosine, the spin, and the sign of its momentum."""
 
     def error_estimate(self) -> tuple[Array, Array]:
         """Return bounds of the rounding errors of both rates, (...), rad/s.
 
         Where the two nearly coincide, at the least spin that allows them, the square root leaves half the digits.
         """
-        slow, fast = rounding.steady(*self.given)
-        return slow.error, fast.error
+        from dalembert.arithmetic.bounds import bounds
+
+        slow, fast = bounds(_rates, self.given)
+        return np.where(self.slow == 0, 0.0, slow), np.where(np.isinf(self.fast), np.inf, fast)
 
 
 def steady_precession(
@@ -76,18 +81,24 @@ def steady_precession(
     [5.07653596218304..., 20.980370319014...]
     """
     I1, I3, a, theta, w = (np.asarray(x, dtype=float) for x in (transverse, axial, mgl, tilt, spin))
-    B = I3 * w
     c = np.cos(theta)
     # a right angle given in radians is one to rounding
     c = np.where(np.abs(c) < 1e-16, 0.0, c)
-    square = B * B - 4 * I1 * a * c
+    side = np.where(I3 * w < 0, -1.0, 1.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        large = B + np.where(B < 0, -1.0, 1.0) * np.sqrt(np.where(square < 0, np.nan, square))
-        slow = np.where(a == 0, 0.0 * large, 2 * a / large)
-        fast = large / (2 * I1 * c)
-    found = Steady(np.asarray(slow), np.asarray(fast))
-    found.given = I1, I3, a, theta, w
+        slow, fast = _rates(I1, I3, a, c, w, side)
+    found = Steady(np.where((a == 0) & (w == 0), 0.0, slow), np.asarray(fast))
+    exact = {"I1": I1, "I3": I3, "mgl": a, "spin": w, "side": side}
+    # a cosine errs by one unit in its last place
+    found.given = {"c": (c, 0, 2 * UNIT * np.abs(c)), **{name: (x, 0, 0.0) for name, x in exact.items()}}
     return found
+
+
+def _rates(I1: Array, I3: Array, mgl: Array, c: Array, spin: Array, side: Array) -> tuple[Array, Array]:
+    """On arrays of any kind of number, recorded ones for bounds too."""
+    B = I3 * spin
+    large = B + side * np.sqrt(B * B - 4 * I1 * mgl * c)
+    return 2 * mgl / large, large / (2 * I1 * c)
 
 
 def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) -> Array:
@@ -104,15 +115,8 @@ def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) 
     return np.asarray(2 * np.sqrt(np.maximum(a, 0.0) * I1) / I3)
 
 
-class _Cones(NamedTuple):
-    space: Array
-    body: Array
-    precession: Array
-    spin: Array
-
-
 @record
-class Cones(_Cones):
+class Cones(NamedTuple):
     """The cones of a free symmetric body: half angles, rad, and rates, rad/s.
 
     `.space` is the angle between ω and H, the cone fixed in space; `.body` that between ω and the axis of the body,
@@ -120,12 +124,15 @@ class Cones(_Cones):
     about its axis relative to the precessing plane, ω3 (I1 - I3)/I1.
     """
 
-    given: tuple[Array, ...]
-    """I1, I3 and ω."""
+    space: Array
+    body: Array
+    precession: Array
+    spin: Array
 
     def error_estimate(self) -> tuple[Array, ...]:
         """Return bounds of the rounding errors of the four, (...): small beside each, since nothing here cancels."""
-        return tuple(x.error for x in rounding.cones(*self.given))
+        roundings = (16, 6, 8, 4)
+        return tuple(n * UNIT * np.abs(x) for n, x in zip(roundings, self, strict=True))
 
 
 def cones(transverse: ArrayLike, axial: ArrayLike, omega: ArrayLike) -> Cones:
@@ -153,11 +160,9 @@ def cones(transverse: ArrayLike, axial: ArrayLike, omega: ArrayLike) -> Cones:
     w = np.asarray(omega, dtype=float)
     across, along = np.hypot(w[..., 0], w[..., 1]), w[..., 2]
     space = np.arctan2(np.abs(I1 - I3) * across * np.abs(along), I1 * across**2 + I3 * along**2)
-    found = Cones(
+    return Cones(
         space,
         np.arctan2(across, np.abs(along)),
         np.hypot(across, I3 * along / I1),
         np.asarray(along * (I1 - I3) / I1),
     )
-    found.given = I1, I3, w
-    return found

@@ -91,9 +91,11 @@ def tensor(
     >>> tensor(2, 3, 4, ixy=0.5)[0]
     array([ 2. , -0.5, -0. ])
     """
-    xx, yy, zz, xy, xz, yz = np.broadcast_arrays(
-        *(np.asarray(x, dtype=float) for x in (ixx, iyy, izz, ixy, ixz, iyz))
-    )
+    return _arranged(*(np.asarray(x, dtype=float) for x in (ixx, iyy, izz, ixy, ixz, iyz)))
+
+
+def _arranged(*entries: Array) -> Array:
+    xx, yy, zz, xy, xz, yz = np.broadcast_arrays(*entries)
     rows = [[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
@@ -129,9 +131,13 @@ def shift(mass: ArrayLike, offset: ArrayLike) -> Array:
     >>> shift(2.0, [3.0, 0.0, 0.0]).diagonal()
     array([ 0., 18., 18.])
     """
-    m = np.asarray(mass, dtype=float)
-    x, y, z = np.moveaxis(np.asarray(offset, dtype=float), -1, 0)
-    return tensor(
+    return point_tensor(np.asarray(mass, dtype=float), np.asarray(offset, dtype=float))
+
+
+def point_tensor(m: Array, offset: Array) -> Array:
+    """The same of arrays of any kind of number."""
+    x, y, z = np.moveaxis(offset, -1, 0)
+    return _arranged(
         m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y), m * (x * y), m * (x * z), m * (y * z)
     )
 
@@ -144,8 +150,12 @@ def turn(inertia: ArrayLike, rotation: ArrayLike) -> Array:
     >>> turn(np.diag([1.0, 2.0, 3.0]), [[0, -1, 0], [1, 0, 0], [0, 0, 1]]).diagonal()
     array([2., 1., 3.])
     """
-    R = np.asarray(rotation, dtype=float)
-    turned = R @ np.asarray(inertia, dtype=float) @ np.swapaxes(R, -1, -2)
+    return turned_tensor(np.asarray(inertia, dtype=float), np.asarray(rotation, dtype=float))
+
+
+def turned_tensor(inertia: Array, R: Array) -> Array:
+    """The same of arrays of any kind of number."""
+    turned = R @ inertia @ np.swapaxes(R, -1, -2)
     return np.asarray((turned + np.swapaxes(turned, -1, -2)) / 2)
 
 

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import components, numbers, record, table
 from rigidbody3d.body import Body
-from rigidbody3d.rounding import MassProperties, of_body
+from rigidbody3d.rounding import MassProperties
 from rigidbody3d.rounding_in_time import require
 
 if TYPE_CHECKING:
@@ -207,8 +207,7 @@ class Shaft(_Formulas):
         from dalembert.arithmetic.bounds import bounds, read
 
         require(of, *ESTIMATED)
-        body = self.body
-        entering = of_body(body.mass, body.center, body.inertia, body.error_estimate())
+        entering = self.body.given()
         for name, axes in (("bearings", 1), ("speed", 0), ("speed_rate", 0), ("gravity", 1)):
             entering[name] = read(getattr(self, name), axes, given)
         return bounds(_quantity, entering, of)[0]

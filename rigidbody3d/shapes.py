@@ -8,7 +8,7 @@ down to walls without thickness.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -185,11 +185,23 @@ def inertia_of(shape: str, mass: ArrayLike, **dimensions: ArrayLike) -> Array:
     >>> inertia_of("disk", 2.0, radius=0.3).diagonal()
     array([0.045, 0.045, 0.09 ])
     """
-    values = _dimensions(shape, dimensions)
-    m = np.asarray(mass, dtype=float)
-    moments = [m * np.asarray(x) for x in find(shape).moments(**values)]
+    return shape_tensor(shape, np.asarray(mass, dtype=float), _dimensions(shape, dimensions))
+
+
+def shape_tensor(shape: str, mass: Array, dimensions: Mapping[str, Array]) -> Array:
+    """The same of arrays of any kind of number, which are not checked."""
+    known = SHAPES[shape]
+    full = dict.fromkeys(known.optional, 0.0) | dict(dimensions)
+    moments = [mass * np.asarray(x) for x in known.moments(**full)]
     diagonal = np.stack(np.broadcast_arrays(*moments), axis=-1)
     return np.asarray(diagonal[..., None, :] * np.eye(3))
+
+
+def weighed(shape: str, dense: bool, amount: Array, **dimensions: Array) -> list[Array]:
+    """Return mass and tensor of a shape from its mass or, where it is `dense`, its density: arrays of any kind of number."""
+    measure = SHAPES[shape].measure
+    mass = amount * np.asarray(measure(**dimensions)) if dense and measure is not None else amount
+    return [mass, shape_tensor(shape, mass, dimensions)]
 
 
 def measure_of(shape: str, **dimensions: ArrayLike) -> tuple[Array, int]:

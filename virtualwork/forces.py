@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualwork.bounds.forces import ForceErrors
 from virtualwork.formulas.dynamics import Dynamics
 
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
+
+    from virtualwork.bounds.forces import ForceErrors
 
 
 class Forces(Dynamics):
@@ -20,6 +21,9 @@ class Forces(Dynamics):
 
     @cached_property
     def _errors(self) -> ForceErrors:
+        # not loaded for forces alone
+        from virtualwork.bounds.forces import ForceErrors
+
         return ForceErrors(self)
 
     def error_estimate(self) -> ForceErrors:

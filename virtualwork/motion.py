@@ -193,6 +193,44 @@ class Motion:
 
         return Bounds(self.poses)
 
+    def error_estimates(self, *names: str) -> dict[str, Reals]:
+        """Return bounds (n,) of the rounding errors of several quantities, as their `error_estimate` gives them one by one.
+
+        They come from one sweep, which they have most of in common.
+
+        Parameters
+        ----------
+        names : str
+            Called as in `Mechanism.evaluator`: `points.H.velocity`, `links.coupler.omega`, `effort`.
+
+        Raises
+        ------
+        DescriptionError
+            Where a name is not known.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
+        >>> found = crank.motion(1.0, speed=2.0).error_estimates("points.P", "links.crank.omega")
+        >>> bool(0 < found["points.P"][0] < 1e-15), found["links.crank.omega"]
+        (True, array([0.]))
+        """
+        from virtualwork.evaluator import key_of
+
+        keys = {name: key_of(self.assembly, name) for name in names}
+        forces = (
+            self.dynamics.error_estimate() if any(key[0] == "reaction" for key in keys.values()) else None
+        )
+        moved = [key for key in keys.values() if key[0] != "reaction"]
+        self.rounding.together(moved)
+        if forces is not None:
+            forces.together()
+        return {
+            name: self.rounding.of(key) if forces is None or key in moved else forces.reaction(*key[1:])
+            for name, key in keys.items()
+        }
+
     # --- forces -----------------------------------------------------------------------------------------------
     @cached_property
     def dynamics(self) -> Forces:

@@ -71,7 +71,11 @@ class PointMotion:
 
     def complex(self, order: int) -> Complexes:
         """The order-th time derivative as x + iy, (n,)."""
-        return self.motion.value(("point", self.body, self.place, self.node, order))  # type: ignore[no-any-return]
+        return self.motion.value(self.key(order))  # type: ignore[no-any-return]
+
+    def key(self, order: int = 0) -> Key:
+        """What the position or a time derivative is asked for by (`Recording.value`)."""
+        return "point", self.body, self.place, self.node, order
 
     def error_estimate(self, order: int = 0) -> Reals:
         """Return a bound (n,) of the rounding error of the position (order 0), velocity (1), acceleration (2) or jerk.
@@ -90,7 +94,7 @@ class PointMotion:
         >>> bool(abs(point.position[0, 1] - math.sqrt(0.75)) <= point.error_estimate()[0] < 1e-15)
         True
         """
-        return self.motion.rounding.of(("point", self.body, self.place, self.node, order))
+        return self.motion.rounding.of(self.key(order))
 
     def sensitivity(self, path: str, order: int = 0) -> Reals:
         """Return the derivative (n, 2) of the position (order 0), velocity (1), ... to a number of the description.
@@ -116,7 +120,7 @@ class PointMotion:
         >>> crank.motion(math.pi / 2).point("P").sensitivity("links.crank.P.x").round(15)
         array([[0., 1.]])
         """
-        return xy(self.motion.derivative(("point", self.body, self.place, self.node, order), path))
+        return xy(self.motion.derivative(self.key(order), path))
 
     def coefficient(self, j: int = 0) -> Complexes:
         """The velocity coefficient dP/dq_j as x + iy, (n,): the point's virtual displacement for a unit of input j."""
@@ -161,21 +165,25 @@ class LinkMotion:
         return self._rate(3)
 
     def _rate(self, order: int) -> Reals:
-        return self.motion.value(("angle", self.body, order))  # type: ignore[no-any-return]
+        return self.motion.value(self.key(order))  # type: ignore[no-any-return]
+
+    def key(self, order: int = 0) -> Key:
+        """What the angle or a time derivative is asked for by (`Recording.value`)."""
+        return "angle", self.body, order
 
     def error_estimate(self, order: int = 0) -> Reals:
         """Return a bound (n,) of the rounding error of the angle (order 0, rad), ω (1), α (2) or the angular jerk (3).
 
         The dimensions and the input are taken as exact. See `virtualwork.bounds`.
         """
-        return self.motion.rounding.of(("angle", self.body, order))
+        return self.motion.rounding.of(self.key(order))
 
     def sensitivity(self, path: str, order: int = 0) -> Reals:
         """Return the derivative (n,) of the angle (order 0, rad), ω (1), α (2) to a number of the description.
 
         `path` names the number, such as "links.crank.B.x".
         """
-        return self.motion.derivative(("angle", self.body, order), path)  # type: ignore[no-any-return]
+        return self.motion.derivative(self.key(order), path)  # type: ignore[no-any-return]
 
     def coefficient(self, j: int = 0) -> Reals:
         """The velocity coefficient dθ/dq_j, (n,): the link's virtual rotation for a unit of input j."""
@@ -212,15 +220,19 @@ class SlideMotion:
         return self._rate(3)
 
     def _rate(self, order: int) -> Reals:
-        return self.motion.value(("slide", self.guide, order))  # type: ignore[no-any-return]
+        return self.motion.value(self.key(order))  # type: ignore[no-any-return]
+
+    def key(self, order: int = 0) -> Key:
+        """What the slide or a time derivative is asked for by (`Recording.value`)."""
+        return "slide", self.guide, order
 
     def error_estimate(self, order: int = 0) -> Reals:
         """Return a bound (n,) of the rounding error of the slide (order 0, m), its speed (1), acceleration (2) or jerk (3).
 
         The dimensions and the input are taken as exact. See `virtualwork.bounds`.
         """
-        return self.motion.rounding.of(("slide", self.guide, order))
+        return self.motion.rounding.of(self.key(order))
 
     def sensitivity(self, path: str, order: int = 0) -> Reals:
         """Return the derivative (n,) of the slide (order 0, m), its speed (1), ... to a number of the description."""
-        return self.motion.derivative(("slide", self.guide, order), path)  # type: ignore[no-any-return]
+        return self.motion.derivative(self.key(order), path)  # type: ignore[no-any-return]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -79,6 +80,28 @@ def _four_bar(poses: int) -> Iterator[Measurement]:
     work = "four-bar: positions, ω and α"
     yield measured(DOMAIN, work, "closed form", rates, size=len(angles), error=error, aim_ns=60.0)
 
+    work, names = "four-bar: position, both angles, ω and α, with bounds of their seven errors", _bounded()
+
+    def answers() -> Motion:
+        motion = bare.motion(angles, speed=speed, acceleration=0.0)
+        for x in (motion.link("coupler"), motion.link("rocker")):
+            _ = x.angle, x.omega, x.alpha
+        _ = motion.point("C").position
+        return motion
+
+    def each() -> list[Real]:
+        motion = answers()
+        return [motion.error_estimates(name)[name] for name in names]
+
+    least = measured(DOMAIN, work, "the answers alone", answers, size=len(angles))
+    yield least
+    for method, bounded in (
+        ("together", lambda: [*answers().error_estimates(*names).values()]),
+        ("one by one", each),
+    ):
+        timed = measured(DOMAIN, work, method, bounded, size=len(angles), aim_ns=1200.0)
+        yield replace(timed, floor="the answers alone", ratio=timed.units / least.units, aim_ratio=16.0)
+
     def ask(motion: Motion) -> list[Real]:
         return [motion.effort, *(motion.reaction(pin, on=link) for pin, link in PINS)]
 
@@ -110,6 +133,12 @@ def _four_bar(poses: int) -> Iterator[Measurement]:
             0.0,
         )
         yield measured(DOMAIN, work, method, forces, size=len(angles), error=error, aim_ns=aim)
+
+
+def _bounded() -> list[str]:
+    """The seven quantities whose errors are bounded."""
+    rates = [f"links.{link}.{k}" for k in ("angle", "omega", "alpha") for link in ("coupler", "rocker")]
+    return ["points.C", *rates]
 
 
 def _klann(poses: int) -> Iterator[Measurement]:

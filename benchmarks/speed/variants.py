@@ -1,4 +1,4 @@
-"""Families: many variants of one mechanism, beside a loop over described mechanisms and beside poses of one."""
+"""Families: many variants of one mechanism, beside a loop over mechanisms and poses of one; designs of an optimiser."""
 
 from __future__ import annotations
 
@@ -28,6 +28,15 @@ from virtualwork.plan.joints import joints
 Real = NDArray[np.float64]
 DOMAIN = "variants"
 PATHS = ("links.crank.B.x", "links.coupler.C.x", "links.rocker.C.x", "ground.D.x")
+# the dimensions of an optimiser
+TEN = (
+    *PATHS,
+    "ground.A.x",
+    "ground.A.y",
+    "ground.D.y",
+    "links.crank.B.y",
+    *(f"links.coupler.H.{k}" for k in "xy"),
+)
 SPEED = 10.0
 RATES: list[Key] = [("angle", name, k) for name in ("coupler", "rocker") for k in (1, 2)]
 # how many are described alone, for the time of a loop and for the error
@@ -35,7 +44,7 @@ ALONE = 200
 
 
 def measure(quick: bool) -> Iterator[Measurement]:
-    """Yield time and error of families: one pose of many variants, many poses with forces, two processes."""
+    """Yield time and error of families: one pose of many variants, many poses with forces, an optimiser's evaluation, two processes."""
     bare, loaded = four_bar(), four_bar(loaded=True)
     many = 10_000 if quick else 100_000
     numbers = lengths(bare, 2 * many)
@@ -62,6 +71,7 @@ def measure(quick: bool) -> Iterator[Measurement]:
                 call = partial(_solve, family, 1.0, RATES)
                 yield measured(DOMAIN, work, name + method, call, size=v, error=off, aim_ns=aim)
     yield from _forces(loaded, 100 if quick else 1000)
+    yield from _evaluations()
     yield from _processes(loaded, many if quick else 1_000_000)
 
 
@@ -104,8 +114,47 @@ def _forces(m: Mechanism, v: int) -> Iterator[Measurement]:
                 error=off,
             )
         yield least
-        aim = 1.3 if name == "numpy" else None
-        yield replace(found, floor="poses of one mechanism", ratio=found.units / least.units, aim_ratio=aim)
+        yield replace(found, floor="poses of one mechanism", ratio=found.units / least.units, aim_ratio=1.3)
+
+
+def _evaluations() -> Iterator[Measurement]:
+    """What an optimiser asks for, of one design after another, and with its gradient to ten dimensions."""
+    bare, turn = four_bar(), np.linspace(0, 2 * np.pi, 73)
+    coupler = bare.links["coupler"]
+    links = dict(bare.links, coupler=replace(coupler, points={**coupler.points, "H": 0.06 + 0.04j}))
+    m = replace(bare, links=links)
+    own, rng = np.array([float(np.real(value(m, path))) for path in TEN]), np.random.default_rng(0)
+    numbers = own + 1e-4 * rng.normal(size=(ALONE, len(TEN)))
+    alone = [changed(m, dict(zip(TEN, x.tolist(), strict=True))).motion(turn).point("H") for x in numbers[:5]]
+    place = np.stack([point.position.T for point in alone])
+    slopes = np.stack([[point.sensitivity(path) for path in TEN] for point in alone])
+    work = "an optimiser's evaluation: new dimensions, 73 poses, position of a point"
+    for name, aim in (("numpy", 60e3), ("llvm", 25e3)):
+        if name == "llvm" and not compiled_code():
+            continue
+        with engine(name):
+            design = m.design(TEN, "points.H")
+            off = worst([design(x, turn) for x in numbers[:5]], place)
+            value_alone = measured(
+                DOMAIN,
+                work,
+                name,
+                lambda design=design: [design(x, turn) for x in numbers],  # type: ignore[misc]
+                size=ALONE,
+                error=off,
+                aim_ns=aim,
+            )
+            found = np.array([design.slopes(x, turn)[..., :-1] for x in numbers[:5]])
+            both = measured(
+                DOMAIN,
+                work,
+                f"{name}, with the gradient to ten dimensions",
+                lambda design=design: [(design(x, turn), design.slopes(x, turn)) for x in numbers],  # type: ignore[misc]
+                size=ALONE,
+                error=worst(found.transpose(0, 3, 2, 1), slopes),
+            )
+        yield value_alone
+        yield replace(both, floor="without the gradient", ratio=both.units / value_alone.units, aim_ratio=4.0)
 
 
 def _processes(m: Mechanism, v: int) -> Iterator[Measurement]:

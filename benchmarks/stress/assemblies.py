@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.stress.pairs import Pairs
-from benchmarks.stress.topologies import END, Topology, evaluate, follow, generate, regularity
+from benchmarks.stress.topologies import Topology, evaluate, generate, regularity
+from benchmarks.stress.topology_followed import END, follow
 from virtualwork import Guess
 from virtualwork.branch.assembly import Assembly
 from virtualwork.formulas.numbers import Reals

@@ -9,8 +9,8 @@ import numpy as np
 
 from benchmarks.stress import random_linkages
 from benchmarks.stress.topologies import generate
-from dalembert.arithmetic.adjoint import rounding_bounds
 from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.rounding import rounding_bounds
 from dalembert.arithmetic.tape import Tape
 from virtualwork import Mechanism
 from virtualwork.describe.description import Description

@@ -92,20 +92,6 @@ def document(found: Balancing) -> Document:
             },
         }
         if tolerance is not None:
-            entry["tolerance"] = {
-                "grade": tolerance.grade,
-                "permissible_kg_m": tolerance.permissible,
-                "planes": [
-                    {
-                        "plane": v.plane,
-                        "permissible_kg_m": v.permissible,
-                        "initial_kg_m": v.initial,
-                        "within": v.initial <= v.permissible,
-                        "residual_kg_m": v.residual,
-                        "residual_within": v.residual <= v.permissible,
-                    }
-                    for v in found.verdicts(r)
-                ],
-            }
+            entry["tolerance"] = tolerance.document(found.verdicts(r))
         documents.append(entry)
     return {"correction": "remove" if found.request.remove else "add", "rotors": documents}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from cli.balance.read import Complex, Real, Rotors
 from cli.errors import DataError, quote
 from cli.read.planes import Planes
 from cli.read.rounding import EPS, vector_error
-from cli.read.tolerance import Tolerance
+from cli.read.tolerance import Tolerance, Verdict
 from cli.read.units import degrees, from_si, phasor, to_si
 
 if TYPE_CHECKING:
@@ -32,15 +32,6 @@ class Request:
     angle_step: tuple[float, str] | None
     center: float | None
     tolerance: Tolerance | None
-
-
-class Verdict(NamedTuple):
-    """A tolerance plane: its name and its unbalances, kg·m."""
-
-    plane: str
-    permissible: float
-    initial: float
-    residual: float
 
 
 @dataclass(eq=False, repr=False)

@@ -84,22 +84,14 @@ def run(
         if others or gravity or speed or speed_rate or correct:
             raise options.bad("--check-inertias", "it is asked alone: expected no motion and no shaft")
         return _inertias(parts)
-    for flag, given in (("--velocity", velocity), ("--acceleration", acceleration)):
-        if given is not None and fixed is not None:
-            raise options.bad(
-                flag, "the motion of the centre of mass follows from --fixed: expected one of them"
-            )
+    of_center = {"velocity": velocity, "acceleration": acceleration}
+    if fixed is not None:
+        options.refuse(
+            "the motion of the centre of mass follows from --fixed: expected one of them", **of_center
+        )
     if shaft is not None:
-        for flag, given in (
-            ("--omega", omega),
-            ("--alpha", alpha),
-            ("--frame-omega", frame_omega),
-            ("--fixed", fixed),
-            ("--velocity", velocity),
-            ("--acceleration", acceleration),
-        ):
-            if given is not None:
-                raise options.bad(flag, "a shaft turns about z at --speed and --speed-rate")
+        free = {"omega": omega, "alpha": alpha, "frame_omega": frame_omega, "fixed": fixed}
+        options.refuse("a shaft turns about z at --speed and --speed-rate", **free, **of_center)
     found = MovingBody(read_parts(parts), request)
 
     def figure() -> Figure:
@@ -154,14 +146,8 @@ def _shaft(
     from cli.read.planes import from_options
 
     if shaft is None:
-        for flag, given in (
-            ("--speed", speed),
-            ("--speed-rate", speed_rate),
-            ("--gravity", gravity),
-            ("--correct", correct),
-        ):
-            if given:
-                raise options.bad(flag, "this is for a shaft: expected --shaft Z1:Z2 too")
+        of_shaft = {"speed": speed, "speed_rate": speed_rate, "gravity": gravity, "correct": correct}
+        options.refuse("this is for a shaft: expected --shaft Z1:Z2 too", **of_shaft)
         return None
     planes = from_options(correct, "--correct") if correct else None
     if planes is not None and planes.z is None:

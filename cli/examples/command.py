@@ -49,8 +49,6 @@ def run(
         lines = [f"wrote {here}{kept}" for here, (_, kept) in files.items()]
         lines += [f"source: {about[name]['source']}", "run:", f"  {about[name]['command']}"]
     return Result(
-        document=dict,
-        tables={},
         notes=lambda: "".join(f"{line}\n" for line in lines),
         beside={here: partial(bytes, data) for here, (data, _) in files.items()},
         sheets=lambda: [Sheet("", [_section(folder, said, files) for folder, said in about.items()])],

@@ -77,8 +77,6 @@ def run(
         return [posed("", m, inputs, bare, first)]
 
     return Result(
-        document=dict,
-        tables={},
         beside={output: lambda: data},
         warnings=notes,
         sheets=sheets,

@@ -33,10 +33,7 @@ def sdf(s: Skeleton, travel: Travel, said: str) -> bytes:
             _link(s, model, part, light)
     for j in s.joints:
         joint(model, s, j, travel)
-    for link, block in s.welds:
-        made = add(model, "joint", name=f"{block} fixed", type="fixed")
-        add(made, "parent", link)
-        add(made, "child", block)
+    welds(model, s)
     gearboxes(model, m.gears, WORLD)
     plugins(model, s)
     return document(root, said)
@@ -96,6 +93,14 @@ def joint(model: Element, s: Skeleton, j: Joint, travel: Travel | None, ground: 
             add(limit, tag, digits(value - j.value))
     peak = None if travel is None else travel.peak
     add(limit, "effort", digits(0.0 if j.input is None else -1.0 if peak is None else peak))
+
+
+def welds(model: Element, s: Skeleton) -> None:
+    """Add the joints that fix blocks to their links."""
+    for link, block in s.welds:
+        made = add(model, "joint", name=f"{block} fixed", type="fixed")
+        add(made, "parent", link)
+        add(made, "child", block)
 
 
 def gearboxes(model: Element, gears: Iterable[Gear], ground: str) -> None:

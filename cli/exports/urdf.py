@@ -12,10 +12,8 @@ from cli.exports.skeleton import Branching, Part, Skeleton
 from cli.exports.travel import Travel
 from virtualwork.describe.parts import GROUND, Gear
 
-THICK = 0.008
 # a limit that is none
 LARGE = 1e9
-AXES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def urdf(s: Skeleton, travel: Travel, said: str) -> bytes:
@@ -35,10 +33,7 @@ def urdf(s: Skeleton, travel: Travel, said: str) -> bytes:
     for j in s.closing:
         ends = (j.ends[0] - origin[j.on], j.ends[1] - origin[j.link])
         sdf.joint(gazebo, s, replace(j, ends=ends), travel, GROUND)
-    for link, block in s.welds:
-        made = add(gazebo, "joint", name=f"{block} fixed", type="fixed")
-        add(made, "parent", link)
-        add(made, "child", block)
+    sdf.welds(gazebo, s)
     _gears(s, root, gazebo)
     sdf.plugins(gazebo, s)
     if len(gazebo):
@@ -53,11 +48,11 @@ def _link(s: Skeleton, root: Element, part: Part, origin: complex) -> None:
         add(inertial, "origin", xyz=spatial(part.center - origin), rpy="0 0 0")
         add(inertial, "mass", value=part.mass)
         # in the plane only izz acts
-        add(inertial, "inertia", None, **{n: part.inertia if n[1] == n[2] else 0.0 for n in AXES})
+        add(inertial, "inertia", None, **{n: part.inertia if n[1] == n[2] else 0.0 for n in sdf.AXES})
     for a, b in part.strokes:
         visual = add(link, "visual")
         add(visual, "origin", xyz=spatial((a + b) / 2 - origin), rpy=digits(0.0, 0.0, cmath.phase(b - a)))
-        size = digits(abs(b - a), 2 * THICK * s.m.size, 2 * THICK * s.m.size)
+        size = digits(abs(b - a), 2 * sdf.THICK * s.m.size, 2 * sdf.THICK * s.m.size)
         add(add(visual, "geometry"), "box", size=size)
 
 

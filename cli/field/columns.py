@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.field.runs import Channel, Real
+from cli.field.runs import Channel, Real, Runs
 from cli.field.solve import FieldBalancing
 from cli.field.tolerance import verdicts
 from cli.read.rounding import angle_error, size_error
 from cli.read.units import degrees, from_si
-from cli.show.columns import Column, Table
+from cli.show.columns import Column, Table, finite
 
 if TYPE_CHECKING:
     from cli.show.columns import Document
@@ -129,20 +129,24 @@ def split(found: FieldBalancing) -> Table:
     return Table(columns if found.several else columns[1:], keys=("rotor", "plane", "position"))
 
 
+def mass_in(runs: Runs, plane: str, w: complex) -> Document:
+    """A mass in a plane, as the JSON has it."""
+    return {"plane": plane, f"{runs.per}_{runs.per_si}": abs(w), "angle_deg": float(degrees(complex(w)))}
+
+
 def document(found: FieldBalancing) -> Document:
     """The JSON document."""
     documents: list[Document] = []
-    suffix = "kg" if found.runs.per == "mass" else "kg_m"
-    key = found.runs.per
+    suffix, key = found.runs.per_si, found.runs.per
     for rotor, (_, solved, i) in zip(found.runs.rotors, found.each(), strict=True):
         group = solved.group
         spreads = found.uncertainty(solved)
         corrections: list[Document] = []
         for p, plane in enumerate(solved.planes):
             w = solved.corrections[i, p]
-            entry: Document = {"plane": plane, f"{key}_{suffix}": abs(w), "angle_deg": float(degrees(w))}
-            entry[f"{key}_uncertainty_{suffix}"] = None if spreads is None else _number(spreads[0][i, p])
-            entry["angle_uncertainty_deg"] = None if spreads is None else _number(spreads[1][i, p])
+            entry = mass_in(found.runs, plane, w)
+            entry[f"{key}_uncertainty_{suffix}"] = None if spreads is None else finite(spreads[0][i, p])
+            entry["angle_uncertainty_deg"] = None if spreads is None else finite(spreads[1][i, p])
             if found.request.places is not None:
                 entry["split"] = [
                     {"position": name, "angle_deg": angle, f"{key}_{suffix}": part}
@@ -155,16 +159,13 @@ def document(found: FieldBalancing) -> Document:
         document: Document = {
             "rotor": rotor,
             "influence": [
-                {
-                    **channel.key,
-                    "plane": plane,
-                    f"magnitude_per_{suffix}": abs(solved.alpha[i, s, p]),
-                    "phase_deg": float(degrees(solved.alpha[i, s, p])),
-                }
+                channel.key
+                | {"plane": plane, f"magnitude_per_{suffix}": abs(solved.alpha[i, s, p])}
+                | {"phase_deg": float(degrees(solved.alpha[i, s, p]))}
                 for s, channel in enumerate(group.channels)
                 for p, plane in enumerate(solved.planes)
             ],
-            "condition_number": _number(solved.condition[i]),
+            "condition_number": finite(solved.condition[i]),
             "corrections": corrections,
             "residual": [
                 {
@@ -182,7 +183,7 @@ def document(found: FieldBalancing) -> Document:
         if solved.bound is not None:
             document["residual_bound"] = float(solved.bound[i])
         if solved.residual_95 is not None:
-            document["residual_max_95"] = _number(solved.residual_95[i])
+            document["residual_max_95"] = finite(solved.residual_95[i])
         if group.repeats:
             document["repeats"] = {
                 "readings": int(group.counts[group.counts > 1].sum()),
@@ -195,26 +196,9 @@ def document(found: FieldBalancing) -> Document:
                 for channel, misfit in zip(group.channels, solved.fits[i].misfit, strict=True)
             ]
             others = [-v / a for v, a in zip(group.initial[i], solved.fits[i].other, strict=True) if a == a]
-            document["alternatives"] = [
-                {"plane": solved.planes[0], f"{key}_{suffix}": abs(w), "angle_deg": float(degrees(w))}
-                for w in others
-            ]
+            document["alternatives"] = [mass_in(found.runs, solved.planes[0], w) for w in others]
         if found.request.tolerance is not None:
-            document["tolerance"] = {
-                "grade": found.request.tolerance.grade,
-                "permissible_kg_m": found.request.tolerance.permissible,
-                "planes": [
-                    {
-                        "plane": plane,
-                        "permissible_kg_m": share,
-                        "initial_kg_m": _number(before),
-                        "within": before <= share if np.isfinite(before) else None,
-                        "residual_kg_m": _number(after),
-                        "residual_within": after <= share if np.isfinite(after) else None,
-                    }
-                    for plane, share, before, after in verdicts(found, solved, i)
-                ],
-            }
+            document["tolerance"] = found.request.tolerance.document(verdicts(found, solved, i))
         documents.append(document)
     return {
         "correction": "add",
@@ -223,9 +207,3 @@ def document(found: FieldBalancing) -> Document:
         "rotors": documents,
         "amplitude_unit": found.runs.amplitude_unit,
     }
-
-
-def _number(value: float) -> float | None:
-    """Return a finite number, or None."""
-    number = float(value)
-    return number if np.isfinite(number) else None

@@ -111,15 +111,13 @@ def run(
         raise options.bad("--ridge", "goes with the least-squares objective without limits")
     four_run = method == "four-run"
     if four_run:
-        needs_phase = {
-            "--influence": influence,
-            "--runout": runout,
-            "--reading-error": reading_error,
-            "--phase-lag": phase_lag,
-            "--rotation": rotation,
+        needs_phase: dict[str, object] = {
+            "influence": influence,
+            "runout": runout,
+            "reading_error": reading_error,
         }
-        for flag in (flag for flag, given in needs_phase.items() if given):
-            raise options.bad(flag, "has no meaning with --method four-run, which uses no phase")
+        needs_phase |= {"phase_lag": phase_lag, "rotation": rotation}
+        options.refuse("has no meaning with --method four-run, which uses no phase", **needs_phase)
     if influence and from_here:
         raise options.bad("--from-here", "has no meaning with --influence: there are no trial masses")
     if monte_carlo and reading_error is None:
@@ -157,16 +155,9 @@ def run(
     # a phase that lags, or a shaft that turns clockwise, turns the sense of the phase against the mass angles
     against = phase_lag != (rotation == "cw")
     files = [read_stored(path) for path in influence or ()]
-    of_fit = {
-        "--fit": fit,
-        "--exclude": exclude,
-        "--predict": predict,
-        "--suggest": suggest,
-        "--robust": robust,
-    }
+    of_fit = {"fit": fit, "exclude": exclude, "predict": predict, "suggest": suggest, "robust": robust}
     if four_run:
-        for flag in (flag for flag, given in of_fit.items() if given):
-            raise options.bad(flag, "fits all runs: it does not go with --method four-run")
+        options.refuse("fits all runs: it does not go with --method four-run", **of_fit)
     fit = any(of_fit.values()) or len(files) > 1 or any(one.along is not None for one in files)
     if not four_run and not fit:
         fit = is_log(runs)

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from balancing.doubt import LEVEL
+from cli.field.columns import mass_in
 from cli.field.fit import Fitted, LogFits, drifts, polar
 from cli.field.solve import Solved
 from cli.read.units import degrees
-from cli.show.columns import Column, Table
+from cli.show.columns import Column, Table, finite
 
 if TYPE_CHECKING:
     from cli.show.columns import Document
@@ -50,7 +51,7 @@ def document(fits: LogFits, document: Document) -> Document:
     rotors: list[Document] = document["rotors"]  # type: ignore[assignment]
     for solved in fits.found.solved:
         fitted = Fitted(solved.group)
-        parts = _of_group(fits, solved)
+        parts = _Parts(fits, solved)
         for i, r in enumerate(solved.group.rotors.tolist()):
             _fill(rotors[r], fits, solved, fitted, i, parts)
     return document
@@ -71,25 +72,19 @@ class _Parts:
         self.drift = drifts(solved.group)
 
 
-def _of_group(fits: LogFits, solved: Solved) -> _Parts:
-    return _Parts(fits, solved)
-
-
 def _fill(entry: Document, fits: LogFits, solved: Solved, fitted: Fitted, i: int, parts: _Parts) -> None:
     """Add a rotor's fit to its part of the document."""
     group, fit = solved.group, fitted.fit
-    log = group.logs[i]
-    key = "kg" if fits.found.runs.per == "mass" else "kg_m"
-    per = fits.found.runs.per
+    log, runs = group.logs[i], fits.found.runs
     keys = [channel.key for channel in group.channels]
     entry["fit"] = {
         "runs": len(log.runs),
         "readings": int(fit.present[i].sum()),
         "degrees_of_freedom": int(fit.degrees_of_freedom[i]),
-        "residual_sd": _number(fit.residual_sd[i]),
+        "residual_sd": finite(fit.residual_sd[i]),
         "phase_sense": log.sense,
         "initial": [
-            {**name, **polar(v), "amplitude_uncertainty": _number(sd)}
+            {**name, **polar(v), "amplitude_uncertainty": finite(sd)}
             for name, v, sd in zip(keys, fit.initial[i], parts.of_initial[i], strict=True)
         ],
         "residuals": [
@@ -97,7 +92,7 @@ def _fill(entry: Document, fits: LogFits, solved: Solved, fitted: Fitted, i: int
                 "run": row.run,
                 **row.channel.key,
                 **polar(row.residual),
-                "standardized": _number(row.standardized),
+                "standardized": finite(row.standardized),
                 "outlier": row.outlier,
             }
             for row in fitted.rows(i)
@@ -110,7 +105,7 @@ def _fill(entry: Document, fits: LogFits, solved: Solved, fitted: Fitted, i: int
             "reading_sd": None if group.before.reading is None else group.before.reading[0],
         }
     if parts.drift is not None:
-        chance = _number(parts.drift.probability[i])
+        chance = finite(parts.drift.probability[i])
         entry["fit"]["drift"] = {  # type: ignore[index]
             "probability": chance,
             "level": LEVEL,
@@ -118,51 +113,41 @@ def _fill(entry: Document, fits: LogFits, solved: Solved, fitted: Fitted, i: int
             "rates": [
                 {
                     **name,
-                    "amplitude_per_year": _number(abs(rate)),
+                    "amplitude_per_year": finite(abs(rate)),
                     "phase_deg": float(degrees(rate)) if np.isfinite(rate) else None,
-                    "amplitude_per_year_uncertainty": _number(sd),
+                    "amplitude_per_year_uncertainty": finite(sd),
                 }
                 for name, rate, sd in zip(keys, parts.drift.rate[i], parts.drift.deviation[i], strict=True)
             ],
         }
     residual: list[Document] = entry["residual"]  # type: ignore[assignment]
     for s, one in enumerate(residual):
-        one["amplitude_uncertainty"] = _number(parts.of_residual[i, s])
+        one["amplitude_uncertainty"] = finite(parts.of_residual[i, s])
         if parts.within is not None:
-            one["probability_within"] = _number(parts.within[i, s])
+            one["probability_within"] = finite(parts.within[i, s])
     if parts.predicted is not None:
         entry["predict"] = [
-            {**name, **polar(v), "amplitude_uncertainty": _number(sd)}
+            {**name, **polar(v), "amplitude_uncertainty": finite(sd)}
             for name, v, sd in zip(keys, parts.predicted[0][i], parts.predicted[1][i], strict=True)
         ]
     if fits.asked.suggest:
-        entry["suggest"] = _suggested(fits, solved, i, per, key)
+        entry["suggest"] = _suggested(fits, solved, i)
     if parts.robust is not None:
         robust, corrections = parts.robust
         entry["robust"] = {
             "initial": [{**name, **polar(v)} for name, v in zip(keys, robust.initial[i], strict=True)],
             "corrections": [
-                {"plane": plane, f"{per}_{key}": abs(w), "angle_deg": float(degrees(complex(w)))}
-                for plane, w in zip(solved.planes, corrections[i], strict=True)
+                mass_in(runs, plane, w) for plane, w in zip(solved.planes, corrections[i], strict=True)
             ],
         }
 
 
-def _suggested(fits: LogFits, solved: Solved, i: int, per: str, key: str) -> Document | None:
-    run = fits.suggested(solved, i)
+def _suggested(fits: LogFits, solved: Solved, i: int) -> Document | None:
+    run, runs = fits.suggested(solved, i), fits.found.runs
     if run is None:
         return None
     return {
-        "masses": [
-            {"plane": plane, f"{per}_{key}": abs(w), "angle_deg": float(degrees(complex(w)))}
-            for plane, w in zip(solved.planes, run.masses, strict=True)
-        ],
-        f"uncertainty_before_{key}": run.before,
-        f"uncertainty_after_{key}": run.after,
+        "masses": [mass_in(runs, plane, w) for plane, w in zip(solved.planes, run.masses, strict=True)],
+        f"uncertainty_before_{runs.per_si}": run.before,
+        f"uncertainty_after_{runs.per_si}": run.after,
     }
-
-
-def _number(value: float) -> float | None:
-    """Return a finite number, or None."""
-    number = float(value)
-    return number if np.isfinite(number) else None

@@ -106,9 +106,6 @@ class _Reader:
         self.speed_given = speed.values if speed is not None else np.full(self.table.rows, np.nan)
         self.speed = to_si(self.speed_given, "speed", speed.unit) if speed is not None else self.speed_given
 
-    def fail(self, row: int, column: str, found: str, expected: str) -> DataError:
-        return self.table.error(row, column, found, expected)
-
     def _of(self, rotors: Rows) -> str:
         return f"rotor {self.runs.rotors[rotors[0]]}: " if len(self.runs.rotors) > 1 else ""
 
@@ -136,7 +133,7 @@ class _Reader:
                         f"{self.table.file}: {of}runs {quote(initial or '')} and {quote(run)} both have no trial mass: "
                         "expected one run, for --influence gives the coefficients"
                     )
-                again = again or self.fail(
+                again = again or self.table.error(
                     first[members[0]],
                     "trial_plane",
                     "",
@@ -289,21 +286,21 @@ class _Reader:
         kept = [self.kept[rows[i]].lower() for i in members]
         for i, word in zip(members, kept, strict=True):
             if word not in (*YES, *NO):
-                raise self.fail(rows[i], "trial_kept", self.kept[rows[i]], "yes or no")
+                raise self.table.error(rows[i], "trial_kept", self.kept[rows[i]], "yes or no")
         is_kept = any(word in YES for word in kept)
         if not told:
             if self.size is not None:
                 for i in members:
                     if self.size.values[rows[i]]:
-                        raise self.fail(rows[i], "trial_plane", "", "the plane of the trial mass")
+                        raise self.table.error(rows[i], "trial_plane", "", "the plane of the trial mass")
             if is_kept:
-                raise self.fail(
+                raise self.table.error(
                     rows[members[0]], "trial_plane", "", f"the trial mass that is kept after run {run}"
                 )
             return None
         for i in told:
             if self.plane[rows[i]] != self.plane[rows[told[0]]]:
-                raise self.fail(
+                raise self.table.error(
                     rows[i],
                     "trial_plane",
                     self.plane[rows[i]],
@@ -316,13 +313,13 @@ class _Reader:
         i = next((i for i in told if self.size.values[rows[i]]), told[0])
         names = [name.strip() for name in self.plane[rows[i]].split(";")]
         if "" in names:
-            raise self.fail(
+            raise self.table.error(
                 rows[i], "trial_plane", self.plane[rows[i]], "a plane's name before and after each ';'"
             )
         for other in told:
             for cells in (self.size, self.table.cells.get("trial_angle")):
                 if cells is not None and cells.values[rows[other]] not in ("", cells.values[rows[i]]):
-                    raise self.fail(
+                    raise self.table.error(
                         rows[other],
                         cells.header,
                         cells.values[rows[other]],
@@ -349,7 +346,7 @@ class _Reader:
         turn = self._numbers(angle, rows, place, "the angle of the trial mass")
         if not (size >= SMALLEST).all():
             row = int(rows[int(np.argmin(size >= SMALLEST))])
-            raise self.fail(row, self.size.header, self.size.values[row], "a positive trial mass")
+            raise self.table.error(row, self.size.header, self.size.values[row], "a positive trial mass")
         return np.asarray(to_si(size, self.runs.per, self.size.unit)), turn, angle.unit
 
     def _numbers(self, cells: Cells, rows: Rows, place: int, expected: str) -> Real:
@@ -370,7 +367,7 @@ class _Reader:
             except ValueError:
                 many = f", {names} joined by ';' as in trial_plane" if names > 1 else ""
                 many += ", with a decimal comma as elsewhere in the file" if cells.decimal_comma else ""
-                raise self.fail(row, cells.header, text, expected + many) from None
+                raise self.table.error(row, cells.header, text, expected + many) from None
         return values
 
     def _channels(
@@ -410,7 +407,7 @@ class _Reader:
             nearest = min(range(len(same)), key=off.__getitem__, default=None)
             if nearest is None or (off[nearest] > NEAR_SPEED and len(same) > 1):
                 what = name if speed != speed else f"{name} at {speed:g}"
-                raise self.fail(
+                raise self.table.error(
                     rows[i],
                     "sensor",
                     what,

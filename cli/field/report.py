@@ -11,7 +11,8 @@ from cli.field import columns, fit_picture, fit_words, picture, words
 from cli.field.fit import LogFits
 from cli.field.runs import Complex, Real
 from cli.field.solve import FieldBalancing, Solved
-from cli.field.tolerance import LastRun, Verdict, first_reading, last_run, measured_verdicts, verdicts
+from cli.field.tolerance import LastRun, first_reading, last_run, measured_verdicts, verdicts
+from cli.read.tolerance import Verdict
 from cli.read.units import degrees, from_si
 from cli.show.columns import Column, Section, Sheet, Table
 from cli.show.text import angle_text

@@ -170,6 +170,11 @@ class Runs:
     """What the file itself states of it, sensor -> vector as read."""
     warnings: list[str] = field(default_factory=list)
 
+    @property
+    def per_si(self) -> str:
+        """The SI unit of the trials, as keys and headers have it."""
+        return "kg" if self.per == "mass" else "kg_m"
+
     def warn(self, text: str) -> None:
         """Say something of the table once."""
         if text not in self.warnings:

@@ -12,7 +12,7 @@ from cli.read.options import bad
 from cli.read.sources import open_source
 from cli.read.tables import read
 from cli.read.units import degrees, find_unit, from_si, to_si
-from cli.show.columns import Column, Result, Table
+from cli.show.columns import Column, Result, Table, finite
 
 MARKS = ("mark", "tacho", "keyphasor", "pulse", "trigger")
 
@@ -110,9 +110,9 @@ def signal(path: str, pulses: int) -> Result:
                     "sensor": sensor,
                     "amplitude": float(size[s]),
                     "phase_deg": float(turn[s]),
-                    "amplitude_uncertainty": float(deviation[s]) if np.isfinite(deviation[s]) else None,
+                    "amplitude_uncertainty": finite(deviation[s]),
                     "speed_rad_s": found.speed,
-                    "speed_sd_rad_s": found.speed_deviation if np.isfinite(found.speed_deviation) else None,
+                    "speed_sd_rad_s": finite(found.speed_deviation),
                     "turns": found.turns,
                 }
                 for s, sensor in enumerate(recorded.sensors)

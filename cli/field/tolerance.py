@@ -9,15 +9,7 @@ import numpy as np
 from balancing import initial_unbalance
 from cli.field.runs import Complex
 from cli.field.solve import SINGULAR, FieldBalancing, Solved
-
-
-class Verdict(NamedTuple):
-    """A plane's permissible, initial and remaining unbalance, kg·m; NaN where the readings do not determine it."""
-
-    plane: str
-    permissible: float
-    initial: float
-    residual: float
+from cli.read.tolerance import Verdict
 
 
 class LastRun(NamedTuple):

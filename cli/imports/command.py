@@ -96,8 +96,6 @@ def run(
         ]
 
     return Result(
-        document=dict,
-        tables={},
         notes=lambda: (
             f"wrote {', '.join(map(str, paths))}\n" if len(paths) > 1 else "" if paths else found[0][0]
         ),

@@ -64,6 +64,21 @@ def _slide_error(motion: Motion, name: str, order: int) -> Reals:
     return motion.slide(name).error_estimate(order)
 
 
+def _together(analysis: Analysis, motion: Motion) -> None:
+    """Form the bounds of all places and rates of a motion that its table shows."""
+    orders = range(analysis.order + 1)
+    keys = [motion.point(name).key(k) for name in analysis.points for k in orders]
+    keys += [motion.slide(name).key(k) for name in analysis.slides for k in orders]
+    # an angle that was given is as it was given
+    given = {name for name in analysis.links if analysis.given(name) is not None}
+    keys += [motion.link(name).key(k) for name in analysis.links for k in orders if k or name not in given]
+    motion.rounding.together(keys)
+
+
+def _all_forces(motion: Motion) -> None:
+    motion.dynamics.error_estimate().together()
+
+
 class _Stack:
     """Columns that grow by the poses of one assembly after the other."""
 
@@ -71,6 +86,8 @@ class _Stack:
         self._analysis = analysis
         self._values: dict[str, list[Cell]] = {}
         self._errors: dict[str, list[Callable[[], Reals]]] = {}
+        # forms bounds that have most of their work in common, before the first is asked for
+        self.before: list[Callable[[], None]] = []
 
     def put(self, header: str, values: Iterable[Cell], error: Callable[[], Reals] | None = None) -> None:
         """Add the cells of an assembly."""
@@ -91,6 +108,8 @@ class _Stack:
         self.put(self._analysis.input_columns[j], shown.tolist(), lambda: TURNED * np.abs(shown))
 
     def _error(self, header: str) -> list[float]:
+        while self.before:
+            self.before.pop()()
         return [bound for error in self._errors[header] for bound in bounds_of(error())]
 
     def table(self) -> Table:
@@ -114,6 +133,7 @@ def poses(analysis: Analysis) -> Table:
         stack.begin(motion, assembly.number)
         for j in range(len(analysis.mechanism.inputs)):
             stack.input(j)
+        stack.before.append(partial(_together, analysis, motion))
         for name in analysis.points:
             for key, values in of_point(motion, name, analysis.order).items():
                 k = next(k for k, keys in enumerate(POINT) if key in keys)
@@ -135,6 +155,7 @@ def forces(analysis: Analysis) -> Table:
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
         d = motion.dynamics
         stack.begin(motion, assembly.number)
+        stack.before.append(partial(_all_forces, motion))
         for j, entry in enumerate(analysis.mechanism.inputs):
             stack.input(j)
             prefix, name = f"{entry.name}_" if several else "", effort_name(entry.is_slide)

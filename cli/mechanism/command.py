@@ -146,10 +146,9 @@ def run(
         raise options.bad(flag, "expected a cycle too: --sweep, such as --sweep 0deg:360deg:1deg")
     if graph is not None and show.plot is None:
         raise options.bad("--graph", "expected --plot FILE too: the picture that the curves are drawn into")
-    of_one = {"--states": states, "--explain": explain, "--graph": graph, "--plot": show.plot}
-    for flag, given in of_one.items():
-        if given and (vary or variants is not None):
-            raise options.bad(flag, "expected one mechanism, and no --vary or --variants beside it")
+    if vary or variants is not None:
+        of_one = {"states": states, "explain": explain, "graph": graph, "plot": show.plot}
+        options.refuse("expected one mechanism, and no --vary or --variants beside it", **of_one)
     request = Request(newton, check, forces, equilibrium, flywheel, counterweights, swept=cycle)
     own = request.tables
     if show.holds_one and len(own) > 1:
@@ -165,27 +164,30 @@ def run(
         from cli.mechanism.tolerance import Tolerances
         from cli.mechanism.tolerated import checked, with_tolerances
 
-        others = {"--vary": vary, "--variants": variants, "--branch": branch, "--states": states}
-        others |= {"--graph": graph, "--html": html, **dict.fromkeys(own, "asked"), "--forces": None}
-        checked(draws, tolerance, [flag for flag, given in others.items() if given])
+        others = options.given(
+            vary=vary, variants=variants, branch=branch, states=states, graph=graph, html=html
+        )
+        checked(draws, tolerance, [*others, *(flag for flag in own if flag != "--forces")])
     if any((fit, point, link, slide, free, weight, starts, best)):
         from cli.mechanism.fitted import FitOptions, fitted
 
-        unfit: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--vary": vary}
-        unfit |= {"--variants": variants, "--time": time, "--only": only, "--order": order, "--html": html}
-        unfit |= {"--states": states, "--tolerance": spreads, "--branch": branch}
-        unfit |= {"--explain": explain, "--graph": graph}
-        there = [*own, *(flag for flag, value in unfit.items() if value)]
+        unfit = options.given(
+            at=at, sweep=sweep, inputs=inputs, vary=vary, variants=variants, time=time, only=only, order=order,
+            html=html, states=states, tolerance=spreads, branch=branch, explain=explain, graph=graph,
+        )  # fmt: skip
         with told(file):
             fits = FitOptions(fit, point, link, slide, free, weight, starts, best)
-            result = fitted(file, fits, change, seed, workers or 1, there)
+            result = fitted(file, fits, change, seed, workers or 1, [*own, *unfit])
             return replace(result, within=lambda: told(file))
     if time is not None:
-        beside: dict[str, object] = {"--at": at, "--sweep": sweep, "--inputs": inputs, "--order": order}
-        beside |= {"--graph": graph, "--states": states, "--explain": explain, **dict.fromkeys(own, True)}
-        beside |= {"--branch all": branch == "all"}
-        beside |= {"--tolerance": spreads}
-        clash = [flag for flag, value in beside.items() if value and flag != "--forces"]
+        clash = options.given(
+            at=at, sweep=sweep, inputs=inputs, order=order, graph=graph, states=states, explain=explain
+        )
+        clash += [
+            *(flag for flag in own if flag != "--forces"),
+            *(["--branch all"] if branch == "all" else []),
+        ]
+        clash += options.given(tolerance=spreads)
         if clash:
             raise options.bad("--time", f"expected without {clash[0]}: the loads decide the poses")
         if html is not None and until is not None and (vary or variants is not None):
@@ -291,8 +293,6 @@ def _long(analysis: Analysis, forces: bool, states: Path | None, digits: bool) -
     stream = Stream(analysis, form, forces)
     every = Stream(replace(analysis, only=None), link_states)
     return Result(
-        document=dict,
-        tables={},
         blocks=lambda form: (form(table, i) for i, table in enumerate(stream.tables())),
         beside={} if states is None else {states: lambda: csv_parts(every.tables(), digits)},
         late_warnings=stream.warnings,

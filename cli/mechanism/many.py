@@ -239,7 +239,6 @@ class Many:
         if streams:
             return Result(
                 document=lambda: {"name": self.asked.mechanism.name},
-                tables={},
                 blocks=partial(self.blocks, json=json),
                 blocks_name="variants",
                 shared=self.workers > 1,

@@ -257,7 +257,6 @@ class VariantsInTime:
         if streams:
             return Result(
                 document=dict,
-                tables={},
                 blocks=self.blocks,
                 blocks_name="variants",
                 shared=self.workers > 1,

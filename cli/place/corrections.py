@@ -28,9 +28,7 @@ def read_corrections(given: list[str], rotor: str | None, plane: str | None) -> 
     """Read MASS@ANGLE ..., or one file, of which --rotor and --plane choose."""
     file = given[0]
     if not _is_file(file):
-        for flag, name in (("--rotor", rotor), ("--plane", plane)):
-            if name is not None:
-                raise options.bad(flag, "chooses among the corrections of a file: expected a file")
+        options.refuse("chooses among the corrections of a file: expected a file", rotor=rotor, plane=plane)
         return [Correction("1", "1", [read_vector(spec) for spec in given])]
     if len(given) > 1:
         raise options.bad("MASS@ANGLE", f"'{given[1]}': beside a file expected nothing")

@@ -30,6 +30,18 @@ def bad(flag: str, message: object) -> typer.BadParameter:
     return typer.BadParameter(str(message), param_hint=flag)
 
 
+def given(**values: object) -> list[str]:
+    """Return the flags of the options that are given, each under the name that the function has for it."""
+    there = (name for name, value in values.items() if value not in (None, False, [], ()))
+    return [f"--{name.replace('_', '-')}" for name in there]
+
+
+def refuse(message: str, **values: object) -> None:
+    """Refuse the first of these options that is given."""
+    for flag in given(**values):
+        raise bad(flag, message)
+
+
 def with_unit(
     flag: str, text: str | None, dimension: str, *, positive: bool = False
 ) -> tuple[float, str] | None:

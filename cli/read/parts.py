@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.errors import DataError, nearest, quote
+from cli.errors import DataError, nearest, needs, quote
 from cli.read.files import note
 from cli.read.tables import Table, read
 from cli.read.units import UNITS, cosine_sine, to_si
@@ -107,8 +107,7 @@ def read_parts(path: str) -> Parts:
         partial(_reading, shapes, rows, meshes, mass, center, inertia),
         partial(_solids, shapes, rows, faces, mass, center, inertia),
     )
-    turned = drawn.turned(rotation)
-    each = replace(turned, rounding=partial(_turning, drawn, rotation, table, kept))
+    each = drawn.turned(rotation, error=_turning(rotation, table, kept))
     total = mass.sum()
     if not total > 0:
         raise DataError(
@@ -217,9 +216,7 @@ def _mesh(
         vertices = to_si(vertices, "length", unit)
         volume, center, inertia = mesh(vertices, faces)
     except ImportError:
-        raise DataError(
-            f"{table.file}: a mesh needs trimesh: install dalembert with its extra, dalembert[mesh]"
-        ) from None
+        raise needs(f"{table.file}: a mesh", "trimesh", "mesh") from None
     except ValueError as error:
         raise table.error(index, "file", cell, f"a closed mesh: {error}") from None
     density = row["density"] if "density" in row else row["mass"] / float(volume)
@@ -268,28 +265,29 @@ def _reading(
     inertia: Array,
 ) -> BodyError:
     """Bound what is off in the parts before they are turned: numbers as read, and their shapes' formulas."""
-    from dalembert.arithmetic.bounded import Bounded
-    from rigidbody3d.rounding import BodyError, shaped
+    from dalembert.arithmetic.bounds import bounds, read
+    from rigidbody3d.rounding import BodyError
+    from rigidbody3d.shapes import weighed
 
     masses, tensors = READ * np.abs(mass), READ * np.abs(inertia)
     centers = READ * np.abs(center)
+    alike: dict[tuple[str, str], list[int]] = {}
     for i, (shape, row) in enumerate(zip(shapes, rows, strict=True)):
         if i in meshes:
             rough, reach = meshes[i]()
             masses[i] += rough * np.abs(mass[i])
             centers[i] += rough * reach
             tensors[i] += rough * np.abs(mass[i]) * reach**2
-        if shape not in SHAPES:
-            continue
-        known = SHAPES[shape]
-        names = known.dimensions + known.optional
-        given = {key: Bounded(row[key], READ * row[key]) for key in names if key in row}
-        given |= {key: Bounded(0.0) for key in known.optional if key not in row}
-        m = Bounded(mass[i], masses[i])
-        if "mass" not in row and known.measure is not None:
-            m = Bounded(row[DENSITIES[known.thin]], masses[i] / mass[i] * row[DENSITIES[known.thin]])
-            m = m * known.measure(**given)
-        masses[i], tensors[i] = m.error, shaped(shape, m, given).error
+        if shape in SHAPES:
+            amount = "mass" if "mass" in row else DENSITIES[SHAPES[shape].thin]
+            alike.setdefault((shape, amount), []).append(i)
+    for (shape, amount), places in alike.items():
+        names = SHAPES[shape].dimensions + SHAPES[shape].optional
+        given = {
+            name: read([rows[i].get(key, 0.0) for i in places], 0, READ)
+            for name, key in (("amount", amount), *zip(names, names, strict=True))
+        }
+        masses[places], tensors[places] = bounds(weighed, given, shape, amount != "mass")
     return BodyError(masses, centers, tensors)
 
 
@@ -315,18 +313,15 @@ def _solids(
     return found
 
 
-def _turning(drawn: Body, rotation: Array, table: Table, kept: NDArray[np.intp]) -> BodyError:
-    """Bound the parts as turned: a matrix of zeros and ones is exact, another has its angles' own rounding."""
-    from rigidbody3d.rounding import turned
-
+def _turning(rotation: Array, table: Table, kept: NDArray[np.intp]) -> Array:
+    """Bound the turns' entries: a matrix of zeros and ones is exact, another has its angles' own rounding."""
     angle = np.zeros(table.rows)
     for name in ("rx", "ry", "rz"):
         if name in table.numbers:
             column = table.numbers[name]
             angle += np.abs(np.nan_to_num(to_si(column.values, "angle", column.unit)))
-    plain = np.isin(rotation, (-1.0, 0.0, 1.0)).all(axis=(-1, -2))
-    off = np.where(plain, 0.0, READ * (4 + angle[kept]))
-    return turned(drawn.numbers, rotation, None, np.broadcast_to(off[:, None, None], rotation.shape))
+    plain = np.isin(rotation, (-1.0, 0.0, 1.0)).all(axis=(-1, -2), keepdims=True)
+    return np.broadcast_to(np.where(plain, 0.0, READ * (4 + angle[kept, None, None])), rotation.shape)
 
 
 def _turns(table: Table) -> Array:

@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from cli.read import options
+
+
+class Verdict(NamedTuple):
+    """A plane's permissible, initial and remaining unbalance, kg·m; NaN where the readings do not determine it."""
+
+    plane: str
+    permissible: float
+    initial: float
+    residual: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -16,6 +27,26 @@ class Tolerance:
     """U_per, kg·m."""
     bearings: tuple[float, float] | None = None
     """Where along the shaft it holds, m; None: in the correction planes."""
+
+    def document(
+        self, verdicts: Iterable[Verdict]
+    ) -> dict[str, str | float | list[dict[str, str | float | None]] | None]:
+        """Return what the JSON says of it and of a rotor's planes."""
+        return {
+            "grade": self.grade,
+            "permissible_kg_m": self.permissible,
+            "planes": [
+                {
+                    "plane": plane,
+                    "permissible_kg_m": share,
+                    "initial_kg_m": before if before == before else None,
+                    "within": before <= share if before == before else None,
+                    "residual_kg_m": after if after == after else None,
+                    "residual_within": after <= share if after == after else None,
+                }
+                for plane, share, before, after in verdicts
+            ],
+        }
 
 
 def tolerance_of(

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from cli.errors import DataError
 from cli.show.columns import Table, Written
+from cli.show.digits import finished
 
 if TYPE_CHECKING:
     from cli.show.columns import Part, Result
@@ -37,19 +38,11 @@ class Form:
 
     def __call__(self, table: Part, number: int) -> Written:
         """Make it of the part of this number, from 0 on."""
-        unknown = 0
         if isinstance(table, list):
             from cli.show.text import json_elements
 
-            return Written(json_elements(table, first=number == 0).encode(), unknown)
-        if self.units is not None:
-            from cli.show.in_units import chosen_units, in_units
-
-            table = in_units(table, chosen_units(self.units))
-        if self.digits:
-            from cli.show.digits import digits_that_hold
-
-            table, unknown = digits_that_hold(table)
+            return Written(json_elements(table, first=number == 0).encode(), 0)
+        table, unknown = finished(table, self.units, self.digits)
         if self.suffix == ".csv":
             from cli.show.text import csv_text
 

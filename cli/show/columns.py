@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -23,6 +24,11 @@ if TYPE_CHECKING:
     # of a table, or of a list of the JSON document; and what is written of it
     Part: TypeAlias = "Table | list[Document]"
     Form = Callable[[Part, int], "Written"]
+
+
+def finite(value: float) -> float | None:
+    """Return a number as JSON can have it: None for what is not finite."""
+    return float(value) if isfinite(value) else None
 
 
 @dataclass(eq=False, repr=False)
@@ -85,9 +91,9 @@ class Sheet:
 class Result:
     """What a command has found, in every form it can be shown in; each is formed when it is asked for."""
 
-    document: Callable[[], Document]
+    document: Callable[[], Document] = dict
     """The JSON document, without its warnings."""
-    tables: Mapping[str, Callable[[], Table]]
+    tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
     """Name -> table; the first is the CSV."""
     companions: Sequence[str] = ()
     """Which further tables go beside a file that holds one table, as FILE-name.csv."""

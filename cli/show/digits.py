@@ -1,4 +1,4 @@
-"""`--digits`: each number cut to the digits before its rounding error."""
+"""`--digits`: each number cut to the digits before its rounding error; a table in the units and digits asked for."""
 
 from __future__ import annotations
 
@@ -10,6 +10,15 @@ from cli.show.columns import Column, Table
 
 if TYPE_CHECKING:
     from cli.show.columns import Cell
+
+
+def finished(table: Table, units: str | None, digits: bool) -> tuple[Table, int]:
+    """Return the table in the units of --units and with the digits of --digits, and of how many no digit is known."""
+    if units is not None:
+        from cli.show.in_units import chosen_units, in_units
+
+        table = in_units(table, chosen_units(units))
+    return digits_that_hold(table) if digits else (table, 0)
 
 
 def digits_that_hold(table: Table) -> tuple[Table, int]:

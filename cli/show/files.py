@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from cli.errors import DataError
+
+
+def write_all(files: Mapping[Path, Callable[[], bytes | Iterable[bytes]]]) -> None:
+    """Write files one after the other, each formed when its turn comes."""
+    for path, data in files.items():
+        write(path, data())
 
 
 def write(path: Path, data: bytes | Iterable[bytes]) -> None:

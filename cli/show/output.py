@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING
@@ -34,7 +34,7 @@ def command(options: str) -> Callable[[Callable[..., Result]], Callable[..., Non
 def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
     """Write the files asked for, print the result; status 1 if an expectation is not met, or nothing was found."""
     from cli.read.headers import check_renamed
-    from cli.show.files import write
+    from cli.show.files import write, write_all
     from cli.show.text import csv_text, json_parts, paragraphs, table_text
 
     if options.form == ".toml" and result.toml is None:
@@ -63,12 +63,8 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
     refuse_inputs(
         [path for path in (output, options.plot, *result.beside, *pages, *tables) if path is not None]
     )
-    for path, table_of in tables.items():
-        write(path, _one_table(options.form, table_of()))
-    for path, data in result.beside.items():
-        write(path, data())
-    for path, page in pages.items():
-        write(path, page)
+    of_tables = {path: partial(_one_table, options.form, table_of) for path, table_of in tables.items()}
+    write_all({**of_tables, **result.beside, **pages})
     if options.plot is not None and result.figure is not None:
         from cli.show.picture import drawn
 
@@ -78,7 +74,7 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
     elif output is not None and options.form == ".toml" and result.toml is not None:
         write(output, result.toml())
     elif output is not None and options.holds_one:
-        write(output, _one_table(options.form, first()))
+        write(output, _one_table(options.form, first))
     elif output is not None:
         (name, _), *others = result.tables.items()
         formed = {name.strip("-"): first()} | {name.strip("-"): table() for name, table in others}
@@ -117,14 +113,15 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
 
 def reported(
     result: Result, options: ShowOptions, asked: Mapping[str, str], checked: Comparison | None = None
-) -> dict[Path, bytes]:
+) -> dict[Path, Callable[[], bytes]]:
     """Return the files of --report."""
     if options.report is None:
         return {}
     from cli.show.report_forms import pages
 
-    read = named()
-    return pages(options.report, result, options.head, asked, read, options.units, options.digits, checked)
+    head, units, digits = options.head, options.units, options.digits
+    files = pages(options.report, result, head, asked, named(), units, digits, checked)
+    return {path: partial(bytes, page) for path, page in files.items()}
 
 
 def _tables_beside(result: Result, options: ShowOptions) -> dict[Path, Callable[[], Table]]:
@@ -160,6 +157,7 @@ def _in_chosen_units(result: Result, units: str | None) -> Result:
 def _stream(result: Result, options: ShowOptions) -> None:
     """Write a table that comes in parts."""
     from cli.show.blocks import stream
+    from cli.show.files import write_all
 
     if options.units is not None:
         from cli.show.in_units import chosen_units
@@ -167,25 +165,22 @@ def _stream(result: Result, options: ShowOptions) -> None:
         # a bad unit is an error before anything is worked out
         chosen_units(options.units)
     refuse_inputs([path for path in (options.output, *result.beside) if path is not None])
-    for path, data in result.beside.items():
-        from cli.show.files import write
-
-        write(path, data())
+    write_all(result.beside)
     unknown = stream(result, options.form, options.output, options.units, options.digits)
     _warn([*result.warnings, *result.late_warnings(), *_unknown(unknown)], options)
     if result.failed():
         raise typer.Exit(1)
 
 
-def _one_table(form: str, table: Table) -> bytes | Iterator[bytes]:
+def _one_table(form: str, table: Callable[[], Table]) -> bytes | Iterator[bytes]:
     """Return a file of a single table."""
     from cli.show.text import csv_text
 
     if form == ".parquet":
         from cli.show.parts import parquet
 
-        return parquet([table])
-    return csv_text(table.cells).encode()
+        return parquet([table()])
+    return csv_text(table().cells).encode()
 
 
 def _warn(warnings: Iterable[str], options: ShowOptions) -> None:

@@ -8,7 +8,7 @@ from itertools import count
 from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING, Any
 
-from cli.errors import DataError
+from cli.errors import needs
 from cli.show.text import plain
 
 if TYPE_CHECKING:
@@ -29,9 +29,7 @@ def workbook(tables: Mapping[str, Iterable[Table]]) -> Iterator[bytes]:
         from openpyxl.styles import Font
         from openpyxl.utils import get_column_letter
     except ImportError:
-        raise DataError(
-            "-o .xlsx needs openpyxl: install dalembert with its extra, dalembert[excel]"
-        ) from None
+        raise needs("-o .xlsx", "openpyxl", "excel") from None
     book = Workbook(write_only=True)
 
     def cell(sheet: Any, value: str | float) -> Any:
@@ -78,9 +76,7 @@ def parquet(blocks: Iterable[Table]) -> Iterator[bytes]:
         import pyarrow
         from pyarrow.parquet import ParquetWriter
     except ImportError:
-        raise DataError(
-            "-o .parquet needs pyarrow: install dalembert with its extra, dalembert[parquet]"
-        ) from None
+        raise needs("-o .parquet", "pyarrow", "parquet") from None
     with TemporaryFile() as stream:
         writer = None
         for table in blocks:

@@ -6,7 +6,7 @@ import io
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from cli.errors import DataError
+from cli.errors import needs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,9 +24,7 @@ def drawn(draw: Callable[[], Figure], suffix: str) -> bytes:
     try:
         import matplotlib
     except ImportError:
-        raise DataError(
-            "--plot needs matplotlib: install dalembert with its extra, dalembert[plot]"
-        ) from None
+        raise needs("--plot", "matplotlib", "plot") from None
     matplotlib.use("Agg")
     matplotlib.rcParams["svg.hashsalt"] = "dalembert"  # the same picture is the same file
     stream = io.BytesIO()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from cli.errors import DataError
 from cli.show.columns import Column, Section, Table
+from cli.show.digits import finished
 from cli.show.handed_on import markdown
 from cli.show.picture import drawn
 from cli.show.report import CODE, Grid, Page, Part, Report, report
@@ -56,15 +57,7 @@ def pages(
     """Return the files of a result's report; `files` were read, `units` and `digits` are those of the tables."""
 
     def finish(table: Table) -> Table:
-        if units is not None:
-            from cli.show.in_units import chosen_units, in_units
-
-            table = in_units(table, chosen_units(units))
-        if digits:
-            from cli.show.digits import digits_that_hold
-
-            table, _ = digits_that_hold(table)
-        return table
+        return finished(table, units, digits)[0]
 
     check = None
     if checked is not None:

@@ -25,14 +25,11 @@ def reported(options: str) -> Callable[[Callable[..., Result]], Callable[..., No
 
 
 def _hand_on(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
-    from cli.show.files import write
+    from cli.show.files import write_all
 
     pages = pages_of(result, options, asked)
     refuse_inputs([*result.beside, *pages])
     for note in result.warnings:
         print(f"note: {one_line(note)}", file=sys.stderr)
-    for path, data in result.beside.items():
-        write(path, data())
-    for path, page in pages.items():
-        write(path, page)
+    write_all({**result.beside, **pages})
     sys.stdout.write(result.notes())

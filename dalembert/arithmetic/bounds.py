@@ -1,7 +1,7 @@
 """Bounds of the rounding errors of formulas on arrays: run once on recorded numbers, a formula leaves its tape.
 
 A formula does with its arrays what numpy does with any kind of number: sums, products, quotients, roots, matrices.
-The adjoint of its tape (`adjoint`) bounds its own rounding and carries on what its numbers are off by.
+The adjoint of its tape (`rounding`) bounds its own rounding and carries on what its numbers are off by.
 """
 
 from __future__ import annotations
@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.adjoint import FEW, bounds_of_few, rounding_bounds
-from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.recorded import Recorder
+from dalembert.arithmetic.rounding import FEW, bounds_of_few, rounding_bounds
 from dalembert.arithmetic.tape import Tape
 
 Array = NDArray[np.float64]
@@ -27,18 +26,16 @@ CONSTANT = 1.0
 """A constant such as 0.4 errs by one rounding."""
 
 
-class Given(NamedTuple):
-    """Numbers that enter a formula, and by how much they may be off."""
+Given = tuple[ArrayLike, int, ArrayLike]
+"""Numbers that enter a formula (..., *own), how many last axes are a vector's or tensor's own, and what they are off by.
 
-    value: ArrayLike
-    axes: int = 0
-    """So many last axes are a vector's or tensor's own; the others are lanes, which the formula keeps apart."""
-    error: ArrayLike = 0.0
+The other axes are lanes, which the formula keeps apart.
+"""
 
 
 def read(value: ArrayLike, axes: int, relative: float) -> Given:
     """Return numbers that may be off by as much of themselves."""
-    return Given(value, axes, relative * np.abs(np.asarray(value, dtype=float)))
+    return value, axes, relative * np.abs(np.asarray(value, dtype=float))
 
 
 def bounds(formula: Formula, given: Mapping[str, Given], *options: Hashable) -> list[Array]:
@@ -49,27 +46,26 @@ def bounds(formula: Formula, given: Mapping[str, Given], *options: Hashable) -> 
     formula
         Takes the options, then the numbers by name, each with one axis of lanes in front; returns arrays (lanes, ...).
     given
-        Numbers (..., *own) by name; their leading axes broadcast.
+        By name; the leading axes broadcast.
 
     Examples
     --------
     What is left of a difference is all error; the quotient's is half a unit of itself:
 
-    >>> third = Given([1.0, 2.0]), Given(1 / 3)
-    >>> (bound,) = bounds(lambda a, b: [a / 3 - b], dict(zip("ab", third)))
+    >>> (bound,) = bounds(lambda a, b: [a / 3 - b], {"a": ([1.0, 2.0], 0, 0.0), "b": (1 / 3, 0, 0.0)})
     >>> [float(round(x * 2**53, 3)) for x in bound]
     [0.333, 1.0]
     """
-    arrays = {name: np.asarray(x.value, dtype=float) for name, x in given.items()}
-    own = {name: array.shape[array.ndim - given[name].axes :] for name, array in arrays.items()}
+    arrays = {name: np.asarray(value, dtype=float) for name, (value, _, _) in given.items()}
+    own = {name: array.shape[array.ndim - given[name][1] :] for name, array in arrays.items()}
     lead = np.broadcast_shapes(*(x.shape[: x.ndim - len(own[name])] for name, x in arrays.items()))
     tape, shapes = _taped(formula, options, tuple(own.items()))
     entering: dict[str, Any] = {}
     errors: list[str] = []
-    for name, x in given.items():
+    for name, (_, _, error) in given.items():
         entering |= _lanes(name, arrays[name], own[name], lead)
-        if np.any(x.error):
-            off = _lanes(f"off {name}", np.asarray(x.error, dtype=float), own[name], lead)
+        if np.any(error):
+            off = _lanes(f"off {name}", np.asarray(error, dtype=float), own[name], lead)
             errors += [key.removeprefix("off ") for key in off]
             entering |= off
     found = _bounded(tape, tuple(name for name in errors if name in tape.inputs), entering, math.prod(lead))
@@ -128,6 +124,9 @@ def _bounded(
     if lanes <= FEW:
         inputs = {name: f"off {name}" for name in errors}
         return bounds_of_few(tape, entering, inputs, tape.names, CONSTANT)
+    # not loaded where few are asked for
+    from dalembert.arithmetic.engines import run
+
     return run(_written(tape, errors), entering)
 
 

@@ -136,13 +136,23 @@ class Real:
         return self
 
     def __abs__(self) -> Real:
-        if self.recorder._operations[self.number][0] in ("abs", "sqrt", "const"):
+        kind, *of = self.recorder._operations[self.number]
+        if kind in ("abs", "sqrt", "const") or (kind == "mul" and of[0] == of[1]):
             return Real(self.recorder, self.number)
         return Real(self.recorder, self.recorder.node("abs", self.number))
 
     def sqrt(self) -> Real:
-        """The root; NaN where the number is negative."""
+        """The root; NaN where the number is negative. That of a square is its factor's size, with the root's own rounding."""
+        kind, *of = self.recorder._operations[self.number]
+        if kind == "mul" and of[0] == of[1] and not self.negative:
+            return abs(Real(self.recorder, of[0]))
         return Real(self.recorder, self.recorder.node("sqrt", self.settled))
+
+    def sin(self) -> Real:
+        return Real(self.recorder, self.recorder.node("sin", self.number), self.negative)
+
+    def cos(self) -> Real:
+        return Real(self.recorder, self.recorder.node("cos", self.number))
 
     def __add__(self, other: Number) -> Number:
         if isinstance(other, (Complex, complex)):
@@ -273,6 +283,8 @@ class Complex:
 
     def __truediv__(self, other: Number) -> Complex:
         other = bare(other)
+        if not isinstance(other, Real) and _plain(other.imag) and other.imag == 0:
+            other = other.real
         if isinstance(other, Real) or _plain(other):
             return Complex(
                 0.0 if _plain(self.real) and self.real == 0 else self.real / other,
@@ -321,13 +333,11 @@ class Recorded:
 
     @staticmethod
     def sin(x: Number) -> Number:
-        if isinstance(x, Real):
-            return Real(x.recorder, x.recorder.node("sin", x.number), x.negative)
-        return math.sin(x)
+        return x.sin() if isinstance(x, Real) else math.sin(x)
 
     @staticmethod
     def cos(x: Number) -> Number:
-        return Real(x.recorder, x.recorder.node("cos", x.number)) if isinstance(x, Real) else math.cos(x)
+        return x.cos() if isinstance(x, Real) else math.cos(x)
 
     @staticmethod
     def atan2(y: Number, x: Number) -> Number:

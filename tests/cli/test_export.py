@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from pathlib import Path
 from typing import Any
@@ -12,151 +10,17 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from cli.errors import DataError
-from cli.exports.skeleton import Joint, Skeleton
 from cli.exports.written import written
 from cli.imports.assembled import described
 from cli.imports.drawn import settle
 from cli.imports.told import read
+from tests.cli.exported import EXAMPLES, FILES, FOUR_BAR, MASSIVE, PLANETARY, exported, home, moved
 from tests.conftest import Dalembert
 from virtualwork import Mechanism
 
-EXAMPLES = Path(__file__).parents[2] / "cli" / "examples"
-FOUR_BAR = """
-name = "Four-bar <A & B>"
-gravity = [0, -9.81]
-[units]
-length = "mm"
-angle = "deg"
-[ground]
-A = [0, 0]
-D = [100, 0]
-[links.crank]
-points = { A = [0, 0], B = [40, 0] }
-mass = 0.4
-center = [20, 3]
-inertia = "80 kg mm2"
-[links.coupler]
-points = { B = [0, 0], C = [110, 0], P = [60, 40] }
-mass = 0.6
-center = [55, 10]
-inertia = "700 kg mm2"
-[links.rocker]
-points = { D = [0, 0], C = [80, 0] }
-mass = 0.5
-center = [40, 0]
-inertia = "300 kg mm2"
-[input]
-link = "crank"
-angle = 60
-speed = "300 rpm"
-[guess]
-at = 60
-coupler = 20
-rocker = 90
-"""
-SLIDER_CRANK = """
-gravity = [0, -9.81]
-[units]
-length = "mm"
-angle = "deg"
-[ground]
-O = [0, 0]
-[links.crank]
-points = { O = [0, 0], A = [45, 0] }
-mass = 0.5
-center = [10, 0]
-inertia = 1e-4
-[links.rod]
-points = { A = [0, 0], B = [150, 0] }
-mass = 0.7
-center = [50, 0]
-inertia = 1e-3
-[links.piston]
-points = { B = [0, 0] }
-mass = 0.9
-[[sliders]]
-point = "B"
-link = "piston"
-through = [10, -20]
-angle = 30
-turned = -30
-[input]
-link = "crank"
-angle = 40
-speed = "600 rpm"
-[guess]
-at = 40
-rod = -10
-"""
-PLANETARY = """
-gravity = [0, -9.81]
-[ground]
-O = [0, 0]
-[links.sun]
-points = { O = [0, 0] }
-mass = 1
-inertia = 0.01
-[links.arm]
-points = { O = [0, 0], C = [0.12, 0] }
-mass = 0.5
-center = [0.06, 0]
-inertia = 0.002
-[links.planet]
-points = { C = [0, 0], T = [0.04, 0] }
-mass = 0.3
-center = [0.01, 0]
-inertia = 0.0005
-[[gears]]
-links = ["sun", "planet"]
-ratio = -2.0
-arm = "arm"
-[[gears]]
-links = ["planet", "ground"]
-ratio = 0.25
-arm = "arm"
-[input]
-link = "sun"
-angle = "20 deg"
-speed = "100 rad/s"
-[guess]
-at = "20 deg"
-arm = 0.3
-planet = 0
-"""
-SPRINGS = (
-    FOUR_BAR
-    + """
-[[springs]]
-between = ["coupler.P", "ground.D"]
-stiffness = "4 N/mm"
-free_length = 60
-damping = 15
-[[torsion_springs]]
-links = ["ground", "rocker"]
-stiffness = 2.5
-free_angle = 90
-damping = 0.01
-[[torsion_springs]]
-links = ["coupler", "crank"]
-stiffness = 1.5
-free_angle = 70
-"""
-)
-MASSIVE = {"four-bar": FOUR_BAR, "springs": SPRINGS, "slider-crank": SLIDER_CRANK, "planetary": PLANETARY}
 ROBOTS = (".xml", ".urdf", ".sdf")
 # inputs that no joint is: another joint is driven in their place, and it is said
 ELSEWHERE = {"desk-lamp", "double-pendulum"}
-FILES = sorted(p for p in EXAMPLES.glob("*/*.toml") if "[links." in p.read_text())
-
-
-def home(m: Mechanism) -> tuple[float, ...]:
-    return tuple(at if e.value is None else e.value for e, at in zip(m.inputs, m.at, strict=True))
-
-
-def exported(m: Mechanism, suffix: str, inputs: tuple[float, ...] | None = None) -> bytes:
-    units = {"length": "mm", "angle": "deg"}
-    return written(m, home(m) if inputs is None else inputs, suffix, "file.toml", units)[0]
 
 
 def taken_back(data: bytes) -> Mechanism:
@@ -165,11 +29,6 @@ def taken_back(data: bytes) -> Mechanism:
     return Mechanism.from_toml_text(described(part, "test"))
 
 
-def moved(m: Mechanism, inputs: Any) -> Any:
-    return m.motion(inputs if len(m.inputs) > 1 else np.asarray(inputs)[:, 0])
-
-
-# --- round trips --------------------------------------------------------------------------------------------------
 @pytest.mark.slow
 @pytest.mark.parametrize("suffix", ROBOTS)
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.parent.name)
@@ -277,133 +136,6 @@ def test_mjcf_keeps_the_value_of_the_input() -> None:
     assert [e.value for e in back.inputs] == pytest.approx(home(m), rel=1e-14)
 
 
-# --- MuJoCo -------------------------------------------------------------------------------------------------------
-def in_mujoco(data: bytes) -> tuple[Any, Any, Any]:
-    mujoco = pytest.importorskip(
-        "mujoco", reason="MuJoCo reads back what is written for it: pip install mujoco"
-    )
-    model = mujoco.MjModel.from_xml_string(data.decode())
-    state = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, state, 0)
-    mujoco.mj_forward(model, state)
-    return mujoco, model, state
-
-
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.parent.name)
-def test_mujoco_stands_where_we_do_and_its_loops_are_closed(file: Path) -> None:
-    m = Mechanism.from_toml(file)
-    _, _, state = in_mujoco(exported(m, ".xml"))
-    ours = moved(m, np.array([home(m)]))
-    for name, link in m.links.items():
-        body = state.body(name)
-        for point, z in link.points.items():
-            at = body.xpos + body.xmat.reshape(3, 3) @ [z.real, z.imag, 0.0]
-            assert at[:2] == pytest.approx(ours.point(point).position[0], abs=1e-14 * m.size)
-    if state.nefc:
-        assert np.abs(state.efc_pos).max() <= 1e-14 * m.size
-        fastest = max(1.0, *(abs(e.speed or 0.0) for e in m.inputs))
-        assert np.abs(state.efc_vel).max() <= 1e-13 * fastest
-
-
-def accelerations(m: Mechanism, q: float, speed: float) -> Any:
-    """The accelerations of the joints' coordinates, in MuJoCo's order."""
-    s, motion = Skeleton(m, (q,)), m.motion(q, speed)
-
-    def alpha(body: str) -> float:
-        return float(motion.link(body).alpha[0]) if body in m.links else 0.0
-
-    found = []
-    for b in s.walk():
-        j = b.joint
-        slide = j.kind == "slide"
-        found.append(float(motion.slide(j.point).acceleration[0]) if slide else alpha(j.link) - alpha(j.on))
-    return np.array(found)
-
-
-@pytest.mark.parametrize("name", MASSIVE)
-def test_mujocos_inverse_dynamics_asks_for_our_effort(name: str) -> None:
-    """Its joint torques without the loops' forces, carried to the input by the joints' own speeds (virtual work)."""
-    m = Mechanism.from_toml_text(MASSIVE[name])
-    speed = m.inputs[0].speed or 0.0
-    q = np.linspace(0, 2 * math.pi, 12, endpoint=False)
-    ours = m.motion(q, speed).effort
-    for angle, effort in zip(q, ours, strict=True):
-        mujoco, model, state = in_mujoco(exported(m, ".xml", (float(angle),)))
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-        state.qacc[:] = accelerations(m, float(angle), speed)
-        mujoco.mj_inverse(model, state)
-        assert state.qfrc_inverse @ state.qvel / speed == pytest.approx(effort, abs=1e-8 * np.abs(ours).max())
-
-
-@pytest.mark.parametrize(
-    ("name", "share"), [("four-bar", 3e-4), ("springs", 6e-4), ("slider-crank", 3e-4), ("planetary", 1e-5)]
-)
-def test_our_effort_keeps_mujocos_input_at_its_speed(name: str, share: float) -> None:
-    """Forward dynamics with its own soft constraints: what is left of the acceleration, as a share of ω²."""
-    m = Mechanism.from_toml_text(MASSIVE[name])
-    speed = m.inputs[0].speed or 0.0
-    q = np.linspace(0, 2 * math.pi, 12, endpoint=False)
-    for angle, effort in zip(q, m.motion(q, speed).effort, strict=True):
-        mujoco, model, state = in_mujoco(exported(m, ".xml", (float(angle),)))
-        state.ctrl[0] = effort
-        mujoco.mj_forward(model, state)
-        assert abs(state.joint(int(model.actuator_trnid[0, 0])).qacc[0]) <= share * speed**2
-
-
-def test_mujoco_reads_the_urdf_and_stands_where_we_do() -> None:
-    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads URDF too: pip install mujoco")
-    m = Mechanism.from_toml_text(FOUR_BAR)
-    data = (
-        exported(m, ".urdf")
-        .decode()
-        .replace("<robot ", '<robot xmlns:x="x" ', 1)
-        .replace("</robot>", '<mujoco><compiler fusestatic="false"/></mujoco></robot>')
-    )
-    model = mujoco.MjModel.from_xml_string(data)
-    state = mujoco.MjData(model)
-    mujoco.mj_forward(model, state)
-    ours = m.motion()
-    for link, point in (("crank", "A"), ("rocker", "D"), ("P", "P")):
-        assert state.body(link).xpos[:2] == pytest.approx(ours.point(point).position[0], abs=1e-15)
-    assert float(model.body("coupler").mass[0]) == 0.6
-
-
-def coordinate(s: Skeleton, j: Joint) -> float:
-    """How far a joint has turned or slid in a skeleton's pose."""
-    if j.kind == "turn":
-        return s.parts[j.link].turn - s.parts[j.on].turn
-    return next(own.value for own in s.joints if own.name == j.name)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.parent.name)
-def test_yourdfpy_stands_where_we_do_in_every_pose(file: Path) -> None:
-    """A reader of URDF alone: masses, and with our coordinates of the tree the place and turn of every link."""
-    yourdfpy = pytest.importorskip("yourdfpy", reason="a reader of URDF: pip install yourdfpy")
-    m = Mechanism.from_toml(file)
-    robot = yourdfpy.URDF.load(io.BytesIO(exported(m, ".urdf")), load_meshes=False)
-    assert robot.validate()
-    for name in m.links:
-        held = robot.link_map[name].inertial
-        assert (0.0 if held is None else held.mass) == m.rigid[name].mass
-    start = Skeleton(m, home(m))
-    for share in (0.0, 0.01, -0.02):
-        inputs = tuple(
-            at + share * (m.size if e.is_slide else 1.0) for at, e in zip(home(m), m.inputs, strict=True)
-        )
-        try:
-            there = Skeleton(m, inputs)
-        except DataError:
-            continue  # beyond a limit
-        way = {j.name: coordinate(there, j) - coordinate(start, j) for j in (b.joint for b in there.walk())}
-        robot.update_cfg({name: way[name] for name in robot.actuated_joint_names})
-        for b in start.walk():
-            part, end = there.parts[b.child], b.joint.ends[b.child == b.joint.link]
-            found, at, turn = robot.get_transform(b.child, "ground"), part.world(end), part.turn
-            assert found[:2, 3] == pytest.approx((at.real, at.imag), abs=1e-14 * m.size), b.child
-            assert found[:2, 0] == pytest.approx((math.cos(turn), math.sin(turn)), abs=1e-14), b.child
-
-
 # --- URDF and SDF by a reader of XML --------------------------------------------------------------------------------
 def test_sdf_has_every_joint_where_both_links_have_it() -> None:
     m = Mechanism.from_toml_text(FOUR_BAR)
@@ -446,82 +178,6 @@ def test_gears_of_two_joints_are_mimicked_others_are_gearboxes() -> None:
     sdf = ElementTree.fromstring(exported(Mechanism.from_toml_text(PLANETARY), ".sdf"))
     boxes = [e for e in sdf.iter("joint") if e.get("type") == "gearbox"]
     assert [float(e.findtext("gearbox_ratio") or 0) for e in boxes] == [2.0, -4.0]
-
-
-# --- drawings -------------------------------------------------------------------------------------------------------
-def test_ezdxf_reads_the_drawing_in_the_unit_of_the_file(tmp_path: Path, dalembert: Dalembert) -> None:
-    ezdxf = pytest.importorskip(
-        "ezdxf", reason="DXF is written and read by ezdxf: pip install 'dalembert[cad]'"
-    )
-    (tmp_path / "m.toml").write_text(FOUR_BAR)
-    done = dalembert("export", "m.toml", "-o", "m.dxf")
-    assert (done.returncode, done.stderr, done.stdout) == (0, "", "")
-    drawing = ezdxf.readfile(tmp_path / "m.dxf")
-    assert not drawing.audit().has_errors
-    assert drawing.header["$INSUNITS"] == 4
-    space = drawing.modelspace()
-    m = Mechanism.from_toml_text(FOUR_BAR)
-    pins = sorted(
-        (round(c.dxf.center.x, 9), round(c.dxf.center.y, 9)) for c in space.query("CIRCLE[layer=='JOINTS']")
-    )
-    stand = m.motion()
-    assert pins == sorted(tuple(np.round(stand.point(p).position[0] * 1000, 9)) for p in "ABCD")
-    (curve,) = space.query("LWPOLYLINE[layer=='CURVES']")
-    assert curve.closed
-    ours = m.motion(np.linspace(m.at[0], m.at[0] + 2 * math.pi, 721)[:-1]).point("P").position * 1000
-    assert np.array(curve.get_points("xy")) == pytest.approx(ours, abs=1e-9)
-    assert len(space.query("LWPOLYLINE[layer=='LINKS']")) == 3
-    assert {t.dxf.text for t in space.query("TEXT")} >= {
-        "A",
-        "B",
-        "C",
-        "D",
-        "P",
-        "crank",
-        "coupler",
-        "rocker",
-    }
-    assert (tmp_path / "m.dxf").read_text().startswith("999\nFour-bar <A & B>, from m.toml by dalembert ")
-
-
-def test_svg_is_in_true_size_with_a_group_for_each_layer(tmp_path: Path, dalembert: Dalembert) -> None:
-    (tmp_path / "m.toml").write_text(FOUR_BAR)
-    assert dalembert("export", "m.toml", "-o", "m.svg", "--at", "90").returncode == 0
-    text = (tmp_path / "m.svg").read_text()
-    root = ElementTree.fromstring(text)
-    space = "{http://www.w3.org/2000/svg}"
-    width = float((root.get("viewBox") or "").split()[2])
-    assert float((root.get("width") or "")[:-2]) == pytest.approx(width, rel=1e-5)
-    groups = {g.get("id"): g for g in root.findall(f"{space}g")}
-    layers = "GROUND GUIDES LINKS GEARS SPRINGS MASSES CURVES JOINTS POINTS NAMES"
-    assert list(groups) == layers.split()
-    pins = {
-        (float(c.get("cx") or 0), float(c.get("cy") or 0)) for c in groups["JOINTS"].findall(f"{space}circle")
-    }
-    assert any(math.dist(p, (0, -40)) < 1e-12 for p in pins)
-    assert "crank = 90 deg" in text
-    assert "Four-bar &lt;A &amp; B" not in text.partition("<svg")[0]
-
-
-def test_curves_are_the_motion(tmp_path: Path, dalembert: Dalembert) -> None:
-    (tmp_path / "m.toml").write_text(FOUR_BAR)
-    assert dalembert("export", "m.toml", "-o", "m.csv").returncode == 0
-    rows = list(csv.DictReader((tmp_path / "m.csv").read_text().splitlines()))
-    assert list(rows[0]) == ["input_deg", "B_x_mm", "B_y_mm", "C_x_mm", "C_y_mm", "P_x_mm", "P_y_mm"]
-    assert len(rows) == 721
-    m = Mechanism.from_toml_text(FOUR_BAR)
-    q = np.radians([float(r["input_deg"]) for r in rows])
-    found = np.array([[float(r["P_x_mm"]), float(r["P_y_mm"])] for r in rows])
-    assert found == pytest.approx(m.motion(q).point("P").position * 1000, abs=1e-9)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("suffix", [".dxf", ".svg"])
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.parent.name)
-def test_every_example_is_drawn(file: Path, suffix: str) -> None:
-    if suffix == ".dxf":
-        pytest.importorskip("ezdxf", reason="pip install 'dalembert[cad]'")
-    assert len(exported(Mechanism.from_toml(file), suffix)) > 1000
 
 
 # --- what is said, and what is refused ----------------------------------------------------------------------------

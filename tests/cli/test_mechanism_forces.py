@@ -12,40 +12,15 @@ from typing import Any
 import pytest
 
 from tests.conftest import Dalembert
+from tests.four_bars import body, four_bar
 
-FOUR_BAR = """
-name = "four-bar"
-gravity = [0, -9.81]
-[units]
-length = "mm"
-angle = "deg"
-[ground]
-A = [0, 0]
-D = [100, 0]
-[links.crank]
-points = { A = [0, 0], B = [40, 0] }
-mass = 1
-center = [10, 3]
-inertia = 1e-3
-[links.coupler]
-points = { B = [0, 0], C = [120, 0] }
-mass = 2
-center = [40, 10]
-inertia = 2e-3
-[links.rocker]
-points = { D = [0, 0], C = [80, 0] }
-mass = 1.5
-center = [30, -10]
-inertia = 1e-3
-[input]
-link = "crank"
-angle = 40
-speed = "30 rad/s"
-[guess]
-at = 40
-coupler = 20
-rocker = 57
-[[torques]]
+FOUR_BAR = four_bar(
+    body(1, (10, 3), 1e-3),
+    body(2, (40, 10), 2e-3),
+    body(1.5, (30, -10), 1e-3),
+    head='name = "four-bar"\ngravity = [0, -9.81]',
+    rates='speed = "30 rad/s"',
+    more="""[[torques]]
 link = "crank"
 torque = 2
 [[springs]]
@@ -53,7 +28,8 @@ between = ["coupler.C", "ground.A"]
 stiffness = 200
 free_length = 50
 damping = 3
-"""
+""",
+)
 
 CYLINDER = """
 gravity = [0, -9.81]
@@ -249,33 +225,14 @@ def test_explain_names_what_is_left_out(dalembert: Dalembert) -> None:
 
 
 def test_a_change_point_is_said_and_spoils_no_other_pose(dalembert: Dalembert) -> None:
-    text = """
-    gravity = [0, -9.81]
-    [units]
-    angle = "deg"
-    [ground]
-    A = [0, 0]
-    D = [2, 0]
-    [links.crank]
-    points = { A = [0, 0], B = [1, 0] }
-    mass = 1
-    center = [0.5, 0]
-    [links.coupler]
-    points = { B = [0, 0], C = [2, 0] }
-    mass = 1
-    center = [1, 0]
-    [links.rocker]
-    points = { D = [0, 0], C = [1, 0] }
-    mass = 1
-    center = [0.5, 0]
-    [input]
-    link = "crank"
-    angle = 60
-    [guess]
-    at = 60
-    coupler = 0
-    rocker = 60
-    """
+    text = four_bar(
+        *(body(1, (x, 0)) for x in (0.5, 1, 0.5)),
+        lengths=(1, 2, 1, 2),
+        length="m",
+        head="gravity = [0, -9.81]",
+        at=60,
+        guess={"coupler": 0, "rocker": 60},
+    )
     found = run_json(
         dalembert, "-", "--forces", "--at", "60deg", "--at", "180deg", "--at", "240deg", stdin=text
     )

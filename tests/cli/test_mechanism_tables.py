@@ -10,31 +10,15 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import Dalembert
+from tests.four_bars import body, four_bar
 
-FOUR_BAR = """
-gravity = [0, -9.81]
-[ground]
-A = [0, 0]
-D = [0.1, 0]
-[links.crank]
-points = { A = [0, 0], B = [0.04, 0] }
-[links.coupler]
-points = { B = [0, 0], C = [0.12, 0] }
-mass = 2
-center = [0.04, 0.01]
-[links.rocker]
-points = { D = [0, 0], C = [0.08, 0] }
-[input]
-link = "crank"
-angle = 40
-speed = "30 rad/s"
-[units]
-angle = "deg"
-[guess]
-at = 40
-coupler = 20
-rocker = 57
-"""
+FOUR_BAR = four_bar(
+    coupler=body(2, (0.04, 0.01)),
+    lengths=(0.04, 0.12, 0.08, 0.1),
+    length="m",
+    head="gravity = [0, -9.81]",
+    rates='speed = "30 rad/s"',
+)
 SWEEP = ("--sweep", "0deg:360deg:10deg")
 
 

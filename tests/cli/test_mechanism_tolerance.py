@@ -9,34 +9,16 @@ import json
 import numpy as np
 import pytest
 
-FILE = """
-name = "four-bar"
-gravity = [0, -9.81]
-[units]
-length = "mm"
-angle = "deg"
-[ground]
-A = [0, 0]
-D = [100, 0]
-[links.crank]
-points = { A = [0, 0], B = [40, 0] }
-mass = 0.5
-center = [20, 0]
-[links.coupler]
-points = { B = [0, 0], C = [120, 0], H = { from = "C", length = 50, angle = 30 } }
-mass = 0.4
-[links.rocker]
-points = { D = [0, 0], C = [80, 0] }
-[input]
-link = "crank"
-angle = 40
-speed = 10
-[guess]
-at = 40
-coupler = 20
-rocker = 57
-[tolerances]
-"""
+from tests.four_bars import body, four_bar
+
+FILE = four_bar(
+    body(0.5, (20, 0)),
+    body(0.4),
+    points=', H = { from = "C", length = 50, angle = 30 }',
+    head='name = "four-bar"\ngravity = [0, -9.81]',
+    rates="speed = 10",
+    more="[tolerances]",
+)
 LIMITS = """
 "links.crank.B.x" = 0.05
 "links.coupler.C" = "0.1 mm"

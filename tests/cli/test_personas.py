@@ -13,6 +13,7 @@ import openpyxl
 import pytest
 
 from tests.conftest import Dalembert
+from tests.four_bars import four_bar
 
 
 def polar(size: float, degrees: float) -> complex:
@@ -74,31 +75,7 @@ def test_a_technician_with_a_german_csv_and_a_workbook(dalembert: Dalembert, tmp
 
 def test_a_teacher_with_degrees_and_millimetres(dalembert: Dalembert, tmp_path: Path) -> None:
     """A four-bar of the book, bare numbers in the file's units, the pupils' answers checked, a sheet in LaTeX."""
-    (tmp_path / "bar.toml").write_text(
-        """
-        name = "Exercise 4"
-        [units]
-        length = "mm"
-        angle = "deg"
-        [ground]
-        A = [0, 0]
-        D = [100, 0]
-        [links.crank]
-        points = { A = [0, 0], B = [40, 0] }
-        [links.coupler]
-        points = { B = [0, 0], C = [120, 0] }
-        [links.rocker]
-        points = { D = [0, 0], C = [80, 0] }
-        [input]
-        link = "crank"
-        angle = 40
-        speed = "10 rpm"
-        [guess]
-        at = 40
-        coupler = 20
-        rocker = 57
-        """
-    )
+    (tmp_path / "bar.toml").write_text(four_bar(head='name = "Exercise 4"', rates='speed = "10 rpm"'))
     call = ("mechanism", "bar.toml", "--at", "40", "--only", "C,coupler,rocker")
     (row,) = csv.DictReader(done(dalembert(*call, "--units", "mm,deg,rpm")).splitlines())
     # Norton's example 4-1: θ3 = 20.298°, θ4 = 57.325°

@@ -8,33 +8,18 @@ import json
 
 import pytest
 
-FOUR_BAR = """
-name = "four-bar"
-gravity = [0, -9.81]
-[units]
-length = "mm"
-angle = "deg"
-[ground]
-A = [0, 0]
-D = [{ground}, 0]
-[links.crank]
-points = {{ A = [0, 0], B = [{crank}, 0] }}
-mass = 0.5
-[links.coupler]
-points = {{ B = [0, 0], C = [120, 0], H = {{ from = "C", length = 50, angle = {turn} }} }}
-mass = {mass}
-[links.rocker]
-points = {{ D = [0, 0], C = [80, 0] }}
-[input]
-link = "crank"
-angle = 40
-speed = 10
-[guess]
-at = 40
-coupler = 20
-rocker = 57
-"""
-NOMINAL = {"ground": 100, "crank": 40, "turn": 30, "mass": 0.25}
+from tests.four_bars import body, four_bar
+
+
+def text(crank=40, turn=30, mass=0.25, ground=100):
+    return four_bar(
+        body(0.5),
+        body(mass),
+        lengths=(crank, 120, 80, ground),
+        points=f', H = {{ from = "C", length = 50, angle = {turn} }}',
+        head='name = "four-bar"\ngravity = [0, -9.81]',
+        rates="speed = 10",
+    )
 
 
 @pytest.fixture
@@ -42,7 +27,7 @@ def files(tmp_path):
     """Write the four-bar with its dimensions into a file."""
 
     def write(name="m.toml", **dimensions):
-        (tmp_path / name).write_text(FOUR_BAR.format(**NOMINAL | dimensions))
+        (tmp_path / name).write_text(text(**dimensions))
         return name
 
     return write

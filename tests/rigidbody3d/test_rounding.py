@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from benchmarks.truth.rotation import taylor
-from dalembert.arithmetic.bounded import Bounded
+from dalembert.arithmetic import bounds
 from dalembert.arithmetic.exact import EPS
-from rigidbody3d import Body, FreeBody, Motion, Shaft, Top, compose, integrate, principal, rounding, tensor
+from rigidbody3d import Body, FreeBody, Motion, Shaft, Top, compose, integrate, principal, tensor
 from rigidbody3d.attitude import angle_between
+from rigidbody3d.shapes import SHAPES
 
 
 def turned(found, exact) -> float:
@@ -55,20 +56,6 @@ def test_a_top_that_starts_next_to_the_upright(tilt, push) -> None:
     assert (off <= state.error_estimate("omega")[0]).all()
 
 
-def test_bounds_follow_each_operation() -> None:
-    rng = np.random.default_rng(3)
-    x, y = rng.uniform(1, 2, (2, 50))
-    exact = [Fraction(a) / 3 - Fraction(b) * Fraction(a) for a, b in zip(x.tolist(), y.tolist(), strict=True)]
-    for found in (Bounded(x) / 3 - Bounded(y) * x, -(Bounded(y) * x - Bounded(x) / 3)):
-        off = [abs(Fraction(a) - b) for a, b in zip(found.value.tolist(), exact, strict=True)]
-        assert (np.array(off, dtype=float) <= found.error).all()
-    assert np.isinf((1 / Bounded(1e-17, 1e-16)).error)
-    root = np.sqrt(Bounded(1e-20, 1e-16))
-    assert 1e-8 <= root.error < 2e-8
-    with pytest.raises(TypeError):
-        np.exp(Bounded(1.0))
-
-
 def test_axes_of_moments_that_rounding_cannot_tell_apart_may_be_anything() -> None:
     # the second axis has no component along x, and in truth 0.04
     near = tensor(1, 1, 1, 1e-16, 1e-16, 1e-16)
@@ -107,9 +94,20 @@ def test_what_a_body_is_made_of_shows_in_its_bounds() -> None:
     assert not any(x.any() for x in given)
 
 
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_shape_has_a_bound_with_and_without_what_it_can_do_without(shape) -> None:
+    known = SHAPES[shape]
+    needed = {name: [0.5, 0.7] if name == "radius" else 0.3 for name in known.dimensions}
+    for given in (needed, needed | dict.fromkeys(known.optional, 0.1)):
+        body = Body.of(shape, [[2.0], [-3.0]], center=[0.1, 0.2, 0.3], **given)
+        for found, bound in zip((body.mass, body.center, body.inertia), body.error_estimate(), strict=True):
+            assert found.shape == bound.shape
+            assert (bound <= 16 * EPS * np.abs(found)).all()
+        assert (body.error_estimate().inertia > 0).any() or shape == "point"
+
+
 def test_nothing_is_worked_out_for_bounds_unless_asked_for(monkeypatch) -> None:
-    for name in ("composed", "of_shape", "turned", "moved", "numbers"):
-        monkeypatch.setattr(rounding, name, lambda *_, **__: pytest.fail("not asked for"))
+    monkeypatch.setattr(bounds, "bounds", lambda *_: pytest.fail("not asked for"))
     parts = Body.of("sphere", [1.0, 2.0], center=[[0, 0, 0], [1, 0, 0]], radius=0.5)
     body = compose(parts.moved([0, 0, 1]).turned(np.eye(3)))
     Shaft(body, (0, 1), 3.0).dynamic  # noqa: B018
@@ -165,6 +163,8 @@ def test_states_in_time_have_bounds_of_their_own_shapes() -> None:
         many.body.error_estimate("attitude")
     with pytest.raises(ValueError, match="expected one of momentum"):
         Motion(np.eye(3), [1, 2, 3.0]).error_estimate("speed")
+    with pytest.raises(ValueError, match="rate_about: expected the point"):
+        Motion(np.eye(3), [1, 2, 3.0]).error_estimate("rate_about")
 
 
 def test_a_tensor_that_was_worked_out_carries_its_errors_on() -> None:

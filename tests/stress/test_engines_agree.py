@@ -20,8 +20,8 @@ import pytest
 from benchmarks.stress.campaigns import replay
 from benchmarks.stress.tapes import beside_fifty_digits, disagreement, exact, near_the_guess
 from benchmarks.stress.topologies import generate
-from dalembert.arithmetic.adjoint import rounding_bounds
 from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.rounding import rounding_bounds
 from virtualwork import Mechanism
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.asked import names

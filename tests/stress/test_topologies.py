@@ -1,4 +1,4 @@
-"""Mechanisms of any topology, drawn at a pose that is known by construction (benchmarks.stress.topologies)."""
+"""Mechanisms of any topology, drawn at a pose that is known by construction (benchmarks.stress.topologies, benchmarks.stress.topology_followed)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from time import process_time
 import numpy as np
 import pytest
 
-from benchmarks.stress.topologies import generate, verdict
+from benchmarks.stress.topologies import generate
+from benchmarks.stress.topology_followed import verdict
 from benchmarks.stress.topology_rates import rates
 
 # some two minutes

@@ -10,25 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.virtualwork.mechanisms import SWEEP, four_bar
 from virtualwork import Guess, Input, Link, Mechanism, Motor
 from virtualwork.formulas.block import Block
-
-SWEEP = np.linspace(0, 2 * np.pi, 361)
-
-
-def four_bar() -> Mechanism:
-    """A crank-rocker with masses off the lines of its pins."""
-    return Mechanism(
-        ground={"A": 0j, "D": 0.1},
-        links={
-            "crank": Link({"A": 0j, "B": 0.04}, 1.0, 0.01 + 0.003j, 1e-3),
-            "coupler": Link({"B": 0j, "C": 0.12}, 2.0, 0.04 + 0.01j, 2e-3),
-            "rocker": Link({"D": 0j, "C": 0.08}, 1.5, 0.03 - 0.01j, 1e-3),
-        },
-        inputs=Input(link="crank"),
-        guess=Guess(at=(0.7,), angles={"coupler": 0.3, "rocker": 1.0}),
-        gravity=-9.81j,
-    )
 
 
 def test_what_is_formed_for_one_joint_force_serves_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -45,7 +29,7 @@ def test_what_is_formed_for_one_joint_force_serves_the_next(monkeypatch: pytest.
 
     monkeypatch.setattr(Solved, "form", counted)
     sweep = np.linspace(0.0, 6.0, 20_000)  # three blocks
-    m = four_bar()
+    m = four_bar(gravity=-9.81j)
     motion = m.motion(sweep, 10.0)
     one_by_one = [motion.reaction(pin, on) for pin, on in (("A", "crank"), ("B", "coupler"), ("D", "rocker"))]
     assert count == 3
@@ -80,7 +64,7 @@ def test_a_long_chain_has_joint_forces() -> None:
 
 def test_the_forces_of_a_motion_go_with_it() -> None:
     """No ring of references: the arrays are given back at once, not when the garbage collector comes."""
-    motion = four_bar().motion(SWEEP, 10.0)
+    motion = four_bar(gravity=-9.81j).motion(SWEEP, 10.0)
     motion.reaction("A", on="crank")
     dynamics, scene = weakref.ref(motion.dynamics), weakref.ref(motion.dynamics.scene)
     alone = motion.dynamics
@@ -97,7 +81,7 @@ def test_the_forces_of_a_motion_go_with_it() -> None:
 
 def test_a_motor_on_another_link_over_many_blocks() -> None:
     """What a carried motor does to its carrier is known before the blocks are solved one after the other."""
-    m = replace(four_bar(), motors=[Motor("rocker", "crank")])
+    m = replace(four_bar(gravity=-9.81j), motors=[Motor("rocker", "crank")])
     q = np.linspace(0.0, 6.0, 10_000)
     motion, few = m.motion(q, 3.0), m.motion(q[::999], 3.0)
     for pin, on in (("A", "crank"), ("D", "rocker")):

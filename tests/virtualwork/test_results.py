@@ -10,20 +10,13 @@ import numpy as np
 import pytest
 
 import virtualwork as vw
-from virtualwork import Force, Guess, Input, Link, Mechanism, Spring
+from tests.virtualwork.mechanisms import four_bar
+from virtualwork import Force, Mechanism, Spring
 
 
-def four_bar(**more: Any) -> Mechanism:
+def press(**more: Any) -> Mechanism:
     """A crank-rocker with masses, a force and a spring."""
-    return Mechanism(
-        ground={"A": 0j, "D": 0.1},
-        links={
-            "crank": Link({"A": 0j, "B": 0.04}, 1.0, 0.01 + 0.003j, 1e-3),
-            "coupler": Link({"B": 0j, "C": 0.12}, 2.0, 0.04 + 0.01j, 2e-3),
-            "rocker": Link({"D": 0j, "C": 0.08}, 1.5, 0.03 - 0.01j, 1e-3),
-        },
-        inputs=Input(link="crank"),
-        guess=Guess(at=(0.7,), angles={"coupler": 0.3, "rocker": 1.0}),
+    return four_bar(
         name="press",
         gravity=-9.81j,
         forces=[Force("rocker", 0.05 + 0j, 10 + 0j)],
@@ -32,7 +25,7 @@ def four_bar(**more: Any) -> Mechanism:
     )
 
 
-M = four_bar()
+M = press()
 SWEEP = M.motion(np.linspace(0.0, 2 * np.pi, 37), 3.0, 1.0)
 RESULTS = {
     "link": M.links["crank"],
@@ -66,7 +59,7 @@ def test_it_tells_itself_in_one_line(name: str) -> None:
 
 
 def test_what_differs_is_not_equal() -> None:
-    other = four_bar(friction=[vw.Friction("B", 0.1, 0.002)])
+    other = press(friction=[vw.Friction("B", 0.1, 0.002)])
     assert other != M
     assert other.assembly != M.assembly
     assert M.motion(0.5) != M.motion(0.6)
@@ -90,4 +83,4 @@ def test_a_motion_as_a_table() -> None:
 
 def test_an_unknown_part_is_refused() -> None:
     with pytest.raises(TypeError, match="loads"):
-        four_bar(loads=[])
+        press(loads=[])

@@ -2,30 +2,34 @@
 
 The constants of the plan, vectors and angles formed of dimensions, enter the tape with what their forming rounds: what
 hangs on them alone is then on the tape too, where a mechanism has links that stand still. The unknowns x of a group
-that enter are wrong by J⁻¹ times what they leave open of the group's loops.
+that enter are off by one step of Newton's, J⁻¹ times what they leave open of the group's loops. It is on the tape: so
+a rounding in forming several loops, and one that reaches the result besides, counts once and with its sign.
 
 Further inputs of the tape
 --------------------------
 `z 0 x`, `z 0 y`                      a vector of the plan
 `constant BODY`, `whole BODY`         the constant of an angle in the steps, and in the plan's angles
-`open GROUP 0`, `inverse GROUP 0 0`   what each equation of a group's loops leaves open, and J⁻¹
+`inverse GROUP 0 0`                   J⁻¹ of a group's loops
+`step`                                1: how much of Newton's steps is made
 `f 0`                                 the first unknown of redundant statics
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
-from dalembert.arithmetic.adjoint import UNIT_ROUNDOFF
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
+from dalembert.arithmetic.rounding import UNIT_ROUNDOFF
 from dalembert.arithmetic.varied import made
+from virtualwork.formulas.asked import Key
 from virtualwork.formulas.dynamics import applied_loads, reduced
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.lanes import Turning
 from virtualwork.formulas.newton import gaps
+from virtualwork.formulas.positions import State
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.statics import equations
 from virtualwork.plan.steps import Angle, Group, Place, Plan, Step, Term, Turn
@@ -42,13 +46,15 @@ class Constants:
     Parameters
     ----------
     plan : Plan
-    given : iterable of complex
-        The points of the bodies as the user gave them.
+    given : iterable of the places of each body
+        Its points, and through where its guides run, as the user gave them.
     """
 
-    def __init__(self, plan: Plan, given: Iterable[complex]) -> None:
+    def __init__(self, plan: Plan, given: Iterable[Collection[complex]]) -> None:
         self.recorder = Recorder()
-        self._given = {sign * z for z in given for sign in (1, -1)}
+        bodies = [*given]
+        self._given = {sign * z for places in bodies for z in places for sign in (1, -1)}
+        self._apart = {a - b for places in bodies for a in places for b in places}
         self.numbers: dict[str, tuple[float, float]] = {}
         self._vectors: dict[tuple[complex, str], complex] = {}
         self.plan = replace(
@@ -67,10 +73,13 @@ class Constants:
         return self.recorder.input(name)
 
     def _vector(self, z: complex, of: str) -> complex:
-        """A vector of a body, wrong by one rounding of its length where it is not as it was given."""
+        """A vector of a body, wrong by a rounding where it is not as it was given: of its parts if it joins two places."""
         if (z, of) not in self._vectors:
-            name, error = f"z {len(self._vectors)}", 0.0 if z in self._given else UNIT_ROUNDOFF * abs(z)
-            x, y = (self._number(f"{name} {axis}", v, error) for axis, v in (("x", z.real), ("y", z.imag)))
+            name, rounding = f"z {len(self._vectors)}", 0.0 if z in self._given else UNIT_ROUNDOFF
+            x, y = (
+                self._number(f"{name} {axis}", v, rounding * abs(v if z in self._apart else z))
+                for axis, v in (("x", z.real), ("y", z.imag))
+            )
             self._vectors[z, of] = made(z, RECORDED.join(x, y))
         return self._vectors[z, of]
 
@@ -119,9 +128,12 @@ class Doubted(Recording):
     """
 
     def __init__(self, plain: Recording, branch: Turning, entered: frozenset[str]) -> None:
-        points = branch.mechanism.bodies.values()
-        constants = Constants(branch.plan, [z for body in points for z in body.values()])
+        m = branch.mechanism
+        through = {body: [m.through(g) for g in m.guides if g.on == body] for body in m.bodies}
+        constants = Constants(branch.plan, [[*of.values(), *through[body]] for body, of in m.bodies.items()])
         self.constants, self.entered = constants.numbers, entered
+        self._left: dict[str, list[Number]] = {}
+        self._groups: dict[Key, tuple[str, ...]] = {}
         super().__init__(
             branch.mechanism,
             constants.plan,
@@ -136,14 +148,21 @@ class Doubted(Recording):
         """Whether the unknowns of a group enter."""
         return group.name in self.entered or super().enters(group)
 
-    def unknowns(self, group: Group) -> list[Number]:
-        """x + J⁻¹·open."""
+    def step(self, group: Group, st: State) -> list[Number] | None:
+        """−J⁻¹ times what the loops leave open."""
         enter, name = self.recorder.input, group.name
-        rows = [(r, enter(f"open {name} {r}")) for r in range(2 * len(group.closures))]
+        self._left[name] = gaps(group, st)
+        rows = [enter("step") * bare(part) for gap in self._left[name] for part in (gap.real, gap.imag)]
         return [
-            sum((enter(f"inverse {name} {i} {r}") * left for r, left in rows), x)
-            for i, x in enumerate(super().unknowns(group))
+            -sum((enter(f"inverse {name} {i} {r}") * row for r, row in enumerate(rows)), 0.0)
+            for i in range(len(group.angles) + len(group.slides))
         ]
+
+    def hangs_on(self, key: Key) -> tuple[str, ...]:
+        """The groups that a quantity hangs on; looked for once, which one pose after the other would pay for."""
+        if key not in self._groups:
+            self._groups[key] = super().hangs_on(key)
+        return self._groups[key]
 
     def _generalized(self, j: int) -> Number:
         paths, _, block = self.forces
@@ -162,8 +181,8 @@ class Doubted(Recording):
 
     def _gap(self, group: str, loop: int) -> Number:
         of = next(g for g in self.plan.groups if g.name == group)
-        self.solve([*self.plan.writes(of), *self.plan.reads(of)], 0)
-        return gaps(of, self.st)[loop]
+        self.solve(self.plan.writes(of), 0)
+        return self._left[group][loop]
 
     def _balance(self, row: int) -> Number:
         return self._balances.get(row, 0.0)

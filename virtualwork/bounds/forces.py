@@ -32,9 +32,26 @@ class ForceErrors:
         self.mechanism = dynamics.poses.mechanism
         self.bounds = Bounds(dynamics.poses)
 
+    def together(self) -> None:
+        """Form the bounds of all forces that `bounds` has, which have most of the sweep in common."""
+        inputs, joints = range(len(self.mechanism.inputs)), self.dynamics.reactions.joints
+        keys: list[Key] = [("shaking",), ("shaking moment",), *(("effort", j) for j in inputs)]
+        if self._redundant is None:
+            keys += [("newton-euler", j) for j in inputs]
+            sides = [(joint, body) for joint in joints for body in joint.bodies]
+            keys += [("force", joint.key, body) for joint, body in sides]
+            keys += [("moment", joint.key, body) for joint, body in sides if self._holds(joint)]
+        self.bounds.together(keys)
+
+    def _holds(self, joint: Joint) -> bool:
+        """Whether a joint keeps its bodies from turning against each other."""
+        return joint.guide is not None and self.mechanism.guides[joint.guide].is_slider
+
     def _each(self, kind: str) -> Reals:
         """Of a quantity of every input, (n, k)."""
-        return np.stack([self.bounds.of((kind, j)) for j in range(len(self.mechanism.inputs))], axis=1)
+        keys: list[Key] = [(kind, j) for j in range(len(self.mechanism.inputs))]
+        self.bounds.together(keys)
+        return np.stack([self.bounds.of(key) for key in keys], axis=1)
 
     @cached_property
     def effort(self) -> Reals:
@@ -70,7 +87,7 @@ class ForceErrors:
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """Of `Dynamics.joint_moment`, (n,)."""
-        if joint.guide is None or not self.mechanism.guides[joint.guide].is_slider:
+        if not self._holds(joint):
             return np.zeros(self.n)
         if self._redundant is None:
             return self.bounds.of(("moment", joint.key, body))
@@ -86,10 +103,12 @@ class ForceErrors:
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:
         """Of `Dynamics.shaking`: the length of the force's error (n,), and the moment's (n,)."""
+        self.bounds.together([("shaking",), ("shaking moment",)])
         return self.bounds.of(("shaking",)), self.bounds.of(("shaking moment",))
 
     def applied(self, link: str) -> tuple[Reals, Reals]:
         """Of `Dynamics.applied`: the length of the force's error (n,), and the moment's (n,)."""
+        self.bounds.together([("applied", link), ("applied moment", link)])
         return self.bounds.of(("applied", link)), self.bounds.of(("applied moment", link))
 
     # --- redundant statics ------------------------------------------------------------------------------------------

@@ -1,11 +1,11 @@
 """Bounds of the rounding errors of a motion's quantities, from the adjoint of the tape that records them.
 
 A quantity y is a list of real operations (`virtualwork.formulas.recording`); each rounds, and the adjoint says how much
-of that arrives at y (`dalembert.arithmetic.adjoint`). What enters the tape and is not exact brings its own error: the
+of that arrives at y (`dalembert.arithmetic.rounding`). What enters the tape and is not exact brings its own error: the
 input, where it was swept; the constant of an angle, a sum of others; what a table gives; and the unknowns x of a group
-without a closed form, which an iteration found. These leave in each loop of the group a gap, as computed and with the
-rounding of computing it, ρ together: then to first order J·δx = −ρ and componentwise |δx| ≤ |J⁻¹|·ρ (N. J. Higham,
-Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM 2002, §7.1 and §7.2), groups one after the other.
+without a closed form, which an iteration found. They are off by δx = −J⁻¹·gap to first order (N. J. Higham, Accuracy and
+Stability of Numerical Algorithms, 2nd ed., SIAM 2002, §7.1), the gap that they leave in the group's loops, as computed
+and with the roundings of computing it. That step is on the tape, groups one after the other.
 
 Close to a limit the second order counts too: see `virtualwork.bounds.second_order`. Dimensions, loads and inputs are
 taken as exact. A bound is infinite where no digit is known, NaN where the pose is not assembled.
@@ -14,15 +14,16 @@ taken as exact. A bound is infinite where no digit is known, NaN where the pose 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, reduce
 from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.adjoint import FEW, bounds_of_few, rounding_bounds
 from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.rounding import FEW, bounds_of_few, rounding_bounds
+from dalembert.arithmetic.tape import Tape
 from virtualwork.bounds.doubted import Doubted
 from virtualwork.bounds.second_order import Solution, grown, solution
 from virtualwork.formulas.asked import FORCES, Key, names, over_blocks
@@ -35,6 +36,10 @@ from virtualwork.formulas.poses import Poses
 CONSTANT = 1.0
 # units by which the cosine of an input of an even sweep errs besides, where e^{iq} is a product of three factors
 SWEPT = 3.0
+# quantities × operations of a tape of theirs: its sweep is some two times as long
+LONGEST, LONGEST_OF_ONE = 2500, 700
+# lanes that a sweep on numbers costs as much as, however few they are
+EACH = 100
 EMPTY: Mapping[str, Any] = MappingProxyType({})
 # what a load's derivatives and its lever make of a limit's root h: a force of order k goes as h^(−2k)
 BESIDE_LIMIT = 0.5
@@ -56,12 +61,28 @@ class Bounds:
 
     def of(self, key: Key) -> Reals:
         """The bound of a quantity's error, (n,); the length of the error of a vector."""
-        if key not in self._known:
-            self._known[key] = self._formed(key)
+        self.together([key])
+        return self._known[key]
+
+    def together(self, keys: Iterable[Key]) -> None:
+        """Form the bounds of several quantities, which have most of the sweep in common; `of` gives them out."""
+        new = [key for key in dict.fromkeys(keys) if key not in self._known]
+        if self.poses.mechanism.friction:
+            # found by iteration
+            rubbed = {key: np.full(self.n, np.inf) for key in new if key[0] in FORCES}
+            self._known |= rubbed
+            new = [key for key in new if key not in rubbed]
+        cost = taped(self.branch, self.recording, tuple(new)).cost
+        while new:
+            # as many as one tape is fit for
+            here = new[: max(1, (LONGEST if self.n > 1 else LONGEST_OF_ONE) // max(cost, 1))]
+            new = new[len(here) :]
+            self._known |= self._formed(here)
             if self._beside is not None:
                 rows, beside = self._beside
-                self._known[key][rows] = beside.of(key)
-        return self._known[key]
+                beside.together(here)
+                for key in here:
+                    self._known[key][rows] = beside.of(key)
 
     @cached_property
     def _beside(self) -> tuple[NDArray[np.bool_], Bounds] | None:
@@ -90,28 +111,32 @@ class Bounds:
         found: Doubted = branch.recordings[key]
         return found
 
-    # --- one quantity -----------------------------------------------------------------------------------------------
-    def _formed(self, key: Key) -> Reals:
-        if key[0] in FORCES and self.poses.mechanism.friction:
-            # found by iteration
-            return np.full(self.n, np.inf)
-        groups = self.recording.hangs_on(key)
-        closed = ("closed", *groups)
-        found = self.run([key], [closed] if self.branch.may_open else [])
-        tau = self._tau(groups, found)
-        with np.errstate(all="ignore"):
-            bound = _length([found[f"error({name})"] for name in names(key)])
-            order = self._order(key)
-            if order:
-                bound = bound * grown(tau, order)
-            if self.careful:
-                bound = bound + self._apart(key, [found[name] for name in names(key)])
-        bound = np.array(np.broadcast_to(bound, self.n), dtype=float)
-        bound[~np.isfinite(bound)] = np.inf
-        lost = ~np.isfinite(self.poses.inputs).all(axis=1)
+    # --- what is asked for ------------------------------------------------------------------------------------------
+    def _formed(self, keys: list[Key]) -> dict[Key, Reals]:
+        bounds: dict[Key, Reals] = {}
+        closed: dict[Key, Key] = {}
         if self.branch.may_open:
-            lost |= ~np.isfinite(np.broadcast_to(found[names(closed)[0]], self.n))
-        bound[lost] = np.nan
+            closed = {key: ("closed", *self.recording.hangs_on(key)) for key in keys}
+        found = self.run(keys, dict.fromkeys(closed.values()), values=self.careful)
+        nowhere = ~np.isfinite(self.poses.inputs).all(axis=1)
+        for key in keys:
+            # what is no number is infinite
+            bound = np.fmin(np.broadcast_to(self._bound(key, found), self.n), np.inf)
+            bound[nowhere] = np.nan
+            if key in closed:
+                bound[~np.isfinite(np.broadcast_to(found[names(closed[key])[0]], self.n))] = np.nan
+            bounds[key] = bound
+        return bounds
+
+    def _bound(self, key: Key, found: Mapping[str, Any]) -> Any:
+        """The bound of a quantity from what a sweep gives."""
+        parts, order = names(key), self._order(key)
+        with np.errstate(all="ignore"):
+            bound = _length([found[f"error({name})"] for name in parts])
+            if order:
+                bound = bound * grown(self._tau(key, found), order)
+            if self.careful:
+                bound = bound + self._apart(key, [found[name] for name in parts])
         return bound
 
     def _apart(self, key: Key, parts: list[Any]) -> Any:
@@ -130,62 +155,68 @@ class Bounds:
         self,
         keys: Sequence[Key],
         more: Iterable[Key] = (),
-        exact: str = "",
         known: Mapping[str, Reals] = EMPTY,
+        values: bool = True,
     ) -> Mapping[str, Any]:
-        """Quantities and more by their names, the bounds of the former, `error(name)`, and τ, `tau`.
+        """Bounds of quantities, `error(name)`, and their τ, `tau(name)`; more by its names, the quantities too if `values`.
 
-        The unknowns of the group `exact` are taken as they are; `known` enters, exact, besides.
+        `known` enters, exact, besides.
         """
         tape = taped(self.branch, self.recording, (*keys, *more))
-        given = {**known} | self._entering((name for name in tape.inputs if name not in known), exact)
-        errors = self._errors(
-            name for name in tape.inputs if not exact or not name.startswith(f"open {exact} ")
-        )
+        given = {**known} | self._entering(name for name in tape.inputs if name not in known)
+        errors = self._errors(tape.inputs)
         inputs = {name: f"error {name}" for name in errors}
         given |= {inputs[name]: error for name, error in errors.items()}
         wanted = tuple(name for key in keys for name in names(key))
         how = CONSTANT, SWEPT if self.swept else 0.0
-        if self.n <= FEW:
-            return bounds_of_few(tape, given, inputs, wanted, *how)
-        key = "bounds", tape, tuple(inputs), wanted, how
+        key = "bounds", tape, tuple(inputs), wanted, how, values
         if key not in self.branch.recordings:
-            self.branch.recordings[key] = rounding_bounds(tape, inputs, wanted, *how)
-        return run(self.branch.recordings[key], given)
+            asked = self.branch.recordings.setdefault("asked for bounds", {})
+            asked[key] = asked.get(key, 0) + self.n + EACH
+            if asked[key] <= FEW:
+                return bounds_of_few(tape, given, inputs, wanted, *how)
+            whole = rounding_bounds(tape, inputs, wanted, *how)
+            left = set() if values else set(wanted)
+            self.branch.recordings[key] = _once(whole, [name for name in whole.names if name not in left])
+        if self.n == 1:
+            given = {name: float(np.ravel(value)[0]) for name, value in given.items()}
+        written, called = self.branch.recordings[key]
+        found = run(written, given)
+        return {name: found[first] for name, first in called.items()}
 
-    def _tau(self, groups: Sequence[str], found: Mapping[str, Any]) -> Any:
-        """τ of roots on the tape, and of groups whose unknowns enter."""
-        tau = found["tau"]
+    def _tau(self, key: Key, found: Mapping[str, Any]) -> Any:
+        """τ of roots that a quantity hangs on, on the tape, and of groups whose unknowns enter."""
+        tau = _largest(found, [key])
+        groups = self.recording.hangs_on(key)
         for group in self.branch.plan.groups:
             if group.name in groups and self.recording.enters(group):
                 tau = np.maximum(tau, self._solution(group.name).tau)
         return tau
 
-    def residual(
-        self, keys: Sequence[Key], known: Mapping[str, Reals] = EMPTY, exact: str = ""
-    ) -> tuple[Reals, Reals]:
+    def residual(self, keys: Sequence[Key], known: Mapping[str, Reals] = EMPTY) -> tuple[Reals, Reals]:
         """The size of what should be zero, as computed and with its rounding, (n, rows), and τ, (n,)."""
-        found = self.run(keys, exact=exact, known=known)
+        found = self.run(keys, known=known)
         rows = [row for key in keys for row in names(key)]
         left = np.empty((self.n, len(rows)))
         for i, row in enumerate(rows):
             left[:, i] = found[f"error({row})"] + np.abs(found[row])
-        tau = found["tau"] if exact else self._tau(self.recording.hangs_on(keys[0]), found)
+        # a gap is what the unknowns of its own group leave
+        tau = _largest(found, keys) if keys[0][0] == "gap" else self._tau(keys[0], found)
         return left, np.broadcast_to(tau, self.n)
 
     # --- what enters -------------------------------------------------------------------------------------------------
-    def _entering(self, inputs: Iterable[str], exact: str) -> dict[str, Any]:
+    def _entering(self, inputs: Iterable[str]) -> dict[str, Any]:
         found: dict[str, Any] = {}
         rest = []
         for name in inputs:
             kind, _, of = name.partition(" ")
             if name in self.recording.constants:
                 found[name] = self.recording.constants[name][0]
-            elif kind == "open":
-                found[name] = 0.0
+            elif name == "step":
+                found[name] = 1.0
             elif kind == "inverse":
                 group, i, r = of.rsplit(" ", 2)
-                found[name] = 0.0 if group == exact else self._solution(group).inverse[:, int(i), int(r)]
+                found[name] = self._solution(group).inverse[:, int(i), int(r)]
             else:
                 rest.append(name)
         return found | self.lanes.entering(rest)
@@ -200,9 +231,9 @@ class Bounds:
                 error = self.recording.constants[name][1]
                 if error:
                     found[name] = error
-            elif kind == "open":
-                group, row = of.rsplit(" ", 1)
-                found[name] = self._solution(group).residual[:, int(row)]
+            elif name == "step":
+                # none of it is made
+                found[name] = 1.0
             elif kind == "table":
                 found[name] = self._table(int(of.split()[0]))
             elif not of and kind[0] == "q" and given[:, int(kind[1:])].any():
@@ -214,7 +245,7 @@ class Bounds:
         if name not in self._solutions:
             group = next(g for g in self.branch.plan.groups if g.name == name)
             keys: list[Key] = [("gap", name, i) for i in range(len(group.closures))]
-            left, _ = self.residual(keys, exact=name)
+            left, _ = self.residual(keys)
             self._solutions[name] = solution(group, self.poses, left)
         return self._solutions[name]
 
@@ -229,6 +260,19 @@ class Bounds:
         if table.axis in ("angle", "speed"):
             read = read + steep * self.of(("angle", table.body, int(table.axis == "speed")))
         return np.broadcast_to(read, self.n)
+
+
+def _largest(found: Mapping[str, Any], keys: Iterable[Key]) -> Any:
+    """The largest τ of some quantities."""
+    return reduce(np.maximum, [found[f"tau({name})"] for key in keys for name in names(key)])
+
+
+def _once(tape: Tape, names: Iterable[str]) -> tuple[Tape, dict[str, str]]:
+    """A tape that has each result once, and what outputs are called there."""
+    first: dict[int, str] = {}
+    known = dict(tape.outputs)
+    called = {name: first.setdefault(known[name], name) for name in names}
+    return tape.pruned(first.values()), called
 
 
 def _length(parts: list[Any]) -> Any:

@@ -108,8 +108,14 @@ def grown(tau: Reals, k: float) -> Reals:
     τ is taken a quarter larger, for the third order.
     """
     tau = 1.25 * np.asarray(tau)
-    grown = np.expm1((0.5 - k) * np.log1p(-2 * tau)) / ((2 * k - 1) * np.maximum(tau, 1e-30))
-    return np.where(tau < 1e-12, 1.0, np.where(tau < 0.5, grown, np.inf))
+    found = np.ones(tau.shape)
+    # far from a limit there is nothing to add
+    near = ~(tau < 1e-12)
+    if near.any():
+        tau = tau[near]
+        more = np.expm1((0.5 - k) * np.log1p(-2 * tau)) / ((2 * k - 1) * tau)
+        found[near] = np.where(tau < 0.5, more, np.inf)
+    return found
 
 
 def inverse(j: Reals) -> Reals:

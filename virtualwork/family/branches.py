@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.engines import run, run_grid
 from virtualwork.branch.guess import BESIDE, informed
 from virtualwork.describe.description import Description
-from virtualwork.family.written import CHOICE, CLOSE, TOLD, Written
+from virtualwork.family.written import CHOICE, CLOSE, DIP, TOLD, Written
 from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Reals
 
 Mask = NDArray[np.bool_]
-# rad, or of the mechanism's size: how finely the way to the poses is looked through, and what is a dip of a radicand
-STEP, DIP = 2 * np.pi / 90, 0.05
+# rad, or of the mechanism's size: how finely the way to the poses is looked through
+STEP = 2 * np.pi / 90
 # so many times wider are the steps at which `CLEAR` tells that no dip can be; and samples of these that are told at once
 WIDER, AT_ONCE = 2, 8
 # what a dip has to go down to for two branches to meet there
@@ -185,7 +185,7 @@ def _wide(m: Description, low: Reals, high: Reals) -> Reals:
 
 def _every_other(count: int) -> NDArray[np.intp]:
     """Which samples are looked at in wider steps: the first and the last among them."""
-    return np.unique([*range(0, count, WIDER), count - 1])
+    return np.append(np.arange(0, count - 1, WIDER), count - 1)
 
 
 def _of(known: Mapping[str, Any], rows: Any) -> dict[str, Any]:

@@ -1,9 +1,9 @@
 """Quantities of one design after another: what an optimiser asks for, with exact derivatives.
 
-The formulas are written down once with the dimensions as inputs of the tape. An evaluation is three runs of tapes: the
-branch on which each loop closes, as the design's own guess has it; the quantities, together with a look along the way from
-the guess to the poses, where another branch might be met; and, if asked for, one sweep backwards. A design of which the
-branch is not told so simply is described alone.
+The formulas are written down once with the dimensions as inputs of the tape. An evaluation is one run of it: the branch on
+which each loop closes, as the design's own guess has it; the quantities; and a look along the way from the guess to the
+poses, where another branch might be met. Derivatives, if asked for, are a second one with a sweep backwards. Where the
+branch is not told so simply, more is done; at worst the design is described alone.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.engines import Repeated
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.describe.errors import DescriptionError, hint
-from virtualwork.family.branches import DIP, meet_on_the_way, samples, signs
+from virtualwork.family.branches import meet_on_the_way, samples, signs
 from virtualwork.family.part import Part, Solver
-from virtualwork.family.written import CLOSE, TOLD
 from virtualwork.formulas.asked import COMPLEX, Key, names
 from virtualwork.formulas.numbers import Reals
 
@@ -50,7 +49,7 @@ class Design:
         self._first = Solver(Part(self.mechanism, self.dimensions, own, np.zeros((1, 1, 1)), AT_REST))
         self._paths = [d.path for d in self.dimensions]
         self._chosen: tuple[bytes, dict[str, Any] | None] = b"", None
-        self._lanes: tuple[Reals, Reals] | None = None
+        self._kept: dict[tuple[tuple[str, ...] | None, bool], tuple[bytes, Repeated]] = {}
         self._held: dict[str, float] | None = None
 
     def __reduce__(self) -> tuple[type[Design], tuple[object, ...]]:
@@ -102,12 +101,11 @@ class Design:
             m; rad within (−π, π]. NaN where a pose cannot be assembled.
         """
         x, q = np.asarray(numbers, dtype=float), np.asarray(inputs, dtype=float)
-        known = self._known(x)
-        if known is not None:
-            found = self._on_tape(known, q)
-            if found is not None:
+        if self.exact:
+            found, fine = self._evaluated(x, q, None)
+            if fine or self._goes(x, q):
                 self.evaluations += 1
-                return found
+                return found if np.isfinite(found).all() else np.where(np.isfinite(found), found, np.nan)
             # a dip that has to be looked into tells of this design what its signs do not
             self._chosen = x.tobytes(), None
         return self.table(x[None], q[None])[:, 0]
@@ -118,22 +116,31 @@ class Design:
         `inputs_alone`: to nothing but the inputs, (rows, n, 1).
         """
         x, q = np.asarray(numbers, dtype=float), np.asarray(inputs, dtype=float)
-        known = self._known(x)
-        if known is None:
-            return self._differences(x, q, inputs_alone)
-        written = self._first.written
-        assert written is not None
         enters = ("q0",) if inputs_alone else (*self._paths, "q0")
-        tape = written.slopes(self.keys, enters)
-        found = run(tape, {**known, "q0": q})
-        out = np.zeros((self.rows, len(q), len(enters)))
-        here = [part for key in self.keys for part in names(key)]
-        for row, part in enumerate(here):
-            for column, name in enumerate(enters):
-                place = tape.rows.get(f"d({part})/d({name})")
-                if place is not None:
-                    out[row, :, column] = found.table[place]
-        return out
+        if self.exact and self._chosen != (x.tobytes(), None):
+            found, fine = self._evaluated(x, q, enters)
+            if fine or self._known(x) is not None:
+                return found.reshape(self.rows, len(enters), len(q)).transpose(0, 2, 1)
+        return self._differences(x, q, inputs_alone)
+
+    def _evaluated(self, x: Reals, q: Reals, enters: tuple[str, ...] | None) -> tuple[Reals, bool]:
+        """The quantities, or their derivatives, from one run of a tape; and whether the branch is told so simply."""
+        known = self._held if self._held is not None else {"at": self.mechanism.at[0]}
+        again = self._ready(q, enters)
+        found, fine = again({**known, **dict(zip(self._paths, x.tolist(), strict=True))})
+        return found[:, : len(q)], fine
+
+    def _ready(self, q: Reals, enters: tuple[str, ...] | None) -> Repeated:
+        """What works out one design after another at some inputs; the last ones' is kept."""
+        own_signs = self._held is None
+        key, same = (enters, own_signs), q.tobytes()
+        kept = self._kept.get(key)
+        if kept is None or kept[0] != same:
+            assert self._first.written is not None
+            tape = self._first.written.evaluation(self.keys, enters, own_signs)
+            lanes = self._with_way(q) if own_signs and enters is None else q
+            kept = self._kept[key] = same, Repeated(tape, {"q0": lanes}, tested=own_signs)
+        return kept[1]
 
     def _known(self, x: Reals) -> dict[str, Any] | None:
         """What enters the tape of a design beside the input; None where it is better described alone."""
@@ -147,47 +154,28 @@ class Design:
         if written is None:
             return None
         known: dict[str, Any] = dict(zip(self._paths, x.tolist(), strict=True))
-        if self._held is not None:
-            return known | self._held
-        if not written.closed:
-            return known
-        found = run(written.choice, {**known, "q0": m.at[0]})
-        chosen = {}
-        for group in written.closed:
-            a, b = found[f"plus {group.name}"], found[f"minus {group.name}"]
-            if not (found[f"margin {group.name}"] > CLOSE and min(a, b) < TOLD * max(a, b)):
-                arrays, told = signs(written, m, known, 1)
-                if not told[0]:
-                    return None
-                return known | {f"sign {name}": float(sign[0]) for name, sign in arrays.items()}
-            chosen[f"sign {group.name}"] = float(found[f"sign {group.name}"])
-        return known | chosen
+        found, told = signs(written, m, known, 1)
+        return known | {f"sign {name}": float(sign[0]) for name, sign in found.items()} if told[0] else None
 
-    def _on_tape(self, known: dict[str, Any], q: Reals) -> Reals | None:
-        """The quantities; None where another branch may be met on the way from the guess."""
-        written, n = self._first.written, len(q)
-        assert written is not None
-        rows, looked = self.rows, [] if self._held is not None else written.closed
-        lanes = q
-        if looked:
-            if self._lanes is None or self._lanes[0] is not q:
-                self._lanes = q, self._with_way(q)
-            lanes = self._lanes[1]
-        margins = [("margin", group.name) for group in looked]
-        table = run(written.tape((*self.keys, *margins)), {**known, "q0": lanes}).table
-        # NaN is not greater either
-        if looked and not table[rows:, n:].min() > DIP:
-            ends = (lanes[n:].min(keepdims=True), lanes[n:].max(keepdims=True))
-            if meet_on_the_way(written, self.mechanism, known, 1, *ends)[0]:
-                return None
-        return np.where(np.isfinite(table[:rows, :n]), table[:rows, :n], np.nan)
+    def _goes(self, x: Reals, q: Reals) -> bool:
+        """Whether a design goes by its signs: the guess tells them, and no other branch is met on the way to the poses."""
+        known, written = self._known(x), self._first.written
+        if known is None or written is None:
+            return False
+        low, high = self._ends(q)
+        return not meet_on_the_way(written, self.mechanism, known, 1, np.array([low]), np.array([high]))[0]
+
+    def _ends(self, q: Reals) -> tuple[float, float]:
+        """The least and the largest of the guess's input and these."""
+        at = self.mechanism.at[0]
+        return min(float(np.nanmin(q)), at), max(float(np.nanmax(q)), at)
 
     def _with_way(self, q: Reals) -> Reals:
         """Inputs, and behind them samples of the way from the guess over all of them, of a turn at most."""
         m = self.mechanism
-        low, high = min(np.nanmin(q), m.at[0]), max(np.nanmax(q), m.at[0])
+        low, high = self._ends(q)
         last = min(high, low + (np.inf if m.inputs[0].is_slide else 2 * np.pi))
-        return np.concatenate([q, np.linspace(low, last, samples(m, float(high - low)))])
+        return np.concatenate([q, np.linspace(low, last, samples(m, high - low))])
 
     def _differences(self, x: Reals, q: Reals, inputs_alone: bool) -> Reals:
         """The derivatives from differences; those to all inputs from one design."""

@@ -14,7 +14,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import distance, sign_of_angles
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, value
-from virtualwork.formulas.asked import FORCES, Key
+from virtualwork.formulas.asked import FORCES, Key, names
 from virtualwork.formulas.kinds import WRITTEN
 from virtualwork.formulas.numbers import Number
 from virtualwork.formulas.positions import Case, State, run
@@ -31,6 +31,8 @@ CLOSE = 1e-9
 TOLD = 0.5
 # the radicand above which no change point is within two steps of `branches.STEP`: it grows with the square of the distance
 CLEAR = 0.2
+# and below which it may dip down to one between samples that are one step apart
+DIP = 0.05
 
 
 class Written:
@@ -73,12 +75,18 @@ class Written:
         self._tapes: dict[tuple[Key, ...], Tape] = {}
         self._tested: dict[tuple[tuple[Key, ...], tuple[Key, ...]], Tape] = {}
         self._told: dict[int, Tape] = {}
+        self._evaluations: dict[tuple[tuple[Key, ...], tuple[str, ...] | None, bool], Tape] = {}
         self._slopes: dict[tuple[tuple[Key, ...], tuple[str, ...]], Tape] = {}
 
     @cached_property
     def closed(self) -> list[Group]:
         """The groups with a closed form that has two branches."""
         return [g for g in self.plan.groups if g.kind not in ("Newton", "PRP")]
+
+    @cached_property
+    def margins(self) -> list[Key]:
+        """The keys of their radicands."""
+        return [("margin", group.name) for group in self.closed]
 
     def tape(self, keys: Iterable[Key]) -> Tape:
         """The tape of quantities, written once."""
@@ -97,15 +105,15 @@ class Written:
             closed = [("closed", *self.recording.hangs_on(key)) for key in (*keys, *also)]
             sound = [sys.float_info.max - abs(self.recording.value(key)) for key in dict.fromkeys(closed)]
             if any(key[0] in FORCES for key in keys):
-                sound += [abs(self.recording.value(("margin", g.name))) - NEAR for g in self.closed]
+                sound += [abs(self.recording.value(key)) - NEAR for key in self.margins]
             self._tested[asked] = self.recording.tape(keys, {"sound": every(sound)})
         return self._tested[asked]
 
     @cached_property
     def clear(self) -> Tape:
         """The tape of `clear`: positive where no radicand is near zero, by the input and the signs."""
-        margins = [self.recording.value(("margin", group.name)) for group in self.closed]
-        return self.recording.recorder.tape({"clear": every([margin - CLEAR for margin in margins])})
+        depths = [self.recording.value(key) - CLEAR for key in self.margins]
+        return self.recording.recorder.tape({"clear": every(depths)})
 
     def told(self, samples: int) -> Tape:
         """The tape of how all closed forms close at the inputs of the guess, and whether that is told plainly.
@@ -115,14 +123,8 @@ class Written:
         """
         if samples not in self._told:
             recorder = Recorder()
-            chosen = _again(self.choice, recorder, {})
-            told = []
-            for name in (group.name for group in self.closed):
-                plus, minus = chosen[f"plus {name}"], chosen[f"minus {name}"]
-                told.append(chosen[f"margin {name}"] - CLOSE)
-                told.append(RECORDED.select(TOLD * plus - minus, 1.0, TOLD * minus - plus))
-            signs = {f"sign {group.name}": chosen[f"sign {group.name}"] for group in self.closed}
-            margins = self.tape([("margin", group.name) for group in self.closed])
+            signs, told = self._chosen(recorder, {})
+            margins = self.tape(self.margins)
             clear = []
             for i in range(samples):
                 depths = _again(margins, recorder, signs | {"q0": recorder.input(f"way {i}")})
@@ -130,6 +132,43 @@ class Written:
             outputs = signs | {"told": every(told), "clear": every(clear)}
             self._told[samples] = recorder.tape(outputs)
         return self._told[samples]
+
+    def _chosen(
+        self, recorder: Recorder, known: Mapping[str, Number]
+    ) -> tuple[dict[str, Number], list[Number]]:
+        """The choice on another tape: the signs as they enter, and what is positive where they are told plainly."""
+        chosen = _again(self.choice, recorder, known)
+        told = []
+        for name in (group.name for group in self.closed):
+            plus, minus = chosen[f"plus {name}"], chosen[f"minus {name}"]
+            told.append(chosen[f"margin {name}"] - CLOSE)
+            told.append(RECORDED.select(TOLD * plus - minus, 1.0, TOLD * minus - plus))
+        return {f"sign {group.name}": chosen[f"sign {group.name}"] for group in self.closed}, told
+
+    def evaluation(self, keys: Sequence[Key], enters: tuple[str, ...] | None, own_signs: bool) -> Tape:
+        """The tape of quantities, or of the derivatives of each to all that enters, one after the other.
+
+        `own_signs`: the signs are those of the guess, at the input `at`, and last comes `fine`: positive where these are
+        told plainly, and for the quantities themselves where no radicand is near zero. Else the signs enter.
+        """
+        asked = tuple(keys), enters, own_signs
+        if asked not in self._evaluations:
+            recorder = Recorder()
+            at = {"q0": recorder.input("at")}
+            signs, fine = self._chosen(recorder, at) if own_signs else ({}, [])
+            parts = [part for key in keys for part in names(key)]
+            if enters is None:
+                margins = self.margins if own_signs else []
+                outputs = _again(self.tape((*keys, *margins)), recorder, signs)
+                fine += [outputs.pop(name) - DIP for key in margins for name in names(key)]
+            else:
+                found = _again(self.slopes(keys, enters), recorder, signs)
+                every_one = [f"d({part})/d({name})" for part in parts for name in enters]
+                outputs = {name: found.get(name, 0.0) for name in every_one}
+            if own_signs:
+                outputs["fine"] = every(fine)
+            self._evaluations[asked] = recorder.tape(outputs)
+        return self._evaluations[asked]
 
     def slopes(self, keys: Sequence[Key], enters: tuple[str, ...]) -> Tape:
         """The tape of quantities' derivatives to what enters, as far as they hang on that; written once."""

@@ -40,7 +40,7 @@ from virtualwork.formulas.positions import Case, State, columns, run
 from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import JointForces
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
+from virtualwork.plan.steps import Group, Plan, Term, path_reads
 
 # sin² of a transmission angle below which a force may have no digit left
 NEAR = 1e-18
@@ -114,12 +114,16 @@ class Recording:
         n = len(group.angles) + len(group.slides)
         return [self.recorder.input(f"x {group.name} {i}") for i in range(n)]
 
+    def step(self, group: Group, st: State) -> list[Number] | None:
+        """By how much a group's unknowns that enter are off, to first order; None where they are exact."""
+        return None if self.settled else WRITTEN.solve(columns(group, st), gaps(group, st))
+
     def _close(self, group: Group, st: State) -> None:
         if self.enters(group):
             x = self.unknowns(group)
             put_unknowns(group, st, x)
-            if not self.settled:
-                step = WRITTEN.solve(columns(group, st), gaps(group, st))
+            step = self.step(group, st)
+            if step is not None:
                 put_unknowns(group, st, [a + b for a, b in zip(x, step, strict=True)])
             return
         sign: Number = self.signs[group.name]
@@ -144,15 +148,13 @@ class Recording:
             for number, rates in ways:
                 for step in steps:
                     key = id(step), k, number
-                    if key not in self._done:
-                        self._done.add(key)
-                        self._advance(step, rates, k)
-
-    def _advance(self, step: Step, rates: Rates | None, k: int) -> None:
-        if rates is None:
-            run([step], self.st, self._close)
-        else:
-            rates.advance([step], k)
+                    if key in self._done:
+                        continue
+                    self._done.add(key)
+                    if rates is None:
+                        run([step], self.st, self._close)
+                    else:
+                        rates.advance([step], k)
 
     @property
     def along(self) -> Rates:
@@ -180,8 +182,8 @@ class Recording:
             self._forces = paths, JointForces(paths, set()), _Block(self)
         return self._forces
 
-    def _places(self, order: int = 1) -> None:
-        """Solve what the places of all joints hang on."""
+    def _places(self, order: int = 1) -> tuple[LoadPaths, JointForces, Block]:
+        """The forces, with everything solved that the places of all joints hang on."""
         paths, *_ = self.forces
         keys: set[str] = {f"slide:{i}" for i in range(len(self.mechanism.guides))}
         for body in self.mechanism.links:
@@ -189,6 +191,7 @@ class Recording:
         for group in self.plan.groups:
             keys |= self.plan.reads(group) | set(self.plan.writes(group))
         self.solve(sorted(keys), max((load.order for load in paths.case.loads), default=order))
+        return self.forces
 
     def efforts(self) -> list[Number]:
         """The effort at each input by virtual work, through the carriers of motors."""
@@ -327,13 +330,11 @@ class Recording:
         return self.efforts()[j]
 
     def _newton_euler(self, j: int) -> Number:
-        self._places()
-        _, of, block = self.forces
+        _, of, block = self._places()
         return of.effort(block, j)
 
     def _force(self, joint: str, body: str) -> Number:
-        self._places()
-        _, of, block = self.forces
+        _, of, block = self._places()
         return of.joint_force(block, of.by_key[joint], body)
 
     def _reaction(self, joint: str, body: str) -> Number:
@@ -341,18 +342,16 @@ class Recording:
         return sum((self.value(("force", j.key, body)) for j in of), 0.0)
 
     def _moment(self, joint: str, body: str) -> Number:
-        self._places()
-        _, of, block = self.forces
+        _, of, block = self._places()
         guide = of.by_key[joint].guide
         return None if guide is None else of.guide_moment(block, guide, body)
 
-    def _shaking(self) -> Number:
+    def _shaking(self, part: int = 0) -> Number:
         paths, _, block = self.forces
-        return resultant(shaking_loads(paths.case.loads), block)[0]
+        return resultant(shaking_loads(paths.case.loads), block)[part]
 
     def _shaking_moment(self) -> Number:
-        paths, _, block = self.forces
-        return resultant(shaking_loads(paths.case.loads), block)[1]
+        return self._shaking(1)
 
     def hangs_on(self, key: Key) -> tuple[str, ...]:
         """The groups that a quantity hangs on, by name: where one of them is not assembled, it has no value.

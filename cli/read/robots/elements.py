@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, ParseError
 
@@ -61,9 +61,23 @@ def children(element: Element, *tags: str) -> Iterator[Element]:
     return (e for e in element if isinstance(e.tag, str) and plain(e) in tags)
 
 
-def child(element: Element, tag: str) -> Element | None:
-    """Return the first element of a tag directly inside."""
-    return next(children(element, tag), None)
+def child(element: Element | None, *path: str) -> Element | None:
+    """Return the first element of a tag directly inside, the first of the next tag in that, and so on."""
+    for tag in path:
+        element = None if element is None else next(children(element, tag), None)
+    return element
+
+
+def text(element: Element | None, *path: str) -> str | None:
+    """Return the text at the end of such a path, without the blanks around it; None where there is none."""
+    found = child(element, *path)
+    return None if found is None or found.text is None else found.text.strip()
+
+
+def stated(limits: Iterable[str | None], friction: str | None) -> tuple[str, ...]:
+    """Name what is said of a joint beyond its place: what is there and not zero."""
+    found = {"limits": list(limits), "friction": [friction]}
+    return tuple(what for what, words in found.items() if any((word or "").strip("0. ") for word in words))
 
 
 def words(file: str, where: str, text: str | None) -> list[str]:

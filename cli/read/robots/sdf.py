@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from cli.errors import DataError
-from cli.read.robots.elements import child, children, named, number, numbers, plain, words
+from cli.read.robots.elements import child, children, named, number, numbers, plain, stated, text
 from cli.read.robots.robot import (
     WORLD,
     Array,
@@ -21,7 +21,6 @@ from cli.read.robots.robot import (
     pose,
     quaternion,
     rpy,
-    sphere_around,
     symmetric,
     unit,
 )
@@ -48,21 +47,17 @@ def read(file: str, root: Element) -> Robot:
         robot.notes.append(f"models after the first are left out: {len(models) - 1}")
     robot.add(RobotLink(WORLD, np.eye(4)))
     if world is not None:
-        gravity = _text(child(world, "gravity"))
-        robot.gravity = np.array(numbers(file, "world, gravity", gravity, 3, (0.0, 0.0, -9.8)))
+        given = text(world, "gravity")
+        robot.gravity = np.array(numbers(file, "world, gravity", given, 3, (0.0, 0.0, -9.8)))
     _Model(robot, models[0], root.get("version", "1.0")).read()
     return robot
 
 
-def _text(element: Element | None) -> str | None:
-    return None if element is None else element.text
-
-
 def _named_text(file: str, element: Element, tag: str, where: str) -> str:
-    text = (_text(child(element, tag)) or "").strip()
-    if not text:
+    found = text(element, tag)
+    if not found:
         raise DataError(f"{file}: {where}: <{tag}> is missing")
-    return text
+    return found
 
 
 def read_pose(file: str, where: str, element: Element | None) -> Array:
@@ -102,7 +97,7 @@ class _Model:
         for e in children(self.element, "model", "include"):
             robot.notes.append(f"<{plain(e)}> in the model: left out: files and models inside are not read")
         static = False
-        if (_text(child(self.element, "static")) or "").strip() in ("true", "1"):
+        if text(self.element, "static") in ("true", "1"):
             robot.notes.append(f"model '{robot.name}' is static: nothing in it moves")
             static = True
         for e in children(self.element, "link"):
@@ -149,9 +144,7 @@ class _Model:
         if not speeds:
             efforts = {}
             for e in children(self.element, "joint"):
-                axis = child(e, "axis")
-                limit = None if axis is None else child(axis, "limit")
-                effort = None if limit is None else _text(child(limit, "effort"))
+                effort = text(e, "axis", "limit", "effort")
                 efforts[named(file, e)] = None if effort is None else number(file, "effort", effort)
             if 0.0 in efforts.values():
                 speeds = dict.fromkeys(
@@ -164,40 +157,21 @@ def _inertial(file: str, where: str, element: Element | None) -> Inertial | None
     """Read an `<inertial>`; without one the format means 1 kg, which nobody has said."""
     if element is None:
         return None
-    inertia = child(element, "inertia")
-    texts = {
-        key: (None if inertia is None else _text(child(inertia, key)))
-        or ("1" if key in ("ixx", "iyy", "izz") else "0")
-        for key in ENTRIES
-    }
-    entries = {key: number(file, f"{where}, {key}", text.strip()) for key, text in texts.items()}
-    mass = _text(child(element, "mass"))
+    own = dict.fromkeys(ENTRIES, "0") | dict.fromkeys(("ixx", "iyy", "izz"), "1")
+    texts = {key: text(element, "inertia", key) or own[key] for key in ENTRIES}
+    entries = {key: number(file, f"{where}, {key}", word) for key, word in texts.items()}
+    mass = text(element, "mass")
     # what `dalembert export` writes beside numbers that the format asks for
     if child(element, "massless") is not None:
         return None
     if child(element, "point_mass") is not None:
         entries = dict.fromkeys(ENTRIES, 0.0)
     return Inertial(
-        1.0 if mass is None else number(file, f"{where}, mass", mass.strip()),
+        1.0 if mass is None else number(file, f"{where}, mass", mass),
         read_pose(file, f"{where}, inertial", child(element, "pose")),
         symmetric(entries),
-        symmetric({key: half_unit(text.strip()) for key, text in texts.items()}),
+        symmetric({key: half_unit(word) for key, word in texts.items()}),
     )
-
-
-def _shapes(file: str, where: str, link: Element) -> list[tuple[Array, float]]:
-    """Return spheres around the shapes of a link; none where the size of one is not said."""
-    found = []
-    for e in children(link, "visual", "collision"):
-        geometry = child(e, "geometry")
-        for shape in () if geometry is None else geometry:
-            texts = [_text(child(shape, key)) for key in ("size", "radius", "length")]
-            size = [float(w) for text in texts for w in words(file, where, text)]
-            radius = sphere_around(plain(shape), size)
-            if radius is None:
-                return []
-            found.append((read_pose(file, where, child(e, "pose"))[:3, 3], radius))
-    return found
 
 
 def joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
@@ -217,13 +191,11 @@ def joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     axis = child(e, "axis")
     type_ = e.get("type", "")
     if type_ == "gearbox":
-        reference = (
-            _text(child(e, "gearbox_reference_body")) or _text(child(e, "reference_body")) or WORLD
-        ).strip()
+        reference = text(e, "gearbox_reference_body") or text(e, "reference_body") or WORLD
         if reference == WORLD and model is None:
             reference = robot.ground
         robot.link(reference, where)
-        ratio = number(file, f"{where}, gearbox_ratio", _text(child(e, "gearbox_ratio")) or "1")
+        ratio = number(file, f"{where}, gearbox_ratio", text(e, "gearbox_ratio") or "1")
         sense = float(
             np.sign(
                 _axis(file, where, axis, frame, None) @ _axis(file, where, child(e, "axis2"), frame, None)
@@ -235,42 +207,30 @@ def joint(robot: Robot, e: Element, model: _Model | None = None) -> None:
     direction = np.zeros(3) if kind in ("fixed", "ball") else _axis(file, where, axis, frame, model)
     at = frame[:3, 3]
     robot.join(RobotJoint(name, kind, parent, below, (at, at), direction, type=type_))
-    robot.joints[name].more = _more(axis)
-    dynamics = None if axis is None else child(axis, "dynamics")
-    if dynamics is not None:
-        made = robot.joints[name]
-        tags = ("damping", "spring_stiffness", "spring_reference")
-        made.damping, made.stiffness, made.rest = (
-            number(file, f"{where}, {tag}", (_text(child(dynamics, tag)) or "0").strip()) for tag in tags
-        )
-    mimic = None if axis is None else child(axis, "mimic")
-    if mimic is not None:
-        factor = number(file, f"{where}, mimic multiplier", _text(child(mimic, "multiplier")) or "1")
-        robot.couplings.append((name, [(name, 1.0), (named(file, mimic, "joint"), -factor)]))
-
-
-def _more(axis: Element | None) -> tuple[str, ...]:
-    """Name what is said of a joint beyond its place."""
-    limit, dynamics = (None if axis is None else child(axis, tag) for tag in ("limit", "dynamics"))
-    found = (("limits", limit, ("lower", "upper")), ("friction", dynamics, ("friction",)))
-    return tuple(
-        what
-        for what, element, tags in found
-        if element is not None and any((_text(child(element, tag)) or "").strip("0. \n") for tag in tags)
+    made = robot.joints[name]
+    made.more = stated(
+        [text(axis, "limit", end) for end in ("lower", "upper")], text(axis, "dynamics", "friction")
     )
+    tags = ("damping", "spring_stiffness", "spring_reference")
+    made.damping, made.stiffness, made.rest = (
+        number(file, f"{where}, {tag}", text(axis, "dynamics", tag) or "0") for tag in tags
+    )
+    mimic = child(axis, "mimic")
+    if mimic is not None:
+        factor = number(file, f"{where}, mimic multiplier", text(mimic, "multiplier") or "1")
+        robot.couplings.append((name, [(name, 1.0), (named(file, mimic, "joint"), -factor)]))
 
 
 def _axis(file: str, where: str, axis: Element | None, frame: Array, model: _Model | None) -> Array:
     """Return the direction of an axis in the world."""
-    element = None if axis is None else child(axis, "xyz")
-    xyz = numbers(file, f"{where}, axis", _text(element), 3, (0.0, 0.0, 1.0))
+    element = child(axis, "xyz")
+    xyz = numbers(file, f"{where}, axis", text(element), 3, (0.0, 0.0, 1.0))
     turned = frame
     if element is not None and model is not None:
         base = element.get("expressed_in", "")
-        assert axis is not None
         if base:
             turned = model.frame(base, where)
-        elif model.old or (_text(child(axis, "use_parent_model_frame")) or "").strip() in ("true", "1"):
+        elif model.old or text(axis, "use_parent_model_frame") in ("true", "1"):
             turned = model.at[MODEL]
     return np.asarray(turned[:3, :3] @ unit(file, f"{where}, axis", xyz))
 
@@ -280,9 +240,7 @@ def driven(file: str, element: Element) -> dict[str, float | None]:
     found: dict[str, float | None] = {}
     for plugin in children(element, "plugin"):
         for name in children(plugin, "joint_name", "jointName"):
-            if (name.text or "").strip():
-                speed = _text(child(plugin, "initial_velocity"))
-                found[(name.text or "").strip()] = (
-                    None if speed is None else number(file, "plugin, initial_velocity", speed.strip())
-                )
+            if which := text(name):
+                speed = text(plugin, "initial_velocity")
+                found[which] = None if speed is None else number(file, "plugin, initial_velocity", speed)
     return found

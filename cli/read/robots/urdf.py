@@ -8,7 +8,7 @@ import numpy as np
 
 from cli.errors import DataError
 from cli.read.robots import sdf
-from cli.read.robots.elements import child, children, named, number, numbers, plain, words
+from cli.read.robots.elements import child, children, named, number, numbers, plain, stated, words
 from cli.read.robots.robot import (
     Array,
     Inertial,
@@ -140,24 +140,14 @@ def _joint(robot: Robot, row: tuple[Element, str, Kind, str, str], frame: Array)
     direction = frame[:3, :3] @ unit(robot.file, f"{where}, axis", xyz) if kind != "fixed" else np.zeros(3)
     ends = (frame[:3, 3], robot.links[link].pose[:3, 3])
     made = RobotJoint(named(robot.file, e), kind, parent, link, ends, direction, type=e.get("type", ""))
-    made.more = _more(e)
-    dynamics = child(e, "dynamics")
+    limit, dynamics = child(e, "limit"), child(e, "dynamics")
+    made.more = stated(
+        [] if limit is None else [limit.get(end) for end in ("lower", "upper")],
+        None if dynamics is None else dynamics.get("friction"),
+    )
     if dynamics is not None:
         made.damping = number(robot.file, f"{where}, damping", dynamics.get("damping", "0"))
     robot.join(made)
-
-
-def _more(e: Element) -> tuple[str, ...]:
-    """Name what is said of a joint beyond its place."""
-    found = (
-        ("limits", child(e, "limit"), ("lower", "upper")),
-        ("friction", child(e, "dynamics"), ("friction",)),
-    )
-    return tuple(
-        what
-        for what, element, keys in found
-        if element is not None and any(element.get(key, "0").strip("0. ") for key in keys)
-    )
 
 
 def _loop(robot: Robot, e: Element) -> None:

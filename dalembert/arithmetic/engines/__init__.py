@@ -178,6 +178,52 @@ def run_grid(
     return table
 
 
+class Repeated:
+    """A tape that is run again and again on the same lanes, with other numbers: what can be got ready is, once.
+
+    Parameters
+    ----------
+    tape : Tape
+    lanes : mapping of name to array (n,)
+        The other inputs are numbers.
+    tested : bool
+        Whether of the last output is wanted only if it is positive in every lane.
+
+    Examples
+    --------
+    >>> from dalembert.arithmetic.recorded import RECORDED, Recorder
+    >>> recorder = Recorder()
+    >>> r, q = recorder.input("r"), recorder.input("q")
+    >>> tape = recorder.tape({"x": r * RECORDED.cos(q), "test": r - q})
+    >>> again = Repeated(tape, {"q": np.array([0.0, np.pi])}, tested=True)
+    >>> again({"r": 2.0}), again({"r": 4.0})
+    ((array([[ 2., -2.]]), False), (array([[ 4., -4.]]), True))
+    """
+
+    def __init__(self, tape: Tape, lanes: Mapping[str, Reals], tested: bool = False) -> None:
+        self.tape, self.tested = tape, tested
+        self.lanes = {name: np.ascontiguousarray(x, dtype=float) for name, x in lanes.items()}
+        self.n = len(next(iter(self.lanes.values())))
+        self._numbers = [name for name in tape.inputs if name not in lanes]
+        self._steady: Any = None
+
+    def __call__(self, numbers: Mapping[str, float]) -> tuple[Reals, bool]:
+        """The outputs, (outputs, n), without the test; and whether it holds."""
+        engine = os.environ.get("DALEMBERT_ENGINE") or chosen(self.tape, self.n)
+        if engine == "llvm" and self.n >= WIDEST:
+            from dalembert.arithmetic.engines import llvm
+
+            self._steady = self._steady or llvm.steady(self.tape, self.lanes, self.n, self.tested)
+            if self._steady is not None:
+                return self._steady([numbers[name] for name in self._numbers])  # type: ignore[no-any-return]
+        columns = [
+            self.lanes[name] if name in self.lanes else np.asarray(numbers[name]) for name in self.tape.inputs
+        ]
+        table = np.empty((len(self.tape.outputs), self.n))
+        _lanes(self.tape, columns, table, self.n, engine)
+        return (table[:-1], bool((table[-1] > 0).all())) if self.tested else (table, True)
+
+
 def chosen(tape: Tape, n: int) -> str:
     """The engine for n lanes: compiled code only once the tape has been asked for so often that it pays."""
     if n <= FEW:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.arrays import NUMPY
 from dalembert.arithmetic.engines import floats
 from dalembert.arithmetic.tape import Tape, shortened
 
@@ -35,23 +36,6 @@ UFUNCS = {
     "cos": "cos",
     "atan2": "arctan2",
 }
-
-
-class Numpy:
-    """The functions of numpy's numbers, for `Tape.on`."""
-
-    const = staticmethod(np.float64)
-    sqrt = staticmethod(np.sqrt)
-    sin = staticmethod(np.sin)
-    cos = staticmethod(np.cos)
-    atan2 = staticmethod(np.arctan2)
-
-    @staticmethod
-    def select(test: Any, positive: Any, otherwise: Any) -> Any:
-        return np.where(np.greater(test, 0), positive, otherwise)
-
-
-NUMPY = Numpy()
 
 
 class Blocks:

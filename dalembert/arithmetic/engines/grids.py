@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.engines.blocks import NUMPY, Blocks
+from dalembert.arithmetic.arrays import NUMPY
+from dalembert.arithmetic.engines.blocks import Blocks
 from dalembert.arithmetic.tape import Tape, performed
 
 Reals = NDArray[np.float64]

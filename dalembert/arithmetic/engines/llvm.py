@@ -12,7 +12,7 @@ import os
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from hashlib import sha256
 from itertools import count
 from pathlib import Path
@@ -41,8 +41,8 @@ class Code:
 
     def __init__(self, width: int, keeper: Any, address: int) -> None:
         self.width, self._keeper = width, keeper
-        pointer = ctypes.POINTER(ctypes.c_void_p)
-        self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, pointer, pointer)(address)
+        of = ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p
+        self._call = ctypes.CFUNCTYPE(None, *of)(address)
 
     def __call__(self, inputs: Sequence[Reals], out: Sequence[Reals] | Reals, shape: tuple[int, int]) -> None:
         """Run: arrays as `run` takes them. At least one vector is done, and the last may do lanes again."""
@@ -65,22 +65,47 @@ class Code:
         # numbers that all lanes share stand side by side: an address of each array's own costs more than the work
         shared = np.array([x.item() for x in inputs if not x.ndim])
         places = count(address(shared), shared.itemsize)
-        given = [address(x) if x.ndim else next(places) for x in inputs]
-        if isinstance(out, np.ndarray):
-            first, step = address(out), out.strides[0]
-            results = list(range(first, first + step * len(out), step))
-        else:
-            results = list(map(address, out))
-        self._call(rows, columns, _pointers(given), _pointers(results))
+        given = np.array([address(x) if x.ndim else next(places) for x in inputs], dtype=np.uintp)
+        results = np.array([address(x) for x in out], dtype=np.uintp)
+        self.at(rows, columns, given, results)
+
+    def at(self, rows: int, columns: int, given: NDArray[np.uintp], results: NDArray[np.uintp]) -> None:
+        """Run on what lies at the addresses of inputs and outputs."""
+        self._call(rows, columns, address(given), address(results))
 
 
-def address(x: Reals) -> int:
+class Steady:
+    """Compiled code on the same lanes again and again: their addresses are looked up once.
+
+    Parameters
+    ----------
+    code : Code
+    lanes : sequence of array (n,) or None
+        In the order of the inputs; None for a number.
+    n, outputs : int
+    tested : bool
+        Whether the last output is a test.
+    """
+
+    def __init__(self, code: Code, lanes: Sequence[Reals | None], n: int, outputs: int, tested: bool) -> None:
+        self.code, self.n, self.tested, self._lanes = code, n, tested, lanes
+        places = count(0, 8)
+        self._open = np.array([x is None for x in lanes], dtype=np.uintp)
+        self._given = np.array([next(places) if x is None else address(x) for x in lanes], dtype=np.uintp)
+        # the test is the first byte of a row of its own
+        self._rows = np.arange(outputs, dtype=np.uintp) * np.uintp(8 * n)
+
+    def __call__(self, numbers: Sequence[float]) -> tuple[Reals, bool]:
+        """The outputs (outputs, n), and whether the test is positive in all lanes."""
+        shared, table = np.array(numbers), np.empty((len(self._rows), self.n))
+        given = self._given + self._open * np.uintp(address(shared))
+        self.code.at(1, self.n, given, self._rows + np.uintp(address(table)))
+        return (table[:-1], bool(table[-1].view(bool)[0])) if self.tested else (table, True)
+
+
+def address(x: NDArray[Any]) -> int:
     """Where an array begins."""
     return int(x.__array_interface__["data"][0])
-
-
-def _pointers(places: list[int]) -> Any:
-    return (ctypes.c_void_p * max(len(places), 1))(*places)
 
 
 def _pairs(out: Sequence[Reals] | Reals) -> list[int]:
@@ -112,15 +137,29 @@ def run(tape: Tape, inputs: Sequence[Reals], out: Sequence[Any] | Reals, shape: 
     kinds = [_kind(x, *shape) for x in inputs]
     pairs = _pairs(out)
     results = ["h" if x.dtype == bool else "p" if k in pairs else "l" for k, x in enumerate(out)]
-    key = (tape, "".join(kinds), "".join(results))
-    with _lock:
-        if key not in _compiled:
-            _compiled[key] = _code(*key)
-        code = _compiled[key]
+    code = _once(tape, "".join(kinds), "".join(results))
     if code is None:
         return False
     code(inputs, out, shape)
     return True
+
+
+def steady(tape: Tape, lanes: Mapping[str, Reals], n: int, tested: bool) -> Steady | None:
+    """A tape on the same lanes again and again, no fewer than a vector has; None where it is not for compiled code."""
+    if len(tape.operations) > LONGEST or _unusable:
+        return None
+    inputs = [lanes.get(name) for name in tape.inputs]
+    kinds = "".join("u" if x is None else "c" for x in inputs)
+    results = "l" * (len(tape.outputs) - tested) + "h" * tested
+    code = _once(tape, kinds, results)
+    return None if code is None else Steady(code, inputs, n, len(tape.outputs), tested)
+
+
+def _once(*key: Any) -> Code | None:
+    with _lock:
+        if key not in _compiled:
+            _compiled[key] = _code(*key)
+        return _compiled[key]
 
 
 def _kind(x: Reals, rows: int, columns: int) -> str:

@@ -1,0 +1,24 @@
+"""The functions of numpy's numbers, by which a tape is worked out on arrays operation by operation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+class Numpy:
+    """The functions of numpy's numbers, for `Tape.on`."""
+
+    const = staticmethod(np.float64)
+    sqrt = staticmethod(np.sqrt)
+    sin = staticmethod(np.sin)
+    cos = staticmethod(np.cos)
+    atan2 = staticmethod(np.arctan2)
+
+    @staticmethod
+    def select(test: Any, positive: Any, otherwise: Any) -> Any:
+        return np.where(np.greater(test, 0), positive, otherwise)
+
+
+NUMPY = Numpy()

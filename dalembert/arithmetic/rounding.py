@@ -1,0 +1,363 @@
+"""Bounds of a tape's own rounding errors, from one sweep backwards over it.
+
+With the adjoint v̄ = ∂y/∂v of every operation v of an output y (`adjoint`), the rounding error of y is to first order
+Σ v̄·δ_v with |δ_v| ≤ r·u·|v|, u = 2⁻⁵³ (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed.,
+SIAM 2002, §3.1). Ways of one rounding to the result over several paths cancel here as they do in truth, which a
+running bound cannot see. The bounds are a tape again and run on every engine; for a few lanes the sweep is done on
+numbers.
+
+What a factor adds to the error is what its product adds, ā·a = v̄·v for v = a·b, if it is used nowhere else; and the
+terms of a sum share its adjoint. So the sum over v is one over far fewer adjoints, Σ |v̄|·S, and the sums S of sizes
+are the same for many outputs (`_Pattern`).
+
+A root of what may cancel is not smooth where its argument a is no more than the argument's own error κ. There the
+first order is not enough. The true argument is within κ of a, and that of the engine whose answer is judged within κ of
+the true one: no step between the two is steeper than the chord from a to a − 3κ, which has it in its middle. That is the
+root's slope here. Where a < 3κ it is 4/√κ: the sign of √a may be the other then, and √3κ + √4κ < 4√κ. What hangs on 1/√a
+needs τ = 3κ/2a too, the share of the second order in the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from math import frexp
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dalembert.arithmetic.adjoint import PARTIALS, times
+from dalembert.arithmetic.arrays import NUMPY
+from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
+from dalembert.arithmetic.tape import Kind, Operation, Tape
+
+UNIT_ROUNDOFF = 2.0**-53
+# lanes up to which a sweep on numbers costs less than writing it down; a tape has to be compiled besides
+FEW = 4096
+
+ROUNDINGS: Mapping[str, float] = {
+    "add": 1.0,
+    "sub": 1.0,
+    "mul": 1.0,
+    "div": 1.0,
+    "sqrt": 1.0,
+    # two units in the last place are at most four roundings
+    "sin": 4.0,
+    "cos": 4.0,
+    "atan2": 4.0,
+}
+"""How many roundings u·|value| an operation errs by, at most; what is not named here is exact."""
+
+
+def rounding_bounds(
+    tape: Tape,
+    inputs: Mapping[str, str] | None = None,
+    of: Iterable[str] | None = None,
+    constants: float = 0.0,
+    turned: float = 0.0,
+) -> Tape:
+    """The tape of bounds of the outputs' own rounding errors, to first order.
+
+    Parameters
+    ----------
+    tape : Tape
+    inputs : mapping of an input to the name of a further input, its absolute error
+        Inputs are exact where not named.
+    of : names of outputs; all where not given
+    constants : float
+        How many roundings a constant errs by; short ones, as 3 or 0.25, are exact.
+    turned : float
+        By how many units u the sine and cosine of an input err besides.
+
+    Returns
+    -------
+    Tape
+        The outputs themselves, the bounds, `error(output)`, and of each `tau(output)`, the largest share of the second
+        order in the first, of the roots that it hangs on.
+
+    Examples
+    --------
+    (1 − cos q)/q² near 0 loses digits: at q = 1e-4 the bound says that half of them are left.
+
+    >>> from dalembert.arithmetic.engines import run
+    >>> recorder = Recorder()
+    >>> q = recorder.input("q")
+    >>> tape = recorder.tape({"y": (1.0 - RECORDED.cos(q)) / (q * q)})
+    >>> value, bound = run(tape, {"q": 1e-4})["y"], run(rounding_bounds(tape), {"q": 1e-4})["error(y)"]
+    >>> bool(abs(value - (0.5 - 1e-8 / 24)) < bound < 1e-7)
+    True
+    """
+    recorder = Recorder()
+    given = {name: recorder.input(name) for name in tape.inputs}
+    errors = {name: recorder.input(other) for name, other in (inputs or {}).items()}
+    return recorder.tape(_Bounds(tape, given, RECORDED, errors, constants, turned).of(of))
+
+
+def bounds_of_few(
+    tape: Tape,
+    given: Mapping[str, Any],
+    inputs: Mapping[str, str],
+    of: Iterable[str],
+    constants: float = 0.0,
+    turned: float = 0.0,
+) -> dict[str, Any]:
+    """The same for a few lanes, on numbers, without writing it down."""
+    arrays = {name: np.asarray(value, dtype=float) for name, value in given.items()}
+
+    def found(numbers: Mapping[str, Any], kind: Kind) -> dict[str, Any]:
+        errors = {name: numbers[other] for name, other in inputs.items()}
+        return _Bounds(tape, numbers, kind, errors, constants, turned).of(of)
+
+    if all(array.size == 1 for array in arrays.values()):
+        # one pose: nothing of numpy, but at a singular place, where its numbers go on with infinity and NaN
+        try:
+            return found({name: array.item() for name, array in arrays.items()}, RECORDED)
+        except (ZeroDivisionError, ValueError, OverflowError):
+            pass
+    with np.errstate(all="ignore"):
+        return found({name: array[()] for name, array in arrays.items()}, NUMPY)
+
+
+class _Bounds:
+    """Σ |v̄|·(what v errs by) over a tape worked out on any kind of number."""
+
+    def __init__(
+        self,
+        tape: Tape,
+        given: Mapping[str, Any],
+        kind: Kind,
+        errors: Mapping[str, Number],
+        constants: float,
+        turned: float,
+    ) -> None:
+        self.tape, self.kind, self.errors, self.turned = tape, kind, errors, turned
+        self.constants = constants
+        self.values = tape.values(given, kind)
+        # the slopes of roots that are no derivatives, and their τ
+        self.slopes: dict[int, Number] = {}
+        self.shares: dict[int, Number] = {}
+        self._sums: dict[tuple[tuple[int, float], ...], Number] = {}
+        self._own: dict[int, Number] = {}
+        self._errors: dict[int, Number] = {}
+
+    def of(self, names: Iterable[str] | None) -> dict[str, Number]:
+        """The outputs, the bounds of some, and their τ."""
+        tape = self.tape
+        wanted = set(tape.names if names is None else names)
+        reached = {name: _reached(tape, number) for name, number in tape.outputs if name in wanted}
+        needed = set[int]().union(*reached.values())
+        for number, (name, *arguments) in enumerate(tape.operations):
+            if name == "sqrt" and number in needed and not _norm(tape, arguments[0]):
+                self._root(number, arguments[0])
+        found: dict[str, Number] = {}
+        for name, number in tape.outputs:
+            found[name] = self.values[number]
+            if name in wanted:
+                found[f"error({name})"] = self.error(number)
+                found[f"tau({name})"] = self._largest(reached[name])
+        return found
+
+    def _largest(self, reached: frozenset[int]) -> Number:
+        largest: Number = 0.0
+        for number, share in self.shares.items():
+            if number in reached:
+                # what is no number counts as none: the bound is none either
+                largest = self.kind.select(share - largest, share, largest)
+        return largest
+
+    def error(self, output: int) -> Number:
+        """The bound of one operation's value, formed once: outputs may be one, as entries of a symmetric matrix are."""
+        if output not in self._errors:
+            self._errors[output] = self._error(output)
+        return self._errors[output]
+
+    def _error(self, output: int) -> Number:
+        pattern = _pattern(self.tape, output, frozenset(self.errors), frozenset(self.slopes), self.constants)
+        operations, values = self.tape.operations, self.values
+        bars: dict[int, Number] = {output: 1.0}
+        for number in pattern.swept:
+            kind, *arguments = operations[number]
+            own, given = bars[number], [values[a] for a in arguments]
+            for i, a in enumerate(arguments):
+                if a not in pattern.needed or (kind == "select" and i == 0):
+                    continue
+                if kind == "select":
+                    moved = self.kind.select(given[0], *((own, 0.0) if i == 1 else (0.0, own)))
+                elif number in self.slopes:
+                    moved = own * self.slopes[number]
+                else:
+                    moved = times(own, PARTIALS[kind][i](self.kind, given, values[number]))
+                bars[a] = moved if a not in bars else bars[a] + moved
+        total: Number = 0.0
+        for number, terms in pattern.sums:
+            size, bar = self._sum(terms), abs(bars[number])
+            if not (isinstance(size, float) and size == 0):
+                total = total + (size if isinstance(bar, float) and bar == 1 else bar * size)
+        # the bound's own roundings, and the products of two of them that the first order leaves out
+        return total * (UNIT_ROUNDOFF * (1 + 2.0**-20))
+
+    def _sum(self, terms: tuple[tuple[int, float], ...]) -> Number:
+        """What operations with one adjoint err by together, in units u: so many times their sizes, or by themselves."""
+        if terms not in self._sums:
+            total: Number = 0.0
+            for number, times_size in terms:
+                if not times_size:
+                    part = self._alone(number)
+                else:
+                    part = abs(self.values[number])
+                    part = part if times_size == 1 else part * times_size
+                total = total + part
+            self._sums[terms] = total
+        return self._sums[terms]
+
+    def _alone(self, number: int) -> Number:
+        """What an operation errs by, in units u, where that is no multiple of its size."""
+        if number not in self._own:
+            name, *arguments = self.tape.operations[number]
+            operations = self.tape.operations
+            if name == "input":
+                found: Number = abs(self.errors[arguments[0]] * (1 / UNIT_ROUNDOFF))
+            elif name in ("sin", "cos"):
+                # next to 1 they have no more than half as many
+                found = abs(self.values[number]) * ROUNDINGS[name]
+                found = self.kind.select(found - 2.0, 2.0, found)
+                if self.turned and operations[arguments[0]][0] == "input":
+                    found = found + self.turned
+            else:
+                constant = next(operations[a][1] for a in arguments if operations[a][0] == "const")
+                found = abs(self.values[number]) + self.constants * abs(constant)
+            self._own[number] = found
+        return self._own[number]
+
+    def _root(self, number: int, argument: int) -> None:
+        kind, a = self.kind, self.values[argument]
+        error = self.error(argument)
+        if isinstance(error, float) and error == 0:
+            return
+        apart = a - 3.0 * error
+        chord = 1.0 / (self.values[number] + kind.sqrt(kind.select(apart, apart, 0.0)))
+        self.slopes[number] = kind.select(apart, chord, 4.0 / kind.sqrt(error))
+        self.shares[number] = 1.5 * error / a
+
+
+class _Pattern(NamedTuple):
+    """What a sweep from one output forms.
+
+    Attributes
+    ----------
+    swept : tuple of int
+        The operations whose adjoints go on to their arguments, from the last to the first.
+    needed : frozenset of int
+        Those that have an adjoint.
+    sums : tuple of (number, terms)
+        The operations that err with the adjoint of `number`, by its size: each with how many roundings of its size it
+        stands for, its own and those of its factors; 0 where it errs by what its size does not tell.
+    """
+
+    swept: tuple[int, ...]
+    needed: frozenset[int]
+    sums: tuple[tuple[int, tuple[tuple[int, float], ...]], ...]
+
+
+@lru_cache(maxsize=1024)
+def _pattern(
+    tape: Tape, output: int, errors: frozenset[str], rough: frozenset[int], constants: float
+) -> _Pattern:
+    """The pattern of a sweep; `rough` are the roots whose slope is no derivative."""
+    operations = tape.operations
+    uses: dict[int, list[int]] = {output: []}
+    # which operation says how much one errs, and how many times its own error counts there
+    share: dict[int, tuple[int, float]] = {}
+    adjoint: dict[int, int] = {}
+    roundings: dict[int, float] = {}
+    alone: set[int] = set()
+    for number in range(output, -1, -1):
+        if number not in uses:
+            continue
+        kind, *arguments = operations[number]
+        users = uses[number]
+        user = users[0] if len(set(users)) == 1 else None
+        weight = 0.0 if user is None else _weight(operations[user], user, len(users), rough)
+        share[number] = (
+            (share[user][0], weight * share[user][1]) if user is not None and weight else (number, 1.0)
+        )
+        passed = user is not None and len(users) == 1 and operations[user][0] in ("add", "sub", "neg", "abs")
+        adjoint[number] = adjoint[user] if user is not None and passed else number
+        if kind == "input":
+            if arguments[0] in errors:
+                alone.add(number)
+            continue
+        if kind == "const":
+            continue
+        own = _roundings(tape, number, constants)
+        if own is None:
+            alone.add(number)
+        elif own:
+            at, times_own = share[number]
+            roundings[at] = roundings.get(at, 0.0) + own * times_own
+        for i, a in enumerate(arguments):
+            if operations[a][0] != "const" and not (kind == "select" and i == 0):
+                uses.setdefault(a, []).append(number)
+    needed: set[int] = set()
+    for number in sorted(uses):
+        kind, *arguments = operations[number]
+        if (
+            number in roundings
+            or number in alone
+            or (kind not in ("const", "input") and not needed.isdisjoint(arguments[kind == "select" :]))
+        ):
+            needed.add(number)
+    needed.add(output)
+    sums: dict[int, list[tuple[int, float]]] = {}
+    for number in sorted(needed):
+        if number in roundings:
+            sums.setdefault(adjoint[number], []).append((number, roundings[number]))
+        if number in alone:
+            sums.setdefault(adjoint[number], []).append((number, 0.0))
+    swept = tuple(n for n in sorted(needed, reverse=True) if operations[n][0] not in ("const", "input"))
+    return _Pattern(swept, frozenset(needed), tuple((n, tuple(terms)) for n, terms in sums.items()))
+
+
+def _weight(operation: Operation, user: int, count: int, rough: frozenset[int]) -> float:
+    """How often the error of an argument counts in that of its only user, relative to their sizes; 0: not so simply."""
+    kind, *_ = operation
+    if kind == "mul" or (kind in ("neg", "abs", "div") and count == 1):
+        return float(count)
+    return 0.5 if kind == "sqrt" and user not in rough else 0.0
+
+
+def _roundings(tape: Tape, number: int, constants: float) -> float | None:
+    """By how many roundings of its own size an operation errs; None where its size does not tell."""
+    name, *arguments = tape.operations[number]
+    if name not in ROUNDINGS:
+        return 0.0
+    if name in ("sin", "cos"):
+        return None
+    if name == "add" and arguments[0] == arguments[1]:
+        return 0.0
+    constant = next((tape.operations[a][1] for a in arguments if tape.operations[a][0] == "const"), None)
+    if name == "mul" and constant is not None and abs(frexp(constant)[0]) == 0.5:
+        # by a power of two
+        return 0.0
+    further = bool(constants) and constant is not None and not (constant * 1024).is_integer()
+    if further and name in ("add", "sub"):
+        return None
+    return ROUNDINGS[name] + (constants if further and name in ("mul", "div") else 0.0)
+
+
+def _reached(tape: Tape, output: int) -> frozenset[int]:
+    """The operations that one hangs on."""
+    found = {output}
+    for number in range(output, -1, -1):
+        kind, *arguments = tape.operations[number]
+        if number in found and kind not in ("const", "input"):
+            found.update(arguments)
+    return frozenset(found)
+
+
+def _norm(tape: Tape, number: int) -> bool:
+    """Whether it is a sum of squares, which does not cancel."""
+    kind, *arguments = tape.operations[number]
+    if kind == "add":
+        return all(_norm(tape, a) for a in arguments)
+    return kind == "mul" and arguments[0] == arguments[1]
