@@ -38,11 +38,7 @@ Options:
 
 
 @reported(OPTIONS)
-def run(
-    file: str,
-    output: Path,
-    at: str | None = None,
-) -> Result:
+def run(file: str, output: Path, at: str | None = None) -> Result:
     """Write a mechanism for other programs: a drawing (DXF, SVG), curves (CSV), a robot (URDF, SDF, MJCF).
 
     A drawing shows the pose of the file's own input, and the curves over the travel of the input; a robot starts in that

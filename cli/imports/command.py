@@ -35,11 +35,7 @@ Options:
 
 
 @reported(OPTIONS)
-def run(
-    file: str,
-    output: Path | None = None,
-    kind: Kind | None = None,
-) -> Result:
+def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Result:
     """Read a mechanism of another program: PMKS text and links, PMKS+ links, MotionGen, Linkage, linkage_sim, planar robots (URDF, SDF, MJCF).
 
     What is written is a file for `dalembert mechanism`. The links' axes are parallel to the ground's in the drawn pose,

@@ -18,8 +18,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.shortfall import shortfall
 from virtualwork.describe.errors import DescriptionError, MechanismError
 from virtualwork.describe.parts import Point, as_point
-from virtualwork.family.branches import LANES
-from virtualwork.family.part import ASSEMBLED, Part, answer, forget, room
+from virtualwork.family.part import ASSEMBLED, LANES, Part, answer, forget, room
 from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Complexes, Reals
 from virtualwork.plan.joints import joints

@@ -191,7 +191,13 @@ def walk(
             continue
         cut = False
         following = longer(h, wanted, before, grow)
-        found = node.met(watches, h, done, left) if watches else None
+        try:
+            found = node.met(watches, h, done, left) if watches else None
+        except Lost:
+            # within the step it cannot be assembled
+            path.rejected += 1
+            h, grow, cut = shorter(h, SHRINK), 1.0, True
+            continue
         met, left, grow = None, {}, GROW
         if found is not None:
             met, level, h, done = found

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from virtualwork.formulas.numbers import Reals
-from virtualwork.intime.coordinates import TURN, Coordinates
+from virtualwork.intime.coordinates import BETTER, FOLDING, TURN, Coordinates
+from virtualwork.intime.equations import Lost
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.joined import Joined
@@ -21,6 +22,7 @@ from virtualwork.intime.watch import Floats, Watch
 
 # changes of coordinates in one simulation
 CHANGES = 10_000
+NO_FURTHER = "it can go no further: a limit, or a pose where its motion is not determined"
 
 
 @dataclass
@@ -177,18 +179,22 @@ class Monitor:
 
     coordinates: Coordinates
     near: Floats
-    folding: bool
+    # a margin below which they fold: where no others were better, a quarter of what it was
+    below: float
     follows: bool
 
     def __call__(self, t: float, q: Floats, v: Floats) -> str:
         if self.follows:
             self.near = self.inputs(q, v)
-        was, self.folding = self.folding, self.coordinates.folds(q)
-        return "folding" if self.folding and not was else ""
+        if self.coordinates.folds(q, self.below):
+            return "folding"
+        if self.below < FOLDING and not self.coordinates.folds(q):
+            self.below = FOLDING
+        return ""
 
     def quiet(self, q: Reals) -> bool:
         """Whether nothing folds at any of many places, and none has to be followed."""
-        return not (self.follows or self.folding) and self.coordinates.stands(q)
+        return not self.follows and self.below == FOLDING and self.coordinates.stands(q)
 
     def inputs(self, q: Floats, v: Floats) -> Floats:
         """The inputs at a state, with the whole turns of those at the last node."""
@@ -230,14 +236,22 @@ def travel(
     ended = ""
     while True:
         equations = coordinates.equations
+        left = None
         if isinstance(equations, Rubbing):
-            equations, v = equations.going_on(t, q, v, ended)
-        monitor = Monitor(coordinates, inputs, coordinates.folds(q), bool(until) and not coordinates.own)
+            before = equations.mode
+            try:
+                equations, v = equations.going_on(t, q, v, ended)
+            except Lost:
+                found.ended = NO_FURTHER
+                return found
+            # in the mode of this leg, out of which the next one comes
+            coordinates, left = coordinates.of(equations), equations.left(ended, before)
+        below = FOLDING if not coordinates.folds(q) else coordinates.margin(q) / BETTER
+        monitor = Monitor(coordinates, inputs, below, bool(until) and not coordinates.own)
         watches = [*(monitor.until(j, level) for j, level in until.items()), *equations.watches()]
         most = MOST if like is None else MOST + 2 * like.steps
         stops, budget = equations.stops, most - found.steps
         begin = t, q, v, work
-        left = {ended: 0.0} if ended.startswith("friction") else None
         path = walk(equations, method, begin, end, tolerance, watches, stops, monitor, budget, left, plan)
         leg = Leg(coordinates, path, inputs)
         found.legs.append(leg)
@@ -247,26 +261,24 @@ def travel(
         t, q, v, work = path.t[-1], path.q[-1], path.v[-1], path.work[-1]
         inputs, ended = leg.inputs[-1].tolist(), path.ended
         if ended.startswith("friction"):
-            # the mode of this leg, out of which the next one comes
-            coordinates = coordinates.of(equations)
             continue
         if path.ended == "stiff":
             method = Radau()
             continue
         found.ended = equations.outside(t, q, v) if path.ended == "lost" else ""
-        other = None if found.ended else coordinates.better(q)
+        other = None if found.ended else coordinates.better(q, inputs)
         if other is None and path.ended == "lost":
-            found.ended = (
-                found.ended or "it can go no further: a limit, or a pose where its motion is not determined"
-            )
+            found.ended = found.ended or NO_FURTHER
             return found
         if other is not None:
-            q, v = _in(coordinates, other, q, v)
-            coordinates = other
+            v = _speeds(coordinates, other[0], q, v)
+            coordinates, q = other
+            if isinstance(equations, Rubbing) and isinstance(coordinates.equations, Rubbing):
+                coordinates = coordinates.of(coordinates.equations.in_mode(equations.mode))
 
 
-def _in(old: Coordinates, new: Coordinates, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """A state in other coordinates: where they are, and the speeds of what they measure."""
+def _speeds(old: Coordinates, new: Coordinates, q: Floats, v: Floats) -> Floats:
+    """The speeds of what other coordinates measure."""
     motion = old.motion(np.array([q]), np.array([v]))
     speeds = []
     for entry in new.equations.mechanism.inputs:
@@ -275,4 +287,4 @@ def _in(old: Coordinates, new: Coordinates, q: Floats, v: Floats) -> tuple[Float
         else:
             base = 0.0 if entry.on == "ground" else float(motion.link(entry.on).omega[0])
             speeds.append(float(motion.link(entry.name).omega[0]) - base)
-    return list(new.equations.mechanism.at), speeds
+    return speeds

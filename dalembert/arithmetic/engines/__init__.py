@@ -172,12 +172,12 @@ def run_grid(
         grids.run(tape, given, shape, table)
         return table
     # every lane by itself
-    flat = [np.broadcast_to(x, shape).ravel() if x.ndim else x for x in given]
+    flat = [(x if x.shape == shape else np.broadcast_to(x, shape)).ravel() if x.ndim else x for x in given]
     tests = {k: np.empty((r, c)) for k, x in enumerate(table) if x.dtype == bool}
     rows = [tests.get(k, x).reshape(r * c) for k, x in enumerate(table)]
     _lanes(tape, flat, rows, r * c, engine)
     for k, test in tests.items():
-        table[k][:] = (test > 0).all(axis=1)
+        table[k][:] = test[:, 0] > 0 if c == 1 else (test > 0).all(axis=1)
     return table
 
 
