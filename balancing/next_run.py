@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.dependence import adjoint
 from balancing.log_balance import LogBalance
 from balancing.propagation import response
 from dalembert.arithmetic.records import record
@@ -107,11 +108,11 @@ class _Spread:
         self.linear, self.antilinear = np.moveaxis(linear, 1, 0), np.moveaxis(antilinear, 1, 0)  # (s, p, n)
         along, across = np.square(errors.along.T), np.square(errors.across.T)
         gain, unit = fit.gain, errors.unit.T  # (s, n, r), (s, r)
-        self.covariance = (gain * (along + across)[:, None]) @ np.swapaxes(gain, 1, 2).conj()
+        self.covariance = (gain * (along + across)[:, None]) @ adjoint(gain)
         self.relation = (gain * (np.square(unit) * (along - across))[:, None]) @ np.swapaxes(gain, 1, 2)
         if fit.foreknown is not None:
             sources = fit.foreknown.sources
-            self.covariance = self.covariance + sources @ np.swapaxes(sources, 1, 2).conj()
+            self.covariance = self.covariance + sources @ adjoint(sources)
         read = fit.present.T
         self.own = np.where(read, along + across, 0.0).sum(axis=1) / read.sum(axis=1)
         self.before = float(self._trace(self.covariance, self.relation))

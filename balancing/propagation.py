@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.dependence import adjoint
+from balancing.dependence import adjoint, damping_norms
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -41,8 +41,7 @@ def response(
     root = np.sqrt(weights)
     a = root[..., None] * alpha
     if ridge:
-        norms = np.linalg.norm(a, axis=-2)
-        norms = ridge * np.where(norms > 0, norms, norms.max(axis=-1, keepdims=True))
+        norms = ridge * damping_norms(a)
         a = np.concatenate([a, norms[..., None] * np.eye(norms.shape[-1])], axis=-2)
     scale = 1 / np.linalg.norm(a, axis=-2)
     q, r = np.linalg.qr(a * scale[..., None, :])

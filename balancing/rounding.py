@@ -18,8 +18,9 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import adjoint, columns_scaled, damping_norms, roundings
+from balancing.dependence import adjoint, damping_norms, roundings
 from balancing.influence import influence_coefficients
+from balancing.qr import factors
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -37,10 +38,7 @@ def perturbed(a: Complex, b: Complex, x: Complex, r: Complex, da: Real, db: Real
     """Bound the errors of x, the least-squares solution of A x + b = r ≈ 0, and of r; da, db: errors of A and b."""
     lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1], x.shape[:-1])
     # rows in the order of their size, columns of like size: then each row of A⁺ keeps its digits
-    order = np.argsort(-np.abs(a).max(axis=-1), axis=-1, kind="stable")
-    scaled, scale = columns_scaled(np.take_along_axis(a, order[..., None], axis=-2))
-    q, upper = np.linalg.qr(scaled)
-    q = np.take_along_axis(q, np.argsort(order, axis=-1)[..., None], axis=-2)
+    q, upper, scale = factors(a)
     inverse: Complex = np.asarray(np.linalg.inv(upper) * scale[..., None], dtype=complex)
     pseudo = inverse @ adjoint(q)
     wrong = (da @ np.abs(x)[..., None])[..., 0] + db
@@ -160,20 +158,20 @@ def _damped(
 ) -> tuple[Complex, Complex, Complex, Real, Real]:
     """Return the problem with the rows λ‖α_p‖ w_p of `ridge` below it."""
     norms = ridge * damping_norms(a)
-    below = norms[..., None] * np.eye(a.shape[-1])
-    of_norms = ridge * np.linalg.norm(da, axis=-2)[..., None] * np.eye(a.shape[-1])
+    of_norms = ridge * np.linalg.norm(da, axis=-2)
     lead = np.broadcast_shapes(a.shape[:-2], b.shape[:-1])
-    zeros = np.zeros((*lead, a.shape[-1]))
 
-    def joined(one: NDArray[Kind], other: NDArray[Kind] | Real, axis: int) -> NDArray[Kind]:
-        axes = -axis
-        shape = lead + one.shape[-axes:], lead + other.shape[-axes:]
-        return np.concatenate([np.broadcast_to(one, shape[0]), np.broadcast_to(other, shape[1])], axis=axis)
+    def joined(one: NDArray[Kind], other: NDArray[Kind] | Real) -> NDArray[Kind]:
+        return np.concatenate([np.broadcast_to(x, lead + x.shape[-2:]) for x in (one, other)], axis=-2)
 
+    def longer(one: NDArray[Kind], other: NDArray[Kind] | Real) -> NDArray[Kind]:
+        return joined(one[..., None], other[..., None])[..., 0]
+
+    below, zeros = np.eye(a.shape[-1]), np.zeros(a.shape[-1])
     return (
-        joined(a, below, -2),
-        joined(b, zeros, -1),
-        joined(r, norms * w, -1),
-        joined(da, of_norms, -2),
-        joined(db, zeros, -1),
+        joined(a, norms[..., None] * below),
+        longer(b, zeros),
+        longer(r, norms * w),
+        joined(da, of_norms[..., None] * below),
+        longer(db, zeros),
     )

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import roundings, threshold
+from balancing.dependence import adjoint, roundings, threshold
 from balancing.qr import factors
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
@@ -314,7 +314,7 @@ def joint_fit(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None 
         _require(rows[..., :1, :], rows)
     q, r, scale = factors(rows)
     _require(r, rows)
-    back = np.swapaxes(q, -1, -2).conj()
+    back = adjoint(q)
     unknowns = scale * np.linalg.solve(r, np.matvec(back, b)[..., None])[..., 0]
     gain = scale[..., None] * np.linalg.solve(r, back)
     leverage = np.square(np.abs(q)).sum(axis=-1)

@@ -16,10 +16,7 @@ COMMANDS = {
     "balance": ("cli.balance.command", "Balance rotors from a table of known eccentric masses."),
     "field": ("cli.field.command", "Balance rotors from measured vibration and trial masses."),
     "place": ("cli.place.command", "Put a correction where masses can go: holes, blades, weights in stock."),
-    "mechanism": (
-        "cli.mechanism.command",
-        "Solve a planar mechanism: motion, limits, torque, joint forces.",
-    ),
+    "mechanism": ("cli.mechanism.command", "Solve a planar mechanism: motion, limits, torque, joint forces."),
     "work": ("cli.work.command", "Find the load that balances a table of link states, by virtual work."),
     "body": ("cli.body.command", "Put a body together: inertia, angular momentum, shaft reactions."),
     "spin": ("cli.spin.command", "Turn a body through time: free, under gravity, under a torque."),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +18,7 @@ from dalembert.arithmetic.records import components, numbers, record, table
 from rigidbody3d import solids
 from rigidbody3d.inertia import Principal, point_tensor, principal, products, turned_tensor
 from rigidbody3d.rounding import BodyError, MassProperties, of_body
-from rigidbody3d.shapes import inertia_of, weighed
+from rigidbody3d.shapes import inertia_of, shape_tensor
 from rigidbody3d.solids import Solid, Whole
 
 if TYPE_CHECKING:
@@ -78,28 +78,35 @@ class Body:
     ) -> Body:
         """Return a body of a shape (see `shapes.SHAPES`) along its own axes."""
         m, c = np.asarray(mass, dtype=float), np.asarray(center, dtype=float)
+        given: dict[str, Given] = {"mass": (m, 0, 0.0), "center": (c, 1, 0.0)}
+        given |= {name: (x, 0, 0.0) for name, x in dimensions.items()}
         return cls(
             m,
             c,
             inertia_of(shape, mass, **dimensions),
-            partial(_of_shape, shape, m, c, dimensions),
+            partial(_error, _shaped, dict, given, shape),
             partial(solids.of_shape, shape, m, c, dimensions),
         )
 
     def moved(self, offset: ArrayLike) -> Body:
         """Return the body moved by an offset (..., 3), m: its tensor stays as it is, digit for digit."""
         by = np.asarray(offset, dtype=float)
-        return self._made(_moved, partial(solids.moved, self.solids, by), offset=by)
+        return self._made(_moved, partial(solids.moved, self.solids, by), offset=(by, 1, 0.0))
 
-    def turned(self, rotation: ArrayLike, about: ArrayLike | None = None) -> Body:
-        """Return the body turned by a rotation matrix (..., 3, 3) about a point (default: its centre of mass)."""
+    def turned(self, rotation: ArrayLike, about: ArrayLike | None = None, error: ArrayLike = 0.0) -> Body:
+        """Return the body turned by a rotation matrix (..., 3, 3) about a point (default: its centre of mass).
+
+        `error` bounds what the entries of the matrix are off by, for `error_estimate`.
+        """
         R = np.asarray(rotation, dtype=float)
         point = None if about is None else np.asarray(about, dtype=float)
+        there: dict[str, Given] = {} if point is None else {"point": (point, 1, 0.0)}
         form = partial(solids.turned, self.solids, R, point)
-        return self._made(_turned, form, rotation=R, **({} if point is None else {"point": point}))
+        return self._made(_turned, form, rotation=(R, 2, error), **there)
 
-    def _made(self, formula: Formula, form: Callable[[], list[Solid]], **given: Array) -> Body:
-        made = formula(self.mass, self.center, self.inertia, **given)
+    def _made(self, formula: Formula, form: Callable[[], list[Solid]], **given: Given) -> Body:
+        numbers = {name: np.asarray(x) for name, (x, _, _) in given.items()}
+        made = formula(self.mass, self.center, self.inertia, **numbers)
         return Body(*made, partial(_error, formula, self.given, given), form)
 
     def about(self, point: ArrayLike) -> Array:
@@ -192,7 +199,11 @@ class Body:
         True
         """
         if about is not None:
-            return _error(_about, self.given, {"point": np.asarray(about, dtype=float)})
+            return _error(_about, self.given, {"point": (about, 1, 0.0)})
+        return self._own_error
+
+    @cached_property
+    def _own_error(self) -> BodyError:
         if self.rounding is not None:
             return self.rounding()
         return BodyError(*(np.zeros_like(x) for x in (self.mass, self.center, self.inertia)))
@@ -242,6 +253,10 @@ def _turned(
     return MassProperties(mass, center, turned_tensor(inertia, rotation))
 
 
+def _shaped(shape: str, mass: Array, center: Array, **dimensions: Array) -> MassProperties:
+    return MassProperties(mass, center, shape_tensor(shape, mass, dimensions))
+
+
 def _about(mass: Array, center: Array, inertia: Array, point: Array) -> MassProperties:
     return MassProperties(mass, center, np.asarray(inertia + point_tensor(mass, center - point)))
 
@@ -260,30 +275,14 @@ def _whole(mass: Array, moment: Array, inertia: Array, shifted: Array, middle: A
 
 # --- bounds of rounding errors ---
 
-AXES = {"offset": 1, "point": 1, "rotation": 2}
 
-
-def _error(formula: Formula, body: Callable[[], dict[str, Given]], given: Mapping[str, Array]) -> BodyError:
-    """Bound what a formula makes of a body."""
+def _error(
+    formula: Formula, body: Callable[[], Mapping[str, Given]], given: Mapping[str, Given], *options: str
+) -> BodyError:
+    """Bound what a formula makes of a body, or of nothing but what is given."""
     from dalembert.arithmetic.bounds import bounds
 
-    exact: dict[str, Given] = {name: (x, AXES[name], 0.0) for name, x in given.items()}
-    return BodyError(*bounds(formula, body() | exact))
-
-
-def turned_error(body: Body, rotation: Array, error: Array) -> BodyError:
-    """Bound a body turned by a rotation matrix (..., 3, 3) whose entries have an error."""
-    from dalembert.arithmetic.bounds import bounds
-
-    return BodyError(*bounds(_turned, {**body.given(), "rotation": (rotation, 2, error)}))
-
-
-def _of_shape(shape: str, mass: Array, center: Array, dimensions: Mapping[str, ArrayLike]) -> BodyError:
-    from dalembert.arithmetic.bounds import bounds
-
-    given: dict[str, Given] = {name: (x, 0, 0.0) for name, x in dimensions.items()}
-    _, inertia = bounds(weighed, {"amount": (mass, 0, 0.0), **given}, shape, False)
-    return BodyError(np.zeros_like(mass), np.zeros_like(center), inertia)
+    return BodyError(*bounds(formula, {**body(), **given}, *options))
 
 
 def _composed_error(parts: Callable[[], dict[str, Given]], axis: int, middle: Array) -> BodyError:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.exact import UNIT
 from dalembert.arithmetic.records import record
+
+if TYPE_CHECKING:
+    from dalembert.arithmetic.bounds import Given
 
 Array = NDArray[np.float64]
 
@@ -36,7 +39,7 @@ class _Rates(NamedTuple):
 class Steady(_Rates):
     """The two rates of steady precession, `.slow` and `.fast`, rad/s; NaN where the spin is too slow for any."""
 
-    given: tuple[Array, ...]
+    given: dict[str, Given]
     """I1, I3, m g l, the tilt's cosine, the spin, and the sign of its momentum."""
 
     def error_estimate(self) -> tuple[Array, Array]:
@@ -46,13 +49,8 @@ class Steady(_Rates):
         """
         from dalembert.arithmetic.bounds import bounds
 
-        given = {
-            name: (x, 0, 0.0)
-            for name, x in zip(("I1", "I3", "mgl", "c", "spin", "side"), self.given, strict=True)
-        }
-        # a cosine errs by one unit in its last place
-        slow, fast = bounds(_rates, given | {"c": (self.given[3], 0, 2 * UNIT * np.abs(self.given[3]))})
-        return np.where(self.given[2] == 0, 0.0, slow), fast
+        slow, fast = bounds(_rates, self.given)
+        return np.where(self.slow == 0, 0.0, slow), np.where(np.isinf(self.fast), np.inf, fast)
 
 
 def steady_precession(
@@ -90,7 +88,9 @@ def steady_precession(
     with np.errstate(invalid="ignore", divide="ignore"):
         slow, fast = _rates(I1, I3, a, c, w, side)
     found = Steady(np.where((a == 0) & (w == 0), 0.0, slow), np.asarray(fast))
-    found.given = I1, I3, a, c, w, side
+    exact = {"I1": I1, "I3": I3, "mgl": a, "spin": w, "side": side}
+    # a cosine errs by one unit in its last place
+    found.given = {"c": (c, 0, 2 * UNIT * np.abs(c)), **{name: (x, 0, 0.0) for name, x in exact.items()}}
     return found
 
 
@@ -115,21 +115,19 @@ def sleeping_threshold(transverse: ArrayLike, axial: ArrayLike, mgl: ArrayLike) 
     return np.asarray(2 * np.sqrt(np.maximum(a, 0.0) * I1) / I3)
 
 
-class _Cones(NamedTuple):
-    space: Array
-    body: Array
-    precession: Array
-    spin: Array
-
-
 @record
-class Cones(_Cones):
+class Cones(NamedTuple):
     """The cones of a free symmetric body: half angles, rad, and rates, rad/s.
 
     `.space` is the angle between ω and H, the cone fixed in space; `.body` that between ω and the axis of the body,
     the cone fixed in it; `.precession` the rate at which the axis goes round H, |H|/I1; `.spin` the rate of the body
     about its axis relative to the precessing plane, ω3 (I1 - I3)/I1.
     """
+
+    space: Array
+    body: Array
+    precession: Array
+    spin: Array
 
     def error_estimate(self) -> tuple[Array, ...]:
         """Return bounds of the rounding errors of the four, (...): small beside each, since nothing here cancels."""

@@ -248,15 +248,10 @@ class Motion(_Formulas):
         from dalembert.arithmetic.bounds import bounds, read
 
         require(of, *ESTIMATED)
-        vectors = {
-            "omega": self.omega,
-            "alpha": self.alpha,
-            "frame_omega": self.frame_omega,
-            "velocity": self.velocity,
-            "acceleration": self.acceleration,
-            "pivot": self.pivot,
-            "point": point,
-        }
+        if point is None and of.endswith("_about"):
+            raise ValueError(f"{of}: expected the point that it is about")
+        names = ("omega", "alpha", "frame_omega", "velocity", "acceleration", "pivot")
+        vectors = {"point": point} | {name: getattr(self, name) for name in names}
         entering = of_body(self.mass, self.center, self.inertia, body)
         entering |= {name: read(v, 1, given) for name, v in vectors.items() if v is not None}
         return bounds(_quantity, entering, of)[0]
@@ -281,7 +276,7 @@ class Motion(_Formulas):
         return motion
 
 
-ESTIMATED = (
+ESTIMATED = [
     "momentum",
     "true_alpha",
     "rate",
@@ -295,7 +290,7 @@ ESTIMATED = (
     "energy",
     "momentum_about",
     "rate_about",
-)
+]
 """What a motion has estimates of."""
 
 

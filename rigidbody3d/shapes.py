@@ -190,7 +190,9 @@ def inertia_of(shape: str, mass: ArrayLike, **dimensions: ArrayLike) -> Array:
 
 def shape_tensor(shape: str, mass: Array, dimensions: Mapping[str, Array]) -> Array:
     """The same of arrays of any kind of number, which are not checked."""
-    moments = [mass * np.asarray(x) for x in SHAPES[shape].moments(**dimensions)]
+    known = SHAPES[shape]
+    full = dict.fromkeys(known.optional, 0.0) | dict(dimensions)
+    moments = [mass * np.asarray(x) for x in known.moments(**full)]
     diagonal = np.stack(np.broadcast_arrays(*moments), axis=-1)
     return np.asarray(diagonal[..., None, :] * np.eye(3))
 

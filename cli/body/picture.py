@@ -16,11 +16,7 @@ def draw(found: MovingBody) -> Figure:
     """Draw the body in two views; below them, for a shaft, the forces of the bearings."""
     figure, parts, motion = blank(), found.parts, found.motion
     solids, whole = parts.each.solids(), parts.whole.whole()
-    vectors = {
-        "angular velocity": motion.omega,
-        "angular momentum": motion.momentum,
-        "its rate": motion.rate,
-    }
+    vectors = {"angular velocity": motion.omega, "angular momentum": motion.momentum, "its rate": motion.rate}
     if found.request.shaft is None:
         views.body(solids, parts.name, whole, vectors, figure)
         return figure

@@ -32,9 +32,7 @@ Arguments:
 
 
 @reported(OPTIONS)
-def run(
-    name: str | None = None,
-) -> Result:
+def run(name: str | None = None) -> Result:
     """List the worked examples; with NAME, write its input files into the current folder and show its command."""
     from cli.show.columns import Result, Sheet
 

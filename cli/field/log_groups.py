@@ -135,11 +135,7 @@ class Logs:
             # each may be a sum of all that went before
             size = 2 * size.sum(axis=1, keepdims=True) + 0 * size
         readings = np.abs(np.where(fit.present, fit.readings, 0.0))
-        return (
-            np.zeros(fit.initial.shape),
-            self.rows.reading_share * readings,
-            self.rows.mass_share * size,
-        )
+        return (np.zeros(fit.initial.shape), self.rows.reading_share * readings, self.rows.mass_share * size)
 
     def _fitted(self, readings: Complex, masses: Complex, known: Before | None) -> JointFit:
         """Fit runs, with what is known before."""

@@ -207,7 +207,9 @@ def more_than_unknowns(table: Table) -> bool:
     def count(codes: Rows, of: Rows) -> Rows:
         """Count what differs, rotor by rotor."""
         many = int(codes.max(initial=0)) + 1
-        return np.bincount(np.unique(of * many + codes) // many, minlength=int(rotor.max()) + 1)
+        # with indices: without them numpy loads its masked arrays, which takes longer than a small table
+        each, _ = np.unique(of * many + codes, return_index=True)
+        return np.bincount(each // many, minlength=int(rotor.max()) + 1)
 
     most = max(map(len, each))
     several = np.array([one + one[-1:] * (most - len(one)) if one else [-1] * most for one in each])[plane]

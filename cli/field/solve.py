@@ -410,9 +410,7 @@ class FieldBalancing:
         for k, solved in enumerate(self.solved):
             g, p = solved.corrections.shape
             keys.append(
-                np.stack(
-                    [np.repeat(solved.group.rotors, p), np.tile(np.arange(p), g), np.full(g * p, k)],
-                )
+                np.stack([np.repeat(solved.group.rotors, p), np.tile(np.arange(p), g), np.full(g * p, k)])
             )
         joined = np.concatenate(keys, axis=1)
         return joined, np.lexsort((joined[1], joined[0]))

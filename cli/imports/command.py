@@ -6,11 +6,10 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from cli.errors import DataError
 from cli.imports.words import KINDS
 from cli.read.files import read_bytes
+from cli.read.options import bad
 from cli.show.reported import reported
 
 if TYPE_CHECKING:
@@ -35,11 +34,7 @@ Options:
 
 
 @reported(OPTIONS)
-def run(
-    file: str,
-    output: Path | None = None,
-    kind: Kind | None = None,
-) -> Result:
+def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Result:
     """Read a mechanism of another program: PMKS text and links, PMKS+ links, MotionGen, Linkage, linkage_sim, planar robots (URDF, SDF, MJCF).
 
     What is written is a file for `dalembert mechanism`. The links' axes are parallel to the ground's in the drawn pose,
@@ -52,7 +47,7 @@ def run(
     from cli.show.columns import Result
 
     if output is not None and output.suffix.lower() != ".toml":
-        raise typer.BadParameter(f"'{output}': expected a name that ends in .toml", param_hint="-o")
+        raise bad("-o", f"'{output}': expected a name that ends in .toml")
     name, data = read_bytes(file)
     folder = None if file == "-" else Path(file).parent
     told, drawings = read(name, data, None if kind is None else str(kind.value), folder)
@@ -69,10 +64,7 @@ def run(
     if not found:
         raise DataError("; ".join([f"{name}: no mechanism: nothing in it is driven by an input", *lost]))
     if len(found) > 1 and output is None:
-        raise typer.BadParameter(
-            f"{name} holds {len(found)} mechanisms: expected a file, which becomes FILE-1.toml …",
-            param_hint="-o",
-        )
+        raise bad("-o", f"{name} holds {len(found)} mechanisms: expected a file, which becomes FILE-1.toml …")
     paths = []
     if output is not None:
         paths = [output]

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,7 +31,7 @@ STUDY_KEYS = ("quantity", "of", "k", "link")
 """The columns that name a row of a study's table."""
 
 
-def column(header: str, values: list[Cell], error: Callable[[], list[float]] | None = None) -> Column:
+def column(header: str, values: Sequence[Cell], error: Callable[[], list[float]] | None = None) -> Column:
     """Return a column by its header, name and unit."""
     unit = _UNIT.search(header)
     if unit is None:
@@ -215,7 +215,7 @@ def studies(found: Studies) -> dict[str, Callable[[], Table]]:
 
 def of_check(document: Document) -> Table:
     """What the mechanism is: a row for each statement, named as in the JSON."""
-    rows: list[tuple[str, str, Any]] = [
+    rows: list[tuple[str, str, Cell]] = [
         ("mobility", "", document["mobility"]),
         ("mobility_by_rank", "", document["mobility_by_rank"]),
         *(("redundant", name, True) for name in document["redundant"]),
@@ -265,6 +265,6 @@ def _records(rows: list[Document]) -> Table:
     return _columns(list(rows[0]), [list(row.values()) for row in rows])
 
 
-def _columns(names: Sequence[str], rows: list[Any]) -> Table:
+def _columns(names: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Table:
     columns = [column(name, [row[i] for row in rows]) for i, name in enumerate(names)]
     return Table(columns, keys=("step", "branch", *STUDY_KEYS))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +14,10 @@ from cli.read.units import degrees
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cli.show.columns import Document, Json
     from virtualwork.motion import Motion
 
-Column = list[Any]
+Column = Sequence[float | None]
 POINT = (("x_m", "y_m"), ("vx_m_s", "vy_m_s"), ("ax_m_s2", "ay_m_s2"), ("jx_m_s3", "jy_m_s3"))
 LINK = ("angle_deg", "omega_rad_s", "alpha_rad_s2", "jerk_rad_s3")
 SLIDE = ("position_m", "speed_m_s", "acceleration_m_s2", "jerk_m_s3")
@@ -24,7 +25,7 @@ SLIDE = ("position_m", "speed_m_s", "acceleration_m_s2", "jerk_m_s3")
 
 def cells(values: NDArray[np.float64]) -> Column:
     """Numbers as Python's own; None where there is none; no −0."""
-    listed: Column = (values + 0.0).tolist()
+    listed: list[float] = (values + 0.0).tolist()
     if np.isfinite(values).all():
         return listed
     return [v if math.isfinite(v) else None for v in listed]
@@ -75,7 +76,7 @@ def of_slide(motion: Motion, name: str, order: int) -> dict[str, Column]:
     }
 
 
-def inputs_of(analysis: Analysis) -> dict[str, Column]:
+def inputs_of(analysis: Analysis) -> dict[str, Sequence[Json]]:
     """`input_deg` or `input_m`; with several inputs, a value per link."""
     m = analysis.mechanism
     shown = analysis.inputs.shown
@@ -112,7 +113,7 @@ def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
 
 def document(
     analysis: Analysis, marks_of: Callable[[Analysis, Motion], list[list[str]]] = marks_of
-) -> list[dict[str, Any]]:
+) -> list[Document]:
     """The poses as INTERFACE's JSON has them, every assembly after the other at each input."""
     shown = inputs_of(analysis)
     columns = []
@@ -135,7 +136,7 @@ def document(
     poses = []
     for i in range(len(analysis.inputs.shown)):
         for number, assembled, condition, marks, links, points, slides in columns:
-            pose: dict[str, Any] = {key: values[i] for key, values in shown.items()}
+            pose: Document = {key: values[i] for key, values in shown.items()}
             pose |= {"branch": number, "assembled": assembled[i]}
             if condition is not None:
                 pose["condition"] = condition[i]

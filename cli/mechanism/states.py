@@ -7,9 +7,10 @@ several inputs every pose has as many velocity fields (column `field`): a unit o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,11 @@ from cli.show.columns import Table
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cli.show.columns import Cell
     from virtualwork.motion import Motion
+
+    Part = dict[str, Sequence[Cell]]
+    Row = dict[str, Cell]
 
 GROUND = "ground"
 ORDER = (
@@ -30,8 +35,6 @@ ORDER = (
 )  # fmt: skip
 
 EXACT = ("step", "branch", "field", "link", "mass_kg", "inertia_kg_m2")
-
-Part = dict[str, list[Any]]
 
 
 @dataclass(frozen=True)
@@ -93,9 +96,9 @@ def table(analysis: Analysis) -> Table:
     return Table(columns, keys=pose_keys(analysis))
 
 
-def rows(analysis: Analysis) -> list[tuple[Place, dict[str, Any]]]:
+def rows(analysis: Analysis) -> list[tuple[Place, Row]]:
     """The table's rows, each with what it holds."""
-    found: list[tuple[Place, dict[str, Any]]] = []
+    found: list[tuple[Place, Row]] = []
     several = analysis.several
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
         order = analysis.order
@@ -114,7 +117,7 @@ def rows(analysis: Analysis) -> list[tuple[Place, dict[str, Any]]]:
                 ]
         several_fields = bool(fields[0][0])
         for i, (step, assembled) in enumerate(zip(analysis.inputs.steps, motion.assembled, strict=True)):
-            head: dict[str, Any] = {"step": step}
+            head: Row = {"step": step}
             if several:
                 head["branch"] = str(assembly.number)
             for j, (field, velocities, marks) in enumerate(fields):
@@ -124,7 +127,7 @@ def rows(analysis: Analysis) -> list[tuple[Place, dict[str, Any]]]:
                     name: {key: values[i] for key, values in (part | velocities.get(name, {})).items()}
                     for name, part in parts.items()
                 }
-                extra: list[tuple[Place, dict[str, Any]]] = []
+                extra: list[tuple[Place, Row]] = []
                 for mark in marks if assembled else ():
                     if mark.link not in here:
                         continue

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -107,8 +107,7 @@ def read_parts(path: str) -> Parts:
         partial(_reading, shapes, rows, meshes, mass, center, inertia),
         partial(_solids, shapes, rows, faces, mass, center, inertia),
     )
-    turned = drawn.turned(rotation)
-    each = replace(turned, rounding=partial(_turning, drawn, rotation, table, kept))
+    each = drawn.turned(rotation, error=_turning(rotation, table, kept))
     total = mass.sum()
     if not total > 0:
         raise DataError(
@@ -314,18 +313,15 @@ def _solids(
     return found
 
 
-def _turning(drawn: Body, rotation: Array, table: Table, kept: NDArray[np.intp]) -> BodyError:
-    """Bound the parts as turned: a matrix of zeros and ones is exact, another has its angles' own rounding."""
-    from rigidbody3d.body import turned_error
-
+def _turning(rotation: Array, table: Table, kept: NDArray[np.intp]) -> Array:
+    """Bound the turns' entries: a matrix of zeros and ones is exact, another has its angles' own rounding."""
     angle = np.zeros(table.rows)
     for name in ("rx", "ry", "rz"):
         if name in table.numbers:
             column = table.numbers[name]
             angle += np.abs(np.nan_to_num(to_si(column.values, "angle", column.unit)))
-    plain = np.isin(rotation, (-1.0, 0.0, 1.0)).all(axis=(-1, -2))
-    off = np.where(plain, 0.0, READ * (4 + angle[kept]))
-    return turned_error(drawn, rotation, np.broadcast_to(off[:, None, None], rotation.shape))
+    plain = np.isin(rotation, (-1.0, 0.0, 1.0)).all(axis=(-1, -2), keepdims=True)
+    return np.broadcast_to(np.where(plain, 0.0, READ * (4 + angle[kept, None, None])), rotation.shape)
 
 
 def _turns(table: Table) -> Array:

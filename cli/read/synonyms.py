@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Iterable
 
 _WORDS = {
@@ -44,8 +43,11 @@ _WORDS = {
 def _plain(word: str) -> str:
     """Return a word in small letters, without accents, one `_` between its parts."""
     word = word.casefold().replace("ä", "ae").replace("ö", "oe").replace("ü", "ue")
-    bare = "".join(c for c in unicodedata.normalize("NFKD", word) if not unicodedata.combining(c))
-    return re.sub(r"[^a-z0-9]+", "_", bare).strip("_")
+    if not word.isascii():
+        import unicodedata
+
+        word = "".join(c for c in unicodedata.normalize("NFKD", word) if not unicodedata.combining(c))
+    return re.sub(r"[^a-z0-9]+", "_", word).strip("_")
 
 
 def quantity_meant(word: str, known: Iterable[str]) -> str:

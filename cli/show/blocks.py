@@ -39,7 +39,7 @@ class Form:
     def __call__(self, table: Part, number: int) -> Written:
         """Make it of the part of this number, from 0 on."""
         if isinstance(table, list):
-            from cli.show.text import json_elements
+            from cli.show.documents import json_elements
 
             return Written(json_elements(table, first=number == 0).encode(), 0)
         table, unknown = finished(table, self.units, self.digits)
@@ -100,7 +100,7 @@ def stream(result: Result, suffix: str, output: Path | None, units: str | None, 
 
 def _document(result: Result, parts: Iterator[bytes]) -> Iterator[bytes]:
     """The JSON document around its list."""
-    from cli.show.text import json_members
+    from cli.show.documents import json_members
 
     yield f'{{{json_members(result.document())},\n "{result.blocks_name}": ['.encode()
     yield from parts

@@ -18,7 +18,7 @@ from cli.show.colour import coloured
 from cli.show.commands import FORMS, ShowOptions, with_options
 
 if TYPE_CHECKING:
-    from cli.show.columns import Document, Result, Table
+    from cli.show.columns import Result, Table
     from cli.show.expect import Comparison
 
 
@@ -35,7 +35,7 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
     """Write the files asked for, print the result; status 1 if an expectation is not met, or nothing was found."""
     from cli.read.headers import check_renamed
     from cli.show.files import write, write_all
-    from cli.show.text import csv_text, json_parts, paragraphs, table_text
+    from cli.show.text import csv_text, paragraphs, table_text
 
     if options.form == ".toml" and result.toml is None:
         raise typer.BadParameter(
@@ -70,7 +70,7 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
 
         write(options.plot, drawn(result.figure, options.plot.suffix.lower()[1:]))
     if output is not None and options.form == ".json":
-        write(output, (part.encode() for part in json_parts(_document(result))))
+        write(output, (part.encode() for part in _json_parts(result)))
     elif output is not None and options.form == ".toml" and result.toml is not None:
         write(output, result.toml())
     elif output is not None and options.holds_one:
@@ -91,7 +91,7 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
     if not at_the_end:
         _warn(result.warnings, options)
     if options.json:
-        sys.stdout.writelines(json_parts(_document(result)))
+        sys.stdout.writelines(_json_parts(result))
         if checked is not None:
             print(verdict, file=sys.stderr)
     elif checked is not None:
@@ -195,8 +195,10 @@ def _unknown(count: int) -> list[str]:
     return [f"--digits: of {count} numbers no digit is known to hold; their cells are empty"]
 
 
-def _document(result: Result) -> Document:
-    return {**result.document(), "warnings": result.warnings}
+def _json_parts(result: Result) -> Iterator[str]:
+    from cli.show.documents import json_parts
+
+    return json_parts({**result.document(), "warnings": result.warnings})
 
 
 def _with_digits_that_hold(result: Result, first: Callable[[], Table]) -> tuple[Result, Table]:

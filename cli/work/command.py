@@ -25,11 +25,7 @@ Output: of the balance:
 
 
 @command(OPTIONS)
-def run(
-    states: str,
-    gravity: str | None = None,
-    ledger: bool = False,
-) -> Result:
+def run(states: str, gravity: str | None = None, ledger: bool = False) -> Result:
     """Find the unknown force or torque that balances a table of link states, by virtual power.
 
     STATES has one row per link (and per step): link, mass_*, inertia_*, vx_* vy_* and ax_* ay_* of the centre of

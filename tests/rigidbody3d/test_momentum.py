@@ -322,6 +322,7 @@ def test_steady_precession_loses_nothing_in_the_slow_root() -> None:
     right_angle = steady_precession(1, 0.5, 10, np.pi / 2, 4.0)
     assert float(right_angle.slow) == pytest.approx(5.0, rel=1e-15)
     assert np.isinf(right_angle.fast)
+    assert np.isinf(right_angle.error_estimate()[1])
     assert sleeping_threshold(1, 1, -2.0) == 0
 
 

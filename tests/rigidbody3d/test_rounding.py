@@ -13,6 +13,7 @@ from dalembert.arithmetic import bounds
 from dalembert.arithmetic.exact import EPS
 from rigidbody3d import Body, FreeBody, Motion, Shaft, Top, compose, integrate, principal, tensor
 from rigidbody3d.attitude import angle_between
+from rigidbody3d.shapes import SHAPES
 
 
 def turned(found, exact) -> float:
@@ -93,6 +94,18 @@ def test_what_a_body_is_made_of_shows_in_its_bounds() -> None:
     assert not any(x.any() for x in given)
 
 
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_shape_has_a_bound_with_and_without_what_it_can_do_without(shape) -> None:
+    known = SHAPES[shape]
+    needed = {name: [0.5, 0.7] if name == "radius" else 0.3 for name in known.dimensions}
+    for given in (needed, needed | dict.fromkeys(known.optional, 0.1)):
+        body = Body.of(shape, [[2.0], [-3.0]], center=[0.1, 0.2, 0.3], **given)
+        for found, bound in zip((body.mass, body.center, body.inertia), body.error_estimate(), strict=True):
+            assert found.shape == bound.shape
+            assert (bound <= 16 * EPS * np.abs(found)).all()
+        assert (body.error_estimate().inertia > 0).any() or shape == "point"
+
+
 def test_nothing_is_worked_out_for_bounds_unless_asked_for(monkeypatch) -> None:
     monkeypatch.setattr(bounds, "bounds", lambda *_: pytest.fail("not asked for"))
     parts = Body.of("sphere", [1.0, 2.0], center=[[0, 0, 0], [1, 0, 0]], radius=0.5)
@@ -150,6 +163,8 @@ def test_states_in_time_have_bounds_of_their_own_shapes() -> None:
         many.body.error_estimate("attitude")
     with pytest.raises(ValueError, match="expected one of momentum"):
         Motion(np.eye(3), [1, 2, 3.0]).error_estimate("speed")
+    with pytest.raises(ValueError, match="rate_about: expected the point"):
+        Motion(np.eye(3), [1, 2, 3.0]).error_estimate("rate_about")
 
 
 def test_a_tensor_that_was_worked_out_carries_its_errors_on() -> None:

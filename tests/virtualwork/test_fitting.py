@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from dalembert.arithmetic.engines import ENGINES
 from virtualwork import DescriptionError, Guess, Guide, Input, Link, Mechanism, MechanismError
 from virtualwork.describe.dimensions import changed, value
 from virtualwork.family.target import Target
@@ -276,15 +277,18 @@ def test_a_problem_travels_to_another_process():
     assert (there([0.1], q) == design([0.1], q)).all()
 
 
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", CASES)
-def test_a_design_is_what_its_own_description_does(name):
+def test_a_design_is_what_its_own_description_does(monkeypatch, name, engine):
     truth, point, paths, (low, high) = CASES[name]
     paths, q = paths.split(), np.linspace(low, high, 73)
     design = truth.design(paths, point)
     own = np.array([value(truth, path) for path in paths])
     for seed in range(12):
         x = own * np.random.default_rng(seed).uniform(0.8, 1.2, len(own))
+        monkeypatch.delenv("DALEMBERT_ENGINE", raising=False)
         alone = changed(truth, dict(zip(paths, x.tolist(), strict=True))).motion(q).point(point).position.T
+        monkeypatch.setenv("DALEMBERT_ENGINE", engine)
         assert design(x, q) == pytest.approx(alone, abs=1e-13 * truth.size, nan_ok=True)
         slopes = design.slopes(x, q)
         step = 1e-6 * truth.size

@@ -32,7 +32,7 @@ LANES = 1 << 18
 
 
 def chosen(
-    written: Written, m: Description, given: Mapping[str, Reals], low: Reals, high: Reals
+    written: Written, m: Description, given: Mapping[str, Reals], n: int, low: Reals, high: Reals
 ) -> tuple[dict[str, Reals], Mask]:
     """The sign of each closed form of each variant, (n,), and which variants go by them over their inputs, (n,).
 
@@ -42,29 +42,34 @@ def chosen(
         With the signs as inputs.
     m : Description
     given : mapping of path to array (n,)
-    low, high : array (n,)
+    low, high : array (n,), or (1,) where they are the same of all
         The least and the largest input that is asked for, and the guess's. Of several inputs no way is looked along.
     """
-    n = len(low)
     if not all(informed(m, group) for group in written.closed):
         return {}, np.zeros(n, dtype=bool)
     one = len(m.inputs) == 1
-    way = _wide(m, low, high) if one and n else np.empty((0, 1))
-    at_once = len(way) <= AT_ONCE
-    tape = written.told(len(way) if at_once else 0)
-    table, (told, clear) = np.empty((len(written.closed), n, 1)), np.empty((2, n), dtype=bool)
+    # steps of a way, each as wide as lets `CLEAR` tell that there is no dip
+    steps = -(-(_count(m, low, high) - 1) // WIDER) if one and n else 0
+    at_once, way = steps < AT_ONCE, np.empty((0, 1))
+    if steps and at_once:
+        way = _way(m, low, high, steps + 1)
+        # at the guess it is looked at anyhow
+        way = way[[not (q == m.at[0]).all() for q in way]]
+    tape = written.told(len(way))
     enters = {**_across(given), **_inputs(m)} | {f"way {i}": q[:, None] for i, q in enumerate(way)}
-    run_grid(tape, enters, (n, 1), [*table, told, clear])
-    found = {group.name: sign for group, sign in zip(written.closed, table[:, :, 0], strict=True)}
-    rest = np.flatnonzero(~told)
-    if len(rest):
+    *table, level = (row[:, 0] for row in run_grid(tape, enters, (n, 1)))
+    found = {group.name: sign for group, sign in zip(written.closed, table, strict=True)}
+    told, clear = level > 0, level > 1
+    if not told.all():
+        rest = np.flatnonzero(~told)
         again, told[rest] = signs(written, m, _of(given, rest), len(rest))
         for name, sign in again.items():
             found[name][rest] = sign
-    rest = np.flatnonzero(told & ~clear if at_once else told)
-    if one and len(rest):
+    if one and not (at_once and clear.all()):
+        rest = np.flatnonzero(told & ~clear if at_once else told)
         known = _of({**given, **{f"sign {name}": sign for name, sign in found.items()}}, rest)
-        told[rest] = ~meet_on_the_way(written, m, known, len(rest), low[rest], high[rest])
+        first, last = (end if len(end) == 1 else end[rest] for end in (low, high))
+        told[rest] = ~meet_on_the_way(written, m, known, len(rest), first, last)
     return found, told
 
 
@@ -111,7 +116,7 @@ def _inputs(m: Description) -> dict[str, float]:
 def meet_on_the_way(
     written: Written, m: Description, known: Mapping[str, Any], n: int, low: Reals, high: Reals
 ) -> Mask:
-    """Which variants may have a change point over their inputs from low to high, (n,) each.
+    """Which variants may have a change point over their inputs from low to high, (n,) or (1,) each.
 
     Where two branches meet the radicand of a closed form touches zero from above; wherever a sample of it lies lower
     than its neighbours, the dip is followed down.
@@ -121,8 +126,8 @@ def meet_on_the_way(
         return found
     for here, some, q in _along(m, known, n, low, high):
         count = len(found[here])
-        wide, clear = q[_every_other(len(q))].T, np.empty(count, dtype=bool)
-        run_grid(written.clear, _across(some) | {"q0": wide}, (count, wide.shape[1]), [clear])
+        clear = np.empty(count, dtype=bool)
+        run_grid(written.clear, _across(some) | {"q0": q.T}, (count, len(q)), [clear])
         left = np.flatnonzero(~clear)
         if len(left):
             its, near = _of(some, left), q if q.shape[1] == 1 else q[:, left]
@@ -138,11 +143,11 @@ def stays_within(
     known: Mapping[str, Any],
     key: Key,
     bound: float,
+    n: int,
     low: Reals,
     high: Reals,
 ) -> Mask:
-    """Of which variants a quantity is no larger than a bound over their inputs from low to high, (n,)."""
-    n = len(low)
+    """Of which variants a quantity is no larger than a bound over their inputs from low to high, (n,) or (1,)."""
     found = np.ones(n, dtype=bool)
     for here, some, q in _along(m, known, n, low, high):
         found[here] = (np.abs(_sampled(written, key, some, q, len(found[here]))) < bound).all(axis=0)
@@ -162,7 +167,8 @@ def _along(
     each = max(1, LANES // count)
     for a in range(0, n, each):
         here = slice(a, min(a + each, n))
-        yield here, _of(known, here), _way(m, low[here], high[here], count)
+        first, last = (end if len(end) == 1 else end[here] for end in (low, high))
+        yield here, _of(known, here), _way(m, first, last, count)
 
 
 def _count(m: Description, low: Reals, high: Reals) -> int:
@@ -172,20 +178,9 @@ def _count(m: Description, low: Reals, high: Reals) -> int:
 
 def _way(m: Description, low: Reals, high: Reals, count: int) -> Reals:
     """Inputs from low to high, of a turn at most: (count, n), or (count, 1) where all share them."""
-    if (low == low[0]).all() and (high == high[0]).all():
+    if len(low) > 1 and (low == low[0]).all() and (high == high[0]).all():
         low, high = low[:1], high[:1]
     return np.linspace(low, np.minimum(high, low + (np.inf if m.inputs[0].is_slide else 2 * np.pi)), count)
-
-
-def _wide(m: Description, low: Reals, high: Reals) -> Reals:
-    """The samples of the ways in wider steps, (samples, n or 1)."""
-    count = _count(m, low, high)
-    return _way(m, low, high, count)[_every_other(count)]
-
-
-def _every_other(count: int) -> NDArray[np.intp]:
-    """Which samples are looked at in wider steps: the first and the last among them."""
-    return np.append(np.arange(0, count - 1, WIDER), count - 1)
 
 
 def _of(known: Mapping[str, Any], rows: Any) -> dict[str, Any]:

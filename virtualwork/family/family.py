@@ -13,6 +13,7 @@ array([1., 2., 3.])
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -106,13 +107,23 @@ class Family:
 
     def own(self, name: str) -> list[Reals]:
         """What the descriptions say of each input: its value, or a rate, (v,)."""
-        own = []
-        for j in range(len(self.mechanism.inputs)):
-            path = next(d.path for d in dimensions(self.mechanism).values() if d.where == ("inputs", j, name))
-            varied = [i for i, d in enumerate(self.dimensions) if d.path == path]
-            number = float(value(self.mechanism, path).real)
-            own.append(self.values[:, varied[0]] if varied else np.full(len(self), number))
-        return own
+        return [np.full(len(self), own) if np.ndim(own) == 0 else own for own in self._of_inputs(name)]
+
+    def _of_inputs(self, name: str) -> list[Number]:
+        """The same; a number where it is not varied."""
+        every = (self._own[j, name] for j in range(len(self.mechanism.inputs)))
+        return [number if at is None else self.values[:, at] for at, number in every]
+
+    @cached_property
+    def _own(self) -> dict[tuple[int | str, int | str], tuple[int | None, float]]:
+        """Of each input's value and rates the place among what is varied, or None; and the description's own number."""
+        known = dimensions(self.mechanism)
+        places = {d.path: i for i, d in enumerate(self.dimensions)}
+        return {
+            (d.where[1], d.where[2]): (places.get(d.path), float(value(self.mechanism, d.path).real))
+            for d in known.values()
+            if d.where[0] == "inputs"
+        }
 
     def inputs(self, angle: ArrayLike | None) -> Reals:
         """(v or 1, n, k)."""
@@ -131,8 +142,10 @@ class Family:
         rates: list[list[Number]] = []
         for rate, name in zip((*given, None), ("speed", "acceleration", "jerk"), strict=True):
             if rate is None:
-                own = self.own(name)
-                rates.append([float(r[0]) if (r == r[0]).all() else r[:, None] for r in own])
+                own = self._of_inputs(name)
+                rates.append(
+                    [r if np.ndim(r) == 0 else float(r[0]) if (r == r[0]).all() else r[:, None] for r in own]
+                )
                 continue
             r = np.asarray(rate, dtype=float)
             k = len(self.mechanism.inputs)

@@ -19,7 +19,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed
 from virtualwork.describe.errors import MechanismError
-from virtualwork.family.branches import LANES, chosen, stays_within
+from virtualwork.family.branches import chosen, stays_within
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import COMPLEX, FORCES, Key, over_blocks, quantity
 from virtualwork.formulas.dynamics import Dynamics
@@ -33,6 +33,8 @@ Mask = NDArray[np.bool_]
 ASSEMBLED: Key = ("assembled",)
 # rad: a torsion spring that is twisted by no more all along its way counts no whole turns
 HALF = 2.6
+# lanes of a part: what is got ready for each is little beside them
+LANES = 1 << 19
 # variants described one by one whose poses are kept for the next question
 KEPT = 500
 
@@ -151,7 +153,7 @@ class Solver:
         part, written = self.part, self.written
         if written is None:
             return {}, np.zeros(part.shape[0], dtype=bool)
-        found, told = chosen(written, part.mechanism, self._given, *self._span)
+        found, told = chosen(written, part.mechanism, self._given, part.shape[0], *self._span)
         for d in part.dimensions:
             if d.kind in ("mass", "inertia"):
                 # what a description refuses
@@ -160,12 +162,14 @@ class Solver:
 
     @cached_property
     def _span(self) -> tuple[Reals, Reals]:
-        """The least and the largest value of the one input of each variant, with that of the guess, (v,) each."""
-        v, at = len(self.part.values), self.part.mechanism.at[0]
-        q = self.part.inputs[:, :, 0]
+        """The least and the largest value of the one input of each variant, with that of the guess.
+
+        (v,) each, or (1,) where all are asked for the same.
+        """
+        at, q = self.part.mechanism.at[0], self.part.inputs[:, :, 0]
         low = np.minimum(np.nanmin(q, axis=1, initial=np.inf), at)
         high = np.maximum(np.nanmax(q, axis=1, initial=-np.inf), at)
-        return np.broadcast_to(low, v), np.broadcast_to(high, v)
+        return low, high
 
     @property
     def _known(self) -> dict[str, Reals]:
@@ -199,11 +203,12 @@ class Solver:
         alone = ~there
         found = list(room(keys, v, n) if out is None else out)
         each = max(1, LANES // max(n, 1))
-        places = np.flatnonzero(there)
-        for i in range(0, len(places), each):
-            rows = places[i : i + each]
-            alone[rows] = self._on_tape(keys, rows, found)
-        if alone.any():
+        whole = bool(there.all())
+        places = np.arange(0) if whole else np.flatnonzero(there)
+        for i in range(0, v if whole else len(places), each):
+            rows = slice(i, min(i + each, v)) if whole else places[i : i + each]
+            alone[self._on_tape(keys, rows, found)] = True
+        if not whole or alone.any():
             for to in found:
                 to[alone] = np.nan
         return found, alone
@@ -235,31 +240,35 @@ class Solver:
             return found
         low, high = self._span
         for number in range(len(m.torsion_springs)):
-            found &= stays_within(self.written, m, self._known, ("twist", number), HALF, low, high)
+            found &= stays_within(self.written, m, self._known, ("twist", number), HALF, v, low, high)
         return found
 
-    def _on_tape(self, keys: Sequence[Key], rows: NDArray[np.intp], out: list[Any]) -> Mask:
-        """Work out some variants on the tape; and which of them are better described alone."""
+    def _on_tape(
+        self, keys: Sequence[Key], rows: NDArray[np.intp] | slice, out: list[Any]
+    ) -> NDArray[np.intp]:
+        """Work out some variants on the tape; and which of all are better described alone."""
         assert self.written is not None
-        v, n = len(rows), self.part.shape[1]
+        v, n = len(self.part.values[rows]), self.part.shape[1]
         asked = list(dict.fromkeys(key for key in keys if key != ASSEMBLED))
         tape = self.written.tested(asked, [ASSEMBLED] if ASSEMBLED in keys else [])
         # straight to their place where that is in one piece
-        together = rows[-1] - rows[0] == v - 1
-        here: Any = slice(rows[0], rows[-1] + 1) if together else rows
-        to = [x[here] for x in out] if together else room(keys, v, n)
+        together = isinstance(rows, slice)
+        to = [x[rows] for x in out] if together else room(keys, v, n)
         first = dict(zip(reversed(keys), reversed(to), strict=True))
         parts = [part for key in asked for part in _parts(first[key])]
         sound = np.empty(v, dtype=bool)
-        run_grid(tape, {name: self._entering(name, here) for name in tape.inputs}, (v, n), [*parts, sound])
+        run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n), [*parts, sound])
         for key, x in zip(keys, to, strict=True):
             if key == ASSEMBLED:
                 x[:] = 0.0
             elif x is not first[key]:
                 x[:] = first[key]
-        near, unsound = np.zeros(v, dtype=bool), np.flatnonzero(~sound)
-        if len(unsound):
-            values, near[unsound] = self._with_gaps(keys, rows[unsound])
+        near = np.arange(0)
+        if not sound.all():
+            unsound = np.flatnonzero(~sound)
+            of = unsound + rows.start if isinstance(rows, slice) else rows[unsound]
+            values, close = self._with_gaps(keys, of)
+            near = of[close]
             for x, value in zip(to, values, strict=True):
                 x[unsound] = value
         if not together:

@@ -111,39 +111,41 @@ class Written:
 
     @cached_property
     def clear(self) -> Tape:
-        """The tape of `clear`: positive where no radicand is near zero, by the input and the signs."""
-        depths = [self.recording.value(key) - CLEAR for key in self.margins]
+        """The tape of `clear`: positive where no radicand dips down to zero, by the input and the signs."""
+        depths = [self.recording.value(key) - DIP for key in self.margins]
         return self.recording.recorder.tape({"clear": every(depths)})
 
     def told(self, samples: int) -> Tape:
         """The tape of how all closed forms close at the inputs of the guess, and whether that is told plainly.
 
-        `sign GROUP`; `told`, positive where the guess is far from a change point and much nearer to one assembly; `clear`,
-        positive where the radicands are far from zero at further inputs `way 0`, `way 1` …, so many.
+        `sign GROUP`; and `told`: positive where the guess is far from a change point and much nearer to one assembly, 2 where
+        the radicands are far from zero there and at further inputs `way 0`, `way 1` …, so many. Where it is not told the
+        signs mean nothing.
         """
         if samples not in self._told:
             recorder = Recorder()
-            signs, told = self._chosen(recorder, {})
-            margins = self.tape(self.margins)
-            clear = []
+            found, margins = _again(self.choice, recorder, {}), self.tape(self.margins)
+            signs, clear = {}, []
+            for name in (group.name for group in self.closed):
+                signs[f"sign {name}"] = RECORDED.select(
+                    found[f"plus {name}"] - found[f"minus {name}"], -1.0, 1.0
+                )
+                clear.append(found[f"margin {name}"] - CLEAR)
             for i in range(samples):
                 depths = _again(margins, recorder, signs | {"q0": recorder.input(f"way {i}")})
                 clear += [depth - CLEAR for depth in depths.values()]
-            outputs = signs | {"told": every(told), "clear": every(clear)}
+            outputs = signs | {"told": every(self._plain(found), every(clear, 2.0, 1.0))}
             self._told[samples] = recorder.tape(outputs)
         return self._told[samples]
 
-    def _chosen(
-        self, recorder: Recorder, known: Mapping[str, Number]
-    ) -> tuple[dict[str, Number], list[Number]]:
-        """The choice on another tape: the signs as they enter, and what is positive where they are told plainly."""
-        chosen = _again(self.choice, recorder, known)
-        told = []
+    def _plain(self, found: Mapping[str, Number]) -> list[Number]:
+        """What is positive where a choice is told plainly."""
+        plain = []
         for name in (group.name for group in self.closed):
-            plus, minus = chosen[f"plus {name}"], chosen[f"minus {name}"]
-            told.append(chosen[f"margin {name}"] - CLOSE)
-            told.append(RECORDED.select(TOLD * plus - minus, 1.0, TOLD * minus - plus))
-        return {f"sign {group.name}": chosen[f"sign {group.name}"] for group in self.closed}, told
+            plus, minus = found[f"plus {name}"], found[f"minus {name}"]
+            plain.append(found[f"margin {name}"] - CLOSE)
+            plain.append(RECORDED.select(TOLD * plus - minus, 1.0, TOLD * minus - plus))
+        return plain
 
     def evaluation(self, keys: Sequence[Key], enters: tuple[str, ...] | None, own_signs: bool) -> Tape:
         """The tape of quantities, or of the derivatives of each to all that enters, one after the other.
@@ -154,8 +156,14 @@ class Written:
         asked = tuple(keys), enters, own_signs
         if asked not in self._evaluations:
             recorder = Recorder()
-            at = {"q0": recorder.input("at")}
-            signs, fine = self._chosen(recorder, at) if own_signs else ({}, [])
+            signs: dict[str, Number] = {}
+            fine: list[Number] = []
+            if own_signs:
+                found = _again(self.choice, recorder, {"q0": recorder.input("at")})
+                signs, fine = (
+                    {name: found[name] for name in found if name.startswith("sign ")},
+                    self._plain(found),
+                )
             parts = [part for key in keys for part in names(key)]
             if enters is None:
                 margins = self.margins if own_signs else []
@@ -217,11 +225,10 @@ class Written:
         return recorder.tape(outputs)
 
 
-def every(conditions: Sequence[Number]) -> Number:
-    """A number that is positive where all of these are."""
-    found: Number = 1.0
+def every(conditions: Sequence[Number], found: Number = 1.0, otherwise: float = -1.0) -> Number:
+    """A number where all of these are positive, and another one where they are not."""
     for condition in reversed(conditions):
-        found = RECORDED.select(condition, found, -1.0)
+        found = RECORDED.select(condition, found, otherwise)
     return found
 
 

@@ -7,8 +7,9 @@ follow from the pose.
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -17,11 +18,15 @@ from itertools import product
 import numpy as np
 
 from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.recorded import Number
+from dalembert.arithmetic.systems import regularity
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.errors import MechanismError
 from virtualwork.describe.parts import GROUND, Guess, Input
+from virtualwork.formulas.kinds import PARTS
 from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.positions import columns
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.watch import Floats
 from virtualwork.motion import Motion
@@ -30,6 +35,8 @@ TURN = 2 * math.pi
 # the relative radicand of a loop's closed form, the squared sine of its transmission angle, below which another
 # coordinate is looked for; by how much it must be better
 FOLDING, BETTER = 0.02, 4.0
+# by how much a pose may differ, on a circle of radius 1, and be the same
+SAME = 1e-6
 
 
 class Coordinates:
@@ -45,6 +52,8 @@ class Coordinates:
     def __init__(self, equations: Equations, inputs: tuple[Input, ...]) -> None:
         self.equations, self.inputs = equations, inputs
         self.own = equations.mechanism.inputs == inputs
+        # all that were made on the way, these among them
+        self.made = [self]
 
     def of(self, equations: Equations) -> Coordinates:
         """The same coordinates with the equations in another mode of friction."""
@@ -83,13 +92,19 @@ class Coordinates:
     # --- how far from folding -----------------------------------------------------------------------------------
     @cached_property
     def _margins(self) -> Tape | None:
-        """The relative radicands of all loops; None where there is none to look at."""
+        """The relative radicands of all loops, or what stands for them; None where there is none to look at."""
         a = self.equations.assembly
-        names = [g.name for g in a.plan.groups if g.kind not in ("Newton", "PRP")]
-        if not names or a.geared or len(names) < len(a.plan.groups):
-            return None
+        groups = [g for g in a.plan.groups if g.kind != "PRP"]
         recording = self.equations.recording(False, False, False)
-        return recording.tape([("margin", name) for name in names])
+        found: dict[str, Number] = {}
+        for g in groups:
+            if g.kind == "Newton":
+                # of two links this is the sine, and its square the radicand
+                regular = recording.value(("regularity", g.name))
+                found[g.name] = regular * regular
+            else:
+                found[g.name] = recording.value(("margin", g.name))
+        return recording.recorder.tape(found) if found else None
 
     @cached_property
     def _margin(self) -> Callable[[float, Floats, Floats], tuple[float, ...]] | None:
@@ -109,20 +124,24 @@ class Coordinates:
         if self._margin is None:
             return 1.0
         try:
-            return min(self._margin(0.0, q, q))
+            # NaN where a group without a closed form cannot be assembled
+            return min(x if x == x else 0.0 for x in self._margin(0.0, q, q))
         except (ZeroDivisionError, ValueError, OverflowError):
             return 0.0
 
-    def folds(self, q: Floats) -> bool:
+    def folds(self, q: Floats, below: float = FOLDING) -> bool:
         """Whether other coordinates should be looked for: a loop folds, and not towards a change point."""
-        return self.margin(q) < FOLDING and not self.equations.passes(q[0])
+        return self.margin(q) < below and not self.equations.passes(q[0])
 
-    def others(self, q: Floats) -> Iterator[Coordinates]:
-        """The same pose in other coordinates: the inputs themselves, then every link's angle for one of those now used."""
+    def better(self, q: Floats, near: Floats) -> tuple[Coordinates, Floats] | None:
+        """Those in which every loop is farthest from folding at a pose, and their values; None where none are much better.
+
+        The inputs themselves are taken with the whole turns of those that are near.
+        """
         m, k = self.equations.mechanism, self.equations.k
         if any(force.history for force in m.forces):
             # they are given over the input
-            return
+            return None
         motion = self.motion(np.array([q]))
         angles = {name: float(motion.link(name).angle[0]) for name in m.links}
         points = {
@@ -135,14 +154,41 @@ class Coordinates:
         for j, name in product(range(k), m.links):
             if all(e.link != name for e in m.inputs):
                 choices.append((*m.inputs[:j], Input(link=name), *m.inputs[j + 1 :]))
+        best, most = None, BETTER * max(self.margin(q), 0.0)
         for entries in choices:
-            at = tuple(self._value(motion, entry) for entry in entries)
-            described = replace(m, inputs=entries, guess=Guess(at, angles, points))
+            at = [self._value(motion, entry) for entry in entries]
+            if entries == self.inputs:
+                at = [
+                    x if e.is_slide else x + TURN * round((y - x) / TURN)
+                    for e, x, y in zip(entries, at, near, strict=True)
+                ]
             try:
-                yield Coordinates(type(self.equations)(Assembly.from_guess(described)), self.inputs)
+                assembly = Assembly.from_guess(
+                    replace(m, inputs=entries, guess=Guess(tuple(at), angles, points))
+                )
             except MechanismError:
                 # the link cannot be a coordinate: others are
                 continue
+            found = opened(assembly, at)
+            if found > most:
+                best, most = (assembly, entries, at), found
+        if best is None:
+            return None
+        assembly, entries, at = best
+        for known in self.made:
+            # what lies along the branch is known of it
+            if known.equations.mechanism.inputs == entries and known.stands_at(at, angles):
+                return known, at
+        other = Coordinates(type(self.equations)(assembly), self.inputs)
+        other.made = self.made
+        self.made.append(other)
+        return other, at
+
+    def stands_at(self, q: Floats, angles: Mapping[str, float]) -> bool:
+        """Whether the links have these angles there."""
+        motion = self.motion(np.array([q]))
+        apart = [cmath.exp(1j * (motion.link(name).angle[0] - a)) - 1 for name, a in angles.items()]
+        return all(abs(x) < SAME for x in apart)
 
     @staticmethod
     def _value(motion: Motion, entry: Input) -> float:
@@ -151,11 +197,14 @@ class Coordinates:
         angle = float(motion.link(entry.name).angle[0])
         return angle if entry.on == GROUND else angle - float(motion.link(entry.on).angle[0])
 
-    def better(self, q: Floats) -> Coordinates | None:
-        """The coordinates in which every loop is farthest from folding at a pose; None where none are much better."""
-        best, most = None, BETTER * max(self.margin(q), 0.0)
-        for other in self.others(q):
-            found = other.margin(list(other.equations.mechanism.at))
-            if found > max(most, FOLDING):
-                best, most = other, found
-        return best
+
+def opened(assembly: Assembly, at: Floats) -> float:
+    """How far every loop is from folding at the inputs of the guess: as `Coordinates.margin`."""
+    st, found = assembly.state(tuple(at)), [1.0]
+    for g in assembly.plan.groups:
+        if g.kind == "Newton":
+            rows = [[part(c) for c in row] for row in columns(g, st) for part in PARTS]
+            found.append(float(np.ravel(regularity(rows))[0]) ** 2)
+        elif g.kind != "PRP":
+            found.append(float(np.ravel(st.margin[g.name])[0]))
+    return min(x if x == x else 0.0 for x in found)

@@ -4,14 +4,12 @@ The effort at the inputs by virtual work is linear in their accelerations: with 
 its derivative to the accelerations (one sweep backwards over the tape), h its value without them. Loops are closed at
 every evaluation, so that nothing drifts.
 
-What a tape cannot decide enters it as a number: the sign of a closed form at the pose, the whole turns of a spring,
-what a table says. Near change points what is smooth is interpolated (`crossing`). With groups that have no closed form
-the poses' own formulas give M and h from k + 1 motions at once.
+What a tape cannot decide enters it as a number: the sign of a closed form at the pose, the unknowns of a group that has
+none, whole turns (`entering`), what a table says. Near change points what is smooth is interpolated (`crossing`).
 """
 
 from __future__ import annotations
 
-import cmath
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
@@ -23,25 +21,25 @@ import numpy as np
 
 from dalembert.arithmetic.engines import floats, run
 from dalembert.arithmetic.tape import Tape
-from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.errors import MechanismError
-from virtualwork.formulas.block import Setting
 from virtualwork.formulas.effort import effort
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.positions import State
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.scene import Scene
 from virtualwork.intime.crossing import Crossing, crossings, nearest
-from virtualwork.intime.powers import motion_of, places_and_speeds, potential, wasted
+from virtualwork.intime.entering import Iteration, Placed, unknowns
+from virtualwork.intime.powers import motion_of, places_and_speeds
 from virtualwork.intime.tables import Value, ends, kinks, place, reader
 from virtualwork.intime.watch import Floats, Watch
 
 # of a turn: how far beyond an input its change points are looked for
 AHEAD = 1.0
+# beyond what is known no step looks farther
+FAR = 64.0
 # of the poses from which is interpolated how far off others are taken, to see how much hangs on that
 OTHER = 0.85
 # how near a change point a fold is its own
@@ -101,11 +99,6 @@ class Equations:
 
     def _plain(self, t: float, q: Floats, v: Floats) -> Floats:
         """The same away from change points."""
-        if self._untaped:
-            mass, rest, power, _ = self.by_poses(np.array([t]), np.array([q]), np.array([v]))
-            if not np.isfinite(mass).all():
-                raise Lost
-            return [*np.linalg.solve(mass[0], -rest[0]).tolist(), float(power[0])]
         try:
             return list(self._function(*self._filled(t, q, v)))
         except (ZeroDivisionError, ValueError, OverflowError):
@@ -122,13 +115,13 @@ class Equations:
         if (t, *q, *v) in self._begun:
             return
         names = [e.name for e in self.mechanism.inputs]
-        mass, rest, *_ = self.by_poses(np.array([t]), np.array([q]), np.array([v]))
+        mass, rest = self.by_poses(t, q, v)
         if not (np.isfinite(mass).all() and np.isfinite(rest).all()):
             raise MechanismError("it cannot be assembled at the start, or stands at a limit of its input")
         # how much of each input's own inertia is left when the others are free to follow
-        whole = np.linalg.eigvalsh(mass[0] * np.outer(self.scale, self.scale))
-        if not mass[0].any() or whole[0] <= 1e-14 * whole[-1]:
-            least = names[int(np.argmin(np.diag(mass[0]) * np.square(self.scale)))]
+        whole = np.linalg.eigvalsh(mass * np.outer(self.scale, self.scale))
+        if not mass.any() or whole[0] <= 1e-14 * whole[-1]:
+            least = names[int(np.argmin(np.diag(mass) * np.square(self.scale)))]
             raise MechanismError(
                 f"no mass moves with input '{least}': its acceleration is not determined; "
                 "expected a mass or an inertia on a link that it moves"
@@ -155,25 +148,15 @@ class Equations:
                 continue
         return out
 
-    def by_poses(self, t: Reals, q: Reals, v: Reals) -> tuple[Reals, Reals, Reals, Reals]:
-        """M (n, k, k), h (n, k), the power of what stores nothing and the potential (n,), by the poses' own formulas.
-
-        The effort of k + 1 motions through each pose gives M and h.
-        """
-        n, k = q.shape
-        speeds = np.repeat(v, k + 1, axis=0)
-        unit = np.tile(np.vstack([np.zeros(k), np.eye(k)]), (n, 1))
+    def by_poses(self, t: float, q: Floats, v: Floats) -> tuple[Reals, Reals]:
+        """M (k, k) and h (k,) at a state, from the effort of k + 1 motions through its pose."""
+        k = self.k
         with np.errstate(all="ignore"):
-            poses = Poses(self.assembly, np.repeat(q, k + 1, axis=0), speeds, unit)
-            poses.time = np.repeat(t, k + 1)
-            scene = Scene(poses)
-            found = effort(scene).reshape(n, k + 1, k)
-            power, stored = np.zeros(n * (k + 1)), np.zeros(n * (k + 1))
-            for block in scene.blocks():
-                power[block.rows] = wasted(scene.loads, block, list(speeds[block.rows].T))
-                stored[block.rows] = potential(scene.loads, block)
-        mass = np.swapaxes(found[:, 1:] - found[:, :1], 1, 2)
-        return mass, found[:, 0], power[:: k + 1], stored[:: k + 1]
+            unit = np.vstack([np.zeros(k), np.eye(k)])
+            poses = Poses(self.assembly, np.tile(q, (k + 1, 1)), np.tile(v, (k + 1, 1)), unit)
+            poses.time = np.full(k + 1, t)
+            found = effort(Scene(poses)).reshape(k + 1, k)
+        return (found[1:] - found[0]).T, found[0]
 
     def watches(self) -> list[Watch]:
         """What a step must not pass: the kinks of tables over what hangs on the inputs alone."""
@@ -203,11 +186,11 @@ class Equations:
         case = LoadCase(self.mechanism, self.assembly.plan, moves=True)
         return [load for load in case.loads if isinstance(load, Tabled)]
 
-    def recording(self, *moves: bool) -> Recording:
+    def recording(self, *moves: bool, settled: bool = True) -> Recording:
         """The formulas of the assembly, with what the equations can fill in: speeds and accelerations as `moves`."""
         a = self.assembly
         turning = {name for name, flips in a.track.flips.items() if len(flips)}
-        return Recording(self.mechanism, a.plan, a.signs, moves, turning_over=turning, geared=a.geared)
+        return Recording(self.mechanism, a.plan, a.signs, moves, turning, a.geared, settled)
 
     def function(self, tape: Tape) -> Callable[[float, Floats, Floats], tuple[float, ...]]:
         """A tape of such a recording as a function of a state."""
@@ -219,7 +202,7 @@ class Equations:
     def plain(self) -> bool:
         """Whether the tape of the motion hangs on the state alone: on nothing that has to be looked up."""
         own = {*places_and_speeds(self.k), "t"}
-        return not self._untaped and own.issuperset(self._tape.inputs)
+        return own.issuperset(self._tape.inputs)
 
     @property
     def rates(self) -> Tape:
@@ -262,19 +245,15 @@ class Equations:
         for i in np.flatnonzero(careful):
             crossing = self._crossing(float(q[i, 0]))
             places = q[i : i + 1] if crossing is None else np.array(crossing.nodes)[:, None]
-            found = self._energies(np.full(len(places), t[i]), places, np.tile(v[i], (len(places), 1)))
+            n = len(places)
+            given = np.full(n, t[i]), places, np.tile(v[i], (n, 1)), np.arange(n)
+            found = self._run(self._recorded[1], *given)["energy"]
             if crossing is not None:
                 of = dict(zip(crossing.nodes, found.tolist(), strict=True))
                 (out[i],) = crossing.interpolated(lambda x, of=of: [of[x]], float(q[i, 0]))  # type: ignore[misc]
             else:
                 (out[i],) = found
         return out
-
-    def _energies(self, t: Reals, q: Reals, v: Reals) -> Reals:
-        if not self._untaped:
-            return np.asarray(self._run(self._recorded[1], t, q, v, np.arange(len(q)))["energy"])
-        mass, _, _, stored = self.by_poses(t, q, v)
-        return np.asarray(stored + 0.5 * np.einsum("ni,nij,nj->n", v, mass, v))
 
     def _run(self, tape: Tape, t: Reals, q: Reals, v: Reals, rows: Any) -> Mapping[str, Any]:
         if self.plain:
@@ -301,8 +280,11 @@ class Equations:
         kind, _, of = name.partition(" ")
         if kind == "sign":
             return self._sign(of)
-        if kind == "turns":
-            return self._turns(int(of.removeprefix("spring ")))
+        if kind == "x":
+            return self._placed.unknown(name)
+        if kind == "near":
+            spring = of.startswith("spring ")
+            return self._placed.twist(int(of.removeprefix("spring "))) if spring else self._placed.angle(of)
         if kind == "table":
             number, axis = of.split()
             load = self._tables[int(number)]
@@ -326,28 +308,19 @@ class Equations:
 
         return at
 
-    def _turns(self, number: int) -> Value:
-        """The whole turns of a torsion spring, followed from the guess."""
-        spring = self.mechanism.torsion_springs[number]
-        a = self.assembly
-        function = self.function(
-            self.recording(False, False, False).tape([("turn", body) for body in spring.links])
-        )
-        known: list[Setting] = []
-
-        def turns(t: float, q: Floats, v: Floats) -> float:
-            ends = known[-1].poses.inputs[:, 0] if known else (0.0, 0.0)
-            if not ends[0] < q[0] < ends[-1]:
-                span = self.assembly.track.length
-                known.append(
-                    Setting(Poses(a, [min(q[0], ends[0]) - span, max(q[0], ends[-1]) + span]), False)
-                )
-            x, y, *other = function(t, q, v)
-            first, second = complex(x, y), complex(*other)
-            within = cmath.phase(second * first.conjugate() * rotation(-spring.free_angle))
-            return float(round((known[-1].wound(spring, State(list(q)), within) - within) / TURN))
-
-        return turns
+    @cached_property
+    def _placed(self) -> Placed:
+        """What enters the tapes of poses, found one pose after another."""
+        larger = [g for g in self.assembly.plan.groups if g.kind == "Newton"]
+        if not larger or self.assembly.geared:
+            return Placed(self.assembly)
+        recording = self.recording(False, False, False, settled=False)
+        recording.solve([key for g in larger for key in self.assembly.plan.writes(g)], 0)
+        st = recording.st
+        after = {f"x {g.name} {i}": x for g in larger for i, x in enumerate(unknowns(g, st))}
+        tape = recording.recorder.tape(after)
+        known = {name: self._filler(name) for name in tape.inputs if not name.startswith("x ")}
+        return Placed(self.assembly, Iteration(tape, known), lambda: self.crosses)
 
     def _sign(self, group: str) -> Value:
         base, start = self.assembly.signs[group], self.assembly.track.start
@@ -366,10 +339,12 @@ class Equations:
         low, high = self._covered
         if track.active and math.isfinite(q) and not low <= q <= high:
             ahead = AHEAD * track.length
+            if max(track.low - q, q - track.high) > FAR * track.length:
+                # a stage of a step that is too long
+                raise Lost
             try:
                 track.cover(q - ahead, q + ahead)
             except MechanismError:
-                # too far away: a stage of a step that is too long
                 raise Lost from None
             low, high = min(low, q - ahead), max(high, q + ahead)
             self._flips.update({name: at.tolist() for name, at in track.flips.items()})
@@ -383,8 +358,6 @@ class Equations:
 
     def _careful(self, q: Reals) -> Any:
         """Which states no tape can do by itself, (n,)."""
-        if self._untaped:
-            return np.ones(len(q), dtype=bool)
         return np.array([self._crossing(x) is not None for x in q[:, 0].tolist()], dtype=bool)
 
     def otherwise(self) -> Equations:
@@ -416,8 +389,3 @@ class Equations:
         """Whether a change point is near: there every loop folds, in all coordinates, and goes on."""
         found = nearest(self._crossings, q)
         return found is not None and abs(q - found.at) < NEAR * self.assembly.track.length
-
-    @cached_property
-    def _untaped(self) -> bool:
-        a = self.assembly
-        return bool(a.geared) or any(g.kind == "Newton" for g in a.plan.groups)

@@ -13,6 +13,7 @@ regularisation: what sticks stands still.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
@@ -25,7 +26,6 @@ from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.recorded import RECORDED, Number
 from dalembert.arithmetic.systems import solved
 from dalembert.arithmetic.tape import Tape
-from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Reals, dot, minus
@@ -36,6 +36,8 @@ from virtualwork.intime.watch import Floats, Watch
 # iterations of friction and joint forces; each gains a factor of some μ r / l
 LIMIT = 400
 CLOSE = 1e-15
+# rad, sizes, or of the largest rate: joints that turn back so near each other do so together
+TOGETHER = 1e-9
 Mode = tuple[int, ...]
 """For each joint that rubs: the sign of its rate, 0 where it sticks."""
 
@@ -59,14 +61,6 @@ class Rubbing(Equations):
     mode: Mode = ()
     # whether nothing moves in this mode
     locked = False
-
-    def __init__(self, assembly: Assembly) -> None:
-        super().__init__(assembly)
-        if self._untaped:
-            raise MechanismError(
-                "friction in time: not with groups that have no closed form, nor with gears of fractional ratio on "
-                "their links"
-            )
 
     def refuse(self, t: float, q: Floats, v: Floats) -> None:
         super().refuse(t, q, v)
@@ -169,6 +163,9 @@ class Rubbing(Equations):
             found = self._function(*self._filled(t, q, v))
         except (ZeroDivisionError, ValueError, OverflowError):
             raise Lost from None
+        if any(x - x != 0.0 for x in found):
+            # NaN and infinity
+            raise Lost
         k, c = self.k, len(self.arms)
         x = iter(found)
         a = [next(x) for _ in range(k)]
@@ -262,22 +259,25 @@ class Rubbing(Equations):
 
         `ended` is the watch that ended it; empty at the beginning.
         """
+        if ended and not ended.startswith("friction"):
+            # other coordinates, or another method: the joints go on as they did
+            return self, v
         of = ended.removeprefix("friction").strip()
         if self.k == 1:
             if of.startswith("away"):
                 direction = float(of.removeprefix("away"))
                 return self.in_mode(tuple(_sign(r) for r in self.values(t, q, [direction]).rate)), v
             if ended and of != "rest":
-                # a joint turns back while the input goes on
-                return self.in_mode(tuple(-s if str(n) == of else s for n, s in enumerate(self.mode))), v
+                return self.in_mode(self._turned_back(t, q, v[0])), v
             if ended:
                 v = [0.0]
             found = self.in_mode(self._decided_alone(t, q, v))
             found.locked = not any(found.mode)
             return found, v
         rates = self.values(t, q, v).rate
+        still = TOGETHER * max(map(abs, rates))
         resting = (
-            [n for n, s in enumerate(self.mode) if not s or str(n) == of]
+            [n for n, s in enumerate(self.mode) if not s or str(n) == of or abs(rates[n]) <= still]
             if ended
             else [n for n, rate in enumerate(rates) if not rate]
         )
@@ -291,6 +291,23 @@ class Rubbing(Equations):
         # without what rounding leaves in joints that stick
         slowed = np.array(v) - inverse @ (by_input @ np.array(v))
         return found, [0.0] * self.k if found.locked else slowed.tolist()
+
+    def _turned_back(self, t: float, q: Floats, v: float) -> Mode:
+        """The mode after a joint turns back while the one input goes on.
+
+        Others may do so at the same pose: a chain that another link drives turns back as a whole.
+        """
+        beside = math.copysign(TOGETHER * self.scale[0], v)
+        before, after = (self.values(t, [q[0] + x], [v]).rate for x in (-beside, beside))
+        changed = (_sign(b) if a * b < 0 else s for a, b, s in zip(before, after, self.mode, strict=True))
+        return tuple(changed)
+
+    def left(self, ended: str, before: Mode) -> dict[str, float]:
+        """The levels at which a path in this mode begins: what the end of the last one, in another mode, has met."""
+        if not ended.startswith("friction"):
+            return {}
+        both = enumerate(zip(before, self.mode, strict=True))
+        return {ended: 0.0} | {f"friction {n}": 0.0 for n, (a, b) in both if a == -b}
 
     def _decided_alone(self, t: float, q: Floats, v: Floats) -> Mode:
         """The mode of one degree of freedom: it moves, begins to move one way, or sticks."""

@@ -1,0 +1,151 @@
+"""What the tapes of a motion cannot decide by themselves at a pose: unknowns without a closed form, and whole turns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from dalembert.arithmetic.engines import floats
+from dalembert.arithmetic.tape import Tape
+from virtualwork.branch.assembly import Assembly
+from virtualwork.formulas.block import Setting
+from virtualwork.formulas.numbers import Number
+from virtualwork.formulas.poses import Poses
+from virtualwork.formulas.positions import State
+from virtualwork.intime.tables import Value
+from virtualwork.intime.watch import Floats
+from virtualwork.plan.steps import Group
+
+# Newton's steps from one pose to the next; rad or sizes: a change from which one more step leaves rounding alone, and
+# how far off the last pose may be to begin from
+LIMIT, CLOSE, FAR = 8, 1e-9, 0.3
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """A step of Newton's method on the unknowns of all groups without a closed form, and what else enters it."""
+
+    tape: Tape
+    known: Mapping[str, Value]
+
+    @cached_property
+    def step(self) -> Callable[..., tuple[float, ...]]:
+        """The step as a function of floats."""
+        return floats.compiled(self.tape)
+
+    def settled(
+        self, q: Floats, x: Mapping[str, float], scale: Mapping[str, float]
+    ) -> dict[str, float] | None:
+        """The unknowns at the inputs, from those of a pose close by; None where that does not lead there."""
+        given = {name: of(0.0, q, q) for name, of in self.known.items()}
+        begin = now = dict(x)
+        for _ in range(LIMIT):
+            try:
+                found = self.step(*[given[name] if name in given else now[name] for name in self.tape.inputs])
+            except (ZeroDivisionError, ValueError, OverflowError):
+                return None
+            after = dict(zip(self.tape.names, found, strict=True))
+            if not all(abs(value - begin[name]) <= FAR * scale[name] for name, value in after.items()):
+                return None
+            near = all(abs(value - now[name]) <= CLOSE * scale[name] for name, value in after.items())
+            now = after
+            if near:
+                return now
+        return None
+
+
+class Placed:
+    """The poses of an assembly, closed on its branch one after the other.
+
+    With an `iteration` the unknowns are followed from pose to pose; the branch itself is asked where that leads too
+    far, and wherever it `crosses` another.
+
+    Examples
+    --------
+    >>> from virtualwork import Guess, Input, Link, Mechanism
+    >>> bars = {"crank": Link({"A": 0j, "B": 1}), "rod": Link({"B": 0j, "C": 2}), "arm": Link({"D": 0j, "C": 2})}
+    >>> m = Mechanism({"A": 0j, "D": 2}, bars, inputs=Input(link="crank"), guess=Guess(1.0, points={"C": 2 + 2j}))
+    >>> Placed(m.assembly).angle("rod")(0.0, [1.0], [0.0]) == float(m.motion(1.0).link("rod").angle[0])
+    True
+    """
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        iteration: Iteration | None = None,
+        crosses: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self.assembly, self.iteration, self.crosses = assembly, iteration, crosses
+        size = assembly.mechanism.size
+        self.larger = [g for g in assembly.plan.groups if g.kind == "Newton"]
+        self.scale = {
+            f"x {g.name} {i}": 1.0 if i < len(g.angles) else size
+            for g in self.larger
+            for i in range(len(g.angles) + len(g.slides))
+        }
+        self._at: Floats = []
+        self._x: dict[str, float] = {}
+        self._state: tuple[Floats, State] = [], State([])
+        # springs' twists, followed from the guess over all inputs met
+        self._wound: tuple[float, float, Setting] | None = None
+
+    def state(self, q: Floats) -> State:
+        """The pose at the inputs; NaN where it cannot be assembled."""
+        if q != self._state[0]:
+            with np.errstate(all="ignore"):
+                self._state = list(q), self.assembly.state(tuple(q))
+        return self._state[1]
+
+    def unknown(self, name: str) -> Value:
+        """An unknown of a group without a closed form, as it is called on the tape."""
+
+        def value(t: float, q: Floats, v: Floats) -> float:
+            if q != self._at:
+                self._x, self._at = self._settled(q), list(q)
+            return self._x[name]
+
+        return value
+
+    def _settled(self, q: Floats) -> dict[str, float]:
+        """All unknowns at the inputs."""
+        if self.iteration is not None and self._x and not self.crosses():
+            found = self.iteration.settled(q, self._x, self.scale)
+            if found is not None:
+                return found
+        st = self.state(q)
+        return {f"x {g.name} {i}": _one(x) for g in self.larger for i, x in enumerate(unknowns(g, st))}
+
+    def angle(self, body: str) -> Value:
+        """A body's angle with its whole turns."""
+        return lambda t, q, v: _one(self.state(q).angle[body])
+
+    def twist(self, number: int) -> Value:
+        """The twist of a torsion spring: with one input followed from the guess, with several within half a turn of free."""
+        spring = self.assembly.mechanism.torsion_springs[number]
+        return lambda t, q, v: _one(self._setting(q[0]).twist(self.state(q), spring))
+
+    def _setting(self, q: float) -> Setting:
+        """Poses over all inputs met so far, and a turn further."""
+        if self._wound is None or not self._wound[0] < q < self._wound[1]:
+            low, high = self._wound[:2] if self._wound else (q, q)
+            span = self.assembly.track.length
+            ends = np.tile(self.assembly.mechanism.at, (2, 1))
+            ends[:, 0] = min(low, q - span), max(high, q + span)
+            self._wound = *ends[:, 0].tolist(), Setting(Poses(self.assembly, ends), False)
+        return self._wound[2]
+
+
+def unknowns(group: Group, st: State) -> list[Number]:
+    """A group's unknowns in a state: angles, and then slides."""
+    # a closed form leaves the rotation alone
+    angles = [st.angle[b] if b in st.angle else st.kind.angle(st.turn[b]) for b in group.angles]
+    return angles + [st.slide[s] for s in group.slides]
+
+
+def _one(x: Any) -> float:
+    """The number of one pose, which may stand in an array."""
+    return float(np.ravel(x)[0])
