@@ -134,7 +134,7 @@ def poses(analysis: Analysis) -> Table:
         for j in range(len(analysis.mechanism.inputs)):
             stack.input(j)
         stack.before.append(partial(_together, analysis, motion))
-        for name, point in of_points(motion, analysis.places, analysis.order).items():
+        for name, point in of_points(motion, analysis.points, analysis.order).items():
             for key, values in point.items():
                 k = next(k for k, keys in enumerate(POINT) if key in keys)
                 stack.put(f"{name}_{key}", values, partial(_point_error, motion, name, k))

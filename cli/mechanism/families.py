@@ -22,6 +22,7 @@ from virtualwork.formulas.linear import condition
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from virtualwork.describe.description import Description
     from virtualwork.motion import Motion
     from virtualwork.plan.joints import Joint
 
@@ -56,6 +57,11 @@ class Flat(FamilyMotion):
     def values(self, keys: Sequence[Key]) -> list[Any]:
         """Quantities by their keys, each (v n,)."""
         return [self._flat[key] for key in keys]
+
+    @property
+    def mechanism(self) -> Description:
+        """What the variants are of."""
+        return self.part.mechanism
 
     @property
     def n(self) -> int:

@@ -32,7 +32,7 @@ def posed(
     def lengths(values: list[float | None]) -> list[float | None]:
         return [None if v is None else from_si(v, "length", length) for v in clean(values, m.size)]
 
-    places = of_points(motion, {p: ("point", *place, p) for p, place in m.points.items()}, 0)
+    places = of_points(motion, list(m.points), 0)
     table = Table(
         [
             Column("point", "", list(places)),

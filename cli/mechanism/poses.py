@@ -62,15 +62,18 @@ def exact_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(reduced >= 360.0, 0.0, reduced)
 
 
-def of_points(motion: Motion, places: dict[str, Key], order: int) -> dict[str, dict[str, Column]]:
-    """Points' positions and their rates; `places`: their keys."""
+def of_points(motion: Motion, names: Sequence[str], order: int) -> dict[str, dict[str, Column]]:
+    """Points' positions and their rates."""
+    homes = motion.mechanism.points
+    # the name says where on the body
+    keys_of = {name: ("point", homes[name][0], 0j, name) for name in names}
     return {
         name: {
             key: values
             for keys, z in zip(POINT, found, strict=False)
             for key, values in zip(keys, pair(z), strict=True)
         }
-        for name, found in up_to(motion, order, places).items()
+        for name, found in up_to(motion, order, keys_of).items()
     }
 
 
@@ -135,7 +138,7 @@ def document(
                 cells(motion.condition) if analysis.only is None else None,
                 marks_of(analysis, motion),
                 of_links(motion, analysis.links, analysis.order, analysis.given),
-                of_points(motion, analysis.places, analysis.order),
+                of_points(motion, analysis.points, analysis.order),
                 {name: of_slide(motion, name, analysis.order) for name in analysis.slides},
             )
         )

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from virtualwork import Mechanism
     from virtualwork.branch.assembly import Assembly
-    from virtualwork.formulas.asked import Key
     from virtualwork.motion import Motion
 
 ORDERS = ("position", "velocity", "acceleration", "jerk")
@@ -147,11 +146,6 @@ class Analysis:
         return tuple(n for n in self.mechanism.points if self.only is None or n in self.only)
 
     @cached_property
-    def places(self) -> dict[str, Key]:
-        """Their keys, without the order of the derivative."""
-        return {name: ("point", *self.mechanism.points[name], name) for name in self.points}
-
-    @cached_property
     def slides(self) -> tuple[str, ...]:
         """The guides asked for, by their point; the points themselves tell where they are."""
         return tuple(g.point for g in self.mechanism.guides if self.only is None or g.point in self.only)
@@ -205,7 +199,8 @@ class Analysis:
         if self.only is None:
             return motion.assembled
         whole = np.ones(motion.n, dtype=bool)
-        places = [(*key, 0) for key in self.places.values()]
+        homes = motion.mechanism.points
+        places = [("point", homes[name][0], 0j, name, 0) for name in self.points]
         for found in motion.values([*places, *(("angle", name, 0) for name in self.links)]):
             whole &= np.isfinite(found)
         return whole
