@@ -79,7 +79,9 @@ def pairs_of(m: Mechanism, end: float, accuracy: float) -> Pairs:
     for j, entry in enumerate(m.inputs):
         name = str(entry.link)
         turned = run.angle[:, j] - run.angle[0, j]
-        error = np.abs(turned - (fine[name] - fine[name][0])) - np.abs(fine[name] - coarse[name])
+        error = np.abs(turned - (fine[name] - fine[name][0])) - np.maximum.accumulate(
+            np.abs(fine[name] - coarse[name])
+        )
         found += zip(np.maximum(error, 0.0)[1:].tolist(), run.error_estimate[1:, j].tolist(), strict=True)
     return found
 
