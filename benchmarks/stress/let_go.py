@@ -71,7 +71,7 @@ def pairs_of(m: Mechanism, end: float, accuracy: float) -> Pairs:
     run = m.simulate(np.linspace(0, end, 5), accuracy=accuracy)
     if len(run.t) < 2:
         return []
-    start = [e.value for e in m.inputs]
+    start = [float(e.value or 0.0) for e in m.inputs]
     fine, coarse = (
         Bodies(m).angles(start, [0.0] * len(start), run.t, tolerance) for tolerance in (1e-12, 1e-10)
     )
