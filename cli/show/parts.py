@@ -113,9 +113,9 @@ def _array(column: Column, kind: pyarrow.DataType) -> pyarrow.Array:
         # what is not a number is null
         return pyarrow.array(given, type=kind, from_pandas=True)
     if kind == pyarrow.string():
-        values: list[Any] = [None if value == "" else str(value) for value in map(plain, column.values)]
+        values: list[str | float | None] = [None if v == "" else str(v) for v in map(plain, column.values)]
     else:
-        values = [None if value == "" else value for value in map(plain, column.values)]
+        values = [None if v == "" else v for v in map(plain, column.values)]
     return pyarrow.array(values, type=kind)
 
 

@@ -208,6 +208,8 @@ class Repeated:
         self.lanes = {name: np.ascontiguousarray(x, dtype=float) for name, x in lanes.items()}
         self.n = len(next(iter(self.lanes.values())))
         self._numbers = [name for name in tape.inputs if name not in lanes]
+        self._columns = [(name, self.lanes.get(name)) for name in tape.inputs]
+        self._blocks = blocks.compiled(tape, frozenset(self._numbers))
         self._steady: Any = None
 
     def __call__(self, numbers: Mapping[str, float]) -> tuple[Reals, bool]:
@@ -219,11 +221,12 @@ class Repeated:
             self._steady = self._steady or llvm.steady(self.tape, self.lanes, self.n, self.tested)
             if self._steady is not None:
                 return self._steady([numbers[name] for name in self._numbers])  # type: ignore[no-any-return]
-        columns = [
-            self.lanes[name] if name in self.lanes else np.asarray(numbers[name]) for name in self.tape.inputs
-        ]
         table = np.empty((len(self.tape.outputs), self.n))
-        _lanes(self.tape, columns, table, self.n, engine)
+        columns = [numbers[name] if x is None else x for name, x in self._columns]
+        if engine == "python":
+            _lanes(self.tape, list(map(np.asarray, columns)), table, self.n, engine)
+        else:
+            self._blocks(columns, table)
         return (table[:-1], bool((table[-1] > 0).all())) if self.tested else (table, True)
 
 
