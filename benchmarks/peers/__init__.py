@@ -65,7 +65,11 @@ PEERS: dict[str, tuple[tuple[str, Peer], ...]] = {
         ("scipy", mechanisms.by_fsolve),
         ("numpy", mechanisms.by_nine_equations),
     ),
-    "in-time": (("scipy", in_time.by_scipy), ("sksundae", in_time.by_sundials)),
+    "in-time": (
+        ("scipy", in_time.by_scipy),
+        ("sksundae", in_time.by_sundials),
+        ("exudyn", in_time.by_exudyn),
+    ),
     "field": (("hsbalance", field.by_hsbalance),),
     "rotation": (
         ("mujoco", rotation.by_mujoco),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -26,6 +26,8 @@ PENDULUMS = "double pendulum, 10 s"
 PENDULUM = (-2.684057329739153252662475, -3.090668097315319789813611)
 # β of Andrews' squeezing mechanism after 0.03 s
 ANDREWS = 15.81077119515370709712
+# the crank's angle of the falling four-bar after 10 s (benchmarks.truth.falling_four_bar)
+FALLING = 0.3742396000070687573915523
 # ns: on Python and numpy, and compiled
 AIMS = {"Andrews": (40e6, 2e6), "four-bar": (150e6, 15e6), "family": (None, 60e3)}
 
@@ -33,21 +35,13 @@ AIMS = {"Andrews": (40e6, 2e6), "four-bar": (150e6, 15e6), "family": (None, 60e3
 def measure(quick: bool) -> Iterator[Measurement]:
     """Yield time and error of simulations, with the estimate of their error."""
     yield from _double_pendulum(accuracies(quick))
-    andrews = Mechanism.from_toml(Path(str(files("cli"))) / "examples" / "andrews" / "andrews.toml")
-
-    def of_andrews(accuracy: float) -> float:
-        return abs(float(andrews.simulate([0.0, 0.03], accuracy=accuracy).angle[-1, 0]) - ANDREWS)
-
-    for accuracy in (3e-10,) if quick else (1e-6, 3e-10, 3e-13):
-        aims = AIMS["Andrews"] if accuracy == 3e-10 else (None, None)
-        work = f"Andrews' mechanism, 0.03 s, accuracy {accuracy:g}"
-        yield from _engines(work, partial(of_andrews, accuracy), aims, error=of_andrews(accuracy))
-    falling = four_bar()
-    yield from _engines(
-        "falling four-bar, 10 s, accuracy 1e-11",
-        lambda: falling.simulate([0.0, 10.0], accuracy=1e-11),
-        AIMS["four-bar"],
-    )
+    works = (andrews_work(quick), AIMS["Andrews"]), (falling_work(), AIMS["four-bar"])
+    for work, aims in works:
+        for accuracy in work.accuracies:
+            call = partial(work.error, accuracy)
+            aimed = aims if accuracy in (3e-10, 1e-11) else (None, None)
+            yield from _engines(work.name(accuracy), call, aimed, error=call())
+    falling = falling_work().mechanism
     count = 100 if quick else 1000
     family = falling.vary({"links.crank.B.x": np.linspace(0.09, 0.11, count)})
     yield from _engines(
@@ -56,6 +50,38 @@ def measure(quick: bool) -> Iterator[Measurement]:
         AIMS["family"],
         size=count,
     )
+
+
+@dataclass(frozen=True)
+class Work:
+    """A mechanism that is let go, and what its first input is at the end."""
+
+    title: str
+    mechanism: Mechanism
+    end: float
+    true: float
+    accuracies: tuple[float, ...]
+
+    def name(self, accuracy: float) -> str:
+        """What the work is called."""
+        return f"{self.title}, accuracy {accuracy:g}"
+
+    def error(self, accuracy: float) -> float:
+        """How far the input is off at the end."""
+        return abs(
+            float(self.mechanism.simulate([0.0, self.end], accuracy=accuracy).angle[-1, 0]) - self.true
+        )
+
+
+def andrews_work(quick: bool) -> Work:
+    """Andrews' squeezing mechanism."""
+    m = Mechanism.from_toml(Path(str(files("cli"))) / "examples" / "andrews" / "andrews.toml")
+    return Work("Andrews' mechanism, 0.03 s", m, 0.03, ANDREWS, (3e-10,) if quick else (1e-6, 3e-10, 3e-13))
+
+
+def falling_work() -> Work:
+    """The four-bar that falls without friction."""
+    return Work("falling four-bar, 10 s", four_bar(), 10.0, FALLING, (1e-11,))
 
 
 def accuracies(quick: bool) -> tuple[float, ...]:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from cli.errors import DataError
+from cli.read.options import bad
 from cli.show.reported import reported
 
 if TYPE_CHECKING:
@@ -52,9 +51,7 @@ def run(file: str, output: Path, at: str | None = None) -> Result:
 
     suffix = output.suffix.lower()
     if suffix not in FORMATS:
-        raise typer.BadParameter(
-            f"'{output}': expected a name that ends in {', '.join(FORMATS)}", param_hint="-o"
-        )
+        raise bad("-o", f"'{output}': expected a name that ends in {', '.join(FORMATS)}")
     given = load(file)
     m, bare = given.mechanism, given.bare
     inputs = tuple(wanted(m, None if at is None else [at], None, None, bare).values[0].tolist())

@@ -76,12 +76,8 @@ class Joint:
 
     def turn_about(self) -> None:
         """Turn `on` against `link` instead."""
-        self.on, self.link, self.ends, self.rate = (
-            self.link,
-            self.on,
-            (self.ends[1], self.ends[0]),
-            -self.rate,
-        )
+        self.on, self.link = self.link, self.on
+        self.ends, self.rate = (self.ends[1], self.ends[0]), -self.rate
 
 
 @dataclass(frozen=True)

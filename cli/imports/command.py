@@ -6,11 +6,10 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from cli.errors import DataError
 from cli.imports.words import KINDS
 from cli.read.files import read_bytes
+from cli.read.options import bad
 from cli.show.reported import reported
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
     from cli.show.columns import Result
 
     if output is not None and output.suffix.lower() != ".toml":
-        raise typer.BadParameter(f"'{output}': expected a name that ends in .toml", param_hint="-o")
+        raise bad("-o", f"'{output}': expected a name that ends in .toml")
     name, data = read_bytes(file)
     folder = None if file == "-" else Path(file).parent
     told, drawings = read(name, data, None if kind is None else str(kind.value), folder)
@@ -65,10 +64,7 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
     if not found:
         raise DataError("; ".join([f"{name}: no mechanism: nothing in it is driven by an input", *lost]))
     if len(found) > 1 and output is None:
-        raise typer.BadParameter(
-            f"{name} holds {len(found)} mechanisms: expected a file, which becomes FILE-1.toml …",
-            param_hint="-o",
-        )
+        raise bad("-o", f"{name} holds {len(found)} mechanisms: expected a file, which becomes FILE-1.toml …")
     paths = []
     if output is not None:
         paths = [output]

@@ -10,6 +10,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
+from cli.imports.words import damaged
+
 GROUND = "ground"
 Place = tuple[Fraction, Fraction]
 LARGEST = 1e60
@@ -31,6 +33,16 @@ def exact(value: float) -> Fraction:
 def place(x: float, y: float) -> Place:
     """Return a place from its two coordinates."""
     return exact(x), exact(y)
+
+
+def finite(file: str, where: str, word: object) -> float:
+    """Return the finite number that a word is; DataError names the place where it is none."""
+    try:
+        value = float(str(word))
+        exact(value)
+    except ValueError:
+        raise damaged(file, where, word, "a finite number") from None
+    return value
 
 
 def apart(a: Place, b: Place) -> float:
@@ -143,9 +155,7 @@ class Drawing:
 
     def prism(self, point: str, link: str, on: str, at: Place, angle: float) -> Slide:
         """Add a prism between two bodies that stand at angle 0; a point that `link` has there already serves."""
-        held = self.body(link).points
-        name = next((p for p, z in held.items() if z == at), None) or self.fresh(point)
-        held[name] = at
+        name = self.point_at(link, at, point)
         self.body(on)
         self.slides.append(Slide(name, link, on, at, angle, -angle))
         return self.slides[-1]
@@ -158,6 +168,22 @@ class Drawing:
         angle = direction(*at)
         self.slides.append(Slide(ends[1], rod, barrel, at[1], angle, -angle))
         return self.slides[-1]
+
+    def point_at(self, body: str, at: Place, wanted: str) -> str:
+        """Return a body's point at a place, by its name; made where it has none there."""
+        held = self.body(body).points
+        name = next((p for p, z in held.items() if z == at), None) or self.fresh(wanted)
+        held[name] = at
+        return name
+
+    def moved(self, line: tuple[Place, Place], z: Place, what: str, point: str) -> None:
+        """Note by how much a guide's line is moved to go through its point, where it misses it."""
+        (a, b), length = line, apart(*line)
+        off = float((b[0] - a[0]) * (z[1] - a[1]) - (b[1] - a[1]) * (z[0] - a[0])) / length
+        if abs(off) > 1e3 * SAME * length:
+            self.notes.append(
+                f"{what}: its line is moved by {abs(off):.3g} {self.length} to go through {point}"
+            )
 
     def fresh(self, wanted: str) -> str:
         """Return a point's name that no body uses yet."""

@@ -6,7 +6,6 @@ from fractions import Fraction
 
 from cli.imports.drawn import (
     GROUND,
-    SAME,
     Drawing,
     Drive,
     Mesh,
@@ -14,6 +13,7 @@ from cli.imports.drawn import (
     Slide,
     apart,
     direction,
+    finite,
     place,
     turning_at,
 )
@@ -56,12 +56,7 @@ class _Reader:
         found = e.attributes.get(key)
         if found is None and default is not None:
             return default
-        try:
-            value = float(str(found))
-            place(value, 0.0)
-        except ValueError:
-            raise damaged(self.file, f"line {e.line}: <{e.tag}> {key}", found, "a finite number") from None
-        return value
+        return finite(self.file, f"line {e.line}: <{e.tag}> {key}", found)
 
     def drawing(self) -> Drawing:
         d, file = self.d, self.file
@@ -190,9 +185,7 @@ class _Reader:
             d.notes.append(left_out(what, "no link is on it"))
             return
         z = self.at[id_]
-        off = float((b[0] - a[0]) * (z[1] - a[1]) - (b[1] - a[1]) * (z[0] - a[0])) / apart(a, b)
-        if abs(off) > 1e3 * SAME * apart(a, b):
-            d.notes.append(f"{what}: its line is moved by {abs(off):.3g} {d.length} to go through it")
+        d.moved((a, b), z, what, "it")
         d.slides.append(Slide(point, held[0] if GROUND in held else held[-1], on, z, direction(a, b)))
 
     def _motor(self, id_: str, e: Element) -> None:

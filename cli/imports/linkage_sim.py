@@ -216,9 +216,7 @@ class _Reader:
         turn_i, turn_j = (self.whole(str(e[f"body_{side}"]))[1] for side in "ij")
         angle = math.atan2(float(axis[1]), float(axis[0])) + turn_i
         delta = self.real(where, e.get("delta_theta_0", 0.0)) + turn_i - turn_j
-        held, z = d.body(j).points, self.points[j][q]
-        point = next((k for k, at in held.items() if at == z), None) or d.fresh(name)
-        held[point] = z
+        point = d.point_at(j, self.points[j][q], name)
         d.slides.append(Slide(point, j, i, self.points[i][p], angle, delta - angle))
 
     def _drives(self, joints: dict[str, dict[str, Any]]) -> None:
@@ -259,10 +257,7 @@ class _Reader:
             z = self._carried(self.pair(where, self.get(where, e, f"point_{k}")), turn, shift)
             if body not in d.bodies:
                 raise damaged(self.file, where, body, "one of the bodies")
-            held = d.bodies[body].points
-            point = next((p for p, at in held.items() if at == z), None) or d.fresh(f"{where} {k}")
-            held[point] = z
-            ends.append((point, z))
+            ends.append((d.point_at(body, z, f"{where} {k}"), z))
         (p, a), (q, b) = ends
         speed = f"{self.real(where, e.get('velocity', 0.0))!r} m/s"
         names = f"{where} barrel", f"{where} rod"

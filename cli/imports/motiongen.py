@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cli.errors import DataError
-from cli.imports.drawn import GROUND, SAME, Drawing, Drive, Place, Slide, apart, direction, place
+from cli.imports.drawn import GROUND, Drawing, Drive, Place, Slide, direction, place
 from cli.imports.words import damaged, left_out
 
 LENGTHS = ("mm", "cm", "m", "in", "ft")
@@ -120,11 +120,7 @@ class _Reader:
                 # the carrier lists its riders among its joints: they are not pinned to it
                 del d.bodies[on].points[rider]
             z = self.at[rider]
-            off = float((b[0] - a[0]) * (z[1] - a[1]) - (b[1] - a[1]) * (z[0] - a[0])) / apart(a, b)
-            if abs(off) > 1e3 * SAME * apart(a, b):
-                d.notes.append(
-                    f"{where}: its line is moved by {abs(off):.3g} {d.length} to go through {rider}"
-                )
+            d.moved((a, b), z, where, rider)
             d.slides.append(Slide(rider, held[-1], on, z, angle))
             self.riders[rider] = (d.slides[-1], ends[0], ends[1])
 

@@ -11,7 +11,19 @@ from typing import Any
 from urllib.parse import unquote
 
 from cli.errors import DataError, quote
-from cli.imports.drawn import GROUND, Drawing, Drive, Mesh, Place, Slide, apart, direction, place, turning_at
+from cli.imports.drawn import (
+    GROUND,
+    Drawing,
+    Drive,
+    Mesh,
+    Place,
+    Slide,
+    apart,
+    direction,
+    finite,
+    place,
+    turning_at,
+)
 from cli.imports.words import damaged, left_out
 
 TYPES = ("R", "P", "RP", "G")
@@ -60,7 +72,7 @@ def _one(file: str, text: str, first: int) -> Drawing:
     settings = re.search(r"(?:^|[?&])set=([^&\n]*)", head, re.MULTILINE)
     for word in re.split(r"[|,\s]+", settings[1] if settings else ""):
         if word[:1] == "s":
-            speed = _number(file, "set", word[1:])
+            speed = finite(file, "set", word[1:])
         elif word:
             d.notes.append(left_out(f"setting {word}", "it is the other program's step or tolerance"))
     if re.search(r"(?:^|[?&])ts=[^&\s]", head, re.MULTILINE):
@@ -78,15 +90,6 @@ def _one(file: str, text: str, first: int) -> Drawing:
     return _drawing(file, d, joints, speed)
 
 
-def _number(file: str, where: str, word: str) -> float:
-    try:
-        value = float(word)
-        place(value, 0.0)
-    except ValueError:
-        raise damaged(file, where, word, "a finite number") from None
-    return value
-
-
 def _link(word: str) -> str:
     low = word.lower()
     return GROUND if low in GROUNDS or low.startswith("ground") else word
@@ -101,7 +104,7 @@ def _joint(file: str, where: str, sentence: str) -> Joint:
     rest = words[i + 1 :]
     numbers: list[float] = []
     while rest and len(numbers) < 3 and re.fullmatch(r"[-+]?[\d.].*", rest[0]):
-        numbers.append(_number(file, where, rest.pop(0)))
+        numbers.append(finite(file, where, rest.pop(0)))
     if len(numbers) < 2:
         raise damaged(file, where, sentence.strip(), EXPECTED)
     flags = rest[0] if len(rest) == 1 and len(rest[0]) > 1 else [w[:1] for w in rest]
@@ -223,7 +226,7 @@ def _json(file: str, data: Any) -> Drawing:
             kind = str(entry.get("typeofjoint", entry.get("jointtype", "R"))).upper()
             if kind not in TYPES:
                 raise damaged(file, where, kind, "R, P, RP or G")
-            x, y, angle = (_number(file, where, str(entry.get(key) or 0.0)) for key in ("x", "y", "angle"))
+            x, y, angle = (finite(file, where, str(entry.get(key) or 0.0)) for key in ("x", "y", "angle"))
             names = list(dict.fromkeys(_link(n) for n in names if n))
             if not names:
                 raise damaged(file, where, quote(str(links)), "the names of its links")

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cli.mechanism.poses import cells, pair
 
 if TYPE_CHECKING:
     from cli.mechanism.solve import Analysis
+    from cli.show.columns import Document
     from virtualwork.motion import Motion
     from virtualwork.plan.joints import Joint
-
-Column = list[Any]
 
 
 def effort_name(slide: bool) -> str:
@@ -28,18 +27,18 @@ def rows_of(analysis: Analysis, motion: Motion) -> list[tuple[Joint, str, str]]:
     ]
 
 
-def with_forces(listed: list[dict[str, Any]], analysis: Analysis) -> list[dict[str, Any]]:
+def with_forces(listed: list[Document], analysis: Analysis) -> list[Document]:
     """The JSON's poses, with the forces of each."""
     return [pose | part for pose, part in zip(listed, poses(analysis), strict=True)]
 
 
-def poses(analysis: Analysis) -> list[dict[str, Any]]:
+def poses(analysis: Analysis) -> list[Document]:
     """Effort, reactions and shaking force of every pose, in the order of the JSON's poses."""
     parts = [_motion_parts(analysis, motion) for motion in analysis.motions]
     return [part[i] for i in range(len(analysis.inputs.shown)) for part in parts]
 
 
-def _motion_parts(analysis: Analysis, motion: Motion) -> list[dict[str, Any]]:
+def _motion_parts(analysis: Analysis, motion: Motion) -> list[Document]:
     d, inputs = motion.dynamics, analysis.mechanism.inputs
     d.solve([(joint, on) for joint, on, _ in rows_of(analysis, motion)])
     work, euler = ([cells(values[:, j]) for j in range(len(inputs))] for values in (d.effort, d.newton_euler))
@@ -50,7 +49,7 @@ def _motion_parts(analysis: Analysis, motion: Motion) -> list[dict[str, Any]]:
         reactions.append(({"joint": joint.name, "on": on, "from": of}, columns))
     shaking, moment = d.shaking
     shake = cells(shaking[:, 0]), cells(shaking[:, 1]), cells(moment)
-    found = []
+    found: list[Document] = []
     for i in range(motion.n):
         efforts = []
         for j, entry in enumerate(inputs):

@@ -19,6 +19,7 @@ from cli.mechanism.parted import Solved, solved
 from cli.mechanism.solve import Analysis
 from cli.mechanism.variants import Variants
 from cli.show.columns import Column, Result, Table, Written
+from dalembert.arithmetic.engines import as_part
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -215,7 +216,7 @@ class Many:
             table = replace(table, columns=[replace(c, error=None) for c in table.columns])
             work = partial(rows_together if together else rows, self.asked, table, form)
         size = TOGETHER[json] // poses if together else min(ONE_BY_ONE[0], ONE_BY_ONE[1][json] // poses)
-        yield from self._solved(work, max(1, size))
+        yield from self._solved(partial(as_part, count * poses, work), max(1, size))
 
     @cached_property
     def table(self) -> Table:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,9 +14,11 @@ from cli.read.units import degrees
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cli.show.columns import Document, Json
+    from virtualwork.formulas.asked import Key
     from virtualwork.motion import Motion
 
-Column = list[Any]
+Column = Sequence[float | None]
 POINT = (("x_m", "y_m"), ("vx_m_s", "vy_m_s"), ("ax_m_s2", "ay_m_s2"), ("jx_m_s3", "jy_m_s3"))
 LINK = ("angle_deg", "omega_rad_s", "alpha_rad_s2", "jerk_rad_s3")
 SLIDE = ("position_m", "speed_m_s", "acceleration_m_s2", "jerk_m_s3")
@@ -24,7 +26,7 @@ SLIDE = ("position_m", "speed_m_s", "acceleration_m_s2", "jerk_m_s3")
 
 def cells(values: NDArray[np.float64]) -> Column:
     """Numbers as Python's own; None where there is none; no −0."""
-    listed: Column = (values + 0.0).tolist()
+    listed: list[float] = (values + 0.0).tolist()
     if np.isfinite(values).all():
         return listed
     return [v if math.isfinite(v) else None for v in listed]
@@ -36,18 +38,22 @@ def pair(z: NDArray[np.complex128]) -> tuple[Column, Column]:
     return cells(np.where(known, z.real, np.nan)), cells(np.where(known, z.imag, np.nan))
 
 
-def of_link(
-    motion: Motion, name: str, order: int, given: NDArray[np.float64] | None = None
-) -> dict[str, Column]:
-    """A link's angle and its rates; `given`: the angle of a driven link as it was asked for, degrees."""
-    link = motion.link(name)
-    angle = np.where(np.isfinite(link.angle), degrees(np.exp(1j * link.angle)), np.nan)
-    if given is not None:
-        angle = np.where(np.isfinite(angle), given, np.nan)
-    parts = {"angle_deg": cells(exact_degrees(angle))}
-    for key, attribute in zip(LINK[1 : order + 1], ("omega", "alpha", "jerk"), strict=False):
-        parts[key] = cells(getattr(link, attribute))
-    return parts
+def up_to(motion: Motion, order: int, of: dict[str, Key]) -> dict[str, list[Any]]:
+    """Quantities and their derivatives in time up to an order, from one pass; `of`: their keys without the order."""
+    found = iter(motion.values([(*key, k) for key in of.values() for k in range(order + 1)]))
+    return {name: [next(found) for _ in range(order + 1)] for name in of}
+
+
+def of_links(
+    motion: Motion, names: Sequence[str], order: int, given: Mapping[str, NDArray[np.float64]]
+) -> dict[str, dict[str, Column]]:
+    """Links' angles and their rates; `given`: the angles of driven links as they were asked for, degrees."""
+    found = {}
+    for name, (angle, *rates) in up_to(motion, order, {name: ("angle", name) for name in names}).items():
+        shown = exact_degrees(given[name]) if name in given else degrees(np.exp(1j * angle))
+        columns = [np.where(np.isfinite(angle), shown, np.nan), *rates]
+        found[name] = {key: cells(values) for key, values in zip(LINK, columns, strict=False)}
+    return found
 
 
 def exact_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -56,12 +62,16 @@ def exact_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(reduced >= 360.0, 0.0, reduced)
 
 
-def of_point(motion: Motion, name: str, order: int) -> dict[str, Column]:
-    """A point's position and its rates."""
-    parts: dict[str, Column] = {}
-    for k in range(order + 1):
-        parts |= zip(POINT[k], pair(motion.point(name).complex(k)), strict=True)
-    return parts
+def of_points(motion: Motion, places: dict[str, Key], order: int) -> dict[str, dict[str, Column]]:
+    """Points' positions and their rates; `places`: their keys."""
+    return {
+        name: {
+            key: values
+            for keys, z in zip(POINT, found, strict=False)
+            for key, values in zip(keys, pair(z), strict=True)
+        }
+        for name, found in up_to(motion, order, places).items()
+    }
 
 
 def of_slide(motion: Motion, name: str, order: int) -> dict[str, Column]:
@@ -75,7 +85,7 @@ def of_slide(motion: Motion, name: str, order: int) -> dict[str, Column]:
     }
 
 
-def inputs_of(analysis: Analysis) -> dict[str, Column]:
+def inputs_of(analysis: Analysis) -> dict[str, Sequence[Json]]:
     """`input_deg` or `input_m`; with several inputs, a value per link."""
     m = analysis.mechanism
     shown = analysis.inputs.shown
@@ -112,7 +122,7 @@ def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
 
 def document(
     analysis: Analysis, marks_of: Callable[[Analysis, Motion], list[list[str]]] = marks_of
-) -> list[dict[str, Any]]:
+) -> list[Document]:
     """The poses as INTERFACE's JSON has them, every assembly after the other at each input."""
     shown = inputs_of(analysis)
     columns = []
@@ -124,18 +134,15 @@ def document(
                 assembled.tolist(),
                 cells(motion.condition) if analysis.only is None else None,
                 marks_of(analysis, motion),
-                {
-                    name: of_link(motion, name, analysis.order, analysis.given(name))
-                    for name in analysis.links
-                },
-                {name: of_point(motion, name, analysis.order) for name in analysis.points},
+                of_links(motion, analysis.links, analysis.order, analysis.given),
+                of_points(motion, analysis.places, analysis.order),
                 {name: of_slide(motion, name, analysis.order) for name in analysis.slides},
             )
         )
     poses = []
     for i in range(len(analysis.inputs.shown)):
         for number, assembled, condition, marks, links, points, slides in columns:
-            pose: dict[str, Any] = {key: values[i] for key, values in shown.items()}
+            pose: Document = {key: values[i] for key, values in shown.items()}
             pose |= {"branch": number, "assembled": assembled[i]}
             if condition is not None:
                 pose["condition"] = condition[i]

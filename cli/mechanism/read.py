@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -271,7 +271,7 @@ def _from_table(m: Mechanism, path: str) -> Inputs:
         numbers[f"{e.name.lower()}_speed"] = "velocity" if e.is_slide else "speed"
         numbers[f"{e.name.lower()}_acceleration"] = "acceleration" if e.is_slide else "angular acceleration"
     table = read(path, numbers=numbers, texts=("step",))
-    columns: dict[str, Any] = {}
+    columns: dict[str, tuple[NDArray[np.float64], str, NDArray[np.float64]]] = {}
     for key, dimension in numbers.items():
         if key in table.numbers:
             column = table.numbers[key]
@@ -303,7 +303,9 @@ def _from_table(m: Mechanism, path: str) -> Inputs:
     return Inputs(q, np.array(shown).T, rates[0], rates[1], steps)
 
 
-def _rates_of(path: str, time: NDArray[np.float64], q: NDArray[np.float64]) -> tuple[Any, Any]:
+def _rates_of(
+    path: str, time: NDArray[np.float64], q: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Speed and acceleration of a law given as a table over time: those of the cubic spline through it."""
     if len(time) < 4 or not (np.diff(time) > 0).all():
         raise DataError(

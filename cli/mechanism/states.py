@@ -7,21 +7,26 @@ several inputs every pose has as many velocity fields (column `field`): a unit o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cli.mechanism.columns import bounds_of, column, link_error, pose_keys
-from cli.mechanism.poses import LINK, POINT, cells, of_link, pair
+from cli.mechanism.poses import LINK, POINT, cells, of_links, pair
 from cli.mechanism.solve import Analysis
 from cli.show.columns import Table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cli.show.columns import Cell
     from virtualwork.motion import Motion
+
+    Part = dict[str, Sequence[Cell]]
+    Row = dict[str, Cell]
 
 GROUND = "ground"
 ORDER = (
@@ -30,8 +35,6 @@ ORDER = (
 )  # fmt: skip
 
 EXACT = ("step", "branch", "field", "link", "mass_kg", "inertia_kg_m2")
-
-Part = dict[str, list[Any]]
 
 
 @dataclass(frozen=True)
@@ -93,9 +96,9 @@ def table(analysis: Analysis) -> Table:
     return Table(columns, keys=pose_keys(analysis))
 
 
-def rows(analysis: Analysis) -> list[tuple[Place, dict[str, Any]]]:
+def rows(analysis: Analysis) -> list[tuple[Place, Row]]:
     """The table's rows, each with what it holds."""
-    found: list[tuple[Place, dict[str, Any]]] = []
+    found: list[tuple[Place, Row]] = []
     several = analysis.several
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
         order = analysis.order
@@ -114,7 +117,7 @@ def rows(analysis: Analysis) -> list[tuple[Place, dict[str, Any]]]:
                 ]
         several_fields = bool(fields[0][0])
         for i, (step, assembled) in enumerate(zip(analysis.inputs.steps, motion.assembled, strict=True)):
-            head: dict[str, Any] = {"step": step}
+            head: Row = {"step": step}
             if several:
                 head["branch"] = str(assembly.number)
             for j, (field, velocities, marks) in enumerate(fields):
@@ -124,7 +127,7 @@ def rows(analysis: Analysis) -> list[tuple[Place, dict[str, Any]]]:
                     name: {key: values[i] for key, values in (part | velocities.get(name, {})).items()}
                     for name, part in parts.items()
                 }
-                extra: list[tuple[Place, dict[str, Any]]] = []
+                extra: list[tuple[Place, Row]] = []
                 for mark in marks if assembled else ():
                     if mark.link not in here:
                         continue
@@ -149,7 +152,7 @@ def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
     for x, y, k in (("x_m", "y_m", 0), ("vx_m_s", "vy_m_s", 1), ("ax_m_s2", "ay_m_s2", 2))[: order + 1]:
         z = motion.at(name, body.center).complex(k)
         part[x], part[y] = pair(z)
-    angle = of_link(motion, name, min(order, 2), analysis.given(name))
+    angle = of_links(motion, [name], min(order, 2), analysis.given)[name]
     part |= {key: angle[key] for key in ("angle_deg", "omega_rad_s", "alpha_rad_s2") if key in angle}
     if order >= 1:
         force, torque = motion.applied(name)
@@ -223,7 +226,7 @@ def _guided(motion: Motion, guide: int, link: str) -> NDArray[np.float64]:
     g = m.guides[guide]
     if link == g.link:
         return motion.at(link, g.point).error_estimate(1)
-    slide, omega = np.abs(motion.poses.slide_derivative(guide, 0)), np.abs(motion.link(link).omega)
+    slide, omega = np.abs(motion.value(("slide", guide, 0))), np.abs(motion.link(link).omega)
     carried = motion.at(link, m.through(g)).error_estimate(1)
     turned = slide * (r.of(("angle", link, 1)) + omega * r.of(("turn", link))) + omega * r.of(
         ("slide", guide, 0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.mechanism.tolerance import Tolerances
+    from virtualwork.formulas.asked import Key
 
 # of the picture's width: a band that is narrower is drawn wider
 SEEN = 0.02
@@ -36,7 +37,7 @@ def draw(found: Tolerances) -> Figure:
     return figure
 
 
-def _paths(axes: Axes, found: Tolerances, points: list[Any]) -> None:
+def _paths(axes: Axes, found: Tolerances, points: list[Key]) -> None:
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
 
@@ -92,7 +93,7 @@ def _over_input(axes: Axes, found: Tolerances, header: str) -> None:
     axes.grid(color="0.9", lw=0.6)
 
 
-def _shares(axes: Axes, found: Tolerances, keys: list[Any], of: str) -> None:
+def _shares(axes: Axes, found: Tolerances, keys: list[Key], of: str) -> None:
     """Bars of the shares, means over the poses."""
     variances = np.zeros(len(found.limits))
     for key in keys:

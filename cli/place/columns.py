@@ -44,8 +44,10 @@ def masses(found: Placing) -> Table:
 
 
 def several(found: Sequence[tuple[Correction, Placing]]) -> Table:
-    """A row for each mass of each correction."""
+    """A row for each mass of each correction; of one alone without its name."""
     tables = [masses(placing) for _, placing in found]
+    if len(tables) == 1:
+        return tables[0]
     lengths = [len(table.columns[0].values) for table in tables]
 
     def stacked(k: int) -> list[Cell]:
@@ -70,7 +72,9 @@ def several(found: Sequence[tuple[Correction, Placing]]) -> Table:
 
 
 def documents(found: Sequence[tuple[Correction, Placing]]) -> Document:
-    """The JSON document of several corrections."""
+    """The JSON document of one correction, or of several."""
+    if len(found) == 1:
+        return document(found[0][1])
     return {
         "placements": [{"rotor": of.rotor, "plane": of.plane, **document(placing)} for of, placing in found]
     }

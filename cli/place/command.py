@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -98,35 +97,24 @@ def run(
         )
         for of in read
     ]
-    if len(found) > 1 and show.plot is not None:
+    alone = len(found) == 1
+    if not alone and show.plot is not None:
         raise options.bad("--plot", "draws one correction: expected --rotor and --plane too")
 
     def sheet(of: Correction, placing: Placing) -> Sheet:
         parts: list[str | Table] = [words.notes(placing), columns.masses(placing), words.error(placing)]
-        return Sheet(
-            of.name if len(found) > 1 else "", [Section("Masses", parts)], lambda: picture.draw(placing)
-        )
+        return Sheet("" if alone else of.name, [Section("Masses", parts)], lambda: picture.draw(placing))
 
-    (_, only), *others = found
-    warnings = [f"{of.name}: {text}" for of, placing in found for text in placing.warnings]
-    result = Result(
+    return Result(
         document=lambda: columns.documents(found),
         tables={"masses": lambda: columns.several(found)},
         notes=lambda: words.several(found),
-        afterword=lambda: "\n".join(f"{of.name}: {words.error(placing)}" for of, placing in found),
+        afterword=lambda: words.errors(found),
+        figure=(lambda: picture.draw(found[0][1])) if alone else None,
         method=words.METHOD,
         sheets=lambda: [sheet(*each) for each in found],
         about={"title": "Placement of a correction"},
-        warnings=warnings,
-    )
-    if others:
-        return result
-    return replace(
-        result,
-        document=lambda: columns.document(only),
-        tables={"masses": lambda: columns.masses(only)},
-        notes=lambda: words.notes(only),
-        afterword=lambda: words.error(only),
-        figure=lambda: picture.draw(only),
-        warnings=only.warnings,
+        warnings=[
+            text if alone else f"{of.name}: {text}" for of, placing in found for text in placing.warnings
+        ],
     )

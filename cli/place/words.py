@@ -30,6 +30,8 @@ def notes(found: Placing) -> str:
 
 def several(found: Sequence[tuple[Correction, Placing]]) -> str:
     """Say what is to be reached of each correction."""
+    if len(found) == 1:
+        return notes(found[0][1])
     lines = [f"{of.name}: {_vector(placing, placing.target)}" for of, placing in found]
     action = "REMOVE" if found[0][1].request.removes else "ADD"
     return "\n".join([*lines, f"angles counter-clockwise; material to {action}:"])
@@ -40,6 +42,13 @@ def error(found: Placing) -> str:
     whole = max(abs(share.goal) for share in found.shares)
     part = f" ({abs(found.error) / whole:.3%} of the correction)" if whole else ""
     return f"error: {_vector(found, found.error)}{part}"
+
+
+def errors(found: Sequence[tuple[Correction, Placing]]) -> str:
+    """Say what is missed of each correction."""
+    if len(found) == 1:
+        return error(found[0][1])
+    return "\n".join(f"{of.name}: {error(placing)}" for of, placing in found)
 
 
 def _vector(found: Placing, vector: complex) -> str:

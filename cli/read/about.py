@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from cli.errors import DataError, nearest
 
 HEAD = ("title", "machine", "customer", "date", "author")
 
 
-def about(file: str, document: Mapping[str, Any]) -> dict[str, str]:
+def about(file: str, document: Mapping[str, object]) -> dict[str, str]:
     """Read the table `[report]`: texts, a date may be TOML's own.
 
     Raises

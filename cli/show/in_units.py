@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import typer
 
 from cli.errors import nearest
+from cli.read.options import bad
 from cli.read.units import UNITS, Scaled, dimensions, find_unit, from_si, to_si, unit_name
 
 if TYPE_CHECKING:
@@ -41,16 +41,14 @@ def chosen_units(text: str) -> dict[str, str]:
                 if dimensions(word)
                 else nearest(word, known)
             )
-            raise typer.BadParameter(
+            raise bad(
+                "--units",
                 f"'{part.strip()}' is no unit of a column: expected such as mm,g,deg,N_mm,rpm{hint}",
-                param_hint="--units",
             )
         for dimension, unit in found.items():
             if chosen.setdefault(dimension, unit) != unit:
-                raise typer.BadParameter(
-                    f"{chosen[dimension]} and {unit} are both units of {dimension}: expected one of them",
-                    param_hint="--units",
-                )
+                both = f"{chosen[dimension]} and {unit}"
+                raise bad("--units", f"{both} are both units of {dimension}: expected one of them")
     return chosen
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import count
 from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING, Any
@@ -95,19 +95,27 @@ def parquet(blocks: Iterable[Table]) -> Iterator[bytes]:
 def _kind(column: Column) -> pyarrow.DataType:
     import pyarrow
 
+    if column.unit:
+        return pyarrow.float64()
     known = {type(value) for value in map(plain, column.values) if value != ""}
-    if column.unit or known == {float} or known == {int} or known == {int, float}:
-        return pyarrow.int64() if known == {int} and not column.unit else pyarrow.float64()
+    if known == {float} or known == {int} or known == {int, float}:
+        return pyarrow.int64() if known == {int} else pyarrow.float64()
     return pyarrow.string()
 
 
 def _array(column: Column, kind: pyarrow.DataType) -> pyarrow.Array:
     import pyarrow
 
+    given = column.values
+    if kind == pyarrow.float64() and (
+        not isinstance(given, Sequence) or {float, type(None)}.issuperset(map(type, given))
+    ):
+        # what is not a number is null
+        return pyarrow.array(given, type=kind, from_pandas=True)
     if kind == pyarrow.string():
-        values: list[Any] = [None if value == "" else str(value) for value in map(plain, column.values)]
+        values: list[str | float | None] = [None if v == "" else str(v) for v in map(plain, column.values)]
     else:
-        values = [None if value == "" else value for value in map(plain, column.values)]
+        values = [None if v == "" else v for v in map(plain, column.values)]
     return pyarrow.array(values, type=kind)
 
 

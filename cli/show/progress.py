@@ -18,13 +18,16 @@ def progress(items: Iterable[T], count: int, what: str, each: int = 1) -> Iterat
         return
     start = shown = time.monotonic()
     told = ""
-    for number, item in enumerate(items):
-        done = number * each
-        now = time.monotonic()
-        if now - start > AFTER and now - shown > EVERY:
-            told = f"{done} of {count} {what}, {(now - start) / done * (count - done):.0f} s to go"
-            print(f"\r{told:<60}", end="", file=sys.stderr, flush=True)
-            shown = now
-        yield item
-    if told:
-        print(f"\r{'':<60}\r", end="", file=sys.stderr, flush=True)
+    try:
+        for number, item in enumerate(items, 1):
+            yield item
+            # whoever asks for the next has done with this one
+            done, now = min(number * each, count), time.monotonic()
+            if now - start > AFTER and now - shown > EVERY:
+                told = f"{done} of {count} {what}, {(now - start) / done * (count - done):.0f} s to go"
+                print(f"\r{told:<60}", end="", file=sys.stderr, flush=True)
+                shown = now
+    finally:
+        # what is said next, an error too, begins on a line of its own
+        if told:
+            print(f"\r{'':<60}\r", end="", file=sys.stderr, flush=True)

@@ -155,3 +155,28 @@ def test_progress_is_for_work_of_more_than_two_seconds(
         assert ("of 8 rotors" in stream.getvalue()) == speaks
         # nothing of it stays on the line
         assert stream.getvalue().rpartition("\r")[2] == ""
+
+
+def test_progress_of_work_whose_first_part_takes_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([0.0, 3.0, 6.0, 9.0])
+    monkeypatch.setattr("time.monotonic", lambda: next(clock))
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    assert len(list(progress(range(3), 250, "rotors", each=100))) == 3
+    said = [line.strip() for line in terminal.getvalue().split("\r") if line.strip()]
+    assert said == [
+        "100 of 250 rotors, 4 s to go",
+        "200 of 250 rotors, 2 s to go",
+        "250 of 250 rotors, 0 s to go",
+    ]
+
+
+def test_an_error_wipes_the_progress_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([0.0, 3.0])
+    monkeypatch.setattr("time.monotonic", lambda: next(clock))
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with pytest.raises(ZeroDivisionError):
+        list(progress((1 / x for x in (1, 0)), 2, "rotors"))
+    assert "1 of 2 rotors" in terminal.getvalue()
+    assert terminal.getvalue().rpartition("\r")[2] == ""

@@ -119,6 +119,27 @@ def test_no_byte_hangs_on_the_number_of_workers(dalembert, table, tmp_path, aske
     assert (tmp_path / "shared.csv").read_bytes() == (tmp_path / "alone.csv").read_bytes()
 
 
+@pytest.mark.slow
+def test_no_digit_hangs_on_what_a_process_has_done_before(dalembert, tmp_path):
+    # work that pays for compiled code, but no part of it does; where there is none all is numpy's
+    (tmp_path / "m.toml").write_text(FOUR_BAR)
+    vary = (
+        "--vary",
+        f"links.crank.B.x=0.035:0.045/{182 * 48 - 1}",
+        "--sweep",
+        "0deg:359deg:1deg",
+        "--only",
+        "H",
+    )
+    written = []
+    for options in (("-o", "one.parquet"), ("--workers", "2", "-o", "two.parquet")):
+        done = dalembert("mechanism", "m.toml", *vary, *options)
+        assert (done.returncode, done.stderr) == (0, "")
+        written.append(pyarrow.parquet.read_table(tmp_path / options[-1], columns=["H_x_m", "H_vy_m_s"]))
+    assert written[0].num_rows == 182 * 48 * 360
+    assert written[0].equals(written[1])
+
+
 def test_workers_write_parquet_into_a_folder_that_reads_as_one_table(dalembert, tmp_path):
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     # 4000 variants in 37 poses are three parts

@@ -10,6 +10,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from benchmarks.truth import falling_four_bar
 from tests.virtualwork.let_go import G, block, double_pendulum, four_bar, holds, pendulum, rotor
 from virtualwork import (
     Force,
@@ -203,6 +204,16 @@ def test_loops_close_and_joint_forces_balance_at_every_time() -> None:
     force, _ = motion.dynamics.shaking
     bearings = motion.reaction("A", on="crank") + motion.reaction("D", on="rocker")
     assert np.abs(force + bearings).max() < 1e-9
+
+
+@pytest.mark.parametrize("accuracy", [1e-6, 1e-11])
+def test_four_bar_that_falls_for_ten_seconds_against_its_energy(accuracy: float) -> None:
+    """Without friction it goes to and fro, and its time is a quadrature: no equation of motion is used."""
+    start = math.radians(60)
+    exact = float(falling_four_bar.angle(10, start, digits=16, points=160))
+    run = four_bar().simulate([0, 10], accuracy=accuracy)
+    holds(run, abs(run.angle[-1, 0] - exact), accuracy)
+    assert abs(run.energy_drift[-1]) < 100 * accuracy
 
 
 def test_andrews_mechanism() -> None:

@@ -127,7 +127,7 @@ class ForceErrors:
         left, tau = self.bounds.residual(keys, known)
         with np.errstate(all="ignore"):
             found = (np.abs(inverse(statics.system()[0])) @ left[..., None])[..., 0]
-            found *= grown(tau, 1)[:, None]
+            found *= np.atleast_1d(grown(tau, 1))[:, None]
         found[~np.isfinite(found) & np.isfinite(value)] = np.inf
         return statics.unknowns, found
 

@@ -122,7 +122,8 @@ class Bounds:
         for key in keys:
             # what is no number is infinite
             bound = np.fmin(np.broadcast_to(self._bound(key, found), self.n), np.inf)
-            bound[nowhere] = np.nan
+            if nowhere.any():
+                bound[nowhere] = np.nan
             if key in closed:
                 bound[~np.isfinite(np.broadcast_to(found[names(closed[key])[0]], self.n))] = np.nan
             bounds[key] = bound

@@ -105,16 +105,16 @@ def kept(high: Reals, low: Reals) -> Reals:
 def grown(tau: Reals, k: float) -> Reals:
     """How much more than the first order a derivative errs, where the second-order step is a share τ of the first.
 
-    τ is taken a quarter larger, for the third order.
+    τ is taken a quarter larger, for the third order. One number where no pose is near a limit.
     """
     tau = 1.25 * np.asarray(tau)
-    found = np.ones(tau.shape)
     # far from a limit there is nothing to add
     near = ~(tau < 1e-12)
-    if near.any():
-        tau = tau[near]
-        more = np.expm1((0.5 - k) * np.log1p(-2 * tau)) / ((2 * k - 1) * tau)
-        found[near] = np.where(tau < 0.5, more, np.inf)
+    if not near.any():
+        return np.ones(())
+    found, tau = np.ones(tau.shape), tau[near]
+    more = np.expm1((0.5 - k) * np.log1p(-2 * tau)) / ((2 * k - 1) * tau)
+    found[near] = np.where(tau < 0.5, more, np.inf)
     return found
 
 

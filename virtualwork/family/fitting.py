@@ -34,10 +34,11 @@ if TYPE_CHECKING:
 D = TypeVar("D", bound=Description)
 
 # of the starts, the first by distance are put in order; the first of those are refined in rounds, so many by so many
-# steps, the best of each round further in the next
-ORDERED, ROUNDS = 64, ((48, 15), (8, 100), (1, 300))
-# of the mechanism's size, or rad: a fit as near as this is not looked for again
-MET = 1e-12
+# steps, the best of each round further in the next; so many where the target is nearly met: a search may creep in a valley
+# next to what meets it, which another one finds
+ORDERED, ROUNDS = 64, ((48, 48, 15), (8, 24, 100), (1, 1, 300))
+# of the mechanism's size, or rad: a fit as near as this is not looked for again; and is nearly one
+MET, NEARLY = 1e-12, 1e-4
 # poses of the look over the whole range
 FINE = 721
 # of the bounds: solutions that differ less than this in every dimension are one
@@ -262,20 +263,19 @@ class _Problem(Generic[D]):
         begun = self.begun(shares((own - self.low) / (self.high - self.low), starts, seed))
         evaluations = self.evaluations
         met: list[_Refined] = []
-        for count, steps in ROUNDS:
+        wanted = 2 * best if best > 1 else 1
+        for count, most, steps in ROUNDS:
             found: list[_Refined] = []
             # each part has what it needs for itself, on threads too
-            work = (
-                (self.own() if executor else self, *start, steps)
-                for start in begun[: max(count, 2 * best if best > 1 else 1)]
-            )
-            with closing(in_parts(_refined, work, executor)) as refined:
+            work = ((self.own() if executor else self, *start, steps) for start in begun[: max(most, wanted)])
+            with closing(in_parts(_refined, work, executor, max(count, wanted))) as refined:
                 for each in refined:
                     evaluations += each.evaluations
                     found.append(each)
                     if each.largest < MET:
                         met = self._distinct([*met, each])
-                    if len(met) >= best:
+                    enough = len(found) >= max(count, wanted)
+                    if len(met) >= best or (enough and min(f.largest for f in found) > NEARLY):
                         break
             found = self._distinct([*met, *found])
             if len(met) >= best:
@@ -383,7 +383,9 @@ class _Problem(Generic[D]):
                 f"({len(gaps)} of {FINE} poses): it does not pass there without being taken apart"
             )
         if not self.designs[0].exact:
-            said.append("fit: derivatives are differences: this mechanism has groups without a closed form")
+            said.append(
+                "fit: derivatives are differences: the phase of a gear hangs on links that have to be placed first"
+            )
         return said
 
     def _shown(self, q: float) -> str:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import weakref
 from collections.abc import Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.engines import as_part
 from dalembert.arithmetic.parts import in_parts
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.shortfall import shortfall
@@ -170,7 +172,9 @@ class FamilyMotion:
                 (self._name, number, self.part.some(some), new, [x[some] for x in out] if here else None)
                 for number, some in self.parts()
             )
-            for some, (values, reasons) in zip(rows, in_parts(answer, work, self.executor), strict=True):
+            # what others work out hangs on the whole, and not on what each of them did before
+            of = answer if here else partial(as_part, math.prod(self.part.shape), answer)
+            for some, (values, reasons) in zip(rows, in_parts(of, work, self.executor), strict=True):
                 if not here:
                     for x, value in zip(out, values, strict=True):
                         x[some] = value

@@ -63,6 +63,12 @@ class Path:
         self.rates.append(rates)
         self.work.append(work)
 
+    def drop(self) -> None:
+        """Take the last node away, but for the first."""
+        if len(self.t) > 1:
+            for of in (self.t, self.q, self.v, self.rates, self.work):
+                of.pop()
+
     def extend(self, rows: Reals, k: int) -> None:
         """Add nodes: a row (t, q, q̇, rates, work) each."""
         self.t += rows[:, 0].tolist()
@@ -70,6 +76,24 @@ class Path:
         self.v += rows[:, k + 1 : 2 * k + 1].tolist()
         self.rates += rows[:, 2 * k + 1 : -1].tolist()
         self.work += rows[:, -1].tolist()
+
+    def turning(self, i: int) -> float:
+        """When the first input turns back between node i and the next, by the secant within a bracket."""
+        low, high = self.t[i], self.t[i + 1]
+        down, up = self.v[i][0], self.v[i + 1][0]
+        for _ in range(60):
+            middle = low - down * (high - low) / (up - down)
+            if not low < middle < high:
+                break
+            speed = float(self.at(np.array([middle]))[1][0, 0])
+            if speed == 0.0:
+                return middle
+            # of the end that stays, half of it counts (Illinois)
+            if (speed > 0) == (up > 0):
+                high, up, down = middle, speed, 0.5 * down
+            else:
+                low, down, up = middle, speed, 0.5 * up
+        return 0.5 * (low + high)
 
     def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
         """q, q̇, q̈ (n, k) and the work (n,) at times on the way: a step of the method from the node before each."""

@@ -20,7 +20,7 @@ from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.path import MOST
-from virtualwork.intime.travel import Travel, travel
+from virtualwork.intime.travel import UNDECIDED, Travel, travel
 from virtualwork.intime.watch import Floats
 from virtualwork.motion import Motion
 
@@ -92,7 +92,7 @@ class Run:
     @cached_property
     def error_estimate(self) -> Reals:
         """(n, k): how far the inputs may be from the truth, rad or m."""
-        nodes = self.coarse.nodes
+        nodes = self.coarse.nodes[self.coarse.nodes <= self.fine.end]
         q, v, a, _ = self.fine.at(nodes)
         found = spread(q, self.coarse.at(nodes)[0], self.share) + rounding(nodes, q, v, a)
         # between two nodes that of the later one
@@ -216,17 +216,21 @@ def simulate(
     levels = levels_of(m.inputs, until)
     tolerance = max(LEAST, FIRST * accuracy)
     start = float(t[0]), q, v
-    fine = travel(own, start, float(t[-1]), tolerance, levels, DormandPrince())
+    fine = travel(own, start, float(t[-1]), tolerance, levels, DormandPrince(), accuracy)
     if fine.stiff:
         # what is stiff somewhere is from the beginning
-        fine = travel(own, start, float(t[-1]), tolerance, levels, Radau())
+        fine = travel(own, start, float(t[-1]), tolerance, levels, Radau(), accuracy)
     for tries in range(TRIES):
         coarse, method = fine, fine.legs[0].path.method
         # near change points every solution is interpolated from other poses
         ways = own if tries % 2 else own.of(equations.otherwise())
-        fine = travel(ways, start, float(t[-1]), tolerance / (GAIN + 1), levels, method, coarse)
+        # no farther than both go
+        last = coarse.end if coarse.ended == UNDECIDED else float(t[-1])
+        fine = travel(ways, start, last, tolerance / (GAIN + 1), levels, method, accuracy, coarse)
+        if last < t[-1] and fine.ended == "end":
+            fine.ended = coarse.ended
         coarse.backwards()
-        part = 1.0 if equations.crosses else share(tolerance)
+        part = 1.0 if equations.crosses or coarse.folds or fine.folds else share(tolerance)
         found = Run(assembly, reached(t, fine.end), fine, coarse, part)
         worst = float((found.error_estimate / scale).max())
         if worst <= accuracy or tolerance <= LEAST or tries == TRIES - 1 or fine.steps > MOST / 2:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.coordinates import BETTER, FOLDING, TURN, Coordinates
 from virtualwork.intime.equations import Lost
 from virtualwork.intime.friction import Rubbing
@@ -22,6 +22,7 @@ from virtualwork.intime.watch import Floats, Watch
 
 # changes of coordinates in one simulation
 CHANGES = 10_000
+UNDECIDED = "it comes so near a change point that rounding decides how it goes on"
 NO_FURTHER = "it can go no further: a limit, or a pose where its motion is not determined"
 
 
@@ -87,6 +88,11 @@ class Travel:
         return any(leg.path.ended == "stiff" for leg in self.legs)
 
     @property
+    def folds(self) -> bool:
+        """Whether a loop came near folding on the way: there halves of steps gain less than the method's order."""
+        return any(leg.path.ended == "folding" for leg in self.legs)
+
+    @property
     def undecided(self) -> float | None:
         """The first time at which it rests at a change point; None where it never does.
 
@@ -94,10 +100,17 @@ class Travel:
         """
         for leg in self.legs:
             path = leg.path
-            rest = 1e-7 * float(np.abs(np.array(path.v)).max())
-            for t, q, v in zip(path.t, path.q, path.v, strict=True):
-                if path.equations.meets(q[0]) and abs(v[0]) <= rest:
+            if not path.equations.crosses:
+                continue
+            v = np.array(path.v)[:, 0]
+            rest = 1e-7 * float(np.abs(v).max())
+            for i, t in enumerate(path.t):
+                if path.equations.meets(path.q[i][0]) and abs(v[i]) <= rest:
                     return t
+                if i and v[i] * v[i - 1] < 0:
+                    turn = path.turning(i - 1)
+                    if path.equations.meets(float(path.at(np.array([turn]))[0][0, 0])):
+                        return turn
         return None
 
     def backwards(self) -> None:
@@ -182,15 +195,26 @@ class Monitor:
     # a margin below which they fold: where no others were better, a quarter of what it was
     below: float
     follows: bool
+    # the coordinate at the last node
+    last: float
 
     def __call__(self, t: float, q: Floats, v: Floats) -> str:
         if self.follows:
             self.near = self.inputs(q, v)
+        if self._strays(q, v):
+            return "undecided"
         if self.coordinates.folds(q, self.below):
             return "folding"
         if self.below < FOLDING and not self.coordinates.folds(q):
             self.below = FOLDING
         return ""
+
+    def _strays(self, q: Floats, v: Floats) -> bool:
+        """Whether another coordinate takes for a change point what the inputs do not: by its rounding, that is larger."""
+        last, self.last = self.last, q[0]
+        if self.coordinates.own or self.coordinates.equations.clear(np.array([last, q[0]])):
+            return False
+        return not self.coordinates.made[0].equations.passes(self.inputs(q, v)[0])
 
     def quiet(self, q: Reals) -> bool:
         """Whether nothing folds at any of many places, and none has to be followed."""
@@ -215,6 +239,7 @@ def travel(
     tolerance: float,
     until: Mapping[int, float],
     method: Method,
+    undecided: float,
     like: Travel | None = None,
 ) -> Travel:
     """Go from a state of the inputs to a time, or until an input has a value.
@@ -226,6 +251,9 @@ def travel(
     until : mapping of an input's number to its value
     method : Method
         Where it is found to be stiff, the implicit one goes on.
+    undecided : float
+        The accuracy wanted: where a loop is so nearly folded, and no other coordinate leads on, that rounding of the rates
+        is more than it, rounding decides how the motion goes on.
     like : Travel, optional
         Each of its steps is done in two halves.
     """
@@ -247,7 +275,7 @@ def travel(
             # in the mode of this leg, out of which the next one comes
             coordinates, left = coordinates.of(equations), equations.left(ended, before)
         below = FOLDING if not coordinates.folds(q) else coordinates.margin(q) / BETTER
-        monitor = Monitor(coordinates, inputs, below, bool(until) and not coordinates.own)
+        monitor = Monitor(coordinates, inputs, below, bool(until) and not coordinates.own, q[0])
         watches = [*(monitor.until(j, level) for j, level in until.items()), *equations.watches()]
         most = MOST if like is None else MOST + 2 * like.steps
         stops, budget = equations.stops, most - found.steps
@@ -258,6 +286,9 @@ def travel(
         found.ended = path.ended
         if path.ended in ("end", "until", "budget") or len(found.legs) > CHANGES:
             return found
+        if path.ended == "undecided":
+            # the last node lies where that has been
+            path.drop()
         t, q, v, work = path.t[-1], path.q[-1], path.v[-1], path.work[-1]
         inputs, ended = leg.inputs[-1].tolist(), path.ended
         if ended.startswith("friction"):
@@ -267,6 +298,15 @@ def travel(
             continue
         found.ended = equations.outside(t, q, v) if path.ended == "lost" else ""
         other = None if found.ended else coordinates.better(q, inputs)
+        if (
+            other is None
+            and coordinates.margin(q) * undecided < EPS
+            and not coordinates.equations.passes(q[0])
+        ):
+            path.ended = "undecided" if path.ended == "folding" else path.ended
+        if path.ended == "undecided":
+            found.ended = UNDECIDED
+            return found
         if other is None and path.ended == "lost":
             found.ended = found.ended or NO_FURTHER
             return found

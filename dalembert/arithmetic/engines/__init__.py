@@ -7,8 +7,9 @@ overrides. All agree to rounding.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextvars import ContextVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.engines import blocks, floats
 from dalembert.arithmetic.tape import Tape
 
+R = TypeVar("R")
 Reals = NDArray[np.float64]
 Rows = Sequence[Reals] | Reals
 Tables = Sequence[NDArray[Any]] | NDArray[Any]
@@ -26,6 +28,7 @@ FEW = 4  # lanes up to which Python's floats are faster than numpy's calls
 PAYS = 3e8  # operations × lanes of one tape from which compiling it pays (some 0.1 s with the import)
 
 _done: dict[Tape, float] = {}
+_whole: ContextVar[int] = ContextVar("_whole", default=0)
 
 
 class Outputs(Mapping[str, Any]):
@@ -205,6 +208,8 @@ class Repeated:
         self.lanes = {name: np.ascontiguousarray(x, dtype=float) for name, x in lanes.items()}
         self.n = len(next(iter(self.lanes.values())))
         self._numbers = [name for name in tape.inputs if name not in lanes]
+        self._columns = [(name, self.lanes.get(name)) for name in tape.inputs]
+        self._blocks = blocks.compiled(tape, frozenset(self._numbers))
         self._steady: Any = None
 
     def __call__(self, numbers: Mapping[str, float]) -> tuple[Reals, bool]:
@@ -216,11 +221,12 @@ class Repeated:
             self._steady = self._steady or llvm.steady(self.tape, self.lanes, self.n, self.tested)
             if self._steady is not None:
                 return self._steady([numbers[name] for name in self._numbers])  # type: ignore[no-any-return]
-        columns = [
-            self.lanes[name] if name in self.lanes else np.asarray(numbers[name]) for name in self.tape.inputs
-        ]
         table = np.empty((len(self.tape.outputs), self.n))
-        _lanes(self.tape, columns, table, self.n, engine)
+        columns = [numbers[name] if x is None else x for name, x in self._columns]
+        if engine == "python":
+            _lanes(self.tape, list(map(np.asarray, columns)), table, self.n, engine)
+        else:
+            self._blocks(columns, table)
         return (table[:-1], bool((table[-1] > 0).all())) if self.tested else (table, True)
 
 
@@ -228,8 +234,23 @@ def chosen(tape: Tape, n: int) -> str:
     """The engine for n lanes: compiled code only once the tape has been asked for so often that it pays."""
     if n <= FEW:
         return "python"
+    whole = _whole.get()
+    if whole:
+        return "llvm" if whole * tape.cost > PAYS else "numpy"
     _done[tape] = _done.get(tape, 0.0) + n * tape.cost
     return "llvm" if _done[tape] > PAYS else "numpy"
+
+
+def as_part(lanes: int, function: Callable[..., R], *given: Any) -> R:
+    """Call a function on a part of work of so many lanes in all: the engine is chosen by these alone.
+
+    Then no digit hangs on what else a process has done, and on how many processes there are.
+    """
+    before = _whole.set(lanes)
+    try:
+        return function(*given)
+    finally:
+        _whole.reset(before)
 
 
 def anew() -> None:

@@ -129,11 +129,11 @@ class Blocks:
             self._own.scratch = list(table[:, : self.block]), np.empty(self.block, dtype=bool)
         return self._own.scratch  # type: ignore[no-any-return]
 
-    def __call__(self, columns: Sequence[Reals], out: Sequence[Reals] | Reals) -> None:
-        """Run: `columns` in the order of the tape's inputs, (n,), or () where uniform; `out` a row an output, (n,)."""
+    def __call__(self, columns: Sequence[Reals | float], out: Sequence[Reals] | Reals) -> None:
+        """Run: `columns` in the order of the tape's inputs, (n,), or one number; `out` a row an output, (n,)."""
         n = len(out[0]) if len(out) else 0
         inputs = dict(zip(self.tape.inputs, columns, strict=True))
-        varying = [inputs[name] for name in self.varying]
+        varying: list[Any] = [inputs[name] for name in self.varying]
         with np.errstate(all="ignore"):
             common = self._common(inputs)
             constants = [common[str(number)] for number in self.read]
@@ -152,16 +152,15 @@ class Blocks:
             else:
                 out[row][:] = inputs[source] if kind == "input" else out[source]
 
-    def _common(self, inputs: Mapping[str, Reals]) -> Mapping[str, Any]:
+    def _common(self, inputs: Mapping[str, Reals | float]) -> Mapping[str, Any]:
         """The values that are the same for all lanes, as floats where those go on."""
-        given = {name: inputs[name][()] for name in self.same.inputs}
+        given = [float(inputs[name]) for name in self.same.inputs]
         if floats.takes(self.same):
             try:
-                found = floats.compiled(self.same)(*map(float, given.values()))
-                return dict(zip(self.same.names, found, strict=True))
+                return dict(zip(self.same.names, floats.compiled(self.same)(*given), strict=True))
             except (ZeroDivisionError, ValueError, OverflowError):
                 pass
-        return self.same.on(given, NUMPY)
+        return self.same.on(dict(zip(self.same.inputs, map(np.float64, given), strict=True)), NUMPY)
 
 
 @lru_cache(maxsize=128)
