@@ -150,7 +150,7 @@ class Series:
         place = m.bodies[body][name]
 
         def part(i: int) -> ArrayLike:
-            z = self.poses.point_derivative(body, place, 0, name)
+            z = self.poses.point(body, place, 0, name)
             return z.imag if i else z.real
 
         found: dict[str, Any] = {
@@ -165,7 +165,7 @@ class Series:
             if all(column in self._index for column in columns):
                 found[key] = [self._index[column] for column in columns]
         if unit and body != GROUND:
-            z = self.poses.point_coefficient(body, place, 0, name)
+            z = self.poses.values([("dpoint", body, place, name, 0, 1)])[0]
             found["v"] = [
                 self._add(f"{name} {axis}", z_, exact=False) for axis, z_ in (("x", z.real), ("y", z.imag))
             ]
@@ -188,7 +188,9 @@ class Series:
             found["omega"] = self._index.get(f"{name}_omega_rad_s")
             found["alpha"] = self._index.get(f"{name}_alpha_rad_s2")
             if unit:
-                found["omega"] = self._add(f"{name} omega", self.poses.angle_coefficient(name), exact=False)
+                found["omega"] = self._add(
+                    f"{name} omega", self.poses.values([("dangle", name, 0, 1)])[0], exact=False
+                )
         return found
 
     def _paths(self, names: list[str]) -> dict[str, list[Any]]:
@@ -210,7 +212,7 @@ class Series:
         found = {}
         for name in names:
             body = next(body for body, points in m.bodies.items() if name in points)
-            z = poses.point_derivative(body, m.bodies[body][name], 0, name)
+            z = poses.point(body, m.bodies[body][name], 0, name)
             found[name] = [_bytes(z.real), _bytes(z.imag)]
         return found
 
@@ -295,7 +297,7 @@ def _first_plots(series: Series) -> list[str]:
 def _comes_back(series: Series, link: str) -> bool:
     """Say whether a link stands at the end as it stood at the beginning."""
     first = next(iter(series.mechanism.links[link].points.items()))
-    z = series.poses.point_derivative(link, first[1], 0, first[0])[[0, -1]]
+    z = series.poses.point(link, first[1], 0, first[0])[[0, -1]]
     turned = np.exp(1j * series.poses.angle(link)[[0, -1]])
     gap = max(abs(z[1] - z[0]) / series.mechanism.size, abs(turned[1] - turned[0]))
     return bool(gap < 1e-6)

@@ -26,10 +26,9 @@ from virtualwork.describe.parts import Point, as_point
 from virtualwork.formulas.asked import FORCES, Key, over_blocks, pays
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.sweep import EvenSweep
+from virtualwork.formulas.positions import EvenSweep
 from virtualwork.parts_of_motion import LinkMotion, PointMotion, SlideMotion
 from virtualwork.plan.steps import Step
-from virtualwork.table import columns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -142,10 +141,9 @@ class Motion:
         DescriptionError
             Where no body has a point of that name.
         """
-        for body, points in self.mechanism.bodies.items():
-            if name in points:
-                return PointMotion(self, body, points[name], name)
-        raise DescriptionError(f"no point is named '{name}'")
+        if name not in self.mechanism.points:
+            raise DescriptionError(f"no point is named '{name}'")
+        return PointMotion(self, *self.mechanism.points[name], name)
 
     def at(self, link: str, point: Point | str) -> PointMotion:
         """Motion of any point of a link: a name, or coordinates in the link's own axes."""
@@ -179,12 +177,21 @@ class Motion:
 
         return Lanes(self.assembly, self.poses)
 
+    def values(self, keys: Sequence[Key]) -> list[Any]:
+        """Quantities by their keys (`Recording.value`), (n,) each: from the tape where that pays, else over blocks."""
+        keys = tuple(keys)
+        way = pays(self.assembly.recordings.setdefault("asked", {}), self.poses.n, keys)
+        if way == "lanes" or (
+            way == "one" and (self.lanes.known.keys() >= set(keys) or self.lanes.one(keys))
+        ):
+            return [value.copy() for value in self.lanes.values(keys)]
+        if FORCES.isdisjoint(key[0] for key in keys):
+            return self.poses.values(keys)
+        return [over_blocks(self.poses, key, self.dynamics) for key in keys]
+
     def value(self, key: Key) -> Any:
-        """A quantity by its key (`Recording.value`), (n,): from the tape where that pays, else over blocks of poses."""
-        way = pays(self.assembly.recordings.setdefault("asked", {}), self.n, (key,))
-        if way == "lanes" or (way == "one" and (key in self.lanes.known or self.lanes.one((key,)))):
-            return self.lanes.values((key,))[0].copy()
-        return over_blocks(self.poses, key, self.dynamics if key[0] in FORCES else None)
+        """A quantity by its key, (n,)."""
+        return self.values((key,))[0]
 
     @cached_property
     def rounding(self) -> Bounds:
@@ -402,6 +409,8 @@ class Motion:
         ['crank_rad', 'assembled', 'crank_angle_rad', 'P_x_m', 'P_y_m']
         """
         from pandas import DataFrame
+
+        from virtualwork.table import columns
 
         return DataFrame(columns(self.poses))
 

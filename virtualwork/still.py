@@ -41,7 +41,7 @@ def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
     order = list(poses.mechanism.bodies)
 
     def at(body: str, z: complex) -> complex:
-        return complex(poses.point_derivative(body, z, 0)[i])
+        return complex(poses.point(body, z)[i])
 
     def places(shape: Shape) -> Complexes:
         if isinstance(shape, Circle):

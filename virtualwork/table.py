@@ -26,18 +26,16 @@ def columns(poses: Poses) -> dict[str, Any]:
 
 def moving_columns(m: Description, poses: Poses, orders: int) -> dict[str, Any]:
     """Return the columns of links and points that move, so many orders of them."""
-    table: dict[str, Any] = {}
-    for name in m.links:
-        for order, header in enumerate(LINK[:orders]):
-            values = poses.angle_derivative(name, order) if order else poses.angle(name)
-            table[f"{name}_{header}"] = values
-    seen = set(m.ground)
-    for body, points in m.bodies.items():
-        for name, place in points.items():
-            if name in seen:
-                continue
-            seen.add(name)
-            for order, (x, y) in enumerate(POINT[:orders]):
-                z = poses.point_derivative(body, place, order, name)
-                table[f"{name}_{x}"], table[f"{name}_{y}"] = z.real, z.imag
+    links = {f"{name}_{LINK[k]}": ("angle", name, k) for name in m.links for k in range(orders)}
+    points = [
+        (name, k, ("point", *place, name, k))
+        for name, place in m.points.items()
+        if name not in m.ground
+        for k in range(orders)
+    ]
+    found = iter(poses.values([*links.values(), *(key for *_, key in points)]))
+    table: dict[str, Any] = {header: next(found) for header in links}
+    for (name, k, _), z in zip(points, found, strict=True):
+        x, y = POINT[k]
+        table[f"{name}_{x}"], table[f"{name}_{y}"] = z.real, z.imag
     return table

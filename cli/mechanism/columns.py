@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.mechanism.forces import acts_by_friction, effort_name, rows_of
-from cli.mechanism.poses import LINK, POINT, SLIDE, cells, of_link, of_point, of_slide, pair
+from cli.mechanism.poses import LINK, POINT, SLIDE, cells, of_links, of_points, of_slide, pair
 from cli.mechanism.solve import Analysis
 from cli.show.columns import Column, Table
 
@@ -48,9 +48,8 @@ def link_error(analysis: Analysis, motion: Motion, name: str, order: int) -> Rea
     """Bound the error of a link's angle (degrees) or of its rate."""
     if order:
         return motion.link(name).error_estimate(order)
-    given = analysis.given(name)
-    if given is not None:
-        return TURNED * np.abs(given)
+    if name in analysis.given:
+        return TURNED * np.abs(analysis.given[name])
     angle = np.degrees(motion.link(name).error_estimate(0))
     # in degrees it lies in a whole turn
     return np.asarray(angle + np.finfo(float).eps * 360)
@@ -70,8 +69,9 @@ def _together(analysis: Analysis, motion: Motion) -> None:
     keys = [motion.point(name).key(k) for name in analysis.points for k in orders]
     keys += [motion.slide(name).key(k) for name in analysis.slides for k in orders]
     # an angle that was given is as it was given
-    given = {name for name in analysis.links if analysis.given(name) is not None}
-    keys += [motion.link(name).key(k) for name in analysis.links for k in orders if k or name not in given]
+    keys += [
+        motion.link(name).key(k) for name in analysis.links for k in orders if k or name not in analysis.given
+    ]
     motion.rounding.together(keys)
 
 
@@ -134,15 +134,15 @@ def poses(analysis: Analysis) -> Table:
         for j in range(len(analysis.mechanism.inputs)):
             stack.input(j)
         stack.before.append(partial(_together, analysis, motion))
-        for name in analysis.points:
-            for key, values in of_point(motion, name, analysis.order).items():
+        for name, point in of_points(motion, analysis.places, analysis.order).items():
+            for key, values in point.items():
                 k = next(k for k, keys in enumerate(POINT) if key in keys)
                 stack.put(f"{name}_{key}", values, partial(_point_error, motion, name, k))
         for name in analysis.slides:
             for key, values in of_slide(motion, name, analysis.order).items():
                 stack.put(f"{name}_{key}", values, partial(_slide_error, motion, name, SLIDE.index(key)))
-        for name in analysis.links:
-            for key, values in of_link(motion, name, analysis.order, analysis.given(name)).items():
+        for name, link in of_links(motion, analysis.links, analysis.order, analysis.given).items():
+            for key, values in link.items():
                 error = partial(link_error, analysis, motion, name, LINK.index(key))
                 stack.put(f"{name}_{key}", values, error)
     return stack.table()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.mechanism.poses import of_link, of_point
+from cli.mechanism.poses import of_links, of_points
 from cli.read.units import UNITS, from_si, read_degrees, written
 from cli.show.columns import Column, Section, Sheet, Table
 
@@ -32,16 +32,15 @@ def posed(
     def lengths(values: list[float | None]) -> list[float | None]:
         return [None if v is None else from_si(v, "length", length) for v in clean(values, m.size)]
 
-    points = dict.fromkeys(p for body in m.bodies.values() for p in body)
-    places = {p: of_point(motion, p, 0) for p in points}
+    places = of_points(motion, {p: ("point", *place, p) for p, place in m.points.items()}, 0)
     table = Table(
         [
-            Column("point", "", list(points)),
+            Column("point", "", list(places)),
             Column(
-                "of", "", [", ".join(name for name, body in m.bodies.items() if p in body) for p in points]
+                "of", "", [", ".join(name for name, body in m.bodies.items() if p in body) for p in places]
             ),
-            Column("x", length, lengths([places[p]["x_m"][0] for p in points])),
-            Column("y", length, lengths([places[p]["y_m"][0] for p in points])),
+            Column("x", length, lengths([places[p]["x_m"][0] for p in places])),
+            Column("y", length, lengths([places[p]["y_m"][0] for p in places])),
         ],
         ("point",),
     )
@@ -50,15 +49,14 @@ def posed(
         for e, v in zip(m.inputs, inputs, strict=True)
         if e.on == "ground" and not e.is_slide
     }
+    angles = of_links(motion, list(m.links), 0, driven)
     links = Table(
         [
             Column("link", "", list(m.links)),
             Column(
                 "angle",
                 "deg",
-                clean(
-                    [of_link(motion, name, 0, driven.get(name))["angle_deg"][0] for name in m.links], 360.0
-                ),
+                clean([turned["angle_deg"][0] for turned in angles.values()], 360.0),
             ),
             Column("mass", "kg", [m.rigid[name].mass for name in m.links]),
             Column("inertia", "kg_m2", [m.rigid[name].inertia for name in m.links]),

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.show.columns import Document, Json
+    from virtualwork.formulas.asked import Key
     from virtualwork.motion import Motion
 
 Column = Sequence[float | None]
@@ -37,18 +38,22 @@ def pair(z: NDArray[np.complex128]) -> tuple[Column, Column]:
     return cells(np.where(known, z.real, np.nan)), cells(np.where(known, z.imag, np.nan))
 
 
-def of_link(
-    motion: Motion, name: str, order: int, given: NDArray[np.float64] | None = None
-) -> dict[str, Column]:
-    """A link's angle and its rates; `given`: the angle of a driven link as it was asked for, degrees."""
-    link = motion.link(name)
-    angle = np.where(np.isfinite(link.angle), degrees(np.exp(1j * link.angle)), np.nan)
-    if given is not None:
-        angle = np.where(np.isfinite(angle), given, np.nan)
-    parts = {"angle_deg": cells(exact_degrees(angle))}
-    for key, attribute in zip(LINK[1 : order + 1], ("omega", "alpha", "jerk"), strict=False):
-        parts[key] = cells(getattr(link, attribute))
-    return parts
+def up_to(motion: Motion, order: int, of: dict[str, Key]) -> dict[str, list[Any]]:
+    """Quantities and their derivatives in time up to an order, from one pass; `of`: their keys without the order."""
+    found = iter(motion.values([(*key, k) for key in of.values() for k in range(order + 1)]))
+    return {name: [next(found) for _ in range(order + 1)] for name in of}
+
+
+def of_links(
+    motion: Motion, names: Sequence[str], order: int, given: Mapping[str, NDArray[np.float64]]
+) -> dict[str, dict[str, Column]]:
+    """Links' angles and their rates; `given`: the angles of driven links as they were asked for, degrees."""
+    found = {}
+    for name, (angle, *rates) in up_to(motion, order, {name: ("angle", name) for name in names}).items():
+        shown = exact_degrees(given[name]) if name in given else degrees(np.exp(1j * angle))
+        columns = [np.where(np.isfinite(angle), shown, np.nan), *rates]
+        found[name] = {key: cells(values) for key, values in zip(LINK, columns, strict=False)}
+    return found
 
 
 def exact_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -57,12 +62,16 @@ def exact_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(reduced >= 360.0, 0.0, reduced)
 
 
-def of_point(motion: Motion, name: str, order: int) -> dict[str, Column]:
-    """A point's position and its rates."""
-    parts: dict[str, Column] = {}
-    for k in range(order + 1):
-        parts |= zip(POINT[k], pair(motion.point(name).complex(k)), strict=True)
-    return parts
+def of_points(motion: Motion, places: dict[str, Key], order: int) -> dict[str, dict[str, Column]]:
+    """Points' positions and their rates; `places`: their keys."""
+    return {
+        name: {
+            key: values
+            for keys, z in zip(POINT, found, strict=False)
+            for key, values in zip(keys, pair(z), strict=True)
+        }
+        for name, found in up_to(motion, order, places).items()
+    }
 
 
 def of_slide(motion: Motion, name: str, order: int) -> dict[str, Column]:
@@ -125,11 +134,8 @@ def document(
                 assembled.tolist(),
                 cells(motion.condition) if analysis.only is None else None,
                 marks_of(analysis, motion),
-                {
-                    name: of_link(motion, name, analysis.order, analysis.given(name))
-                    for name in analysis.links
-                },
-                {name: of_point(motion, name, analysis.order) for name in analysis.points},
+                of_links(motion, analysis.links, analysis.order, analysis.given),
+                of_points(motion, analysis.places, analysis.order),
                 {name: of_slide(motion, name, analysis.order) for name in analysis.slides},
             )
         )

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from virtualwork import Mechanism
     from virtualwork.branch.assembly import Assembly
+    from virtualwork.formulas.asked import Key
     from virtualwork.motion import Motion
 
 ORDERS = ("position", "velocity", "acceleration", "jerk")
@@ -143,8 +144,12 @@ class Analysis:
     @cached_property
     def points(self) -> tuple[str, ...]:
         """The points asked for, in the order of the file."""
-        named = dict.fromkeys(p for body in self.mechanism.bodies.values() for p in body)
-        return tuple(n for n in named if self.only is None or n in self.only)
+        return tuple(n for n in self.mechanism.points if self.only is None or n in self.only)
+
+    @cached_property
+    def places(self) -> dict[str, Key]:
+        """Their keys, without the order of the derivative."""
+        return {name: ("point", *self.mechanism.points[name], name) for name in self.points}
 
     @cached_property
     def slides(self) -> tuple[str, ...]:
@@ -162,16 +167,15 @@ class Analysis:
         several = len(self.mechanism.inputs) > 1
         return tuple(f"{name}_{key}" if several else key for name, key in self.input_names.items())
 
-    def given(self, link: str) -> NDArray[np.float64] | None:
-        """The angles asked for of a link that is driven against the ground, degrees; None for any other."""
-        for j, e in enumerate(self.mechanism.inputs):
-            if e.link == link and e.on == "ground":
-                return self.inputs.shown[:, j]
-        return None
+    @cached_property
+    def given(self) -> dict[str, NDArray[np.float64]]:
+        """The angles asked for of the links that are driven against the ground, degrees."""
+        shown, inputs = self.inputs.shown, self.mechanism.inputs
+        return {e.link: shown[:, j] for j, e in enumerate(inputs) if e.link and e.on == "ground"}
 
     def check_names(self) -> None:
         """Refuse names that --only cannot find."""
-        known = {*self.mechanism.links, *(p for body in self.mechanism.bodies.values() for p in body)}
+        known = {*self.mechanism.links, *self.mechanism.points}
         for name in self.only or ():
             if name not in known:
                 raise DataError(
@@ -201,8 +205,7 @@ class Analysis:
         if self.only is None:
             return motion.assembled
         whole = np.ones(motion.n, dtype=bool)
-        for name in self.points:
-            whole &= np.isfinite(motion.point(name).complex(0))
-        for name in self.links:
-            whole &= np.isfinite(motion.link(name).angle)
+        places = [(*key, 0) for key in self.places.values()]
+        for found in motion.values([*places, *(("angle", name, 0) for name in self.links)]):
+            whole &= np.isfinite(found)
         return whole

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cli.mechanism.columns import bounds_of, column, link_error, pose_keys
-from cli.mechanism.poses import LINK, POINT, cells, of_link, pair
+from cli.mechanism.poses import LINK, POINT, cells, of_links, pair
 from cli.mechanism.solve import Analysis
 from cli.show.columns import Table
 
@@ -152,7 +152,7 @@ def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
     for x, y, k in (("x_m", "y_m", 0), ("vx_m_s", "vy_m_s", 1), ("ax_m_s2", "ay_m_s2", 2))[: order + 1]:
         z = motion.at(name, body.center).complex(k)
         part[x], part[y] = pair(z)
-    angle = of_link(motion, name, min(order, 2), analysis.given(name))
+    angle = of_links(motion, [name], min(order, 2), analysis.given)[name]
     part |= {key: angle[key] for key in ("angle_deg", "omega_rad_s", "alpha_rad_s2") if key in angle}
     if order >= 1:
         force, torque = motion.applied(name)
@@ -226,7 +226,7 @@ def _guided(motion: Motion, guide: int, link: str) -> NDArray[np.float64]:
     g = m.guides[guide]
     if link == g.link:
         return motion.at(link, g.point).error_estimate(1)
-    slide, omega = np.abs(motion.poses.slide_derivative(guide, 0)), np.abs(motion.link(link).omega)
+    slide, omega = np.abs(motion.value(("slide", guide, 0))), np.abs(motion.link(link).omega)
     carried = motion.at(link, m.through(g)).error_estimate(1)
     turned = slide * (r.of(("angle", link, 1)) + omega * r.of(("turn", link))) + omega * r.of(
         ("slide", guide, 0)

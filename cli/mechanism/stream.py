@@ -11,8 +11,7 @@ import numpy as np
 from cli.mechanism.columns import column
 from cli.show.columns import Table
 from cli.show.progress import progress
-from virtualwork.formulas.positions import BLOCK
-from virtualwork.formulas.sweep import EvenSweep
+from virtualwork.formulas.positions import BLOCK, EvenSweep
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -137,3 +137,16 @@ def _told(self: object) -> str:
 def _html(self: object) -> str:
     frame: pd.DataFrame = self.to_frame()  # type: ignore[attr-defined]
     return str(frame.to_html(max_rows=20))
+
+
+def rebuilt(kind: Callable[..., Any], values: Mapping[str, Any]) -> Any:
+    """Make a record again from its fields."""
+    return kind(**values)
+
+
+class Record:
+    """Base of frozen dataclasses with frozen mappings: a pickle or a copy holds the fields, and nothing worked out."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        values = {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
+        return rebuilt, (type(self), {k: dict(v) if isinstance(v, Mapping) else v for k, v in values.items()})

@@ -6,6 +6,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.positions import State, loop, run
 from virtualwork.formulas.rates import Rates
 
@@ -14,7 +15,6 @@ class Digits:
     """The operations of mpmath's numbers."""
 
     sqrt, exp, join = staticmethod(mp.sqrt), staticmethod(mp.expj), staticmethod(mp.mpc)
-    constant = staticmethod(mp.mpmathify)
 
     def regular(self, inverse: mp.mpf, c1: mp.mpc, c2: mp.mpc) -> mp.mpf:
         return inverse
@@ -31,7 +31,9 @@ def test_positions_and_rates_in_forty_digits(kind, random_mechanism) -> None:
     a.cover(q, q)
     with mp.workdps(40):
         st = State([mp.mpf(q)], kind=Digits())
-        run(steps, st, a.close, a.plain)
+        cases = {g.name: Case(g, mp.mpmathify) for g in a.plan.groups}
+        assert cases.keys() == a.plain.keys()
+        run(steps, st, lambda group, st: cases[group.name].solve(st, a.signs[group.name], m.size))
         for group in a.plan.groups:
             for closure in group.closures:
                 assert abs(loop(closure, st)) < mp.mpf(10) ** -37 * m.size

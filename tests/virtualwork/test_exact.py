@@ -23,7 +23,7 @@ def errors(m, q, orders=3):
     for order in range(orders):
         values = [
             (
-                motion.poses.angle(name) if order == 0 else motion.poses.angle_derivative(name, order),
+                motion.poses.angle(name, order),
                 exact.angle(name, order),
             )
             for name in m.links
@@ -34,7 +34,9 @@ def errors(m, q, orders=3):
         sizes = [float(true) for _, true in values]
         for i, _ in enumerate(m.guides):
             true = exact.slide(i, order)
-            apart.append(float(mp.mpf(float(motion.poses.slide_derivative(i, order)[0])) - true) / m.size)
+            apart.append(
+                float(mp.mpf(float(motion.poses.values([("slide", i, order)])[0][0])) - true) / m.size
+            )
             sizes.append(float(true) / m.size)
         found.append(max(map(abs, apart)) / max(1.0, *map(abs, sizes)))
     return found, float(motion.condition[0])

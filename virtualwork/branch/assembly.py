@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.guess import choose
-from virtualwork.branch.solutions import every_solution
 from virtualwork.branch.track import Track
 from virtualwork.describe.description import Description
-from virtualwork.formulas.newton import write_unknowns
 from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.rates import Passage
@@ -154,6 +152,9 @@ def all_assemblies(chosen: Assembly) -> tuple[Assembly, ...]:
 
 def _combinations(chosen: Assembly) -> list[tuple[dict[str, int], dict[str, Any]]]:
     """Walk the steps at the guess's input and fork wherever a group closes in more than one way."""
+    from virtualwork.branch.solutions import every_solution
+    from virtualwork.formulas.newton import write_unknowns
+
     m = chosen.mechanism
     fronts: list[tuple[State, dict[str, int], dict[str, Any]]] = [(State(list(m.at)), {}, {})]
     for step in chosen.plan.steps:

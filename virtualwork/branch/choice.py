@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
 
-from dalembert.arithmetic.records import record
+from dalembert.arithmetic.records import Record, record
 from virtualwork.describe.description import Description
-from virtualwork.describe.record import Record
+from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.positions import Case, State, run
+from virtualwork.formulas.positions import State, run
 from virtualwork.formulas.rates import Passage
 from virtualwork.formulas.winding import principal
 from virtualwork.plan.order import plan
@@ -68,10 +68,10 @@ class Choice(Record):
         return found
 
     @cached_property
-    def plain(self) -> dict[str, tuple[Case, int, float]]:
-        """The closed forms that keep their sign wherever the input goes, as far as is known: case, sign, size."""
+    def plain(self) -> dict[str, Callable[[State], None]]:
+        """The closed forms that keep their sign wherever the input goes, as far as is known, each ready to be solved."""
         return {
-            name: (self.cases[name], sign, self.mechanism.size)
+            name: partial(self.cases[name].solve, sign=sign, size=self.mechanism.size)
             for name, sign in self.signs.items()
             if name in self.cases and self.geared.isdisjoint(self.cases[name].group.members)
         }

@@ -13,7 +13,7 @@ import numpy as np
 
 from virtualwork.branch.choice import Along
 from virtualwork.branch.roots import chebyshev_nodes, real_roots
-from virtualwork.describe.description import Description
+from virtualwork.branch.winding import NODES, straight_lines
 from virtualwork.formulas.double_roots import settle, singular
 from virtualwork.formulas.linear import SINGULAR, solve, stack, stack_rows
 from virtualwork.formulas.newton import gaps, newton, write_unknowns
@@ -22,8 +22,6 @@ from virtualwork.formulas.positions import State, columns
 from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Group, Step
 
-# of one turn
-NODES = 120
 # of one turn: a step this short has met a limit
 FINEST = 1e-7
 # of one turn: nodes this near to where they are to end have reached it
@@ -392,12 +390,3 @@ def _slope(track: Along, group: Group, before: Sequence[Step], inputs: Reals, wa
         d = Rates(track.assembly.plan, st, [[rate] for rate in way.T])
         d.advance(before, 1)
         return np.nan_to_num(solve(stack(columns(group, st), n), -stack_rows(d.right_side(group, 1), n)))
-
-
-def straight_lines(m: Description, st: State) -> tuple[Reals, Reals, Reals]:
-    """From the guess to each pose of a state: the guess's inputs, the ways (n, k), the longest steps as shares of them."""
-    n = max(np.size(v) for v in st.inputs)
-    at = np.array(m.at)
-    way = np.array([np.broadcast_to(np.asarray(v, dtype=float), n) for v in st.inputs]).T - at
-    unit = np.array([m.size if e.is_slide else 2 * np.pi for e in m.inputs])
-    return at, way, 1 / np.maximum(1.0, np.abs(way / unit).max(axis=1) * NODES)

@@ -11,14 +11,12 @@ import numpy as np
 from dalembert.arithmetic.recorded import bare, squared
 from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.choice import Choice
-from virtualwork.branch.solutions import every_solution, guessed_unknowns
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
-from virtualwork.formulas.constraints import Constraints, coordinates, hidden_freedom
+from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.linear import stack, stack_rows
-from virtualwork.formulas.newton import gaps, newton, write_unknowns
 from virtualwork.formulas.numbers import Number, cross, dot
-from virtualwork.formulas.positions import Case, State, columns, run
+from virtualwork.formulas.positions import State, columns, run
 from virtualwork.formulas.winding import principal
 from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
@@ -89,6 +87,8 @@ class _Chooser:
 
     def _refuse_floating(self) -> None:
         """Refuse a mechanism of which a part is free though the count of its joints and inputs says otherwise."""
+        from virtualwork.formulas.constraints import hidden_freedom
+
         x = []
         for name, link in self.m.links.items():
             turn = complex(np.exp(1j * self.angles.get(name, 0.0)))
@@ -139,6 +139,8 @@ class _Chooser:
 
     def _refuse_overdriven(self, done: Plan, st: State) -> None:
         """Constraints that depend on each other may leave less motion than there are inputs."""
+        from virtualwork.formulas.constraints import Constraints, coordinates
+
         jacobian = Constraints.at(self.m, coordinates(self.m, done, st), {}).jacobian
         try:
             s = np.linalg.svd(jacobian, compute_uv=False)
@@ -305,6 +307,10 @@ class _Chooser:
 
     # --- groups with no closed form ------------------------------------------------------------------------
     def _newton(self, group: Group, st: State) -> Any:
+        # a mechanism whose groups all have a closed form does not load these
+        from virtualwork.branch.solutions import every_solution, guessed_unknowns
+        from virtualwork.formulas.newton import gaps, newton, write_unknowns
+
         many = st.copy(many=True)
         why = ""
         start = guessed_unknowns(group, many, self.angles, self.points, self.m, self.plan.directions)
@@ -353,11 +359,12 @@ def distance(
             total = total + squared(bare(st.turn[body] - bare(rotation(angles[body]))))
         base, terms = done.anchors[body]
         placed = all(t.body in st.turn and (t.slide is None or t.slide in st.slide) for t in terms)
-        if placed and base in st.point and body in st.turn:
-            for name, z in m.links[body].points.items():
-                if name in points:
-                    here = st.point[base] + st.sum(terms) + z * st.turn[body]
-                    total = total + squared(bare(here - points[name])) / bare(m.size**2)
+        named = [(name, z) for name, z in m.links[body].points.items() if name in points]
+        if named and placed and base in st.point and body in st.turn:
+            origin = st.at((base, terms))
+            for name, z in named:
+                here = origin + z * st.turn[body]
+                total = total + squared(bare(here - points[name])) / bare(m.size**2)
     return total
 
 

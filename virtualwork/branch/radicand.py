@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from virtualwork.branch.roots import chebyshev_nodes, real_roots
+from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.numbers import EPS, Number, Reals
-from virtualwork.formulas.positions import Case
 
 # of a group, at inputs (n,)
 Radicand = Callable[[Reals], Reals]

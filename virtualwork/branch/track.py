@@ -12,21 +12,22 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from virtualwork.branch.change_point import ChangePoint, near_by, put, through
 from virtualwork.branch.choice import Choice
-from virtualwork.branch.continuation import Continuation, along_lines
-from virtualwork.branch.limits import Limit, limits, own_range
-from virtualwork.branch.period import SAME, repetition
+from virtualwork.branch.limits import SAME, Limit, limits, own_range, repetition
 from virtualwork.branch.radicand import lowest, rounding, vanishes
 from virtualwork.branch.winding import Winding, wind_along_lines
 from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.positions import State, run
 from virtualwork.plan.steps import Group, Step, turns
+
+if TYPE_CHECKING:
+    from virtualwork.branch.continuation import Continuation
 
 # of one turn, or of one mechanism's size of slide
 SAMPLES = 720
@@ -229,13 +230,11 @@ class Track:
                 if isinstance(s, Group) and s.kind == "Newton":
                     return
                 self.assembly.run_untracked([s], st)
-                if isinstance(s, Group) and s.kind != "PRP" and vanishes(st.margin[s.name], self._noise(s)):
-                    self._fold(s.name)
-                    self.assembly.cases[s.name].solve(st, 1, self.assembly.mechanism.size, folded=True)
-
-    def _noise(self, group: Group) -> float:
-        """The rounding of a group's radicand."""
-        return rounding(self.assembly.cases[group.name], self.assembly.mechanism.size)
+                if isinstance(s, Group) and s.kind != "PRP":
+                    case, size = self.assembly.cases[s.name], self.assembly.mechanism.size
+                    if vanishes(st.margin[s.name], rounding(case, size)):
+                        self._fold(s.name)
+                        case.solve(st, 1, size, folded=True)
 
     def warnings(self) -> tuple[str, ...]:
         """The assembly's warnings, and the groups that are singular in every pose in what was covered."""
@@ -288,7 +287,8 @@ class Track:
 
     def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
         """Find where the radicand crosses or touches zero; say whether a change point was found."""
-        if group.kind != "PRP" and vanishes(m, self._noise(group)):
+        noise = rounding(self.assembly.cases[group.name], self.assembly.mechanism.size)
+        if vanishes(m, noise):
             self._fold(group.name)
             return True
         if np.mean(np.abs(m) < 1e-14) > 0.9:
@@ -302,16 +302,16 @@ class Track:
         dips = 1 + np.flatnonzero((m[1:-1] <= m[:-2]) & (m[1:-1] < m[2:]) & (np.abs(m[1:-1]) < DIP))
         fresh: list[float] = []
         for i in dips:
-            found = lowest(partial(self.margin, group), float(q[i - 1]), float(q[i + 1]), self._noise(group))
+            found = lowest(partial(self.margin, group), float(q[i - 1]), float(q[i + 1]), noise)
             if found is None:
                 continue
-            where, depth, noise = found
+            where, depth, left = found
             # the gap is narrower than the samples
-            if depth < -noise and m[i] > 0:
+            if depth < -left and m[i] > 0:
                 self.brackets += [(group.name, float(q[i - 1]), where), (group.name, where, float(q[i + 1]))]
             # a change point at the seam of two chunks belongs to both
             edge = 1e-9 * self.length
-            if abs(depth) <= noise and a - edge <= where < b + edge:
+            if abs(depth) <= left and a - edge <= where < b + edge:
                 known = self.flips.setdefault(group.name, np.empty(0))
                 self.assembly.plain.pop(group.name, None)
                 if not len(known) or np.abs(known - where).min() > SAME * self.length:
@@ -338,7 +338,7 @@ class Track:
         """How many turns of the input tell the poses of the branch apart: its period.
 
         A branch between two limits needs what tells its own inputs apart; any other as many as bring every group back
-        to where it stood. None with a slide or several inputs, and where no number of turns up to `period.TURNS` does it.
+        to where it stood. None with a slide or several inputs, and where no number of turns up to `limits.TURNS` does it.
         """
         n = self.repetition
         if n == 1 or self.slides or not self.has_limits:
@@ -387,6 +387,9 @@ class Track:
     # --- groups with no closed form ------------------------------------------------------------------------------
     def _continued(self, group: Group) -> Continuation:
         if group.name not in self.continuations:
+            # four files: a mechanism whose groups all have a closed form does not load them
+            from virtualwork.branch.continuation import Continuation
+
             self.continuations[group.name] = Continuation(self, group)
         return self.continuations[group.name]
 
@@ -395,4 +398,6 @@ class Track:
         if self.active:
             self._continued(group).close(st)
         else:
+            from virtualwork.branch.continuation import along_lines
+
             along_lines(self, group, st)

@@ -10,11 +10,14 @@ from collections.abc import Collection
 import numpy as np
 
 from virtualwork.branch.choice import Along
-from virtualwork.branch.continuation import straight_lines
+from virtualwork.describe.description import Description
 from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.winding import FAR, NONE, SHORTEST, Samples, follow, principal, whole
 from virtualwork.plan.steps import Group
+
+# of one turn
+NODES = 120
 
 
 class Winding:
@@ -40,6 +43,15 @@ class Winding:
 
         known = self._samples.get(body, NONE)
         self._samples[body] = follow(angle, q, self.track.start, self.track.length, known)
+
+
+def straight_lines(m: Description, st: State) -> tuple[Reals, Reals, Reals]:
+    """From the guess to each pose of a state: the guess's inputs, the ways (n, k), the longest steps as shares of them."""
+    n = max(np.size(v) for v in st.inputs)
+    at = np.array(m.at)
+    way = np.array([np.broadcast_to(np.asarray(v, dtype=float), n) for v in st.inputs]).T - at
+    unit = np.array([m.size if e.is_slide else 2 * np.pi for e in m.inputs])
+    return at, way, 1 / np.maximum(1.0, np.abs(way / unit).max(axis=1) * NODES)
 
 
 def wind_along_lines(track: Along, group: Group, st: State, bodies: Collection[str]) -> None:

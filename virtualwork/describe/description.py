@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
-from dalembert.arithmetic.records import record
+from dalembert.arithmetic.records import Record, record
 from virtualwork.describe.checks import refuse
 from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.describe.parts import (
@@ -25,7 +25,6 @@ from virtualwork.describe.parts import (
     as_point,
     as_points,
 )
-from virtualwork.describe.record import Record
 
 
 @record
@@ -128,6 +127,15 @@ class Description(Record):
     def bodies(self) -> Mapping[str, Mapping[str, complex]]:
         """The points of each body in its own axes; the ground comes first."""
         return {GROUND: self.ground} | {name: link.points for name, link in self.links.items()}
+
+    @cached_property
+    def points(self) -> Mapping[str, tuple[str, complex]]:
+        """Each named point: the first body that has it, the ground before the links, and its place in that body's axes."""
+        found: dict[str, tuple[str, complex]] = {}
+        for body, points in self.bodies.items():
+            for name, z in points.items():
+                found.setdefault(name, (body, z))
+        return found
 
     @cached_property
     def pins(self) -> Mapping[str, tuple[str, ...]]:

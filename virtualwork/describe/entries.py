@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import io
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,6 @@ from typing import Any
 from virtualwork.describe.errors import DescriptionError, hint
 from virtualwork.describe.keys import UNITS, Keys
 from virtualwork.describe.parts import GROUND, Link
-from virtualwork.describe.tables import rows
 from virtualwork.describe.units import Units, wrong
 
 Load = Callable[[Path], bytes]
@@ -51,7 +52,7 @@ class Entries:
     def csv(self, name: Any, where: str) -> list[dict[str, str]]:
         """The rows of a CSV file beside this one."""
         try:
-            return rows(self.load(self.folder / str(name)))
+            return table_rows(self.load(self.folder / str(name)))
         except (OSError, ValueError, csv.Error):
             raise wrong(where, name, "a CSV file that can be read") from None
 
@@ -107,3 +108,41 @@ def proper(entry: Mapping[str, Any], keys: Keys, where: str) -> None:
     """Refuse unknown keys, and an entry in which one is missing that must be there."""
     known_keys(entry, keys, where, "key")
     need(entry, tuple(name for name, key in keys.items() if key.needed), where)
+
+
+def table_rows(data: bytes) -> list[dict[str, str]]:
+    """Return the rows of a table: commas, semicolons or tabs between the cells; UTF-8, UTF-16 or Latin-1.
+
+    Where the cells are not told apart by commas, a comma is a decimal one, and then no cell has a decimal point.
+
+    Raises
+    ------
+    ValueError, csv.Error
+        No such table.
+
+    Examples
+    --------
+    >>> table_rows(b"angle_deg;fx_N\\n0;-1,5\\n90;2\\n")
+    [{'angle_deg': '0', 'fx_N': '-1.5'}, {'angle_deg': '90', 'fx_N': '2'}]
+    """
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        text = data.decode("utf-16")
+    else:
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = data.decode("cp1252")
+    header = re.search(r"\S.*", text)
+    mark = max(",;\t", key=lambda m: (header.group().count(m) if header else 0, m == ","))
+    found = list(csv.DictReader(io.StringIO(text, newline=""), delimiter=mark, skipinitialspace=True))
+    cells = (cell for row in found for cell in row.values() if isinstance(cell, str))
+    if mark == "," or not any("," in cell for cell in cells):
+        return found
+    # 2.500 beside 1,5 may be 2500: it is made no number, and refused
+    return [
+        {key: _decimal(cell) if isinstance(cell, str) else cell for key, cell in row.items()} for row in found
+    ]
+
+
+def _decimal(cell: str) -> str:
+    return cell.replace(".", "'").replace(",", ".")

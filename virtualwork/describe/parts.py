@@ -10,10 +10,9 @@ from dataclasses import dataclass, field
 from numbers import Real
 from types import MappingProxyType
 
-from dalembert.arithmetic.records import record
+from dalembert.arithmetic.records import Record, record
 from dalembert.arithmetic.varied import rotation
 from virtualwork.describe.errors import DescriptionError, hint
-from virtualwork.describe.record import Record
 
 GROUND = "ground"
 Point = complex | tuple[float, float] | Sequence[float]

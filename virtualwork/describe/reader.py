@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 
 from virtualwork.describe import keys
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import dimensions, named
 from virtualwork.describe.entries import Load, known_keys, proper
 from virtualwork.describe.errors import DescriptionError, MechanismError, hint
 from virtualwork.describe.load_entries import LoadEntries
@@ -97,6 +96,9 @@ class _Reader(LoadEntries):
         found: dict[str, float] = {}
         if "tolerances" not in self.data:
             return found
+        # most files have none
+        from virtualwork.describe.dimensions import dimensions, named
+
         known = dimensions(m)
 
         def walk(table: Mapping[str, Any], before: str) -> None:

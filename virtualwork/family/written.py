@@ -15,9 +15,10 @@ from virtualwork.branch.guess import distance, sign_of_angles
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, value
 from virtualwork.formulas.asked import FORCES, Key, names
+from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.kinds import WRITTEN
 from virtualwork.formulas.numbers import Number
-from virtualwork.formulas.positions import Case, State, run
+from virtualwork.formulas.positions import State, run
 from virtualwork.formulas.recording import NEAR, Recording
 from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
@@ -201,7 +202,7 @@ class Written:
         outputs: dict[str, Number] = {}
 
         def close(group: Group, st: State) -> None:
-            case, size, name = Case(group), bare(m.size), group.name
+            case, size, name = Case(group, bare), bare(m.size), group.name
             if group not in self.closed:
                 case.solve(st, 1, size)
                 return

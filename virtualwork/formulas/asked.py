@@ -82,24 +82,7 @@ def over_blocks(poses: Poses, key: Key, forces: Dynamics | None = None) -> Any:
             return forces.at_joint(*of)
         joint = forces.reactions.by_key[of[0]]
         return forces.joint_force(joint, of[1]) if kind == "force" else forces.joint_moment(joint, of[1])
-    match kind:
-        case "point":
-            body, z, node, order = of
-            return poses.point_derivative(body, z, order, node)
-        case "angle":
-            body, order = of
-            return poses.angle_derivative(body, order) if order else poses.angle(body)
-        case "turn":
-            poses.solve((f"angle:{of[0]}",), 0)
-            return poses.over(lambda _, st: st.turn[of[0]], complex)
-        case "slide":
-            return poses.slide_derivative(*of)
-        case "dpoint":
-            body, z, node, j, order = of
-            return poses.point_coefficient(body, z, j, node, order)
-        case "dangle":
-            return poses.angle_coefficient(*of)
-    raise KeyError(key)
+    return poses.values((key,))[0]
 
 
 def names(key: Key) -> tuple[str, ...]:

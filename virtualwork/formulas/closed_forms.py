@@ -13,8 +13,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from virtualwork.formulas.kinds import ONE
+import numpy as np
+
+from dalembert.arithmetic.varied import rotation
+from virtualwork.formulas.kinds import ONE, Folded
 from virtualwork.formulas.numbers import Kind, Number, cross
+from virtualwork.formulas.positions import State
+from virtualwork.plan.steps import Angle, Group, Term
 
 
 @dataclass(frozen=True)
@@ -179,3 +184,113 @@ def two_columns(w: Number, c1: Number, c2: Number) -> tuple[Number, Number, Numb
     det = cross(c1, c2)
     inverse = -1 / det
     return cross(w, c2) * inverse, cross(c1, w) * inverse, det
+
+
+class Case:
+    """What a closed-form group needs, worked out once: its known terms, arms and rails.
+
+    An arm is the vector that turns with an unknown angle; it is a constant unless an input stretches or bends it.
+    `constant` makes a number of the mechanism one of those that the group is solved with.
+    """
+
+    def __init__(self, group: Group, constant: Callable[[Number], Number] | None = None) -> None:
+        closure = group.closures[0]
+        tie = {t.body: t.angle for t in group.ties}
+        owner = {b: b for b in group.angles} | {
+            b: next(base for base, _ in a.bases if base in group.angles) for b, a in tie.items()
+        }
+        members = set(owner)
+        self.closure, self.group = closure, group
+        self.known = tuple(
+            t
+            for t in closure.terms
+            if t.body not in members and (t.slide is None or t.slide not in group.slides)
+        )
+        self.arms: list[Number] = []
+        self.bent: list[list[tuple[Term, Angle]]] = []
+        self.tie = tie
+        for angle in group.angles:
+            fixed, bent = 0j, []
+            for t in closure.terms:
+                if owner.get(t.body) == angle and t.slide not in group.slides:
+                    relative = tie.get(t.body, Angle())
+                    if t.slide is None and not relative.inputs:
+                        fixed += t.z * rotation(relative.const)
+                    else:
+                        bent.append((t, relative))
+            self.arms.append(fixed if constant is None else constant(fixed))
+            self.bent.append(bent)
+        self.rails: list[tuple[complex, str]] = []
+        for g in group.slides:
+            rail = [t for t in closure.terms if t.slide == g]
+            t = rail[0]
+            relative = tie.get(t.body, Angle())
+            plain = group.kind == "RPR" and not relative.inputs
+            self.rails.append((t.z * rotation(relative.const) if plain else t.z, t.body))
+
+    def arm(self, i: int, st: State) -> Number:
+        """The arm of unknown angle i."""
+        value: Number = self.arms[i]
+        for t, relative in self.bent[i]:
+            v = t.z
+            if relative.inputs or relative.const:
+                v = v * st.kind.exp(st.affine(relative))
+            if t.slide is not None:
+                v = v * st.slide[t.slide]
+            value = value + v
+        return value
+
+    def rail(self, st: State) -> Number:
+        """The direction of a slide that turns with the unknown angle, relative to it."""
+        z, body = self.rails[0]
+        relative = self.tie.get(body, Angle())
+        return z * st.kind.exp(st.affine(relative)) if relative.inputs else z
+
+    def offset(self, st: State) -> Number:
+        """W: the known part of the loop."""
+        w = st.point[self.closure.start] - st.point[self.closure.end]
+        return w + st.sum(self.known) if self.known else w
+
+    def gap(self, st: State) -> Gap | None:
+        """By how much the group does not close at one pose; None where it does."""
+        group = self.group
+        if group.kind == "RRR":
+            v, u = self.arm(0, st), self.arm(1, st)
+        elif group.kind == "PRP":
+            v, u = (z * st.turn[body] for z, body in self.rails)
+        else:
+            z, body = self.rails[0]
+            v, u = self.arm(0, st), z * st.turn[body] if group.kind == "RRP" else self.rail(st)
+        return gap_of(group.kind, group.angles, complex(self.offset(st)), complex(v), complex(u))
+
+    def solve(self, st: State, sign: Number, size: float, folded: bool = False) -> None:
+        """Write the group's rotations and slides into the state; `folded`: its two assemblies meet in every pose."""
+        group = self.group
+        kind: Kind = Folded(st.kind) if folded else st.kind
+        w = self.offset(st)
+        if st.many and isinstance(w, complex):
+            # between points that stand: as in any array, what is divided by zero is infinite
+            w = np.complex128(w)
+        if group.kind == "RRR":
+            a, b = group.angles
+            st.turn[a], st.turn[b], margin = two_angles(w, self.arm(0, st), self.arm(1, st), sign, kind)
+        elif group.kind == "RRP":
+            (a,), (g,) = group.angles, group.slides
+            z, body = self.rails[0]
+            st.turn[a], st.slide[g], margin = angle_and_slide(
+                w, self.arm(0, st), z * st.turn[body], sign, kind
+            )
+        elif group.kind == "RPR":
+            (a,), (g,) = group.angles, group.slides
+            st.turn[a], st.slide[g], margin = turning_slide(
+                w, self.arm(0, st), self.rail(st), sign, size, kind
+            )
+        else:
+            g, h = group.slides
+            u, v = (z * st.turn[body] for z, body in self.rails)
+            st.slide[g], st.slide[h], margin = two_slides(w, u, v)
+        st.margin[group.name] = margin
+        if folded:
+            st.folded.add(group.name)
+        for tie in group.ties:
+            st.turn[tie.body] = st.rotate(tie.angle)

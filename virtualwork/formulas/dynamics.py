@@ -63,7 +63,7 @@ class Dynamics:
         m, found = self.poses.mechanism, {}
         for number, spring in enumerate(m.springs, 1):
             if (spring.stiffness and spring.free_length) or (spring.damping and self.scene.moves):
-                a, b = (self.poses.point_derivative(link, m.place(link, p), 0) for link, p in spring.between)
+                a, b = (self.poses.point(link, m.place(link, p)) for link, p in spring.between)
                 meet = np.broadcast_to(np.abs(a - b) <= TOGETHER * m.size, self.poses.n)
                 if meet.any():
                     found[number] = meet

@@ -103,8 +103,9 @@ def through_carriers(scene: Scene, force: Reals) -> Reals:
     matrix = np.broadcast_to(np.eye(k), (poses.n, k, k)).copy()
     for j in moved:
         for i in range(k):
-            driven = poses.angle_coefficient(str(inputs[j].link), i)
-            matrix[:, i, j] = driven - poses.angle_coefficient(scene.mechanism.carrier(j), i)
+            bodies = str(inputs[j].link), scene.mechanism.carrier(j)
+            driven, carrier = poses.values([("dangle", body, i, 1) for body in bodies])
+            matrix[:, i, j] = driven - carrier
     if k == 1:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(force / matrix[:, 0])

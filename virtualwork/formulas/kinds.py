@@ -16,10 +16,6 @@ from virtualwork.formulas.numbers import PARALLEL, Kind, Number
 class One:
     """Python numbers: a single pose."""
 
-    def constant(self, z: complex) -> complex:
-        """The constant itself."""
-        return z
-
     def sqrt(self, x: float) -> float:
         """The root."""
         return math.sqrt(x) if x >= 0 else math.nan
@@ -52,10 +48,6 @@ class Many:
 
     sqrt, angle = staticmethod(np.sqrt), staticmethod(np.angle)
     solve, transposed = staticmethod(solve_columns), staticmethod(solve_transposed)
-
-    def constant(self, z: complex) -> complex:
-        """The constant itself."""
-        return z
 
     def exp(self, angle: Number) -> Number:
         """e^{i·angle}."""
@@ -91,7 +83,7 @@ class Folded:
 
     def __init__(self, kind: Kind) -> None:
         self.exp, self.join, self.regular = kind.exp, kind.join, kind.regular
-        self.constant, self.angle, self.inverse = kind.constant, kind.angle, kind.inverse
+        self.angle, self.inverse = kind.angle, kind.inverse
         self.solve, self.transposed = kind.solve, kind.transposed
 
     def sqrt(self, x: Number) -> Number:
@@ -114,10 +106,6 @@ PARTS = real_part, imaginary_part
 
 class Written:
     """Recorded numbers, and constants of the mechanism that vary: what is done with them is written down."""
-
-    def constant(self, z: complex) -> Number:
-        """The constant itself, or what is recorded of it."""
-        return bare(z)
 
     def sqrt(self, x: Number) -> Number:
         """The root."""

@@ -227,7 +227,7 @@ class Lanes:
         if table.axis == "time":
             return np.asarray(table.timed(poses.time))
         if table.axis == "speed":
-            return poses.angle_derivative(table.body, 1)
+            return poses.angle(table.body, 1)
         known = self.branch.plan.angles[table.body]
         if known.bases:
             return np.asarray(table.in_turn(poses.angle(table.body)))

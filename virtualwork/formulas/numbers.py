@@ -25,9 +25,6 @@ TOGETHER = 64 * EPS
 class Kind(Protocol):
     """The operations of one kind of number."""
 
-    def constant(self, z: complex) -> Number:
-        """A constant of the mechanism as such a number, so that its size and its inverse have all digits."""
-
     def sqrt(self, x: Number) -> Number:
         """The root; NaN of a negative number."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, partial
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,10 +18,9 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.linear import condition
 from virtualwork.formulas.numbers import Complexes, Number, Reals
-from virtualwork.formulas.positions import BLOCK, SWEEP, Case, State, columns, run
+from virtualwork.formulas.positions import BLOCK, SWEEP, EvenSweep, State, columns, run
 from virtualwork.formulas.rates import Passage, Rates
-from virtualwork.formulas.sweep import EvenSweep
-from virtualwork.plan.steps import Group, Path, Plan, Step, Term, path_reads
+from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
 
 
 class Branch(Protocol):
@@ -56,8 +55,8 @@ class Branch(Protocol):
         """The steps that targets hang on, as far as they were asked for."""
 
     @property
-    def plain(self) -> dict[str, tuple[Case, int, float]]:
-        """The closed forms that keep their sign wherever the input goes: case, sign, size."""
+    def plain(self) -> dict[str, Callable[[State], None]]:
+        """The closed forms that keep their sign wherever the input goes, each ready to be solved."""
 
     @property
     def close(self) -> Callable[[Group, State], None]:
@@ -65,6 +64,19 @@ class Branch(Protocol):
 
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""
+
+
+class _Asked(NamedTuple):
+    """A quantity: what it hangs on, to which order, over which input; what a state has of it, and its rates."""
+
+    targets: tuple[str, ...]
+    order: int
+    which: int
+    # for one input alone, not along the motion
+    alone: bool
+    number: type
+    place: Callable[[State], Number]
+    rate: Callable[[Rates, int], Number]
 
 
 class Poses:
@@ -196,22 +208,14 @@ class Poses:
                     for i in range(0, self.n, BLOCK)
                 ]
                 if k == 1 and self.swept:
-                    self._sweep(self.inputs[:, 0], self._blocks)
+                    sweep = self.block_of or EvenSweep(self.inputs[0, 0], self.inputs[-1, 0], self.n)
+                    sweep.give(self._blocks)
         return self._blocks
 
     @property
     def swept(self) -> bool:
         """Whether this is a sweep of so many poses, or a block of one, that e^{iq} is formed by angle addition."""
         return self.n > SWEEP or self.block_of is not None
-
-    def _sweep(self, q: Reals, blocks: list[State]) -> None:
-        """Give the blocks of an even sweep their e^{iq}; where one block is not even, none gets them."""
-        sweep = self.block_of or EvenSweep(q[0], q[-1], self.n)
-        if all(sweep.off(q[i : i + BLOCK]) is not None for i in range(0, len(q), BLOCK)):
-            for st in blocks:
-                turns = sweep.turns(np.asarray(st.inputs[0]))
-                if turns is not None:
-                    st.spins[0] = turns
 
     def rows(self) -> Iterator[tuple[slice, State]]:
         """The blocks, each with the poses that are in it."""
@@ -315,63 +319,66 @@ class Poses:
 
         return self.over(form, kind)
 
-    def _which(self, j: int) -> int:
-        return -1 if self.inputs.shape[1] == 1 else j
-
     # --- quantities -------------------------------------------------------------------------------------------
     def rate(self, j: int, order: int) -> Reals:
         """The order-th derivative of input j in time, (n,)."""
         return np.broadcast_to(np.asarray(self.rates[order - 1][j], dtype=float), (self.n,))
 
-    def angle(self, body: str) -> Reals:
-        """A link's angle, (n,) rad."""
-        self.solve((f"angle:{body}",), 0)
-        return self.over(lambda i, st: np.angle(st.turn[body]))  # type: ignore[no-any-return]
+    def values(self, keys: Sequence[tuple[Any, ...]]) -> list[Any]:
+        """Quantities of motion by their keys (`asked.Key`), (n,) each; what they hang on is solved in one pass."""
+        asked = [self._asked(key) for key in keys]
+        wanted: dict[tuple[int, int], dict[str, None]] = {}
+        for quantity in asked:
+            wanted.setdefault((quantity.order, quantity.which), {}).update(dict.fromkeys(quantity.targets))
+        rates = {of: self.solve(targets, *of) for of, targets in wanted.items()}
+        return [self._formed(quantity, rates[quantity.order, quantity.which]) for quantity in asked]
 
-    def angle_derivative(self, body: str, order: int) -> Reals:
-        """A link's ω, α or angular jerk, (n,)."""
-        if body == GROUND:
-            return np.zeros(self.n)
-        rates = self.solve((f"angle:{body}",), order)
-        return self.in_time(order, lambda i, k: rates[i].angle[body][k - 1])  # type: ignore[no-any-return]
+    def _asked(self, key: tuple[Any, ...]) -> _Asked:
+        """What a quantity hangs on, and what the states and their rates have of it."""
+        kind, of, *more = key
+        alone = kind in ("dpoint", "dangle")
+        how = more[-1] if more else 0, more[-2] if alone and self.inputs.shape[1] > 1 else -1, alone
+        if kind in ("point", "dpoint"):
+            z, node = more[:2]
+            if node is not None:
+                return _Asked(
+                    (f"point:{node}",),
+                    *how,
+                    complex,
+                    lambda st: st.point[node],
+                    lambda r, k: r.point[node][k - 1],
+                )
+            base, terms = self.plan.anchors[of]
+            path = base, (*terms, Term(z, of))
+            reads = tuple(sorted(path_reads(path)))
+            return _Asked(reads, *how, complex, lambda st: st.at(path), lambda r, k: r.vector(path, k))
+        if kind == "slide":
+            return _Asked(
+                (f"slide:{of}",), *how, float, lambda st: st.slide[of], lambda r, k: r.slide[of][k - 1]
+            )
+        target = (f"angle:{of}",)
+        if kind == "turn":
+            return _Asked(target, *how, complex, lambda st: st.turn[of], lambda r, k: r.turn(of, k))
+        if kind not in ("angle", "dangle"):
+            raise KeyError(key)
+        if of == GROUND:
+            return _Asked((), 0, -1, False, float, lambda st: 0.0, lambda r, k: None)
+        return _Asked(target, *how, float, lambda st: np.angle(st.turn[of]), lambda r, k: r.angle[of][k - 1])
 
-    def angle_coefficient(self, body: str, j: int = 0, order: int = 1) -> Reals:
-        """dθ/dq_j, (n,); order 2: d²θ/dq_j²."""
-        if body == GROUND:
-            return np.zeros(self.n)
-        rates = self.solve((f"angle:{body}",), order, self._which(j))
-        return self.over(lambda i, st: rates[i].angle[body][order - 1])  # type: ignore[no-any-return]
+    def _formed(self, of: _Asked, rates: list[Rates]) -> Any:
+        if of.order == 0:
+            return self.over(lambda _, st: of.place(st), of.number)
+        if of.alone:
+            return self.over(lambda i, _: of.rate(rates[i], of.order), of.number)
+        return self.in_time(of.order, lambda i, k: of.rate(rates[i], k), of.number)
 
-    def _path(self, body: str, z: complex, node: str | None) -> tuple[tuple[str, ...], Path]:
-        """What a point of a body hangs on, and where it lies."""
-        if node is not None:
-            return (f"point:{node}",), (node, ())
-        base, terms = self.plan.anchors[body]
-        path = base, (*terms, Term(z, body))
-        return tuple(sorted(path_reads(path))), path
+    def angle(self, body: str, order: int = 0) -> Reals:
+        """A link's angle, (n,) rad, or its ω, α or angular jerk."""
+        return self.values((("angle", body, order),))[0]  # type: ignore[no-any-return]
 
-    def point_derivative(self, body: str, z: complex, order: int, node: str | None = None) -> Complexes:
+    def point(self, body: str, z: complex, order: int = 0, node: str | None = None) -> Complexes:
         """Position (order 0) or a time derivative of any point of a body, x + iy, (n,)."""
-        keys, path = self._path(body, z, node)
-        rates = self.solve(keys, order)
-        if order == 0:
-            return self.over(lambda i, st: st.at(path), complex)  # type: ignore[no-any-return]
-        return self.in_time(order, lambda i, k: rates[i].vector(path, k), complex)  # type: ignore[no-any-return]
-
-    def point_coefficient(
-        self, body: str, z: complex, j: int = 0, node: str | None = None, order: int = 1
-    ) -> Complexes:
-        """dP/dq_j of any point of a body, x + iy, (n,); order 2: d²P/dq_j²."""
-        keys, path = self._path(body, z, node)
-        rates = self.solve(keys, order, self._which(j))
-        return self.over(lambda i, st: rates[i].vector(path, order), complex)  # type: ignore[no-any-return]
-
-    def slide_derivative(self, guide: int, order: int) -> Reals:
-        """A slide or its time derivative, (n,)."""
-        rates = self.solve((f"slide:{guide}",), order)
-        if order == 0:
-            return self.over(lambda i, st: st.slide[guide])  # type: ignore[no-any-return]
-        return self.in_time(order, lambda i, k: rates[i].slide[guide][k - 1])  # type: ignore[no-any-return]
+        return self.values((("point", body, z, node, order),))[0]  # type: ignore[no-any-return]
 
     def columns(self, group: Group) -> list[list[Complexes]]:
         """The Jacobian of one Assur group: for each of its loops, the column of each of its unknowns, (n,) complex."""

@@ -6,24 +6,16 @@ Assur group. The steps do not know what kind of numbers they run on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from dalembert.arithmetic.varied import rotation
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.closed_forms import (
-    Gap,
-    angle_and_slide,
-    gap_of,
-    turning_slide,
-    two_angles,
-    two_slides,
-)
-from virtualwork.formulas.kinds import MANY, ONE, Folded
-from virtualwork.formulas.numbers import Kind, Number, plus
+from virtualwork.formulas.kinds import MANY, ONE
+from virtualwork.formulas.numbers import EPS, Complexes, Kind, Number, Reals
 from virtualwork.plan.steps import Angle, Closure, Group, Path, Place, Step, Term, Turn
 
 # poses worked out together: their temporaries stay in the cache
@@ -123,15 +115,82 @@ class State:
         return 1.0 + 0j if value is None else value
 
 
+class EvenSweep:
+    """An even sweep of an input, whose e^{iq} follow by angle addition: e^{i(q0 + jh)} = e^{iq0}·e^{ijh}.
+
+    Each factor is rounded once and the product twice, whatever the length of the sweep; the sweep's own rounding,
+    the difference between q and q0 + jh, is put back to first order, which is exact here. A block of `BLOCK` poses
+    needs no other block of the sweep.
+
+    Parameters
+    ----------
+    first, last : float
+        rad.
+    n : int
+        Number of poses.
+    even : bool
+        False where some block is known not to be even: then none is taken as such.
+
+    Examples
+    --------
+    >>> sweep = EvenSweep(0.0, 6.0, 7)
+    >>> bool(np.allclose(sweep.turns(np.arange(7.0)), np.exp(1j * np.arange(7.0)), rtol=1e-15))
+    True
+    >>> sweep.turns(np.arange(7.0) ** 2) is None
+    True
+    """
+
+    def __init__(self, first: float, last: float, n: int, even: bool = True) -> None:
+        self.even = even
+        h = (last - first) / (n - 1)
+        self.ramp = h * np.arange(min(n, BLOCK))
+        self.bound = 64 * EPS * max(abs(first), abs(last), 1e-3)
+
+    @cached_property
+    def _table(self) -> Complexes:
+        table = np.empty(len(self.ramp), complex)
+        np.cos(self.ramp, out=table.real)
+        np.sin(self.ramp, out=table.imag)
+        return table
+
+    def off(self, q: Reals) -> Reals | None:
+        """By how much a block's inputs are off from even steps; None where they are not even to rounding."""
+        with np.errstate(invalid="ignore"):
+            off = (q - q[0]) - self.ramp[: len(q)]
+            return off if off.max() <= self.bound and off.min() >= -self.bound else None
+
+    def give(self, blocks: Sequence[State]) -> None:
+        """Give blocks of poses their e^{iq}; where one block is not even, none gets them."""
+        turns = []
+        for st in blocks:
+            turns.append(self.turns(st.inputs[0]))
+            if turns[-1] is None:
+                return
+        for st, spin in zip(blocks, turns, strict=True):
+            st.spins[0] = spin
+
+    def turns(self, q: Reals) -> Complexes | None:
+        """e^{iq} of a block, (≤ BLOCK,); None where the sweep is not even."""
+        off = self.off(q) if self.even else None
+        if off is None:
+            return None
+        e = self._table[: len(q)] * complex(np.cos(q[0]), np.sin(q[0]))
+        turn = np.empty(len(q), complex)
+        turn.real = 1.0
+        turn.imag = off
+        e *= turn
+        return e
+
+
 def run(
     steps: Iterable[Step],
     st: State,
     close: Callable[[Group, State], None] | None = None,
-    plain: Mapping[str, tuple[Case, int, float]] = EMPTY,
+    plain: Mapping[str, Callable[[State], None]] = EMPTY,
 ) -> None:
     """Work out positions, step by step.
 
-    `close` closes the loops of a group on its branch; those of `plain`, (case, sign, size), keep one sign all along.
+    `close` closes the loops of a group on its branch; what `plain` has for a group does so wherever the input goes.
     """
     for step in steps:
         if isinstance(step, Place):
@@ -139,8 +198,7 @@ def run(
             st.point[step.node] = v if step.base is None else st.point[step.base] + v
         elif isinstance(step, Group):
             if step.name in plain:
-                case, sign, size = plain[step.name]
-                case.solve(st, sign, size)
+                plain[step.name](st)
             elif close is not None:
                 close(step, st)
         elif isinstance(step, Turn):
@@ -166,115 +224,6 @@ def loop(closure: Closure, st: State) -> Number:
     return w + st.sum(closure.terms) if closure.terms else w
 
 
-class Case:
-    """What a closed-form group needs, worked out once: its known terms, arms and rails.
-
-    An arm is the vector that turns with an unknown angle; it is a constant unless an input stretches or bends it.
-    """
-
-    def __init__(self, group: Group) -> None:
-        closure = group.closures[0]
-        tie = {t.body: t.angle for t in group.ties}
-        owner = {b: b for b in group.angles} | {
-            b: next(base for base, _ in a.bases if base in group.angles) for b, a in tie.items()
-        }
-        members = set(owner)
-        self.closure, self.group = closure, group
-        self.known = tuple(
-            t
-            for t in closure.terms
-            if t.body not in members and (t.slide is None or t.slide not in group.slides)
-        )
-        self.arms: list[complex] = []
-        self.bent: list[list[tuple[Term, Angle]]] = []
-        self.tie = tie
-        for angle in group.angles:
-            fixed, bent = 0j, []
-            for t in closure.terms:
-                if owner.get(t.body) == angle and t.slide not in group.slides:
-                    relative = tie.get(t.body, Angle())
-                    if t.slide is None and not relative.inputs:
-                        fixed += t.z * rotation(relative.const)
-                    else:
-                        bent.append((t, relative))
-            self.arms.append(fixed)
-            self.bent.append(bent)
-        self.rails: list[tuple[complex, str]] = []
-        for g in group.slides:
-            rail = [t for t in closure.terms if t.slide == g]
-            t = rail[0]
-            relative = tie.get(t.body, Angle())
-            plain = group.kind == "RPR" and not relative.inputs
-            self.rails.append((t.z * rotation(relative.const) if plain else t.z, t.body))
-
-    def arm(self, i: int, st: State) -> Number:
-        """The arm of unknown angle i."""
-        value: Number = st.kind.constant(self.arms[i])
-        for t, relative in self.bent[i]:
-            v = t.z
-            if relative.inputs or relative.const:
-                v = v * st.kind.exp(st.affine(relative))
-            if t.slide is not None:
-                v = v * st.slide[t.slide]
-            value = value + v
-        return value
-
-    def rail(self, st: State) -> Number:
-        """The direction of a slide that turns with the unknown angle, relative to it."""
-        z, body = self.rails[0]
-        relative = self.tie.get(body, Angle())
-        return z * st.kind.exp(st.affine(relative)) if relative.inputs else z
-
-    def offset(self, st: State) -> Number:
-        """W: the known part of the loop."""
-        w = st.point[self.closure.start] - st.point[self.closure.end]
-        return w + st.sum(self.known) if self.known else w
-
-    def gap(self, st: State) -> Gap | None:
-        """By how much the group does not close at one pose; None where it does."""
-        group = self.group
-        if group.kind == "RRR":
-            v, u = self.arm(0, st), self.arm(1, st)
-        elif group.kind == "PRP":
-            v, u = (z * st.turn[body] for z, body in self.rails)
-        else:
-            z, body = self.rails[0]
-            v, u = self.arm(0, st), z * st.turn[body] if group.kind == "RRP" else self.rail(st)
-        return gap_of(group.kind, group.angles, complex(self.offset(st)), complex(v), complex(u))
-
-    def solve(self, st: State, sign: Number, size: float, folded: bool = False) -> None:
-        """Write the group's rotations and slides into the state; `folded`: its two assemblies meet in every pose."""
-        group = self.group
-        kind: Kind = Folded(st.kind) if folded else st.kind
-        w = self.offset(st)
-        if st.many and isinstance(w, complex):
-            # between points that stand: as in any array, what is divided by zero is infinite
-            w = np.complex128(w)
-        if group.kind == "RRR":
-            a, b = group.angles
-            st.turn[a], st.turn[b], margin = two_angles(w, self.arm(0, st), self.arm(1, st), sign, kind)
-        elif group.kind == "RRP":
-            (a,), (g,) = group.angles, group.slides
-            z, body = self.rails[0]
-            st.turn[a], st.slide[g], margin = angle_and_slide(
-                w, self.arm(0, st), z * st.turn[body], sign, kind
-            )
-        elif group.kind == "RPR":
-            (a,), (g,) = group.angles, group.slides
-            st.turn[a], st.slide[g], margin = turning_slide(
-                w, self.arm(0, st), self.rail(st), sign, size, kind
-            )
-        else:
-            g, h = group.slides
-            u, v = (z * st.turn[body] for z, body in self.rails)
-            st.slide[g], st.slide[h], margin = two_slides(w, u, v)
-        st.margin[group.name] = margin
-        if folded:
-            st.folded.add(group.name)
-        for tie in group.ties:
-            st.turn[tie.body] = st.rotate(tie.angle)
-
-
 def columns(group: Group, st: State) -> list[list[Number]]:
     """The Jacobian of a group: for each loop, its complex column for each unknown (angles, then slides).
 
@@ -289,13 +238,15 @@ def columns(group: Group, st: State) -> list[list[Number]]:
                 r = ratio(group, t.body, angle)
                 if r:
                     v = (1j * r * t.z) * st.turn[t.body]
-                    c = plus(c, v if t.slide is None else v * st.slide[t.slide])
+                    v = v if t.slide is None else v * st.slide[t.slide]
+                    c = v if c is None else c + v
             row.append(0j if c is None else c)
         for g in group.slides:
             c = None
             for t in closure.terms:
                 if t.slide == g:
-                    c = plus(c, t.z * st.turn[t.body])
+                    v = t.z * st.turn[t.body]
+                    c = v if c is None else c + v
             row.append(0j if c is None else c)
         rows.append(row)
     return rows

@@ -28,6 +28,7 @@ from virtualwork.describe.loads import TorsionSpring
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.asked import FORCES, JOINTS, Key, names
 from virtualwork.formulas.block import Block, Shared, Table
+from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.dynamics import resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.kinds import PARTS, WRITTEN
@@ -36,7 +37,7 @@ from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.newton import gaps, put_unknowns
 from virtualwork.formulas.poses import chain_rule
-from virtualwork.formulas.positions import Case, State, columns, run
+from virtualwork.formulas.positions import State, columns, run
 from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import JointForces
 from virtualwork.plan.order import plan
@@ -90,7 +91,7 @@ class Recording:
             [self.recorder.input(f"{name}{j}") if there else None for j in range(k)]
             for name, there in zip(NAMES[1:], moves, strict=True)
         ]
-        self._cases = {g.name: Case(g) for g in plan.groups if g.kind != "Newton"}
+        self._cases = {g.name: Case(g, bare) for g in plan.groups if g.kind != "Newton"}
         self._by = (
             [Rates(plan, self.st, [[1.0]])]
             if k == 1

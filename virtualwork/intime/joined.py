@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 class Joined:
     """What `Motion` has, asked of every part and put together row by row.
 
-    Arrays are joined along their poses, pairs part by part; whatever else a motion gives is joined in the same way.
+    Arrays are joined along their poses, pairs, lists and mappings of them part by part; whatever else a motion gives is joined in the same way.
 
     Examples
     --------
@@ -45,8 +45,10 @@ class Joined:
             for (rows, _), part in zip(self._parts, found, strict=True):
                 out[rows] = part
             return out
-        if isinstance(first, tuple) and all(isinstance(part, np.ndarray) for part in first):
-            return tuple(self._joined(list(parts)) for parts in zip(*found, strict=True))
+        if isinstance(first, (tuple, list)) and all(isinstance(part, np.ndarray) for part in first):
+            return type(first)(self._joined(list(parts)) for parts in zip(*found, strict=True))
+        if isinstance(first, dict):
+            return {key: self._joined([part[key] for part in found]) for key in first}
         if first is None or isinstance(first, (bool, str, float, list)):
             return first
         return Joined([(rows, of) for (rows, _), of in zip(self._parts, found, strict=True)], self._n)

@@ -73,8 +73,7 @@ class _Paper:
         self.colors = {GROUND: "0.25"} | {b: COLORS[k % len(COLORS)] for k, b in enumerate(self.m.links)}
         # each body's origin and its x-axis of one metre, over the poses
         self.places = {
-            body: [poses.point_derivative(body, z, 0) * self.scale for z in (0j, 1 + 0j)]
-            for body in self.m.bodies
+            body: [poses.point(body, z) * self.scale for z in (0j, 1 + 0j)] for body in self.m.bodies
         }
         self.axes = sheet(7.4, self._height(6.4) + 0.9, figure).add_subplot()
 
@@ -171,7 +170,7 @@ class _Paper:
         wanted = tracers(m) if points is None else [p for p in points if body_of.get(p, GROUND) != GROUND]
         for name in dict.fromkeys(wanted) if self.travel.n > 1 else ():
             own = m.bodies[body_of[name]][name]
-            z = self.travel.point_derivative(body_of[name], own, 0, name) * self.scale
+            z = self.travel.point(body_of[name], own, 0, name) * self.scale
             self.axes.plot(z.real, z.imag, color="0.15", lw=0.9, zorder=2)
             at = z[np.isfinite(z)]
             if len(at):

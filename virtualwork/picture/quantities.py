@@ -42,30 +42,29 @@ def quantities(poses: Poses, names: Iterable[str]) -> list[Quantity]:
 def _quantity(poses: Poses, word: str) -> Quantity:
     m = poses.mechanism
     name, _, what = word.rpartition(".")
-    homes = {p: (body, z) for body, points in m.bodies.items() for p, z in points.items()}
     guides = {g.point: i for i, g in enumerate(m.guides)}
-    known = {*homes, *m.links}
+    known = {*m.points, *m.links}
     if name not in known:
         close = get_close_matches(name, known, n=1)
         hint = f"; did you mean '{close[0]}'?" if close else ""
         raise DescriptionError(f"'{word}': no link or point is named '{name}'{hint}")
-    if name in homes and what in POINTS:
+    if name in m.points and what in POINTS:
         order, part = POINTS[what]
-        body, place = homes[name]
-        z = poses.point_derivative(body, place, order, name)
+        body, place = m.points[name]
+        z = poses.point(body, place, order, name)
         return Quantity(
             word, LENGTHS[order], z.real if part == "x" else z.imag, m.size * pace(poses) ** order
         )
     if name in m.links and what in LINKS:
         order = LINKS[what]
         if order:
-            return Quantity(word, ANGLES[order], poses.angle_derivative(name, order), pace(poses) ** order)
+            return Quantity(word, ANGLES[order], poses.angle(name, order), pace(poses) ** order)
         return Quantity(word, "deg", unwrapped(poses.angle(name)), 180.0)
     if name in guides and what in SLIDES:
         order = SLIDES[what]
-        values = poses.slide_derivative(guides[name], order)
+        values = poses.values([("slide", guides[name], order)])[0]
         return Quantity(word, LENGTHS[order], values, m.size * pace(poses) ** order)
-    kinds = ((POINTS, homes), (LINKS, m.links), (SLIDES, guides))
+    kinds = ((POINTS, m.points), (LINKS, m.links), (SLIDES, guides))
     choices = [choice for of, holders in kinds if name in holders for choice in of]
     raise DescriptionError(f"'{word}': expected {name}. with one of {', '.join(choices)}")
 

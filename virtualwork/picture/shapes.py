@@ -13,7 +13,7 @@ def shapes_of(*motions: Poses) -> Drawing:
     m = motions[0].mechanism
     spans = []
     for i in range(len(m.guides)):
-        slide = np.concatenate([poses.slide_derivative(i, 0) for poses in motions])
+        slide = np.concatenate([poses.values([("slide", i, 0)])[0] for poses in motions])
         used = slide[np.isfinite(slide)]
         spans.append((float(used.min()), float(used.max())) if len(used) else (-np.inf, np.inf))
     return draw(m, spans)

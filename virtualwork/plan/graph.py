@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.errors import MobilityError
 from virtualwork.describe.parts import GROUND
-from virtualwork.plan.joints import guide_label, relations
+from virtualwork.plan.joints import Relation, guide_label
 from virtualwork.plan.steps import Blocks, Variable
 
 
@@ -20,8 +21,8 @@ class Equation:
     is_input: bool = False
 
 
-def equations(m: Description) -> tuple[list[Variable], list[Equation]]:
-    """The coordinates of a mechanism and the scalar equations of its inputs and joints."""
+def equations(m: Description, tied: Sequence[Relation]) -> tuple[list[Variable], list[Equation]]:
+    """The coordinates of a mechanism and the scalar equations of its inputs and joints; `tied`: its relations between angles."""
     variables: list[Variable] = []
     for link in m.links:
         variables += [("angle", link), ("x", link), ("y", link)]
@@ -36,7 +37,7 @@ def equations(m: Description) -> tuple[list[Variable], list[Equation]]:
     rows = [
         Equation(f"input {e.name}", (("slide", str(m.guide_of(e))),), True) for e in m.inputs if e.is_slide
     ]
-    for relation in relations(m):
+    for relation in tied:
         angles = tuple(("angle", body) for body in relation.shares if body != GROUND)
         rows.append(Equation(relation.label, angles, relation.kind == "input"))
     for pin, bodies in m.pins.items():
@@ -52,7 +53,7 @@ def equations(m: Description) -> tuple[list[Variable], list[Equation]]:
     return variables, rows
 
 
-def decompose(m: Description) -> Blocks:
+def decompose(m: Description, tied: Sequence[Relation]) -> Blocks:
     """Split the coordinates of a mechanism into irreducible blocks, in their order of solution.
 
     Raises
@@ -60,7 +61,7 @@ def decompose(m: Description) -> Blocks:
     MobilityError
         Where coordinates stay free, or inputs are too many; the message names the links.
     """
-    variables, rows = equations(m)
+    variables, rows = equations(m, tied)
     joints = sum(not row.is_input for row in rows)
     mobility = len(variables) - joints
     of_variable = _match(rows)

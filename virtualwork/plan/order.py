@@ -35,9 +35,11 @@ from virtualwork.plan.steps import (
     Term,
     Turn,
     Variable,
+    Vector,
     combined,
+    longer,
 )
-from virtualwork.plan.topology import Topology, Vector
+from virtualwork.plan.topology import Topology
 
 Key = TypeVar("Key", int, str)
 
@@ -95,7 +97,7 @@ class _Planner:
         self.joined: set[str] = set()
 
     def run(self) -> Plan:
-        self.blocks = decompose(self.m)
+        self.blocks = decompose(self.m, self.relations)
         for body_point, z in self.points[GROUND].items():
             self._place(body_point, GROUND, z)
         pending = list(self.blocks.order)
@@ -116,7 +118,7 @@ class _Planner:
     def _place(self, node: str, body: str, z: Any) -> str:
         if node not in self.nodes and body in self.anchors:
             base, terms = self.anchors[body]
-            self.steps.append(Place(node, base, _longer(terms, Term(z, body))))
+            self.steps.append(Place(node, base, longer(terms, Term(z, body))))
             self.nodes.add(node)
             self.used.add((node, body))
         return node
@@ -269,7 +271,7 @@ class _Planner:
 
     def _chain(self, body: str, z: Any, anchors: Mapping[str, Path]) -> Path:
         base, terms = anchors[body]
-        return base, _longer(terms, Term(z, body))
+        return base, longer(terms, Term(z, body))
 
     def _attach(self, body: str, placed: Collection[str], chain: Callable[[str, Any], Path]) -> Path | None:
         """The first joint that ties a body to the placed ones: pins first, then guides whose slide is known."""
@@ -277,7 +279,7 @@ class _Planner:
         for name, z in points.items():
             if name in self.nodes:
                 self.used.add((name, body))
-                return name, _longer((), Term(-z, body))
+                return name, longer((), Term(-z, body))
         for i in range(len(self.m.guides)):
             if i not in self.slides_known or (f"guide {i}", "") in self.used:
                 continue
@@ -338,7 +340,7 @@ class _Planner:
                     self.used.add((name, body))
             else:
                 base, terms = nodes[name]
-                anchors[body] = base, _longer(terms, Term(-z, body))
+                anchors[body] = base, longer(terms, Term(-z, body))
                 self.used.add((name, body))
                 queue.append(body)
 
@@ -419,10 +421,3 @@ def _sums(
 
 def _times(a: Angle, factor: float) -> Angle:
     return _plus(Angle(), a, factor)
-
-
-def _longer(terms: tuple[Term, ...], t: Term) -> tuple[Term, ...]:
-    """Terms and one more, added to that of the same body and slide."""
-    if any(own.body == t.body and own.slide == t.slide for own in terms):
-        return combined((*terms, t))
-    return (*terms, t) if t.z != 0 else terms

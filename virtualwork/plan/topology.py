@@ -15,10 +15,8 @@ from typing import Any
 from dalembert.arithmetic.recorded import Constant
 from dalembert.arithmetic.varied import Varied, rotation
 from virtualwork.describe.description import Description
-from virtualwork.plan.steps import Closure, Group, Place, Plan, Step, Term
+from virtualwork.plan.steps import Closure, Group, Place, Plan, Slot, Step, Term, Vector
 
-# a point of a body; the number of a guide and what of it: where its line runs, which way
-Slot = tuple[str, str] | tuple[int, str]
 KEPT = 256
 
 
@@ -34,48 +32,6 @@ def direction(angle: float) -> complex:
     if abs(quarter - round(quarter)) <= 1e-15 * max(1.0, abs(quarter)):
         return (1 + 0j, 1j, -1 + 0j, -1j)[round(quarter) % 4]
     return rotation(angle)  # type: ignore[no-any-return]
-
-
-class Vector:
-    """A sum of a body's points, each so many times, as the order of solution adds them up.
-
-    >>> a, b = Vector.of(("arm", "A")), Vector.of(("arm", "B"))
-    >>> a + -b == 0, a + -b + -a + b == 0
-    (False, True)
-    """
-
-    __slots__ = ("parts",)
-
-    def __init__(self, parts: Mapping[Slot, int]) -> None:
-        self.parts = parts
-
-    @classmethod
-    def of(cls, slot: Slot | None) -> Vector:
-        """One of them; None is the origin."""
-        return cls({} if slot is None else {slot: 1})
-
-    def __add__(self, other: Any) -> Vector:
-        if other == 0:
-            return self
-        sums = dict(self.parts)
-        for slot, times in other.parts.items():
-            total = sums.get(slot, 0) + times
-            if total:
-                sums[slot] = total
-            else:
-                del sums[slot]
-        return Vector(sums)
-
-    __radd__ = __add__
-
-    def __neg__(self) -> Vector:
-        return Vector({slot: -times for slot, times in self.parts.items()})
-
-    def __eq__(self, other: object) -> bool:
-        return self.parts == other.parts if isinstance(other, Vector) else not self.parts and other == 0
-
-    def __hash__(self) -> int:
-        return hash(tuple(self.parts.items()))
 
 
 @dataclass(frozen=True)
@@ -139,19 +95,16 @@ class Topology:
         """The order of solution with the numbers of its mechanism."""
         m, plan = self.first, self.plan(make)
         directions = {i: direction(g.angle) for i, g in enumerate(m.guides)}
-        numbers: dict[Any, complex] = {}
 
         def number(z: Any) -> complex:
-            if z not in numbers:
-                total: complex = 0j
-                for (of, name), times in z.parts.items():
-                    if isinstance(of, str):
-                        value = m.bodies[of][name]
-                    else:
-                        value = m.through(m.guides[of]) if name == "through" else directions[of]
-                    total = total + (value if times == 1 else -value if times == -1 else times * value)
-                numbers[z] = total
-            return numbers[z]
+            total: complex = 0j
+            for (of, name), times in z.parts.items():
+                if isinstance(of, str):
+                    value = m.bodies[of][name]
+                else:
+                    value = m.through(m.guides[of]) if name == "through" else directions[of]
+                total = total + (value if times == 1 else -value if times == -1 else times * value)
+            return total
 
         def terms(of: tuple[Term, ...]) -> tuple[Term, ...]:
             return tuple([Term(number(t.z), t.body, t.slide) for t in of])

@@ -248,7 +248,7 @@ class Check:
 
     def _seen(self, bodies: tuple[str, ...], corners: list[str]) -> list[float]:
         """The transmission angle over the motion, sampled, for chains that are not driven at their own crank."""
-        b, c, d = (self._sampled.point_derivative(GROUND, 0j, 0, p) for p in corners[1:])
+        b, c, d = (self._sampled.point(GROUND, 0j, 0, p) for p in corners[1:])
         mu = np.abs(np.angle((b - c) * np.conj(d - c)))
         mu = mu[np.isfinite(mu)]
         return [float(mu.min()), float(mu.max())] if len(mu) else [math.nan, math.nan]

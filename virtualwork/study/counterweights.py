@@ -70,7 +70,7 @@ def least_squares(motion: Moving, links: Sequence[str]) -> tuple[dict[str, compl
     for link in links:
         z = pivot(poses.mechanism, link)
         # of two points a metre apart on the link, about a fixed pivot: −d²(e^{iθ})/dt²
-        columns.append(-poses.point_derivative(link, z + 1.0, 2))
+        columns.append(-poses.point(link, z + 1.0, 2))
     matrix = np.stack(columns, axis=1)
     rows = np.isfinite(before) & np.isfinite(matrix).all(axis=1) & poses.assembled
     if not rows.any():
