@@ -29,6 +29,7 @@ MODULES = tuple(
         "equilibria",
         "assemblies",
         "in_time",
+        "let_go",
         "tapes",
     )
 )

@@ -144,17 +144,22 @@ class _Bounds:
         """The outputs, the bounds of some, and their τ."""
         tape = self.tape
         wanted = set(tape.names if names is None else names)
-        reached = {name: _reached(tape, number) for name, number in tape.outputs if name in wanted}
+        roots = [
+            (number, arguments[0])
+            for number, (name, *arguments) in enumerate(tape.operations)
+            if name == "sqrt" and not _norm(tape, arguments[0])
+        ]
+        reached = {name: _reached(tape, number) for name, number in tape.outputs if name in wanted and roots}
         needed = set[int]().union(*reached.values())
-        for number, (name, *arguments) in enumerate(tape.operations):
-            if name == "sqrt" and number in needed and not _norm(tape, arguments[0]):
-                self._root(number, arguments[0])
+        for number, argument in roots:
+            if number in needed:
+                self._root(number, argument)
         found: dict[str, Number] = {}
         for name, number in tape.outputs:
             found[name] = self.values[number]
             if name in wanted:
                 found[f"error({name})"] = self.error(number)
-                found[f"tau({name})"] = self._largest(reached[name])
+                found[f"tau({name})"] = self._largest(reached[name]) if roots else 0.0
         return found
 
     def _largest(self, reached: frozenset[int]) -> Number:
@@ -172,6 +177,9 @@ class _Bounds:
         return self._errors[output]
 
     def _error(self, output: int) -> Number:
+        kind, *arguments = self.tape.operations[output]
+        if kind in ("const", "input"):
+            return self.errors.get(arguments[0], 0.0)
         pattern = _pattern(self.tape, output, frozenset(self.errors), frozenset(self.slopes), self.constants)
         operations, values = self.tape.operations, self.values
         bars: dict[int, Number] = {output: 1.0}

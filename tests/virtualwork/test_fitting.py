@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pickle
 from concurrent.futures import ThreadPoolExecutor
+from importlib.resources import files
 
+import mpmath as mp
 import numpy as np
 import pytest
 
@@ -172,10 +174,14 @@ def test_points_out_of_order_are_an_order_defect():
     assert found.remarks == ("fit: order defect: the input meets target point 3 before target point 2",)
 
 
-def test_a_mechanism_off_the_tape_is_fitted_with_differences(monkeypatch):
+@pytest.mark.parametrize("exact", [True, False])
+def test_a_mechanism_off_the_tape_is_fitted_alone_and_with_differences(monkeypatch, exact):
+    from virtualwork.family.alone import Alone
     from virtualwork.family.part import Solver
 
     monkeypatch.setattr(Solver, "written", None)
+    if not exact:
+        monkeypatch.setattr(Alone, "written", None)
     truth, point, *_ = CASES["four-bar"]
     q = np.linspace(0, 5, 8)
     target = truth.motion(q).point(point).position
@@ -184,6 +190,87 @@ def test_a_mechanism_off_the_tape_is_fitted_with_differences(monkeypatch):
             point, target, {"ground.D.x": (0.08, 0.11), "links.coupler.H.y": (0.01, 0.09)}, inputs, starts=8
         )
         assert found.max < 1e-9 * truth.size
+        assert exact == (found.remarks == ())
+
+
+def stephenson():
+    """Stephenson III, driven in its five-bar loop: a triad, which has no closed form."""
+    return Mechanism.from_toml(str(files("cli") / "examples" / "stephenson-six-bar" / "stephenson.toml"))
+
+
+@pytest.mark.parametrize("timed", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_a_path_of_a_group_without_a_closed_form_is_met_with_exact_derivatives(timed):
+    truth = stephenson()
+    q = truth.at[0] + np.linspace(-0.6, 0.6, 12)
+    target = truth.motion(q).point("E").position
+    free = {
+        path: tuple(np.sort(np.outer(value(truth, path).real, (0.9, 1.1)).ravel()))
+        for path in ("links.left.B.x", "links.coupler.E.x", "links.coupler.E.y", "links.right.C.x")
+    }
+    begun = changed(truth, {path: 0.03 * low + 0.97 * high for path, (low, high) in free.items()})
+    found = begun.fit("E", target, free, q if timed else None, starts=8)
+    assert found.remarks == ()
+    again = found.mechanism.motion(found.inputs).point("E").position
+    assert np.abs(again - target).max() < 1e-9 * truth.size
+
+
+def test_derivatives_of_a_design_without_a_closed_form_in_fifty_digits():
+    """Newton's iteration in fifty digits at both sides of each dimension, 1e-20 apart."""
+    m = stephenson()
+    paths = [
+        "links.left.B.x",
+        "links.coupler.C.x",
+        "links.coupler.E.y",
+        "links.crank.F.x",
+        "ground.G.y",
+        "links.right.C.x",
+    ]
+    q = m.at[0] + np.array([-0.4, 0.0, 0.7])
+    own = np.array([float(value(m, path).real) for path in paths])
+    found = m.design(paths, "points.E").slopes(own, q)
+    motion = m.motion(q)
+    at = {name: motion.point(name).complex(0) for name in "BCEF"}
+    with mp.workdps(50):
+
+        def places(i, numbers, angle):
+            """B, C and E from the lengths alone: six equations for their coordinates."""
+            given = dict(zip(paths, numbers, strict=True))
+
+            def number(path):
+                return given.get(path, mp.mpf(float(value(m, path).real)))
+
+            ground = {name: mp.mpc(number(f"ground.{name}.x"), number(f"ground.{name}.y")) for name in "ADG"}
+            tip = ground["G"] + number("links.crank.F.x") * mp.exp(1j * angle)
+            side = number("links.coupler.C.x")
+            apex = mp.mpc(number("links.coupler.E.x"), number("links.coupler.E.y"))
+
+            def gaps(bx, by, turn):
+                b, along = mp.mpc(bx, by), mp.exp(1j * turn)
+                c, e = b + side * along, b + apex * along
+                return [
+                    abs(b - ground["A"]) ** 2 - number("links.left.B.x") ** 2,
+                    abs(c - ground["D"]) ** 2 - number("links.right.C.x") ** 2,
+                    abs(e - tip) ** 2 - number("links.rod.E.x") ** 2,
+                ]
+
+            near = at["B"][i], np.angle(at["C"][i] - at["B"][i])
+            start = mp.mpf(near[0].real), mp.mpf(near[0].imag), mp.mpf(near[1])
+            bx, by, turn = mp.findroot(gaps, start, tol=mp.mpf(10) ** -90)
+            return mp.mpc(bx, by) + apex * mp.exp(1j * turn)
+
+        for i, angle in enumerate(q):
+            exact = [mp.mpf(float(x)) for x in [*own, angle]]
+            for j in range(len(exact)):
+                h = mp.mpf(10) ** -20
+                ends = []
+                for side in (-1, 1):
+                    moved = [*exact]
+                    moved[j] += side * h
+                    ends.append(places(i, moved[:-1], moved[-1]))
+                slope = (ends[1] - ends[0]) / (2 * h)
+                off = abs(complex(slope) - complex(*found[:, i, j]))
+                # angles are in rad, lengths in m
+                assert off <= 1e-12 * max(abs(slope), m.size if j == len(paths) else 1), (i, j)
 
 
 @pytest.mark.parametrize(

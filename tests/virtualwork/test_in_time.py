@@ -331,3 +331,21 @@ def test_wrong_questions(wrong: dict[str, object]) -> None:
         pendulum().simulate(**wrong)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="no input is named 'bab'"):
         pendulum().simulate([0, 1], until={"bab": 1.0})
+
+
+def test_wheels_without_a_loop_turn_as_far_as_they_like() -> None:
+    """No change point is looked for, turn after turn: α = 3/(2 + 4·1)."""
+    m = Mechanism(
+        {"A": 0j, "B": 4 + 0j},
+        {"one": Link({"A": 0j}, inertia=2.0), "two": Link({"B": 0j}, inertia=4.0)},
+        gears=[Gear(("one", "two"), -1.0)],
+        inputs=Input(link="one"),
+        torques=[Torque("one", 3.0)],
+    )
+    run = m.simulate([0, 1, 2], angle=0.25, speed=1e5)
+    t = np.array([0.0, 1.0, 2.0])
+    assert run.angle[:, 0] == pytest.approx(0.25 + 1e5 * t + 0.25 * t * t, rel=1e-12)
+    assert np.abs(run.angle[:, 0]).max() > 30_000 * 2 * np.pi
+    far = m.motion(run.angle[:, 0])
+    assert far.link("two").omega == pytest.approx([0, 0, 0])
+    assert far.assembled.all()

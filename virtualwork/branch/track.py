@@ -56,8 +56,8 @@ class Track:
         factors = [k for t in turns(self.plan.steps) for _, k in (*t.angle.inputs, *t.angle.bases)]
         self.whole = not self.slides and all(float(k).is_integer() for k in factors)
         self.repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
-        # no change point anywhere, however far the input turns
-        self.settled = False
+        # no change point anywhere, however far the input turns: without a loop there is none
+        self.settled = not self.plan.groups
         # groups that are singular in every pose
         self.folded: set[str] = set()
         # where one turn begins and what it has, where all others have the same

@@ -18,6 +18,7 @@ from dalembert.arithmetic.engines import Repeated
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.describe.errors import DescriptionError, hint
+from virtualwork.family.alone import Alone
 from virtualwork.family.branches import meet_on_the_way, samples, signs
 from virtualwork.family.part import Part, Solver
 from virtualwork.formulas.asked import COMPLEX, Key, names
@@ -48,6 +49,7 @@ class Design:
         own = np.zeros((1, len(self.dimensions)))
         self._first = Solver(Part(self.mechanism, self.dimensions, own, np.zeros((1, 1, 1)), AT_REST))
         self._paths = [d.path for d in self.dimensions]
+        self._alone = Alone(self.mechanism, self.dimensions, self.keys)
         self._chosen: tuple[bytes, dict[str, Any] | None] = b"", None
         self._kept: dict[tuple[tuple[str, ...] | None, bool], tuple[bytes, Repeated]] = {}
         self._held: dict[str, float] | None = None
@@ -66,8 +68,8 @@ class Design:
 
     @property
     def exact(self) -> bool:
-        """Whether derivatives are exact: no group without a closed form, no gear on a coupler."""
-        return self._first.written is not None
+        """Whether derivatives are exact: unless a gear's phase hangs on links that have to be placed first."""
+        return self._first.written is not None or self._alone.written is not None
 
     def hold(self, numbers: Reals | None) -> bool:
         """Close every loop from here on as the guess has it at these numbers; None: as it has it at each design's own.
@@ -101,14 +103,15 @@ class Design:
             m; rad within (−π, π]. NaN where a pose cannot be assembled.
         """
         x, q = np.asarray(numbers, dtype=float), np.asarray(inputs, dtype=float)
-        if self.exact:
+        if self._first.written is not None:
             found, fine = self._evaluated(x, q, None)
             if fine or self._goes(x, q):
                 self.evaluations += 1
                 return found if np.isfinite(found).all() else np.where(np.isfinite(found), found, np.nan)
             # a dip that has to be looked into tells of this design what its signs do not
             self._chosen = x.tobytes(), None
-        return self.table(x[None], q[None])[:, 0]
+        self.evaluations += 1
+        return self._alone.values(x, q)
 
     def slopes(self, numbers: ArrayLike, inputs: ArrayLike, inputs_alone: bool = False) -> Reals:
         """The derivatives of that to the dimensions, and last to the inputs themselves, (rows, n, d + 1).
@@ -117,10 +120,12 @@ class Design:
         """
         x, q = np.asarray(numbers, dtype=float), np.asarray(inputs, dtype=float)
         enters = ("q0",) if inputs_alone else (*self._paths, "q0")
-        if self.exact and self._chosen != (x.tobytes(), None):
+        if self._first.written is not None and self._chosen != (x.tobytes(), None):
             found, fine = self._evaluated(x, q, enters)
             if fine or self._known(x) is not None:
                 return found.reshape(self.rows, len(enters), len(q)).transpose(0, 2, 1)
+        if self._alone.written is not None:
+            return self._alone.slopes(x, q, enters)
         return self._differences(x, q, inputs_alone)
 
     def _evaluated(self, x: Reals, q: Reals, enters: tuple[str, ...] | None) -> tuple[Reals, bool]:

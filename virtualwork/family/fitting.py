@@ -383,7 +383,9 @@ class _Problem(Generic[D]):
                 f"({len(gaps)} of {FINE} poses): it does not pass there without being taken apart"
             )
         if not self.designs[0].exact:
-            said.append("fit: derivatives are differences: this mechanism has groups without a closed form")
+            said.append(
+                "fit: derivatives are differences: the phase of a gear hangs on links that have to be placed first"
+            )
         return said
 
     def _shown(self, q: float) -> str:

@@ -230,7 +230,7 @@ def simulate(
         if last < t[-1] and fine.ended == "end":
             fine.ended = coarse.ended
         coarse.backwards()
-        part = 1.0 if equations.crosses else share(tolerance)
+        part = 1.0 if equations.crosses or coarse.folds or fine.folds else share(tolerance)
         found = Run(assembly, reached(t, fine.end), fine, coarse, part)
         worst = float((found.error_estimate / scale).max())
         if worst <= accuracy or tolerance <= LEAST or tries == TRIES - 1 or fine.steps > MOST / 2:

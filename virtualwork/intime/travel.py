@@ -88,6 +88,11 @@ class Travel:
         return any(leg.path.ended == "stiff" for leg in self.legs)
 
     @property
+    def folds(self) -> bool:
+        """Whether a loop came near folding on the way: there halves of steps gain less than the method's order."""
+        return any(leg.path.ended == "folding" for leg in self.legs)
+
+    @property
     def undecided(self) -> float | None:
         """The first time at which it rests at a change point; None where it never does.
 
