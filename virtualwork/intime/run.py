@@ -312,6 +312,16 @@ def _said(
             f"at {undecided:.9g} s it rests at a change point, from where more than one motion leads on: that of the "
             "guess's branch is followed"
         )
+    equations, path = run.fine.legs[0].path.equations, run.fine.legs[0].path
+    if equations.crosses:
+        t, q, v = (np.array(x) for x in (path.t, path.q, path.v))
+        moving = float(np.max(equations.energies(t, q, v) - equations.energies(t, q, 0 * v)))
+        drift = float(np.abs(run.energy_drift).max())
+        if drift > 1e3 * accuracy * moving:
+            found.append(
+                f"{drift:.1e} J of energy are not explained: close to change points accelerations are interpolated, and "
+                "the error is larger than estimated"
+            )
     if run.unknown.any():
         found.append(
             f"no digit is known from {run.t[np.argmax(run.unknown)]:.6g} s on: the motion makes any error grow, "
