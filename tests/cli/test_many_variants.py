@@ -140,6 +140,7 @@ def test_no_digit_hangs_on_what_a_process_has_done_before(dalembert, tmp_path):
     assert written[0].equals(written[1])
 
 
+@pytest.mark.slow
 def test_workers_write_parquet_into_a_folder_that_reads_as_one_table(dalembert, tmp_path):
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     # 4000 variants in 37 poses are three parts

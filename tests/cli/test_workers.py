@@ -32,7 +32,9 @@ def runs(machines, seed=0):
     "asked",
     [
         ("--objective", "minimax", "--max-mass", "4g"),
-        ("--max-mass", "3g", "--reading-error", "2%,2deg", "--monte-carlo", "40"),
+        pytest.param(
+            ("--max-mass", "3g", "--reading-error", "2%,2deg", "--monte-carlo", "40"), marks=pytest.mark.slow
+        ),
         ("--reading-error", "2%,2deg"),
     ],
 )

@@ -171,6 +171,7 @@ def test_what_redundant_statics_determines() -> None:
     judge(pairs, 300)
 
 
+@pytest.mark.slow
 def test_a_chain_of_a_hundred_links() -> None:
     """Four-bars in a row, each rocker the next one's crank: dyad by dyad in 50 digits."""
     bars, length = 50, 1 + 2**-6
