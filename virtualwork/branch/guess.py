@@ -354,16 +354,17 @@ def distance(
 ) -> Number:
     """How far an assembly is from the guess: chords of the unit circle, and points relative to the size, squared."""
     total: Number = 0.0
+    named = {
+        body: [(name, z) for name, z in m.links[body].points.items() if name in points]
+        for body in group.links
+    }
+    origins = st.origins({body: done.anchors[body] for body, here in named.items() if here})
     for body in group.links:
         if body in angles and body in st.turn:
             total = total + squared(bare(st.turn[body] - bare(rotation(angles[body]))))
-        base, terms = done.anchors[body]
-        placed = all(t.body in st.turn and (t.slide is None or t.slide in st.slide) for t in terms)
-        named = [(name, z) for name, z in m.links[body].points.items() if name in points]
-        if named and placed and base in st.point and body in st.turn:
-            origin = st.at((base, terms))
-            for name, z in named:
-                here = origin + z * st.turn[body]
+        if body in origins:
+            for name, z in named[body]:
+                here = origins[body] + z * st.turn[body]
                 total = total + squared(bare(here - points[name])) / bare(m.size**2)
     return total
 

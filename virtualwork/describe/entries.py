@@ -7,7 +7,7 @@ import io
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from virtualwork.describe.errors import DescriptionError, hint
 from virtualwork.describe.keys import UNITS, Keys
@@ -15,6 +15,7 @@ from virtualwork.describe.parts import GROUND, Link
 from virtualwork.describe.units import Units, wrong
 
 Load = Callable[[Path], bytes]
+P = TypeVar("P")
 
 
 class Entries:
@@ -48,6 +49,10 @@ class Entries:
         if not isinstance(value, list) or not all(isinstance(e, dict) for e in value):
             raise wrong(f"[[{name}]]", value, "an array of tables")
         return enumerate(value, 1)
+
+    def every(self, name: str, read: Callable[[dict[str, Any], int], P]) -> list[P]:
+        """Every entry of an array of tables, read."""
+        return [read(entry, i) for i, entry in self.rows(name)] if name in self.data else []
 
     def csv(self, name: Any, where: str) -> list[dict[str, str]]:
         """The rows of a CSV file beside this one."""

@@ -115,18 +115,23 @@ FRICTION: Keys = {
     "radius": Key("length", "the radius of the pin; 0 in a guide", default=0),
 }
 
-# the file's tables that may stand once or many times, with the keys of an entry
-ENTRIES: Mapping[str, Keys] = {
-    "input": INPUT,
-    "slots": SLOT,
-    "sliders": SLIDER,
-    "gears": GEAR,
+# the tables of loads, with the keys of an entry
+LOADS: Mapping[str, Keys] = {
     "forces": FORCE,
     "torques": TORQUE,
     "springs": SPRING,
     "torsion_springs": TORSION_SPRING,
     "motors": MOTOR,
     "friction": FRICTION,
+}
+
+# the file's tables that may stand once or many times
+ENTRIES: Mapping[str, Keys] = {
+    "input": INPUT,
+    "slots": SLOT,
+    "sliders": SLIDER,
+    "gears": GEAR,
+    **LOADS,
 }
 
 # everything else that stands at the top of the file

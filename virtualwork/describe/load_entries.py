@@ -27,12 +27,16 @@ AXES = {
 class LoadEntries(Entries):
     """The tables of loads; `[[springs]] 2` is the second."""
 
-    def gravity(self) -> complex:
-        """Its two components."""
-        value = self.data.get("gravity", [0, 0])
-        if isinstance(value, list) and len(value) == 2:
-            return complex(*(self.number(v, "slide acceleration", "gravity") for v in value))
-        raise wrong("gravity", value, "two accelerations [x, y]")
+    def loads(self) -> dict[str, Any]:
+        """Every load, under the name that `Description` gives it."""
+        return {
+            "forces": self.every("forces", self.force),
+            "torques": self.every("torques", self.torque),
+            "springs": self.every("springs", self.spring),
+            "torsion_springs": self.every("torsion_springs", self.torsion),
+            "motors": self.every("motors", self.motor),
+            "friction": self.every("friction", self.joint_friction),
+        }
 
     def force(self, entry: dict[str, Any], i: int) -> Force:
         """A force, constant or over the input by a table."""

@@ -10,14 +10,12 @@ from typing import Any, TypeVar
 
 from virtualwork.describe import keys
 from virtualwork.describe.description import Description
-from virtualwork.describe.entries import Load, known_keys, proper
+from virtualwork.describe.entries import Entries, Load, known_keys, proper
 from virtualwork.describe.errors import DescriptionError, MechanismError, hint
-from virtualwork.describe.load_entries import LoadEntries
 from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link, Polar
 from virtualwork.describe.units import LARGEST, wrong
 
 D = TypeVar("D", bound=Description)
-P = TypeVar("P")
 
 TABLES = {*keys.FILE, *keys.ENTRIES}
 
@@ -60,8 +58,8 @@ def read_text(
         raise type(error)(f"{file}: {error}") from None
 
 
-class _Reader(LoadEntries):
-    """All tables together."""
+class _Reader(Entries):
+    """All tables but those of loads."""
 
     def parts(self) -> dict[str, Any]:
         """Every part of the mechanism, under the name that `Description` gives it."""
@@ -83,13 +81,27 @@ class _Reader(LoadEntries):
             "guess": self.guess(inputs),
             "name": self.name(),
             "gravity": self.gravity(),
-            "forces": self.every("forces", self.force),
-            "torques": self.every("torques", self.torque),
-            "springs": self.every("springs", self.spring),
-            "torsion_springs": self.every("torsion_springs", self.torsion),
-            "motors": self.every("motors", self.motor),
-            "friction": self.every("friction", self.joint_friction),
+            **self.loads(),
         }
+
+    def gravity(self) -> complex:
+        """Its two components."""
+        if "gravity" not in self.data:
+            return 0j
+        value = self.data["gravity"]
+        if isinstance(value, list) and len(value) == 2:
+            return complex(*(self.number(v, "slide acceleration", "gravity") for v in value))
+        raise wrong("gravity", value, "two accelerations [x, y]")
+
+    def loads(self) -> dict[str, Any]:
+        """The loads of a file that has any."""
+        if self.data.keys().isdisjoint(keys.LOADS):
+            return {}
+        from virtualwork.describe.load_entries import LoadEntries
+
+        entries = LoadEntries(self.data, self.folder, self.load)
+        entries.links, entries.bodies = self.links, self.bodies
+        return entries.loads()
 
     def tolerances(self, m: Description) -> dict[str, float]:
         """The limits ± of dimensions, by their paths; quoted, or with the words of the path as tables."""
@@ -118,10 +130,6 @@ class _Reader(LoadEntries):
 
         walk(self.table("tolerances"), "")
         return found
-
-    def every(self, name: str, read: Callable[[dict[str, Any], int], P]) -> list[P]:
-        """Every entry of an array of tables, read."""
-        return [read(entry, i) for i, entry in self.rows(name)] if name in self.data else []
 
     def name(self) -> str:
         found = self.data.get("name", "")

@@ -24,14 +24,6 @@ class One:
         """e^{i·angle}."""
         return complex(math.cos(angle), math.sin(angle))
 
-    def join(self, re: float, im: float) -> complex:
-        """re + i·im."""
-        return complex(re, im)
-
-    def angle(self, z: complex) -> float:
-        """The angle."""
-        return cmath.phase(z)
-
     def regular(self, inverse: float, c1: complex, c2: complex) -> float:
         """1/(c1 × c2), or NaN."""
         return inverse if abs(inverse) * (abs(c1) * abs(c2)) < 1 / PARALLEL else math.nan
@@ -40,6 +32,7 @@ class One:
         """1/length, or NaN."""
         return 1 / length if length > least else math.nan
 
+    join, angle = complex, staticmethod(cmath.phase)
     solve, transposed = staticmethod(solve_columns), staticmethod(solve_transposed)
 
 

@@ -24,7 +24,8 @@ from virtualwork.formulas.loads import (
 from virtualwork.formulas.quantities import Combination, Quantities
 from virtualwork.formulas.springs import SpringEnd, TorsionEnd
 from virtualwork.plan.joints import Joint, joints
-from virtualwork.plan.steps import Path, Place, Plan, Term, combined
+from virtualwork.plan.order import combined
+from virtualwork.plan.steps import Path, Place, Plan, Term
 
 
 class LoadCase:

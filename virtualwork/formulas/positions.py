@@ -84,6 +84,16 @@ class State:
         base, terms = path
         return self.point[base] + self.sum(terms) if terms else self.point[base]
 
+    def origins(self, anchors: Mapping[str, Path]) -> dict[str, Number]:
+        """Where the origins of bodies lie, of those that are placed so far."""
+        return {
+            body: self.at((base, terms))
+            for body, (base, terms) in anchors.items()
+            if body in self.turn
+            and base in self.point
+            and all(t.body in self.turn and (t.slide is None or t.slide in self.slide) for t in terms)
+        }
+
     def affine(self, angle: Angle) -> Number:
         """const + Σ k·input, the part of an angle that needs no other angle."""
         value: Number = angle.const or None

@@ -7,15 +7,15 @@ inputs are linear relations and are eliminated before anything else; what remain
 R_1 e^{iθ1} + R_2 e^{iθ2} + ... = 0 (Ibrahim eq. 1.3.1; Nicoletti, lecture 7) in its own few angles and slides.
 
 All of this hangs on which points are the same, not on where they lie: the vectors R are written down in the points'
-names (`topology.Vector`), and another mechanism of the same topology only puts its own numbers in.
+names (`Vector`), and another mechanism of the same topology only puts its own numbers in.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
@@ -31,17 +31,67 @@ from virtualwork.plan.steps import (
     Place,
     Plan,
     Slide,
+    Slot,
     Step,
     Term,
     Turn,
     Variable,
-    Vector,
-    combined,
-    longer,
 )
 from virtualwork.plan.topology import Topology
 
-Key = TypeVar("Key", int, str)
+
+class Vector:
+    """A sum of a body's points, each so many times, as the order of solution adds them up.
+
+    >>> a, b = Vector.of(("arm", "A")), Vector.of(("arm", "B"))
+    >>> a + -b == 0, a + -b + -a + b == 0
+    (False, True)
+    """
+
+    __slots__ = ("parts",)
+
+    def __init__(self, parts: Mapping[Slot, int]) -> None:
+        self.parts = parts
+
+    @classmethod
+    def of(cls, slot: Slot | None) -> Vector:
+        """One of them; None is the origin."""
+        return cls({} if slot is None else {slot: 1})
+
+    def __add__(self, other: Any) -> Vector:
+        if other == 0:
+            return self
+        sums = dict(self.parts)
+        for slot, times in other.parts.items():
+            total = sums.get(slot, 0) + times
+            if total:
+                sums[slot] = total
+            else:
+                del sums[slot]
+        return Vector(sums)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Vector:
+        return Vector({slot: -times for slot, times in self.parts.items()})
+
+    def __eq__(self, other: object) -> bool:
+        return self.parts == other.parts if isinstance(other, Vector) else not self.parts and other == 0
+
+
+def combined(terms: Iterable[Term]) -> tuple[Term, ...]:
+    """Add terms of the same body and slide; drop those that cancel."""
+    sums: dict[tuple[str, int | None], complex] = {}
+    for t in terms:
+        sums[t.body, t.slide] = sums.get((t.body, t.slide), 0j) + t.z
+    return tuple(Term(z, body, slide) for (body, slide), z in sums.items() if z != 0)
+
+
+def longer(terms: tuple[Term, ...], t: Term) -> tuple[Term, ...]:
+    """Terms and one more, added to that of the same body and slide."""
+    if any(own.body == t.body and own.slide == t.slide for own in terms):
+        return combined((*terms, t))
+    return (*terms, t) if t.z != 0 else terms
 
 
 def plan(m: Description, *, merged: bool = False, phases: Mapping[int, float] | None = None) -> Plan:
@@ -74,7 +124,11 @@ class _Planner:
     def __init__(self, topology: Topology) -> None:
         self.m = m = topology.first
         self.merged, self.phases = topology.merged, topology.phases
-        self.points, self.throughs = topology.vectors()
+        self.points: dict[str, dict[str, Any]] = {
+            body: {p: Vector.of(slot) for p, slot in given} for body, given in topology.bodies
+        }
+        # a point of each guide's line
+        self.throughs: list[Any] = [Vector.of(line) for _, _, _, line, _ in topology.guides]
         self.guess = known_by_guess(m)[0] if m.gears else {}
         self.relations = list(relations(m))
         self.driven = {m.guide_of(e): j for j, e in enumerate(m.inputs) if e.is_slide}
@@ -85,9 +139,8 @@ class _Planner:
         self.slides_known: set[int] = set()
         self.directions: dict[int, Any] = {i: Vector.of((i, "direction")) for i in range(len(m.guides))}
         self.guide_nodes: dict[int, str] = {}
-        self.used: set[tuple[str, str]] = (
-            set()
-        )  # (joint, body) already spent to place a body or to close a loop
+        # (joint, body) already spent to place a body or to close a loop
+        self.used: set[tuple[str, str]] = set()
         # long chains: what is done is not looked through again for every block
         # bodies whose angle the steps written so far give
         self.solved: set[str] = set()
@@ -202,25 +255,25 @@ class _Planner:
             known = replace(right, gears=())
             for body, factor in c.items():
                 if body not in fresh:
-                    known = _plus(known, self.angles[body], -factor)
+                    known = known.plus(self.angles[body], -factor)
             unknown = {body: factor for body, factor in c.items() if body in fresh}
             if self.m.gears:
                 there = known.at(self.m.at)
                 stands = sum(factor * self.guess.get(body, 0.0) for body, factor in unknown.items())
                 if right.gears:
                     # its constant is that of the guess, at once where no link before it has to be placed
-                    known = _plus(known, right if there is None else Angle(stands - there), 1.0)
+                    known = known.plus(right if there is None else Angle(stands - there))
                 elif relation.kind == "guide" and there is not None and unknown.keys() <= self.guess.keys():
                     # gears count whole turns: those of a slider are the guess's
                     whole = round(complex(stands - there).real / (2 * math.pi))
-                    known = _plus(known, Angle(2 * math.pi * whole), 1.0) if whole else known
+                    known = known.plus(Angle(2 * math.pi * whole)) if whole else known
             rows.append((unknown, known))
         solved: dict[str, tuple[dict[str, float], Angle]] = {}
         for unknown, known in rows:
             for body, (others, value) in solved.items():
                 if body in unknown:
                     f = unknown.pop(body)
-                    known = _plus(known, value, -f)
+                    known = known.plus(value, -f)
                     for other, o in others.items():
                         unknown[other] = unknown.get(other, 0.0) + f * o
             unknown = {b: f for b, f in unknown.items() if abs(f) > 1e-13}
@@ -229,13 +282,13 @@ class _Planner:
             pivot = max(unknown, key=lambda b: (abs(abs(unknown[b]) - 1) < 1e-12, fresh.index(b)))
             p = unknown.pop(pivot)
             others = {b: -f / p for b, f in unknown.items()}
-            value = _times(known, 1 / p)
+            value = Angle().plus(known, 1 / p)
             for body, (was, val) in list(solved.items()):
                 if pivot in was:
                     f = was.pop(pivot)
                     for other, o in others.items():
                         was[other] = was.get(other, 0.0) + f * o
-                    solved[body] = (was, _plus(val, value, f))
+                    solved[body] = (was, val.plus(value, f))
             solved[pivot] = (others, value)
         free = [b for b in fresh if b not in solved]
         for b in free:
@@ -244,7 +297,7 @@ class _Planner:
         for b, (others, value) in solved.items():
             angle = value
             for other, f in others.items():
-                angle = _plus(angle, Angle(bases=((other, 1.0),)), f)
+                angle = angle.plus(Angle(bases=((other, 1.0),)), f)
             self.angles[b] = Angle(bases=((b, 1.0),)) if angle.gears else angle
             turns.append(Turn(b, angle))
         return free, turns
@@ -395,29 +448,3 @@ class _Planner:
         (start, plus), (end, minus) = there, here
         terms = combined((*plus, *(Term(-t.z, t.body, t.slide) for t in minus)))
         closures.append(Closure(start, end, terms, joint, body, guide))
-
-
-def _plus(a: Angle, b: Angle, factor: float) -> Angle:
-    """a + factor·b."""
-    const, more = a.const + factor * b.const, factor * b.const
-    added = abs(more) + abs(const) if a.const and b.const else 0.0
-    return Angle(
-        const,
-        _sums(a.inputs, b.inputs, factor),
-        _sums(a.bases, b.bases, factor),
-        _sums(a.gears, b.gears, factor),
-        a.size + abs(factor) * b.size + added,
-    )
-
-
-def _sums(
-    own: tuple[tuple[Key, float], ...], other: tuple[tuple[Key, float], ...], factor: float
-) -> tuple[tuple[Key, float], ...]:
-    total = dict(own)
-    for key, k in other:
-        total[key] = total.get(key, 0.0) + factor * k
-    return tuple((key, k) for key, k in total.items() if k != 0)
-
-
-def _times(a: Angle, factor: float) -> Angle:
-    return _plus(Angle(), a, factor)

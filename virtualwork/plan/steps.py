@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal, TypeVar
 
 from virtualwork.describe.parts import GROUND
 
@@ -24,45 +24,7 @@ from virtualwork.describe.parts import GROUND
 Variable = tuple[str, str]
 # a point of a body; the number of a guide and what of it: where its line runs, which way
 Slot = tuple[str, str] | tuple[int, str]
-
-
-class Vector:
-    """A sum of a body's points, each so many times, as the order of solution adds them up.
-
-    >>> a, b = Vector.of(("arm", "A")), Vector.of(("arm", "B"))
-    >>> a + -b == 0, a + -b + -a + b == 0
-    (False, True)
-    """
-
-    __slots__ = ("parts",)
-
-    def __init__(self, parts: Mapping[Slot, int]) -> None:
-        self.parts = parts
-
-    @classmethod
-    def of(cls, slot: Slot | None) -> Vector:
-        """One of them; None is the origin."""
-        return cls({} if slot is None else {slot: 1})
-
-    def __add__(self, other: Any) -> Vector:
-        if other == 0:
-            return self
-        sums = dict(self.parts)
-        for slot, times in other.parts.items():
-            total = sums.get(slot, 0) + times
-            if total:
-                sums[slot] = total
-            else:
-                del sums[slot]
-        return Vector(sums)
-
-    __radd__ = __add__
-
-    def __neg__(self) -> Vector:
-        return Vector({slot: -times for slot, times in self.parts.items()})
-
-    def __eq__(self, other: object) -> bool:
-        return self.parts == other.parts if isinstance(other, Vector) else not self.parts and other == 0
+Key = TypeVar("Key", int, str)
 
 
 @dataclass(frozen=True)
@@ -102,6 +64,27 @@ class Angle:
         if self.bases or self.gears:
             return None
         return self.const + sum(k * inputs[j] for j, k in self.inputs)
+
+    def plus(self, other: Angle, factor: float = 1.0) -> Angle:
+        """This angle and so many times another."""
+        const, more = self.const + factor * other.const, factor * other.const
+        added = abs(more) + abs(const) if self.const and other.const else 0.0
+        return Angle(
+            const,
+            _sums(self.inputs, other.inputs, factor),
+            _sums(self.bases, other.bases, factor),
+            _sums(self.gears, other.gears, factor),
+            self.size + abs(factor) * other.size + added,
+        )
+
+
+def _sums(
+    own: tuple[tuple[Key, float], ...], other: tuple[tuple[Key, float], ...], factor: float
+) -> tuple[tuple[Key, float], ...]:
+    total = dict(own)
+    for key, k in other:
+        total[key] = total.get(key, 0.0) + factor * k
+    return tuple((key, k) for key, k in total.items() if k != 0)
 
 
 @dataclass(frozen=True)
@@ -254,18 +237,3 @@ def _term_reads(terms: tuple[Term, ...]) -> set[str]:
 
 def _node(name: str | None) -> set[str]:
     return set() if name is None else {f"point:{name}"}
-
-
-def combined(terms: Iterable[Term]) -> tuple[Term, ...]:
-    """Add terms of the same body and slide; drop those that cancel."""
-    sums: dict[tuple[str, int | None], complex] = {}
-    for t in terms:
-        sums[t.body, t.slide] = sums.get((t.body, t.slide), 0j) + t.z
-    return tuple(Term(z, body, slide) for (body, slide), z in sums.items() if z != 0)
-
-
-def longer(terms: tuple[Term, ...], t: Term) -> tuple[Term, ...]:
-    """Terms and one more, added to that of the same body and slide."""
-    if any(own.body == t.body and own.slide == t.slide for own in terms):
-        return combined((*terms, t))
-    return (*terms, t) if t.z != 0 else terms

@@ -1,7 +1,7 @@
 """The topology of a mechanism: what its order of solution hangs on, and the plan kept for it.
 
 Which links meet, which points of a link lie at the same place, how angles are tied: no length is in it. A plan is made
-once for a topology, with its vectors written down in the names of the points (`Vector`); a mechanism puts its numbers in.
+once for a topology, with its vectors written down in the names of the points (`order.Vector`); a mechanism puts its numbers in.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 from dalembert.arithmetic.recorded import Constant
 from dalembert.arithmetic.varied import Varied, rotation
 from virtualwork.describe.description import Description
-from virtualwork.plan.steps import Closure, Group, Place, Plan, Slot, Step, Term, Vector
+from virtualwork.plan.steps import Closure, Group, Place, Plan, Slot, Step, Term
 
 KEPT = 256
 
@@ -78,11 +78,6 @@ class Topology:
             guides.append((g.point, g.link, g.on, line, None if g.turned is None else (g.angle, g.turned)))
         inputs = tuple((e.link, e.on, e.slider) for e in m.inputs)
         return cls(bodies, tuple(guides), inputs, merged, m, phases)
-
-    def vectors(self) -> tuple[dict[str, dict[str, Any]], list[Any]]:
-        """The points of each body and a point of each guide's line, in names."""
-        points = {body: {p: Vector.of(slot) for p, slot in given} for body, given in self.bodies}
-        return points, [Vector.of(line) for _, _, _, line, _ in self.guides]
 
     def plan(self, make: Callable[[Topology], Plan]) -> Plan:
         """The order of solution in names: made once, but where a gear's constant, or a constant that varies, is in it."""
