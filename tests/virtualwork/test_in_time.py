@@ -121,7 +121,7 @@ def test_torque_over_time_is_followed_through_its_kinks() -> None:
     table = ((0.0, 0.0), (1.0, 4.0), (2.0, 0.0), (3.0, 0.0))
     m = rotor(torques=[Torque("rotor", history=table, over="time")])
     run = m.simulate([0, 1, 2, 2.5, 5], angle=0.0)
-    assert run.t[-1] == pytest.approx(3.0, rel=1e-11)
+    assert run.t[-1] == 3.0
     assert np.allclose(run.angle[:, 0], [0, 1 / 3, 2, 3, 4], rtol=1e-11)
     assert "ends at 3 s: the table of the applied torque on rotor ends at 3 s" in " ".join(run.warnings)
 
@@ -331,6 +331,15 @@ def test_wrong_questions(wrong: dict[str, object]) -> None:
         pendulum().simulate(**wrong)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="no input is named 'bab'"):
         pendulum().simulate([0, 1], until={"bab": 1.0})
+
+
+def test_a_motion_that_takes_too_many_steps_ends_with_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    for room in ("run", "travel"):
+        monkeypatch.setattr(f"virtualwork.intime.{room}.MOST", 40)
+    run = pendulum().simulate(np.linspace(0, 1000, 11))
+    assert run.t[-1] < 1000
+    (said,) = (text for text in run.warnings if "steps" in text)
+    assert said == f"ends at {run.t[-1]:.9g} s, after 40 steps: a lower accuracy takes fewer"
 
 
 def test_wheels_without_a_loop_turn_as_far_as_they_like() -> None:

@@ -61,6 +61,12 @@ class Coordinates:
         other.equations = equations
         return other
 
+    def otherwise(self) -> Coordinates:
+        """The same coordinates, and all that follow them, interpolated from other poses near change points."""
+        other = self.of(self.equations.otherwise())
+        other.made = [other]
+        return other
+
     def motion(
         self, q: Reals, v: Reals | float = 0.0, a: Reals | float = 0.0, t: Reals | None = None
     ) -> Motion:
@@ -179,7 +185,7 @@ class Coordinates:
             # what lies along the branch is known of it
             if known.equations.mechanism.inputs == entries and known.stands_at(at, angles):
                 return known, at
-        other = Coordinates(type(self.equations)(assembly), self.inputs)
+        other = Coordinates(self.equations.through(assembly), self.inputs)
         other.made = self.made
         self.made.append(other)
         return other, at

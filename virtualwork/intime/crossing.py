@@ -17,7 +17,9 @@ from virtualwork.intime.watch import Floats
 # rad, or of a slide's size: from how far off is interpolated at most; which share of it is left out
 REACH, INNER = 0.6, 0.2
 # on each side
-NODES = 6
+NODES = 8
+# of how far off as many others are tried, until one misses by no more than rounding does anyway
+NARROWER, NARROWINGS, ENOUGH = 0.75, 12, 1e-12
 
 
 class Crossing:
@@ -53,11 +55,43 @@ class Crossing:
         values = zip(*(f(x) for x in self.nodes), strict=True)
         return [sum(s * y for s, y in zip(shares, of, strict=True)) / total for of in values]
 
+    def gap(self, f: Callable[[float], Floats]) -> float:
+        """How far interpolation lies from quantities at the ends of what it replaces, relative to their size at the nodes.
 
-def crossings(points: Iterable[float], unit: float, share: float = 1.0) -> list[Crossing]:
+        From poses too far off it misses them, for what is smooth here has an end (a limit, a fast turn) not far away;
+        from poses too near they have lost their digits.
+        """
+        known = {x: f(x) for x in (*self.nodes, self.at - self.inner, self.at + self.inner)}
+        sizes = [max(map(abs, of)) for of in zip(*known.values(), strict=True)]
+        gaps = [
+            abs(x - y) / size if size else 0.0
+            for q in (self.at - self.inner, self.at + self.inner)
+            for x, y, size in zip(known[q], self.interpolated(known.__getitem__, q), sizes, strict=True)
+        ]
+        # NaN is the worst
+        return max(x if x == x else math.inf for x in gaps)
+
+
+def narrowed(f: Callable[[float], Floats], at: float, widest: float) -> Crossing:
+    """The crossing at an input whose poses tell most of quantities close to it; from no farther off than `widest`."""
+    best, least = Crossing(at, widest), math.inf
+    for j in range(NARROWINGS):
+        found = Crossing(at, widest * NARROWER**j)
+        gap = found.gap(f)
+        if gap < least:
+            best, least = found, gap
+        if least <= ENOUGH:
+            break
+    return best
+
+
+def crossings(
+    points: Iterable[float], unit: float, settled: Callable[[float, float], Crossing], share: float = 1.0
+) -> list[Crossing]:
     """The crossings at change points, those within rounding of each other as one; `unit`: 1 rad, or a size.
 
-    `share` of how far off poses are taken as a rule: with others the interpolation errs in another way.
+    `settled` makes one at an input, with poses from no farther off than given; `share` of how far off poses are taken as
+    a rule: with others the interpolation errs in another way.
     """
     places: list[float] = []
     for at in sorted(points):
@@ -66,7 +100,8 @@ def crossings(points: Iterable[float], unit: float, share: float = 1.0) -> list[
     found = []
     for i, at in enumerate(places):
         apart = [abs(at - other) for other in (*places[max(0, i - 1) : i], *places[i + 1 : i + 2])]
-        found.append(Crossing(at, share * min([REACH * unit, *(0.6 * x for x in apart)])))
+        widest = min([REACH * unit, *(0.6 * x for x in apart)])
+        found.append(settled(at, share * widest))
     return found
 
 

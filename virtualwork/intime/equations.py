@@ -30,7 +30,7 @@ from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.scene import Scene
-from virtualwork.intime.crossing import Crossing, crossings, nearest
+from virtualwork.intime.crossing import Crossing, crossings, narrowed, nearest
 from virtualwork.intime.entering import Iteration, Placed, unknowns
 from virtualwork.intime.powers import motion_of, places_and_speeds
 from virtualwork.intime.tables import Value, ends, kinks, place, reader
@@ -44,6 +44,8 @@ FAR = 64.0
 OTHER = 0.85
 # how near a change point a fold is its own
 NEAR = 0.1
+# a speed of the input, rad/s or m/s, beside whose forces all others are small
+FAST = 1e4
 TURN = 2 * math.pi
 EVERYWHERE = (-math.inf, math.inf)
 
@@ -72,6 +74,7 @@ class Equations:
         self._flips: dict[str, list[float]] = {}
         self._crossings: list[Crossing] = []
         self._share = 1.0
+        self._known: dict[tuple[float, float], Crossing] = {}
         # starts that were looked at
         self._begun: set[tuple[float, ...]] = set()
         self._cover(self.mechanism.at[0])
@@ -348,8 +351,21 @@ class Equations:
                 raise Lost from None
             low, high = min(low, q - ahead), max(high, q + ahead)
             self._flips.update({name: at.tolist() for name, at in track.flips.items()})
-            self._crossings = crossings(track.crossings, self.scale[0], self._share)
+            self._crossings = crossings(track.crossings, self.scale[0], self._settled, self._share)
         self._covered = (low, high) if track.active and not track.settled else EVERYWHERE
+
+    def _settled(self, at: float, widest: float) -> Crossing:
+        """The crossing at a change point, found once."""
+        if (at, widest) not in self._known:
+            self._known[at, widest] = narrowed(self._samples, at, widest)
+        return self._known[at, widest]
+
+    def _samples(self, q: float) -> Floats:
+        """What is interpolated near change points, at rest and where it moves fast; NaN where there is none."""
+        try:
+            return [self._plain(self.stops[0] if self.stops else 0.0, [q], [v])[0] for v in (0.0, FAST)]
+        except Lost:
+            return [math.nan, math.nan]
 
     def _crossing(self, q: float) -> Crossing | None:
         """The change point that an input is close to."""
@@ -363,9 +379,19 @@ class Equations:
     def otherwise(self) -> Equations:
         """The same equations, interpolated from other poses near change points."""
         other = copy(self)
-        other._share, other._covered, other._crossings = OTHER, (math.inf, -math.inf), []
-        other._cover(self.mechanism.at[0])
+        other._takes(OTHER)
         return other
+
+    def through(self, assembly: Assembly) -> Equations:
+        """The equations of another assembly, interpolated as these are."""
+        other = type(self)(assembly)
+        if self._share != other._share:
+            other._takes(self._share)
+        return other
+
+    def _takes(self, share: float) -> None:
+        self._share, self._covered, self._crossings = share, (math.inf, -math.inf), []
+        self._cover(self.mechanism.at[0])
 
     @property
     def crosses(self) -> bool:

@@ -69,6 +69,12 @@ class Path:
             for of in (self.t, self.q, self.v, self.rates, self.work):
                 of.pop()
 
+    def back(self, stops: Sequence[float]) -> None:
+        """Take away the nodes that lie beyond the last of some times by no more than rounding of it."""
+        for stop in stops[: bisect_right(stops, self.t[-1])][-1:]:
+            while len(self.t) > 1 and 0 < self.t[-1] - stop <= 1e-9 * max(abs(stop), stop - self.t[0]):
+                self.drop()
+
     def extend(self, rows: Reals, k: int) -> None:
         """Add nodes: a row (t, q, q̇, rates, work) each."""
         self.t += rows[:, 0].tolist()

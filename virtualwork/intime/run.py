@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
+from virtualwork.describe.errors import MechanismError
 from virtualwork.describe.parts import Input
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.coordinates import Coordinates
@@ -223,7 +224,7 @@ def simulate(
     for tries in range(TRIES):
         coarse, method = fine, fine.legs[0].path.method
         # near change points every solution is interpolated from other poses
-        ways = own if tries % 2 else own.of(equations.otherwise())
+        ways = own if tries % 2 else own.otherwise()
         # no farther than both go
         last = coarse.end if coarse.ended == UNDECIDED else float(t[-1])
         fine = travel(ways, start, last, tolerance / (GAIN + 1), levels, method, accuracy, coarse)
@@ -236,7 +237,33 @@ def simulate(
         if worst <= accuracy or tolerance <= LEAST or tries == TRIES - 1 or fine.steps > MOST / 2:
             break
         tolerance /= GAIN + 1
+    _refuse_lost_energy(found, max(accuracy, worst))
     return replace(found, warnings=(*equations.warnings, *_said(found, accuracy, worst, until, t)))
+
+
+def _refuse_lost_energy(run: Run, error: float) -> None:
+    """Refuse a motion through change points whose energy is lost by more than its error explains.
+
+    Raises
+    ------
+    MechanismError
+        From which time on.
+    """
+    fine = run.fine
+    path = fine.legs[0].path
+    equations = path.equations
+    if not equations.crosses:
+        return
+    t, q, v = (np.array(x) for x in (path.t, path.q, path.v))
+    moving = float(np.max(equations.energies(t, q, v) - equations.energies(t, q, 0 * v)))
+    nodes = fine.nodes
+    energy = fine.energy(nodes)
+    lost = np.abs(energy - energy[0] - fine.at(nodes)[3]) > 1e3 * error * moving
+    if lost.any():
+        raise MechanismError(
+            f"at {nodes[np.argmax(lost)]:.6g} s it passes a change point too close to which its rates change too fast: "
+            "energy is lost there beyond the error of the motion"
+        )
 
 
 def _own(assembly: Assembly) -> Coordinates:
@@ -312,16 +339,6 @@ def _said(
             f"at {undecided:.9g} s it rests at a change point, from where more than one motion leads on: that of the "
             "guess's branch is followed"
         )
-    equations, path = run.fine.legs[0].path.equations, run.fine.legs[0].path
-    if equations.crosses:
-        t, q, v = (np.array(x) for x in (path.t, path.q, path.v))
-        moving = float(np.max(equations.energies(t, q, v) - equations.energies(t, q, 0 * v)))
-        drift = float(np.abs(run.energy_drift).max())
-        if drift > 1e3 * accuracy * moving:
-            found.append(
-                f"{drift:.1e} J of energy are not explained: close to change points accelerations are interpolated, and "
-                "the error is larger than estimated"
-            )
     if run.unknown.any():
         found.append(
             f"no digit is known from {run.t[np.argmax(run.unknown)]:.6g} s on: the motion makes any error grow, "

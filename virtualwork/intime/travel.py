@@ -297,6 +297,9 @@ def travel(
             method = Radau()
             continue
         found.ended = equations.outside(t, q, v) if path.ended == "lost" else ""
+        if found.ended:
+            # a table over time reads a little beyond its end
+            path.back(stops)
         other = None if found.ended else coordinates.better(q, inputs)
         if (
             other is None
