@@ -50,6 +50,12 @@ def _elsewhere() -> None:
     """Stand in for a command that was not called: its file is not loaded."""
 
 
+def _call_of(example: str) -> str:
+    from cli.examples.command import describe
+
+    return describe(example)["command"]
+
+
 def build(called: str | None) -> typer.Typer:
     """Build the command line with only the called command's file loaded."""
     app = typer.Typer(
@@ -67,7 +73,7 @@ def build(called: str | None) -> typer.Typer:
             from cli.show.commands import with_help
 
             file = import_module(module)
-            kind = with_help(getattr(file, "OPTIONS", ""), getattr(file, "EXAMPLE", ""))
+            kind = with_help(getattr(file, "OPTIONS", ""), getattr(file, "EXAMPLE", ""), _call_of)
             app.command(name, short_help=line, cls=kind)(file.run)
         else:
             app.command(name, short_help=line)(_elsewhere)

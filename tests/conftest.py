@@ -18,6 +18,13 @@ sys.path.append(str(Path(__file__).parents[1]))
 from tests.forks import LONGEST, Forks
 
 COMMAND = Path(sys.executable).with_name("dalembert")
+# tests that run in the background have Ctrl-C ignored, and what they start would too
+TAKES_CTRL_C = [
+    sys.executable,
+    "-c",
+    "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); os.execv(sys.argv[1], sys.argv[1:])",
+    str(COMMAND),
+]
 Dalembert = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
@@ -30,7 +37,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what is beyond the first cases of a test as slow: `-m slow` and .ci/run have them all."""
     seen: dict[tuple[str, str], int] = {}
     for item in items:
-        if getattr(item, "callspec", None) is not None:
+        if getattr(item, "callspec", None) is not None and item.get_closest_marker("whole") is None:
             key = item.nodeid.split("::")[0], item.originalname  # type: ignore[attr-defined]
             seen[key] = seen.get(key, 0) + 1
             if seen[key] > CASES:

@@ -257,6 +257,7 @@ def offences(package: str) -> dict[str, set[str]]:
     return found
 
 
+@pytest.mark.whole
 @pytest.mark.parametrize("package", LEVELS)
 def test_imports_point_down_in_no_circle_and_private_names_stay_at_home(package: str) -> None:
     """Only what KNOWN lists is otherwise, and KNOWN lists nothing that is mended."""

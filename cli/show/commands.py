@@ -233,6 +233,8 @@ class Command(TyperCommand):
 
     told: Mapping[str, Told] = {}
     example = ""
+    # the call that an example shows, by the example's name
+    call_of: Callable[[str], str]
 
     def panels_of(self, ctx: Any) -> dict[str, list[tuple[str, str]]]:
         """Return the rows of help below their headings."""
@@ -252,14 +254,12 @@ class Command(TyperCommand):
                 formatter.write_dl(records)
 
     def format_epilog(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
-        if not self.example:
-            return
-        from cli.examples.command import describe
-
-        with formatter.section(f"Example (dalembert examples {self.example} writes its files here)"):
-            formatter.write(f"  {describe(self.example)['command']}\n")
+        if self.example:
+            with formatter.section(f"Example (dalembert examples {self.example} writes its files here)"):
+                formatter.write(f"  {self.call_of(self.example)}\n")
 
 
-def with_help(options: str, example: str) -> type[Command]:
-    """Return the kind of command whose help says this of its options, and ends in this example."""
-    return type("Command", (Command,), {"told": told(options), "example": example})
+def with_help(options: str, example: str, call_of: Callable[[str], str]) -> type[Command]:
+    """Return the kind of command whose help says this of its options, and ends in this example's call."""
+    own = {"told": told(options), "example": example, "call_of": staticmethod(call_of)}
+    return type("Command", (Command,), own)

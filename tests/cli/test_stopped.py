@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import TAKES_CTRL_C
+
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc"),
@@ -39,9 +41,8 @@ def begun(tmp_path):
 
     def begin(*options):
         own, its = pty.openpty()
-        command = str(Path(sys.executable).with_name("dalembert"))
         process = subprocess.Popen(
-            [command, *CALL, *options], cwd=tmp_path, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=its
+            [*TAKES_CTRL_C, *CALL, *options], cwd=tmp_path, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=its,
         )  # fmt: skip
         os.close(its)
         all_of_them.append((process, own))

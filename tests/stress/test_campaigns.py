@@ -15,8 +15,13 @@ TALLIES: dict[str, Tally] = {}
 @pytest.mark.parametrize("name", campaigns())
 def test_campaign(name: str) -> None:
     tally = None
-    for tally in run(name, 60.0 / len(campaigns())):
-        if tally.trials >= 400:
+    # where others use the processor too, a few trials may take longer
+    for seconds in (60.0 / len(campaigns()), 15.0):
+        for tally in run(name, seconds):
+            if tally.trials >= 400:
+                break
+        assert tally is not None
+        if len(tally.ratios) >= 3:
             break
     assert tally is not None
     TALLIES[name] = tally

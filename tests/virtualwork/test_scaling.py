@@ -102,7 +102,7 @@ def test_ctrl_c_stops_all_workers(tmp_path):
     )
     (tmp_path / "m.toml").write_text(text)
     command = [
-        Path(sys.executable).with_name("dalembert"),
+        *TAKES_CTRL_C,
         "mechanism",
         "m.toml",
         "--sweep",
@@ -110,7 +110,10 @@ def test_ctrl_c_stops_all_workers(tmp_path):
     ]
     options = ["--draws", "300000", "--workers", "2", "--only", "C"]
     running = subprocess.Popen(
-        [*map(str, command), *options], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        [*map(str, command), *options],
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
     )
 
     def children():
