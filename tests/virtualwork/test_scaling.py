@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import pytest
 
 from dalembert.arithmetic.parts import LostPart, in_parts
 from dalembert.arithmetic.processes import Processes
+from tests.conftest import TAKES_CTRL_C
 from virtualwork import Guess, Input, Link, Mechanism
 
 # a call that kills its process unless the file is there, which it leaves behind
