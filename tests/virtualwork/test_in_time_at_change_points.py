@@ -185,6 +185,7 @@ def test_energy_lost_between_interpolated_poses_is_refused(monkeypatch: pytest.M
         loop(0.5, 0.5, 0.3, 0.3, 0.6, 1).simulate([0, 1.2], speed=7.0, accuracy=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lengths", [(0.5, 0.5, 0.3, 0.3), (0.3, 0.5, 0.3, 0.5), (0.3, 0.6, 0.5, 0.4)])
 def test_with_friction_it_ends_close_to_the_flat_pose_with_its_time(lengths: tuple[float, ...]) -> None:
     """The joint forces there, and with them friction, grow beyond any bound."""
