@@ -69,7 +69,7 @@ class Placed:
     >>> from virtualwork import Guess, Input, Link, Mechanism
     >>> bars = {"crank": Link({"A": 0j, "B": 1}), "rod": Link({"B": 0j, "C": 2}), "arm": Link({"D": 0j, "C": 2})}
     >>> m = Mechanism({"A": 0j, "D": 2}, bars, inputs=Input(link="crank"), guess=Guess(1.0, points={"C": 2 + 2j}))
-    >>> Placed(m.assembly).angle("rod")(0.0, [1.0], [0.0]) == float(m.motion(1.0).link("rod").angle[0])
+    >>> bool(np.angle(Placed(m.assembly).state([1.0]).turn["rod"]) == m.motion(1.0).link("rod").angle[0])
     True
     """
 
