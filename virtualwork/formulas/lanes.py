@@ -21,6 +21,7 @@ from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.linear import SINGULAR
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
+from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.numbers import Number, Reals, leave_out
 from virtualwork.formulas.poses import Branch, Poses
 from virtualwork.formulas.recording import NAMES, NEAR, Recording
@@ -191,15 +192,7 @@ class Lanes:
         """An unknown of a group without a closed form, from its own iteration."""
         of = next(g for g in self.branch.plan.groups if g.name == group)
         self.poses.solve(self.branch.plan.writes(of), 0)
-        at = int(i)
-        if at < len(of.angles):
-            body = of.angles[at]
-            # a closed form leaves the rotation alone
-            found: Reals = self.poses.over(
-                lambda _, st: st.angle[body] if body in st.angle else np.angle(st.turn[body])
-            )
-            return found
-        return self.poses.over(lambda _, st: st.slide[of.slides[at - len(of.angles)]])  # type: ignore[no-any-return]
+        return self.poses.over(lambda _, st: unknowns(of, st)[int(i)])  # type: ignore[no-any-return]
 
     def _angle(self, body: str) -> Reals:
         """A body's angle with its whole turns."""

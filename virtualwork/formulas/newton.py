@@ -23,6 +23,13 @@ def write_unknowns(group: Group, st: State, x: Reals) -> None:
     put_unknowns(group, st, [x[:, j] if st.many else float(x[0, j]) for j in range(x.shape[1])])
 
 
+def unknowns(group: Group, st: State) -> list[Number]:
+    """A group's unknowns in a state: angles, and then slides."""
+    # a closed form leaves the rotation alone
+    angles = [st.angle[b] if b in st.angle else st.kind.angle(st.turn[b]) for b in group.angles]
+    return angles + [st.slide[s] for s in group.slides]
+
+
 def put_unknowns(group: Group, st: State, x: Sequence[Number]) -> None:
     """Put a group's unknowns, angles and then slides, into the state, with the bodies tied to them."""
     for body, angle in zip(group.angles, x, strict=False):

@@ -13,12 +13,11 @@ from dalembert.arithmetic.engines import floats
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.formulas.block import Setting
-from virtualwork.formulas.numbers import Number
+from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.positions import State
 from virtualwork.intime.tables import Value
 from virtualwork.intime.watch import Floats
-from virtualwork.plan.steps import Group
 
 # Newton's steps from one pose to the next; rad or sizes: a change from which one more step leaves rounding alone, and
 # how far off the last pose may be to begin from
@@ -137,13 +136,6 @@ class Placed:
             ends[:, 0] = min(low, q - span), max(high, q + span)
             self._wound = *ends[:, 0].tolist(), Setting(Poses(self.assembly, ends), False)
         return self._wound[2]
-
-
-def unknowns(group: Group, st: State) -> list[Number]:
-    """A group's unknowns in a state: angles, and then slides."""
-    # a closed form leaves the rotation alone
-    angles = [st.angle[b] if b in st.angle else st.kind.angle(st.turn[b]) for b in group.angles]
-    return angles + [st.slide[s] for s in group.slides]
 
 
 def _one(x: Any) -> float:

@@ -26,12 +26,13 @@ from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.effort import effort
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
+from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.scene import Scene
 from virtualwork.intime.crossing import Crossing, crossings, narrowed, nearest
-from virtualwork.intime.entering import Iteration, Placed, unknowns
+from virtualwork.intime.entering import Iteration, Placed
 from virtualwork.intime.powers import motion_of, places_and_speeds
 from virtualwork.intime.tables import Value, ends, kinks, place, reader
 from virtualwork.intime.watch import Floats, Watch
