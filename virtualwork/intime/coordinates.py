@@ -185,7 +185,7 @@ class Coordinates:
             # what lies along the branch is known of it
             if known.equations.mechanism.inputs == entries and known.stands_at(at, angles):
                 return known, at
-        other = Coordinates(self.equations.through(assembly), self.inputs)
+        other = Coordinates(type(self.equations)(assembly).sharing(self.equations.share), self.inputs)
         other.made = self.made
         self.made.append(other)
         return other, at

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.numbers import EPS, Reals
-from virtualwork.intime.explicit import names
 from virtualwork.intime.marching import over
+from virtualwork.intime.powers import names
 from virtualwork.intime.watch import APART, SMALL, Levels, between
 
 Nodes = Mapping[str, Reals]

@@ -20,6 +20,7 @@ from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.equations import Equations, Lost
+from virtualwork.intime.powers import names
 from virtualwork.intime.step import Step
 from virtualwork.intime.tableau import AT, FIFTH, STAGES, THIRD, WEIGHTS
 from virtualwork.intime.watch import Floats
@@ -108,12 +109,6 @@ def size(third: Numbers, fifth: Numbers, scale: Numbers) -> Number:
     whole = (high + 0.01 * low) * len(scale)
     # no error at all is none; what is NaN stays so
     return high / RECORDED.sqrt(RECORDED.select(whole - TINY, whole, TINY))
-
-
-def names(k: int) -> tuple[list[str], list[str], list[str]]:
-    """What q, q̇ and the rates are called on a tape."""
-    rates = [*(f"a{j}" for j in range(k)), "power"]
-    return [f"q{j}" for j in range(k)], [f"v{j}" for j in range(k)], rates
 
 
 @lru_cache(maxsize=64)

@@ -33,7 +33,8 @@ from virtualwork.intime.control import (
     stiffer,
     tried,
 )
-from virtualwork.intime.explicit import DormandPrince, called_by, names, size, step
+from virtualwork.intime.explicit import DormandPrince, called_by, size, step
+from virtualwork.intime.powers import names, state_names
 
 # an error that is surely enough, and is no zero
 SMALL = 1e-30
@@ -100,9 +101,9 @@ def body(k: int, passed: tuple[str, ...]) -> Tape:
 @lru_cache(maxsize=64)
 def loop(k: int, rates: Tape) -> Loop:
     """The loop of steps with the tape of accelerations and power of k inputs."""
-    own = {"t", *names(k)[0], *names(k)[1]}
+    own = state_names(k)
     passed = tuple(name for name in rates.inputs if name in own)
-    kept = ("t", *names(k)[0], *names(k)[1], *names(k)[2], "work")
+    kept = (*own, *names(k)[2], "work")
     return Loop(body(k, passed), rates, kept)
 
 
@@ -112,7 +113,7 @@ def again(k: int, rates: Tape) -> Loop:
     recorder = Recorder()
     enter = recorder.input
     places, speeds, slopes = names(k)
-    own = {"t", *places, *speeds}
+    own = state_names(k)
     calls = Calls(recorder, [name for name in rates.inputs if name in own], slopes)
     t, end, work = enter("t"), enter("next"), enter("work")
     q, v, a = ([enter(name) for name in of] for of in (places, speeds, slopes))
@@ -121,7 +122,7 @@ def again(k: int, rates: Tape) -> Loop:
     out |= dict(zip(slopes, done.rates, strict=True))
     for x, d, name in (*zip(q, done.dq, places, strict=True), *zip(v, done.dv, speeds, strict=True)):
         out[name], out[f"l{name}"] = added(x, enter(f"l{name}"), d)
-    kept = ("t", *places, *speeds, *slopes, "work")
+    kept = (*own, *slopes, "work")
     return Loop(recorder.tape(out | calls.outputs), rates, kept, ("next",))
 
 

@@ -28,8 +28,9 @@ from virtualwork.intime.control import (
     tried,
 )
 from virtualwork.intime.equations import Equations, Lost
-from virtualwork.intime.explicit import DormandPrince, names
+from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.marching import ROUNDS, beginning, follow, loop, march, over
+from virtualwork.intime.powers import names
 from virtualwork.intime.step import Method, Step
 from virtualwork.intime.watch import Check, Floats, Watch, between
 

@@ -26,9 +26,8 @@ from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
 from virtualwork.intime.ends import events, passed
 from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, rounding, share, spread
-from virtualwork.intime.explicit import names
 from virtualwork.intime.marching import beginning, follow, march, over
-from virtualwork.intime.powers import motion_of, places_and_speeds
+from virtualwork.intime.powers import motion_of, names, state_names
 from virtualwork.intime.run import levels_of, not_met, reached, rising, simulate
 from virtualwork.intime.runs import Runs
 from virtualwork.intime.watch import Levels
@@ -168,7 +167,7 @@ class _Lanes:
                 # no mass moves: each says so
                 return None
         rates, energy = family.tapes
-        if not {*places_and_speeds(k), *given}.issuperset(rates.inputs):
+        if not {*state_names(k), *given}.issuperset(rates.inputs):
             return None
         scale = np.ones((len(q), k))
         slides = [j for j, e in enumerate(m.inputs) if e.is_slide]
@@ -359,7 +358,7 @@ class _Lanes:
         given = {name: np.repeat(x, n) for name, x in self.some(rows).items()}
         given |= dict(
             zip(
-                places_and_speeds(self.k),
+                state_names(self.k)[1:],
                 np.concatenate([found["q"], found["v"]], axis=2).reshape(-1, 2 * self.k).T,
                 strict=True,
             )

@@ -12,6 +12,9 @@ from virtualwork.formulas.numbers import EPS, Number, Reals
 
 Floats = list[float]
 Several = Sequence[Number]
+Value = Callable[[float, Floats, Floats], float]
+Rate = Callable[[float, Floats, Floats, Floats], float]
+"""A quantity at a state (t, q, q̇), and its derivative in time, of (t, q, q̇, rates)."""
 Levels = Mapping[int, float]
 """An input's number → its value that ends the motion."""
 # how far a level must be from where a step begins, relative to what is watched, and that at least
@@ -37,8 +40,8 @@ class Watch:
     """
 
     name: str
-    value: Callable[[float, Floats, Floats], float]
-    rate: Callable[[float, Floats, Floats, Floats], float] | None
+    value: Value
+    rate: Rate | None
     levels: Sequence[float]
     period: float | None = None
     ends: bool = False
