@@ -65,11 +65,11 @@ class Values(NamedTuple):
 
     def force(self, n: int, phi: Floats) -> float:
         """A joint's force with friction, in size."""
-        return abs(self.p[n] + sum(map(mul, self.q[n], phi)))
+        return float(abs(self.p[n] + sum(map(mul, self.q[n], phi))))
 
     def slid(self, n: int, phi: Floats) -> float:
         """The acceleration of a joint's slide with friction."""
-        return self.slip[n] + sum(map(mul, self.slips[n], phi))
+        return float(self.slip[n] + sum(map(mul, self.slips[n], phi)))
 
     def moved(self, phi: Floats) -> Floats:
         """The accelerations with friction."""

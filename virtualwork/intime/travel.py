@@ -9,16 +9,16 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from virtualwork.formulas.numbers import EPS, Reals
-from virtualwork.intime.coordinates import BETTER, FOLDING, TURN, Coordinates
+from virtualwork.intime.coordinates import BETTER, FOLDING, TURN, Coordinates, Monitor, measured, unwound
 from virtualwork.intime.equations import Lost
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.joined import Joined
-from virtualwork.intime.path import MOST, Path, walk
-from virtualwork.intime.step import Method
-from virtualwork.intime.watch import Floats, Watch
+from virtualwork.intime.path import MOST, Method, Path, Walk
+from virtualwork.intime.watch import Floats
 
 # changes of coordinates in one simulation
 CHANGES = 10_000
@@ -40,22 +40,13 @@ class Leg:
         q, v = np.array(self.path.q), np.array(self.path.v)
         if self.coordinates.own:
             return q
-        rates = np.array(self.path.rates)[:, : q.shape[1]]
-        found, speed, _ = self.coordinates.states(q, v, rates, np.zeros_like(q))
-        step = np.diff(self.path.t)[:, None]
-        near = 0.5 * (speed[1:] + speed[:-1]) * step
-        change = np.diff(found, axis=0)
+        found, speed, _ = self.coordinates.states(q, v, v, np.zeros_like(q))
         turning = np.array([not e.is_slide for e in self.coordinates.inputs])
-        change = np.where(turning, change - TURN * np.round((change - near) / TURN), change)
-        return np.asarray(self.first + np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(change, axis=0)]))
-
-    def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
-        """The coordinates, their speeds and accelerations, and the work."""
-        return self.path.at(times)
+        return np.asarray(self.first + _followed(found, speed, self.path.t, turning))
 
     def states(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
         """The inputs, their speeds and accelerations, and the work."""
-        q, v, a, work = self.at(times)
+        q, v, a, work = self.path.at(times)
         if self.coordinates.own:
             return q, v, a, work
         t = np.array(self.path.t)
@@ -63,6 +54,14 @@ class Leg:
         near = self.inputs[i]
         speed = self.coordinates.states(q, v, a, near)[1]
         return *self.coordinates.states(q, v, a, near + 0.5 * speed * (times - t[i])[:, None]), work
+
+
+def _followed(q: Reals, v: Reals, times: ArrayLike, turning: Any) -> Reals:
+    """How far angles have come since the first of many times, (n, k), whole turns and all, and the others."""
+    step = np.diff(times)[:, None]
+    change = np.diff(q, axis=0)
+    change = np.where(turning, unwound(change, 0.5 * (v[1:] + v[:-1]) * step), change)
+    return np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(change, axis=0)])
 
 
 @dataclass
@@ -165,7 +164,7 @@ class Travel:
     def motion(self, times: Reals) -> Any:
         """The motion through times: a `Motion`, or several joined."""
         parts = [
-            (rows, leg.coordinates.motion(*leg.at(times[rows])[:3], times[rows]))
+            (rows, leg.coordinates.motion(*leg.path.at(times[rows])[:3], times[rows]))
             for leg, rows in self._parts(times)
         ]
         return parts[0][1] if len(parts) == 1 else Joined(parts, len(times))
@@ -174,62 +173,13 @@ class Travel:
         """A link's angle (n,) rad, followed from the first time on through all whole turns."""
         every = np.union1d(self.nodes[self.nodes <= times[-1]], times)
         link = self.motion(every).link(name)
-        angle, omega = link.angle, link.omega
-        near = 0.5 * (omega[1:] + omega[:-1]) * np.diff(every)
-        change = np.diff(angle)
-        change -= TURN * np.round((change - near) / TURN)
-        whole = angle[0] + np.concatenate([[0.0], np.cumsum(change)])
+        angle, omega = link.angle[:, None], link.omega[:, None]
+        whole = angle[0] + _followed(angle, omega, every, True)[:, 0]
         for j, entry in enumerate(self.legs[0].coordinates.inputs):
             if entry.link == name and entry.on == "ground":
                 # as the input itself is counted
                 whole += TURN * np.round((self.legs[0].first[j] - whole[0]) / TURN)
         return np.asarray(whole[np.searchsorted(every, times)])
-
-
-@dataclass
-class Monitor:
-    """What a path is asked at every node: whether its coordinates fold, and what the inputs are there."""
-
-    coordinates: Coordinates
-    near: Floats
-    # a margin below which they fold: where no others were better, a quarter of what it was
-    below: float
-    follows: bool
-    # the coordinate at the last node
-    last: float
-
-    def __call__(self, t: float, q: Floats, v: Floats) -> str:
-        if self.follows:
-            self.near = self.inputs(q, v)
-        if self._strays(q, v):
-            return "undecided"
-        if self.coordinates.folds(q, self.below):
-            return "folding"
-        if self.below < FOLDING and not self.coordinates.folds(q):
-            self.below = FOLDING
-        return ""
-
-    def _strays(self, q: Floats, v: Floats) -> bool:
-        """Whether another coordinate takes for a change point what the inputs do not: by its rounding, that is larger."""
-        last, self.last = self.last, q[0]
-        if self.coordinates.own or self.coordinates.equations.clear(np.array([last, q[0]])):
-            return False
-        return not self.coordinates.made[0].equations.passes(self.inputs(q, v)[0])
-
-    def quiet(self, q: Reals) -> bool:
-        """Whether nothing folds at any of many places, and none has to be followed."""
-        return not self.follows and self.below == FOLDING and self.coordinates.stands(q)
-
-    def inputs(self, q: Floats, v: Floats) -> Floats:
-        """The inputs at a state, with the whole turns of those at the last node."""
-        state = [np.array([x]) for x in (q, v, v, self.near)]
-        return self.coordinates.states(*state)[0][0].tolist()  # type: ignore[no-any-return]
-
-    def until(self, j: int, level: float) -> Watch:
-        """The end where input j has a value."""
-        if self.coordinates.own:
-            return Watch("until", lambda t, q, v: q[j], lambda t, q, v, a: v[j], [level], ends=True)
-        return Watch("until", lambda t, q, v: self.inputs(q, v)[j], None, [level], ends=True)
 
 
 def travel(
@@ -264,7 +214,7 @@ def travel(
     ended = ""
     while True:
         equations = coordinates.equations
-        left = None
+        left: dict[str, float] = {}
         if isinstance(equations, Rubbing):
             before = equations.mode
             try:
@@ -278,9 +228,8 @@ def travel(
         monitor = Monitor(coordinates, inputs, below, bool(until) and not coordinates.own, q[0])
         watches = [*(monitor.until(j, level) for j, level in until.items()), *equations.watches()]
         most = MOST if like is None else MOST + 2 * like.steps
-        stops, budget = equations.stops, most - found.steps
-        begin = t, q, v, work
-        path = walk(equations, method, begin, end, tolerance, watches, stops, monitor, budget, left, plan)
+        way = Path(equations, method), end, tolerance, watches, equations.stops, monitor, most - found.steps
+        path = Walk(*way, left, plan).go(t, q, v, work)
         leg = Leg(coordinates, path, inputs)
         found.legs.append(leg)
         found.ended = path.ended
@@ -299,7 +248,7 @@ def travel(
         found.ended = equations.outside(t, q, v) if path.ended == "lost" else ""
         if found.ended:
             # a table over time reads a little beyond its end
-            path.back(stops)
+            path.back(equations.stops)
         other = None if found.ended else coordinates.better(q, inputs)
         if (
             other is None
@@ -314,20 +263,8 @@ def travel(
             found.ended = found.ended or NO_FURTHER
             return found
         if other is not None:
-            v = _speeds(coordinates, other[0], q, v)
+            motion = coordinates.motion(np.array([q]), np.array([v]))
             coordinates, q = other
+            v = [float(measured(motion, entry, 1)[0]) for entry in coordinates.equations.mechanism.inputs]
             if isinstance(equations, Rubbing) and isinstance(coordinates.equations, Rubbing):
                 coordinates = coordinates.of(coordinates.equations.in_mode(equations.mode))
-
-
-def _speeds(old: Coordinates, new: Coordinates, q: Floats, v: Floats) -> Floats:
-    """The speeds of what other coordinates measure."""
-    motion = old.motion(np.array([q]), np.array([v]))
-    speeds = []
-    for entry in new.equations.mechanism.inputs:
-        if entry.is_slide:
-            speeds.append(float(motion.slide(entry.name).speed[0]))
-        else:
-            base = 0.0 if entry.on == "ground" else float(motion.link(entry.on).omega[0])
-            speeds.append(float(motion.link(entry.name).omega[0]) - base)
-    return speeds
