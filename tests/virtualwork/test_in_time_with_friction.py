@@ -19,7 +19,7 @@ def test_block_that_slides_to_rest_and_stays() -> None:
     assert (run.speed[-3:, 0] == 0).all()
     assert (run.acceleration[-3:, 0] == 0).all()
     assert np.abs(run.energy_drift).max() < 1e-12
-    assert run.fine.legs[0].path.t[-1] == pytest.approx(3 / (0.2 * G), rel=1e-13)
+    assert run.fine.legs[0].end == pytest.approx(3 / (0.2 * G), rel=1e-13)
 
 
 def test_spring_and_coulomb_friction_lose_the_same_at_every_turn() -> None:

@@ -27,7 +27,7 @@ def _place(before: Nodes, after: Nodes, j: int, share: Any) -> Reals:
 
 def _quarters(nodes: Nodes, j: int, level: float) -> NDArray[np.intp]:
     """In which quarter of each step input j first passes a level, 1 to 4; 0 where it does not."""
-    steps = nodes.at(slice(None, -1)), nodes.at(slice(1, None))
+    steps = nodes.at(np.s_[:-1]), nodes.at(np.s_[1:])
     before = steps[0].q[..., j]
     found = np.zeros(before.shape, dtype=np.intp)
     for i, share in enumerate(QUARTERS, 1):
@@ -66,7 +66,7 @@ def events(rates: Tape, given: Mapping[str, Any], nodes: Nodes, levels: Levels) 
         if not len(lanes):
             continue
         at = np.argmax(quarter[:, lanes] > 0, axis=0)
-        here, after = nodes.at(at, lanes), nodes.at(at + 1, lanes)
+        here, after = nodes.at((at, lanes)), nodes.at((at + 1, lanes))
         high = 0.25 * quarter[at, lanes]
         low, up = high - 0.25, _place(here, after, j, high) > level
         for _ in range(HALVINGS):

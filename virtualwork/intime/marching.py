@@ -7,7 +7,7 @@ one by one: the same formulas, `explicit` and `control`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -129,21 +129,48 @@ def _kept(k: int) -> tuple[str, ...]:
 
 
 class Nodes(NamedTuple):
-    """States of lanes: times and works (…, n), q and q̇ (…, n, k), rates (…, n, k + 1)."""
+    """States of lanes side by side, (…, 3k + 3): the times and works (…), q and q̇ (…, k), the rates (…, k + 1)."""
 
-    t: Reals
-    q: Reals
-    v: Reals
-    rates: Reals
-    work: Reals
+    table: Reals
+    k: int
 
-    def at(self, *where: Any) -> Nodes:
+    @property
+    def t(self) -> Reals:
+        """The times."""
+        return self.table[..., 0]
+
+    @property
+    def q(self) -> Reals:
+        """The coordinates."""
+        return self.table[..., 1 : self.k + 1]
+
+    @property
+    def v(self) -> Reals:
+        """Their speeds."""
+        return self.table[..., self.k + 1 : 2 * self.k + 1]
+
+    @property
+    def rates(self) -> Reals:
+        """The accelerations, and the power."""
+        return self.table[..., 2 * self.k + 1 : -1]
+
+    @property
+    def work(self) -> Reals:
+        """The work so far."""
+        return self.table[..., -1]
+
+    def at(self, where: Any) -> Nodes:
         """Some of them."""
-        return Nodes(*(of[where] for of in self))
+        return Nodes(self.table[where], self.k)
 
-    def then(self, others: Iterable[Nodes]) -> Nodes:
+    def then(self, *others: Nodes) -> Nodes:
         """These and others, one round after the other."""
-        return Nodes(*(np.concatenate(of) for of in zip(self, *others, strict=True)))
+        return _nodes(self.k, np.concatenate([np.moveaxis(of.table, -1, 1) for of in (self, *others)]))
+
+
+def _nodes(k: int, kept: Reals) -> Nodes:
+    """What is kept of each round, (rounds, 3k + 3, n), as nodes (rounds, n)."""
+    return Nodes(np.moveaxis(kept, 1, -1), k)
 
 
 class March(NamedTuple):
@@ -171,7 +198,7 @@ def march(k: int, rates: Tape, given: Lanes, state: Lanes, capacity: int = ROUND
         See `body`; what further enters the rates is given.
     """
     found, kept = rounds.run(loop(k, rates), given, state, capacity)
-    return March(_nodes(k, kept), found)
+    return March(_nodes(k, np.stack(list(kept.values()), axis=1)), found)
 
 
 def follow(k: int, rates: Tape, given: Lanes, state: Lanes, times: Reals) -> March:
@@ -179,13 +206,7 @@ def follow(k: int, rates: Tape, given: Lanes, state: Lanes, times: Reals) -> Mar
     steps = again(k, rates)
     begin = {name: state[name] for name in steps.states}
     found, kept = rounds.run(steps, given, begin, len(times), fed={"next": times})
-    return March(_nodes(k, kept), {**state, **found})
-
-
-def _nodes(k: int, kept: Lanes) -> Nodes:
-    table = np.stack(list(kept.values()), axis=-1)
-    t, q, v, rates, work = np.split(table, (1, k + 1, 2 * k + 1, 3 * k + 2), axis=-1)
-    return Nodes(t[..., 0], q, v, rates, work[..., 0])
+    return March(_nodes(k, np.stack(list(kept.values()), axis=1)), {**state, **found})
 
 
 def beginning(
@@ -194,7 +215,7 @@ def beginning(
     fastest: Several | None = None,
 ) -> dict[str, Any]:
     """The state of steps from nodes: the next one's length, and the largest speeds so far, (k, n) or (k,)."""
-    k = node.q.shape[-1]
+    k = node.k
     places, speeds, rates = names(k)
     low = {f"l{name}": 0.0 for name in (*places, *speeds)}
     found = {"t": node.t, "h": h, "grow": GROW, "stiff": 0.0, "left": 1.0, "work": node.work}
@@ -206,10 +227,11 @@ def beginning(
 
 def over(rates: Tape, given: Lanes, node: Nodes, h: Reals) -> tuple[Reals, Reals, Reals]:
     """Changes of q and q̇ (n, k) and the work (n,) over one step of a length of its own from each of n states; NaN where there is none."""
-    k, end = node.q.shape[1], node.t + h
+    k, end = node.k, node.t + h
     # any error will do
     whole = {**given, "end": end, "span": 0.0, "tolerance": 1e100} | {f"scale{j}": 1.0 for j in range(k)}
-    found = march(k, rates, whole, beginning(node._replace(work=np.zeros(len(h))), h), 1).nodes.at(0)
+    state = beginning(node, h) | {"work": 0.0}
+    found = march(k, rates, whole, state, 1).nodes.at(0)
     there = found.t == end
     dq, dv = (np.where(there[:, None], x, np.nan) for x in (found.q - node.q, found.v - node.v))
     return dq, dv, np.where(there, found.work, np.nan)

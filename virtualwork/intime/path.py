@@ -1,397 +1,164 @@
-"""A way through time: steps of chosen length, the nodes between them, and any time between two nodes."""
+"""A path through time in one set of coordinates: its nodes, and any time between two of them."""
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from dalembert.arithmetic.engines import rounds
 from dalembert.arithmetic.loop import Loop
-from virtualwork.formulas.numbers import EPS, Reals
-from virtualwork.intime.control import (
-    GROW,
-    SAFETY,
-    SHRINK,
-    STIFF,
-    added,
-    allowed,
-    first_steps,
-    longer,
-    shorter,
-    shortest,
-    stiffer,
-    tried,
-)
-from virtualwork.intime.coordinates import Monitor
-from virtualwork.intime.equations import Equations, Lost
+from virtualwork.formulas.numbers import Reals
+from virtualwork.intime.coordinates import Coordinates, unwound
+from virtualwork.intime.equations import Equations
 from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.implicit import Radau
-from virtualwork.intime.marching import ROUNDS, Nodes, beginning, follow, loop, march, over
-from virtualwork.intime.powers import state_names
-from virtualwork.intime.watch import HALVINGS, NEWTONS, QUARTERS, Floats, Step, Watch, between
+from virtualwork.intime.marching import Nodes, loop, over
+from virtualwork.intime.watch import Floats
 
 Method = DormandPrince | Radau
-# steps of one simulation
-MOST = 200_000
-# of a planned step's error over the one allowed: halves of what a tolerance chose may be so much rougher than this one's
-ROUGH = 256.0
-# what a step raises that cannot be done
-UNDONE = (Lost, ZeroDivisionError, ValueError, OverflowError)
 
 
 @dataclass
 class Path:
-    """The nodes of a way through time, and why it ended."""
+    """The nodes of a way through time, a row (t, q, q̇, rates, work) each, and why it ended; `first` are the inputs at its beginning."""
 
-    equations: Equations
+    coordinates: Coordinates
     method: Method
-    t: list[float] = field(default_factory=list)
-    q: list[Floats] = field(default_factory=list)
-    v: list[Floats] = field(default_factory=list)
-    rates: list[Floats] = field(default_factory=list)
-    work: list[float] = field(default_factory=list)
+    first: Floats
+    rows: list[Floats] = field(default_factory=list)
     ended: str = ""
     rejected: int = 0
     # whether times are reached from the node after them
     backwards: bool = False
 
+    def __post_init__(self) -> None:
+        self._nodes = Nodes(np.empty((0, 0)), self.equations.k)
+
     @property
-    def _columns(self) -> tuple[list[Any], ...]:
-        return self.t, self.q, self.v, self.rates, self.work
+    def equations(self) -> Equations:
+        """The equations of motion in its coordinates."""
+        return self.coordinates.equations
+
+    @property
+    def nodes(self) -> Nodes:
+        """The nodes as arrays."""
+        if len(self._nodes.table) != len(self.rows):
+            self._nodes = Nodes(np.array(self.rows), self.equations.k)
+        return self._nodes
+
+    @property
+    def end(self) -> float:
+        """The last time reached."""
+        return self.rows[-1][0]
+
+    @property
+    def steps(self) -> int:
+        """How many steps were taken."""
+        return len(self.rows) - 1
+
+    def parted(self, row: Floats) -> tuple[float, Floats, Floats, Floats, float]:
+        """t, q, q̇, the rates and the work of a row."""
+        k = self.equations.k
+        return row[0], row[1 : k + 1], row[k + 1 : 2 * k + 1], row[2 * k + 1 : -1], row[-1]
 
     @property
     def last(self) -> tuple[float, Floats, Floats, Floats, float]:
-        """The last node: t, q, q̇, the rates and the work."""
-        return self.t[-1], self.q[-1], self.v[-1], self.rates[-1], self.work[-1]
+        """The same of the last node."""
+        return self.parted(self.rows[-1])
 
-    def put(self, *node: Any) -> None:
+    def put(self, t: float, q: Floats, v: Floats, rates: Floats, work: float) -> None:
         """Add a node."""
-        for of, value in zip(self._columns, node, strict=True):
-            of.append(value)
+        self.rows.append([t, *q, *v, *rates, work])
 
     def drop(self) -> None:
         """Take the last node away, but for the first."""
-        if len(self.t) > 1:
-            for of in self._columns:
-                of.pop()
+        del self.rows[max(1, self.steps) :]
 
     def back(self, stops: Sequence[float]) -> None:
         """Take away the nodes that lie beyond the last of some times by no more than rounding of it."""
-        for stop in stops[: bisect_right(stops, self.t[-1])][-1:]:
-            while len(self.t) > 1 and 0 < self.t[-1] - stop <= 1e-9 * max(abs(stop), stop - self.t[0]):
+        for stop in stops[: bisect_right(stops, self.end)][-1:]:
+            while self.steps and 0 < self.end - stop <= 1e-9 * max(abs(stop), stop - self.rows[0][0]):
                 self.drop()
 
-    def extend(self, nodes: Nodes) -> None:
-        """Add nodes."""
-        for of, values in zip(self._columns, nodes, strict=True):
-            of.extend(values.tolist())
-
     def turning(self, i: int) -> float:
-        """When the first input turns back between node i and the next, by the secant within a bracket."""
-        low, high = self.t[i], self.t[i + 1]
-        down, up = self.v[i][0], self.v[i + 1][0]
+        """When the first coordinate turns back between node i and the next, by the secant within a bracket."""
+        (low, high), (down, up) = self.nodes.t[i : i + 2].tolist(), self.nodes.v[i : i + 2, 0].tolist()
         for _ in range(60):
             middle = low - down * (high - low) / (up - down)
             if not low < middle < high:
                 break
             speed = float(self.at(np.array([middle]))[1][0, 0])
             if speed == 0.0:
-                return middle
+                return float(middle)
             # of the end that stays, half of it counts (Illinois)
             if (speed > 0) == (up > 0):
                 high, up, down = middle, speed, 0.5 * down
             else:
                 low, down, up = middle, speed, 0.5 * up
-        return 0.5 * (low + high)
+        return float(0.5 * (low + high))
 
     def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
         """q, q̇, q̈ (n, k) and the work (n,) at times on the way: a step of the method from the node before each."""
-        t = np.array(self.t)
+        t = self.nodes.t
         # a stiff method does not go back
         if self.backwards and self.method.stable < np.inf:
             i = np.minimum(np.searchsorted(t, times), len(t) - 1)
         else:
-            i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
-        node = Nodes(t, *(np.array(of) for of in (self.q, self.v, self.rates, self.work))).at(i)
-        _, q, v, rates, work = node
-        a, h = rates[:, : q.shape[1]], times - node.t
+            i = self._before(times)
+        node = self.nodes.at(i)
+        q, v, a, work, h = node.q, node.v, node.rates[:, :-1], node.work, times - node.t
         on = np.flatnonzero(h)
         if len(on):
             here = node.at(on)
             if compiled(self.equations, self.method) is not None:
                 dq, dv, dw = over(self.equations.rates, {}, here, h[on])
             else:
-                dq, dv, dw = self.method.steps(self.equations, *here[:-1], h[on])
+                state = here.t, here.q, here.v, here.rates
+                dq, dv, dw = self.method.steps(self.equations, *state, h[on])
             q[on] += dq
             v[on] += dv
             work[on] += dw
-            a[on] = self.equations.many(times[on], q[on], v[on])[:, : q.shape[1]]
+            a[on] = self.equations.many(times[on], q[on], v[on])[:, :-1]
         return q, v, a, work
 
+    def _before(self, times: Reals) -> Any:
+        """The node before each time."""
+        return np.clip(np.searchsorted(self.nodes.t, times, side="right") - 1, 0, self.steps)
 
-class Meeting(NamedTuple):
-    """A watch, the level it has met, the length of the step that ends there, and that step."""
+    # --- the inputs -----------------------------------------------------------------------------------------------
+    @cached_property
+    def inputs(self) -> Reals:
+        """The inputs at the nodes (n, k), whole turns and all."""
+        q, v = self.nodes.q, self.nodes.v
+        if self.coordinates.own:
+            return q
+        found, speed, _ = self.coordinates.states(q, v, v, np.zeros_like(q))
+        turning = np.array([not e.is_slide for e in self.coordinates.inputs])
+        return np.asarray(self.first + followed(found, speed, self.nodes.t, turning))
 
-    watch: Watch
-    level: float
-    h: float
-    done: Step
+    def states(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
+        """The inputs, their speeds and accelerations (n, k), and the work (n,)."""
+        q, v, a, work = self.at(times)
+        if self.coordinates.own:
+            return q, v, a, work
+        i = self._before(times)
+        near = self.inputs[i]
+        speed = self.coordinates.states(q, v, a, near)[1]
+        near = near + 0.5 * speed * (times - self.nodes.t[i])[:, None]
+        return *self.coordinates.states(q, v, a, near), work
 
 
-@dataclass
-class Walk:
-    """The way to a time, step by step.
-
-    Attributes
-    ----------
-    end : float
-    tolerance : float
-        Of the error of each step: of an input, relative to its `scale`; of a speed, to the largest met so far.
-    watches : sequence of Watch
-    stops : rising times
-        No step passes them.
-    monitor : Monitor
-        Asked at every node; the path ends where it says why.
-    budget : int
-        Of steps.
-    left : mapping of a watch's name to its level
-        Levels at which the path begins, and which the first step does not meet again.
-    plan : rising times
-        Where steps end, as far as it goes: they are judged roughly.
-    """
-
-    path: Path
-    end: float
-    tolerance: float
-    watches: Sequence[Watch]
-    stops: Sequence[float]
-    monitor: Monitor
-    budget: int
-    left: Mapping[str, float]
-    plan: Sequence[float]
-    # by how much the next step may be longer, and how many have been limited by the method's stability
-    grow: float = GROW
-    stiff: float = 0.0
-    # whether the last one was refused
-    cut: bool = False
-
-    def go(self, t: float, q: Floats, v: Floats, work: float) -> Path:
-        """The path from a state; `ended` says why: "end", "stiff", "lost", "budget", the name of a watch, or what the monitor says."""
-        path, equations = self.path, self.path.equations
-        try:
-            rates = equations(t, q, v)
-        except Lost:
-            path.put(t, q, v, [0.0] * (equations.k + 1), work)
-            path.ended = "lost"
-            return path
-        path.put(t, q, v, rates, work)
-        self.span = self.end - t
-        fastest, h = first_steps(self.span, self.tolerance, equations.scale, q, v, rates)
-        self.fastest, self.h = [float(x) for x in fastest], float(h)
-        # what rounding leaves over
-        self.low_q, self.low_v = [0.0] * equations.k, [0.0] * equations.k
-        by_code = not self.stops or bool(self.plan)
-        while not path.ended:
-            if not path.t[-1] < self.end:
-                path.ended = "end"
-                if isinstance(path.method, DormandPrince) and equations.plain:
-                    rounds.on_floats(loop(equations.k, equations.rates), len(path.t) + path.rejected)
-            elif by_code and not (len(path.t) - 1) % ROUNDS and compiled(equations, path.method) is not None:
-                # it goes on as far as nothing happens that has to be looked at step by step
-                self._marches()
-                self.left, by_code = {}, False
-            else:
-                self._steps()
-        return path
-
-    # --- step by step ---------------------------------------------------------------------------------------------
-    def _steps(self) -> None:
-        """One step, or none and a shorter one to be tried next."""
-        path = self.path
-        t, q, v, _, work = path.last
-        if len(path.t) > self.budget:
-            path.ended = "budget"
-            return
-        least = shortest(t, self.span)
-        stop = min(_next(self.stops, t), self.end)
-        before, whole, mark = self.h, stop - t, _next(self.plan, t + least)
-        planned = mark < math.inf
-        # where a step of the plan could not be done it is shorter
-        h = min(mark - t, whole, before if self.cut else math.inf) if planned else tried(before, whole)
-        if h < least:
-            path.ended = "lost"
-            return
-        taken, wanted = self._tried(h, ROUGH if planned else 1.0)
-        if taken is None:
-            path.rejected += 1
-            self.h, self.grow, self.cut = shorter(h, wanted), 1.0, True
-            return
-        done, found = taken
-        following = longer(h, wanted, before, self.grow)
-        self.left, self.grow, self.cut, self.h = {}, GROW, False, following
-        if found is not None:
-            _, _, h, done = found
-            self.left = {found.watch.name: found.level}
-        self.stiff = stiffer(self.stiff, done.stiffness, path.method.stable)
-        t = stop if h == whole else mark if h == mark - t else t + h
-        q, self.low_q = _added(q, self.low_q, done.dq)
-        v, self.low_v = _added(v, self.low_v, done.dv)
-        self.fastest = [max(f, abs(x)) for f, x in zip(self.fastest, v, strict=True)]
-        path.put(t, q, v, done.rates, work + done.work)
-        if found is not None and found.watch.ends:
-            path.ended = found.watch.name
-        else:
-            path.ended = self.monitor(t, q, v)
-        if not path.ended and self.stiff >= STIFF:
-            path.ended = "stiff"
-
-    def _tried(self, h: float, most: float) -> tuple[tuple[Step, Meeting | None] | None, float]:
-        """A step and what it meets, None where its error is too large or it cannot be done; the length wanted, over its own."""
-        path, method, scale = self.path, self.path.method, self.path.equations.scale
-        t, q, v, rates, _ = path.last
-        try:
-            done = method.step(path.equations, t, q, v, rates, h)
-        except UNDONE:
-            # of the rates, or of their tape
-            return None, SHRINK
-        error = method.size(done, allowed(self.tolerance, scale, q, self.fastest, v, done.dv))
-        wanted = SAFETY * error ** (-1.0 / method.order) if error else GROW
-        if not error < most:
-            return None, wanted
-        try:
-            return (done, self._met(h, done) if self.watches else None), wanted
-        except Lost:
-            # within the step it cannot be assembled
-            return None, SHRINK
-
-    # --- by compiled code -----------------------------------------------------------------------------------------
-    def _marches(self) -> None:
-        """Go on to the end (of the plan), to where the monitor ends it, or to the last node before a watch."""
-        path, equations, k = self.path, self.path.equations, self.path.equations.k
-        given = {"end": self.end, "span": self.span, "tolerance": self.tolerance}
-        given |= {f"scale{j}": x for j, x in enumerate(equations.scale)}
-        state = beginning(Nodes(*map(np.array, path.last)), self.h, self.fastest)
-        state |= {"grow": self.grow, "stiff": self.stiff}
-        lows = [f"l{name}" for name in state_names(k)[1:]]
-        state |= dict(zip(lows, (*self.low_q, *self.low_v), strict=True))
-        while not path.ended:
-            before = state
-            if self.plan:
-                ahead = bisect_right(self.plan, path.t[-1] + shortest(path.t[-1], self.span))
-                ends = [x for x in self.plan[ahead : ahead + ROUNDS] if x <= self.end]
-                if not ends:
-                    break
-                found = follow(k, equations.rates, {}, state, np.array(ends)[:, None])
-            else:
-                found = march(k, equations.rates, given, state)
-            nodes = found.nodes.at(slice(None), 0)
-            taken = np.diff(nodes.t, prepend=path.t[-1]) > 0
-            if not all(np.isfinite(of).all() for of in nodes) or not equations.clear(nodes.q[:, 0]):
-                # change points or a limit are near: step by step
-                break
-            path.rejected += len(taken) - int(taken.sum())
-            step = self._passed(nodes.at(taken))
-            if step is not None:
-                state = before | dict.fromkeys(lows, 0.0) | {"h": step, "grow": 1.0, "stiff": 0.0}
-                break
-            state = found.state
-            if path.ended:
-                break
-            if len(path.t) > self.budget:
-                path.ended = "budget"
-            elif self.plan:
-                path.ended = "end" if path.t[-1] >= self.end else ""
-            elif not state["left"][0] > 0:
-                path.ended = "end" if state["t"][0] >= self.end else "stiff" if found.stiff[0] else "lost"
-        own = ("h", "grow", "stiff", *lows, *(f"f{j}" for j in range(k)))
-        self.h, self.grow, self.stiff, *rest = (float(np.ravel(state[name])[0]) for name in own)
-        self.low_q, self.low_v, self.fastest = rest[:k], rest[k : 2 * k], rest[2 * k :]
-
-    def _passed(self, nodes: Nodes) -> float | None:
-        """Take nodes over, as far as none has to be met before; then the length of the step that does so."""
-        path = self.path
-        if not self.watches and self.monitor.quiet(nodes.q):
-            path.extend(nodes)
-            return None
-        for t, q, v, rates, work in zip(*(of.tolist() for of in nodes), strict=True):
-            if self.watches:
-                h = t - path.t[-1]
-                dq, dv = (
-                    [x - y for x, y in zip(*of, strict=True)] for of in ((q, path.q[-1]), (v, path.v[-1]))
-                )
-                if self._met(h, Step(dq, dv, 0.0, rates, (), 0.0)):
-                    return float(h)
-                self.left = {}
-            path.put(t, q, v, rates, work)
-            path.ended = self.monitor(t, q, v)
-            if path.ended:
-                break
-        return None
-
-    # --- watches --------------------------------------------------------------------------------------------------
-    def _met(self, h: float, done: Step) -> Meeting | None:
-        """The first watch that a step passes a level of."""
-        t, q, v, _, _ = self.path.last
-        first: Meeting | None = None
-        for watch in self.watches:
-            before = watch.value(t, q, v)
-            for share in QUARTERS:
-                value = self._within(watch, h, done, share)
-                level = watch.passed(before, value, self.left.get(watch.name))
-                if level is not None:
-                    found = self._sharpened(watch, level, self._bisected(watch, level, h, done, share) * h)
-                    if found is not None and (first is None or found[0] < first.h):
-                        first = Meeting(watch, level, *found)
-                    break
-        return first
-
-    def _within(self, watch: Watch, h: float, done: Step, share: float) -> float:
-        """What is watched within a step, roughly."""
-        t, q, v, rates, _ = self.path.last
-        return watch.value(t + share * h, *between(q, v, rates, h, done.dq, done.dv, done.rates, share))
-
-    def _bisected(self, watch: Watch, level: float, h: float, done: Step, high: float) -> float:
-        """Where in a step a level lies, to seven digits."""
-        low, up = high - 0.25, self._within(watch, h, done, high) > level
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            if (self._within(watch, h, done, middle) > level) == up:
-                high = middle
-            else:
-                low = middle
-        return 0.5 * (low + high)
-
-    def _sharpened(self, watch: Watch, level: float, h: float) -> tuple[float, Step] | None:
-        """The length of a step that ends at a level, by Newton's method over the method's own steps."""
-        t, q, v, rates, _ = self.path.last
-        enough = 2 * EPS * max(abs(t), abs(h)) if watch.ends else 1e-7 * h
-        # of the secant, where no derivative is known
-        before: tuple[float, float] | None = None
-        try:
-            for _ in range(NEWTONS):
-                done = self.path.method.step(self.path.equations, t, q, v, rates, h)
-                there = [x + d for x, d in zip(q, done.dq, strict=True)]
-                speeds = [x + d for x, d in zip(v, done.dv, strict=True)]
-                gap = level - watch.value(t + h, there, speeds)
-                if watch.rate is not None:
-                    rate = watch.rate(t + h, there, speeds, done.rates)
-                    change = gap / rate if rate else 0.0
-                elif before is None:
-                    change = 1e-6 * h
-                else:
-                    change = gap * (h - before[0]) / (before[1] - gap) if before[1] != gap else 0.0
-                before = h, gap
-                if not abs(change) > enough or h + change <= 0:
-                    break
-                h += change
-        except UNDONE:
-            return None
-        return h, done
+def followed(q: Reals, v: Reals, times: Reals, turning: Any) -> Reals:
+    """How far angles have come since the first of many times, (n, k), whole turns and all, and what does not turn."""
+    change = np.diff(q, axis=0)
+    near = 0.5 * (v[1:] + v[:-1]) * np.diff(times)[:, None]
+    change = np.where(turning, unwound(change, near), change)
+    return np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(change, axis=0)])
 
 
 def compiled(equations: Equations, method: Method) -> Loop | None:
@@ -400,15 +167,3 @@ def compiled(equations: Equations, method: Method) -> Loop | None:
         return None
     found = loop(equations.k, equations.rates)
     return None if rounds.ready(found) is None else found
-
-
-def _next(times: Sequence[float], after: float) -> float:
-    """The first of rising times after one; infinite where there is none."""
-    i = bisect_right(times, after)
-    return times[i] if i < len(times) else math.inf
-
-
-def _added(x: Floats, low: Floats, d: Floats) -> tuple[Floats, Floats]:
-    """x + d of every input, and what rounding leaves."""
-    high, rest = zip(*(added(*of) for of in zip(x, low, d, strict=True)), strict=True)
-    return list(high), list(rest)

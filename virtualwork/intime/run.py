@@ -20,8 +20,8 @@ from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, UNKNOWN, roun
 from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.implicit import Radau
-from virtualwork.intime.path import MOST
 from virtualwork.intime.travel import UNDECIDED, Travel, travel
+from virtualwork.intime.walk import MOST
 from virtualwork.intime.watch import Floats
 from virtualwork.motion import Motion
 
@@ -81,7 +81,7 @@ class Run:
     @property
     def unknown(self) -> NDArray[np.bool_]:
         """(n,): from when on no digit is known."""
-        scale = np.array(self.fine.legs[0].path.equations.scale)
+        scale = np.array(self.fine.legs[0].equations.scale)
         return np.asarray((self.error_estimate / scale).max(axis=1) > UNKNOWN)
 
     def spread(self, fine: Reals, coarse: Reals) -> Reals:
@@ -201,7 +201,7 @@ def simulate(
         # what is stiff somewhere is from the beginning
         fine = travel(own, start, end, tolerance, levels, Radau(), accuracy)
     for tries in range(TRIES):
-        coarse, method = fine, fine.legs[0].path.method
+        coarse, method = fine, fine.legs[0].method
         # near change points every solution is interpolated from other poses
         ways = own if tries % 2 else own.otherwise()
         # no farther than both go
@@ -239,17 +239,16 @@ def _refuse_lost_energy(fine: Travel, error: float) -> None:
     MechanismError
         From which time on.
     """
-    path = fine.legs[0].path
-    equations = path.equations
+    nodes, equations = fine.legs[0].nodes, fine.legs[0].equations
     if not equations.crosses:
         return
-    t, q, v = (np.array(x) for x in (path.t, path.q, path.v))
+    t, q, v = nodes.t, nodes.q, nodes.v
     moving = float(np.max(equations.energies(t, q, v) - equations.energies(t, q, 0 * v)))
-    nodes = fine.nodes
-    lost = np.abs(drift(fine.energy(nodes), fine.at(nodes)[3])) > 1e3 * error * moving
+    times = fine.nodes
+    lost = np.abs(drift(fine.energy(times), fine.at(times)[3])) > 1e3 * error * moving
     if lost.any():
         raise MechanismError(
-            f"at {nodes[np.argmax(lost)]:.6g} s it passes a change point too close to which its rates change too fast: "
+            f"at {times[np.argmax(lost)]:.6g} s it passes a change point too close to which its rates change too fast: "
             "energy is lost there beyond the error of the motion"
         )
 

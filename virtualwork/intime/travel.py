@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from virtualwork.formulas.numbers import EPS, Reals
-from virtualwork.intime.coordinates import BETTER, FOLDING, TURN, Coordinates, Monitor, measured, unwound
+from virtualwork.intime.coordinates import BETTER, FOLDING, TURN, Coordinates, Monitor, measured
 from virtualwork.intime.equations import Lost
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.joined import Joined
-from virtualwork.intime.path import MOST, Method, Path, Walk
+from virtualwork.intime.path import Method, Path, followed
+from virtualwork.intime.walk import MOST, Walk
 from virtualwork.intime.watch import Floats
 
 # changes of coordinates in one simulation
@@ -27,69 +26,31 @@ NO_FURTHER = "it can go no further: a limit, or a pose where its motion is not d
 
 
 @dataclass
-class Leg:
-    """A path and its coordinates; `first` are the inputs at its beginning."""
-
-    coordinates: Coordinates
-    path: Path
-    first: Floats
-
-    @cached_property
-    def inputs(self) -> Reals:
-        """The inputs at the nodes (n, k), whole turns and all."""
-        q, v = np.array(self.path.q), np.array(self.path.v)
-        if self.coordinates.own:
-            return q
-        found, speed, _ = self.coordinates.states(q, v, v, np.zeros_like(q))
-        turning = np.array([not e.is_slide for e in self.coordinates.inputs])
-        return np.asarray(self.first + _followed(found, speed, self.path.t, turning))
-
-    def states(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
-        """The inputs, their speeds and accelerations, and the work."""
-        q, v, a, work = self.path.at(times)
-        if self.coordinates.own:
-            return q, v, a, work
-        t = np.array(self.path.t)
-        i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
-        near = self.inputs[i]
-        speed = self.coordinates.states(q, v, a, near)[1]
-        return *self.coordinates.states(q, v, a, near + 0.5 * speed * (times - t[i])[:, None]), work
-
-
-def _followed(q: Reals, v: Reals, times: ArrayLike, turning: Any) -> Reals:
-    """How far angles have come since the first of many times, (n, k), whole turns and all, and the others."""
-    step = np.diff(times)[:, None]
-    change = np.diff(q, axis=0)
-    change = np.where(turning, unwound(change, 0.5 * (v[1:] + v[:-1]) * step), change)
-    return np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(change, axis=0)])
-
-
-@dataclass
 class Travel:
     """The legs, one after the other, and why the last one ended."""
 
-    legs: list[Leg] = field(default_factory=list)
+    legs: list[Path] = field(default_factory=list)
     ended: str = ""
 
     @property
     def end(self) -> float:
         """The last time reached."""
-        return self.legs[-1].path.t[-1]
+        return self.legs[-1].end
 
     @property
     def steps(self) -> int:
         """How many steps were taken."""
-        return sum(len(leg.path.t) - 1 for leg in self.legs)
+        return sum(leg.steps for leg in self.legs)
 
     @property
     def stiff(self) -> bool:
         """Whether a leg ended for it was stiff."""
-        return any(leg.path.ended == "stiff" for leg in self.legs)
+        return any(leg.ended == "stiff" for leg in self.legs)
 
     @property
     def folds(self) -> bool:
         """Whether a loop came near folding on the way: there halves of steps gain less than the method's order."""
-        return any(leg.path.ended == "folding" for leg in self.legs)
+        return any(leg.ended == "folding" for leg in self.legs)
 
     @property
     def undecided(self) -> float | None:
@@ -98,17 +59,17 @@ class Travel:
         With a speed the motion is decided there: only one of the branches that meet goes on with it.
         """
         for leg in self.legs:
-            path = leg.path
-            if not path.equations.crosses:
+            if not leg.equations.crosses:
                 continue
-            v = np.array(path.v)[:, 0]
-            rest = 1e-7 * float(np.abs(v).max())
-            for i, t in enumerate(path.t):
-                if path.equations.meets(path.q[i][0]) and abs(v[i]) <= rest:
-                    return t
+            nodes, meets = leg.nodes, leg.equations.meets
+            t, q, v = (of.tolist() for of in (nodes.t, nodes.q[:, 0], nodes.v[:, 0]))
+            rest = 1e-7 * max(map(abs, v))
+            for i in range(len(t)):
+                if meets(q[i]) and abs(v[i]) <= rest:
+                    return float(t[i])
                 if i and v[i] * v[i - 1] < 0:
-                    turn = path.turning(i - 1)
-                    if path.equations.meets(float(path.at(np.array([turn]))[0][0, 0])):
+                    turn = leg.turning(i - 1)
+                    if meets(float(leg.at(np.array([turn]))[0][0, 0])):
                         return turn
         return None
 
@@ -119,12 +80,12 @@ class Travel:
         it is another one.
         """
         for leg in self.legs:
-            leg.path.backwards = True
+            leg.backwards = True
 
     @property
     def nodes(self) -> Reals:
         """The times between steps."""
-        return np.unique(np.concatenate([leg.path.t for leg in self.legs]))
+        return np.unique(np.concatenate([leg.nodes.t for leg in self.legs]))
 
     @property
     def halves(self) -> Floats:
@@ -134,17 +95,17 @@ class Travel:
     @property
     def methods(self) -> list[str]:
         """The methods used."""
-        return list(dict.fromkeys(leg.path.method.name for leg in self.legs))
+        return list(dict.fromkeys(leg.method.name for leg in self.legs))
 
-    def _parts(self, times: Reals) -> list[tuple[Leg, Any]]:
+    def _parts(self, times: Reals) -> list[tuple[Path, Any]]:
         """The legs, each with the rows of the times on it."""
-        begins = np.array([leg.path.t[0] for leg in self.legs])
+        begins = np.array([leg.rows[0][0] for leg in self.legs])
         which = np.clip(np.searchsorted(begins, times, side="right") - 1, 0, None)
         return [(leg, rows) for i, leg in enumerate(self.legs) if len(rows := np.flatnonzero(which == i))]
 
     def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
         """The inputs, their speeds and accelerations (n, k), and the work done (n,)."""
-        k = self.legs[0].path.equations.k
+        k = self.legs[0].equations.k
         out = [np.empty((len(times), k)) for _ in range(3)]
         work = np.empty(len(times))
         for leg, rows in self._parts(times):
@@ -157,14 +118,14 @@ class Travel:
         """Kinetic energy and that of gravity and springs, (n,) J."""
         out = np.empty(len(times))
         for leg, rows in self._parts(times):
-            q, v, _, _ = leg.path.at(times[rows])
-            out[rows] = leg.path.equations.energies(times[rows], q, v)
+            q, v, _, _ = leg.at(times[rows])
+            out[rows] = leg.equations.energies(times[rows], q, v)
         return out
 
     def motion(self, times: Reals) -> Any:
         """The motion through times: a `Motion`, or several joined."""
         parts = [
-            (rows, leg.coordinates.motion(*leg.path.at(times[rows])[:3], times[rows]))
+            (rows, leg.coordinates.motion(*leg.at(times[rows])[:3], times[rows]))
             for leg, rows in self._parts(times)
         ]
         return parts[0][1] if len(parts) == 1 else Joined(parts, len(times))
@@ -174,7 +135,7 @@ class Travel:
         every = np.union1d(self.nodes[self.nodes <= times[-1]], times)
         link = self.motion(every).link(name)
         angle, omega = link.angle[:, None], link.omega[:, None]
-        whole = angle[0] + _followed(angle, omega, every, True)[:, 0]
+        whole = angle[0] + followed(angle, omega, every, True)[:, 0]
         for j, entry in enumerate(self.legs[0].coordinates.inputs):
             if entry.link == name and entry.on == "ground":
                 # as the input itself is counted
@@ -228,18 +189,18 @@ def travel(
         monitor = Monitor(coordinates, inputs, below, bool(until) and not coordinates.own, q[0])
         watches = [*(monitor.until(j, level) for j, level in until.items()), *equations.watches()]
         most = MOST if like is None else MOST + 2 * like.steps
-        way = Path(equations, method), end, tolerance, watches, equations.stops, monitor, most - found.steps
-        path = Walk(*way, left, plan).go(t, q, v, work)
-        leg = Leg(coordinates, path, inputs)
-        found.legs.append(leg)
+        path = Path(coordinates, method, inputs)
+        way = path, end, tolerance, watches, equations.stops, monitor, most - found.steps, left, plan
+        Walk(*way).go(t, q, v, work)
+        found.legs.append(path)
         found.ended = path.ended
         if path.ended in ("end", "until", "budget") or len(found.legs) > CHANGES:
             return found
         if path.ended == "undecided":
             # the last node lies where that has been
             path.drop()
-        t, q, v, work = path.t[-1], path.q[-1], path.v[-1], path.work[-1]
-        inputs, ended = leg.inputs[-1].tolist(), path.ended
+        t, q, v, _, work = path.last
+        inputs, ended = path.inputs[-1].tolist(), path.ended
         if ended.startswith("friction"):
             continue
         if path.ended == "stiff":

@@ -276,7 +276,7 @@ class _Lanes:
                 axis=(1, 2), initial=0.0
             )
             holds = worst <= accuracy
-            self._put(runs, rows[holds], nodes.at(slice(None), holds), times[holds], error[holds])
+            self._put(runs, rows[holds], nodes.at(np.s_[:, holds]), times[holds], error[holds])
             tolerance /= GAIN + 1
             last = tolerance <= LEAST or tries == TRIES - 1 or len(nodes.t) > MOST
             # what does not hold is tried again, and at last left to say itself why not
@@ -284,7 +284,7 @@ class _Lanes:
             alone[rows[~holds & ~again]] = True
             if not again.any():
                 break
-            rows, nodes = rows[again], nodes.at(slice(None), again)
+            rows, nodes = rows[again], nodes.at(np.s_[:, again])
         return alone
 
     def way(self, rows: Rows, tolerance: float, alone: Mask) -> Nodes:
@@ -298,7 +298,7 @@ class _Lanes:
         given |= {f"scale{j}": self.scale[rows, j] for j in range(self.k)}
         q, v, scale = self.q[rows], self.v[rows], self.scale[rows].T
         slopes = self._run(self.rates, rows, q, v)
-        first = Nodes(np.full(n, t[0]), q, v, slopes, np.zeros(n))
+        first = Nodes(np.column_stack([np.full(n, t[0]), q, v, slopes, np.zeros(n)]), self.k)
         fastest, h = first_steps(span, tolerance, scale, q.T, v.T, slopes.T)
         state = beginning(first, h, fastest)
         state["left"] = np.where(np.isfinite(slopes).all(axis=1) & (span > 0), 1.0, 0.0)
@@ -309,24 +309,24 @@ class _Lanes:
             parts.append(found)
             taken += len(found.t)
             # one step beyond the event is enough
-            hits = passed(parts[-2].then(parts[-1:]), self.levels)[:-1].any(axis=0)
+            hits = passed(parts[-2].then(found), self.levels)[:-1].any(axis=0)
             state["left"] = np.where(hits, 0.0, state["left"])
-        whole = parts[0].then(parts[1:])
+        whole = parts[0].then(*parts[1:])
         hits = passed(whole, self.levels)
         ended = (whole.t[-1] >= end) | hits.any(axis=0)
         if self.levels:
             beyond = np.where(hits.any(axis=0), np.argmax(hits, axis=0) + 2, len(whole.t))
-            whole = whole.at(np.minimum(np.arange(len(whole.t))[:, None], beyond), np.arange(n))
+            whole = whole.at((np.minimum(np.arange(len(whole.t))[:, None], beyond), np.arange(n)))
         alone[rows[~ended]] = True
         alone[rows[self._folds(rows, whole)]] = True
         return whole
 
     def halved(self, rows: Rows, nodes: Nodes) -> Nodes:
         """The nodes of the same ways in steps half as long."""
-        t, first = nodes.t, nodes.at(slice(1))
+        t, first = nodes.t, nodes.at(np.s_[:1])
         times = np.stack([0.5 * (t[1:] + t[:-1]), t[1:]], axis=1).reshape(-1, t.shape[1])
         found = follow(self.k, self.rates, self.some(rows), beginning(first.at(0)), times)
-        return first.then([found.nodes])
+        return first.then(found.nodes)
 
     def times(self, rows: Rows, nodes: Nodes, alone: Mask) -> Reals:
         """The times up to each lane's event, it the last, (lanes, n); then NaN."""
@@ -374,11 +374,11 @@ class _Lanes:
     def _put(self, runs: Runs, rows: Rows, nodes: Nodes, t: Reals, error: Reals) -> None:
         """Take over the states at times (lanes, n), each from the node before; NaN where the time is."""
         before = np.stack([(nodes.t <= x).sum(axis=0) - 1 for x in t.T], axis=1)
-        node = nodes.at(np.maximum(before, 0), np.arange(len(rows))[:, None])
+        node = nodes.at((np.maximum(before, 0), np.arange(len(rows))[:, None]))
         h = t - node.t
         lane, on = np.nonzero(h > 0)
         if len(lane):
-            changes = over(self.rates, self.some(rows[lane]), node.at(lane, on), h[lane, on])
+            changes = over(self.rates, self.some(rows[lane]), node.at((lane, on)), h[lane, on])
             for of, change in zip((node.q, node.v, node.work), changes, strict=True):
                 of[lane, on] += change
         for of in (node.q, node.v, node.work):
