@@ -276,7 +276,7 @@ class _Lanes:
                 axis=(1, 2), initial=0.0
             )
             holds = worst <= accuracy
-            self._put(runs, rows[holds], nodes.at(np.s_[:, holds]), times[holds], error[holds])
+            self._put(runs, rows, np.flatnonzero(holds), nodes, times[holds], error[holds])
             tolerance /= GAIN + 1
             last = tolerance <= LEAST or tries == TRIES - 1 or len(nodes.t) > MOST
             # what does not hold is tried again, and at last left to say itself why not
@@ -371,10 +371,11 @@ class _Lanes:
         rates: list[list[Any]] = [[1.0], [1.0], [0.0]]
         return ~Solver(Part(f.mechanism, f.dimensions, f.values, ends, rates), self.solver).together
 
-    def _put(self, runs: Runs, rows: Rows, nodes: Nodes, t: Reals, error: Reals) -> None:
-        """Take over the states at times (lanes, n), each from the node before; NaN where the time is."""
-        before = np.stack([(nodes.t <= x).sum(axis=0) - 1 for x in t.T], axis=1)
-        node = nodes.at((np.maximum(before, 0), np.arange(len(rows))[:, None]))
+    def _put(self, runs: Runs, rows: Rows, lanes: Rows, nodes: Nodes, t: Reals, error: Reals) -> None:
+        """Take over the states of some lanes at times (lanes, n), each from the node before; NaN where the time is."""
+        rows, begin = rows[lanes], nodes.t[:, lanes]
+        before = np.stack([(begin <= x).sum(axis=0) - 1 for x in t.T], axis=1)
+        node = nodes.at((np.maximum(before, 0), lanes[:, None]))
         h = t - node.t
         lane, on = np.nonzero(h > 0)
         if len(lane):
