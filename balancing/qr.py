@@ -60,7 +60,9 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> Complex:
     # a row of zeros where there are no more readings than planes: R is square then too
     both = np.zeros((*lead, max(readings, planes + 1), planes + 1), dtype=complex)
     both[..., :readings, :planes], both[..., :readings, planes] = scaled, b
-    both = np.linalg.qr(_largest_first(both, np.abs(both[..., :planes]).max(axis=-1)), mode="r")
+    order = np.argsort(-np.abs(both[..., :planes]).max(axis=-1), axis=-1, kind="stable")
+    both = both[order] if not lead else np.take_along_axis(both, order[..., None], axis=-2)
+    both = np.linalg.qr(both, mode="r")
     # [R c; 0 1]⁻¹ = [R⁻¹ -R⁻¹c; 0 1]: the solution, and what R⁻¹ tells of the planes' dependence
     both[..., planes, planes] = 1.0
     try:
@@ -73,12 +75,6 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> Complex:
     if not worst * planes**2 * threshold(readings, planes) < 1:
         require_independent(r, scale, readings, planes, "readings", DependentPlanes)
     return np.asarray(inverse[..., :planes, planes] * scale + 0.0, dtype=complex)
-
-
-def _largest_first(a: Complex, size: Real) -> Complex:
-    """Return the rows of a (..., m, n) in the order of their size (..., m)."""
-    order = np.argsort(-size, axis=-1, kind="stable")
-    return a[order] if a.ndim == 2 else np.take_along_axis(a, order[..., None], axis=-2)
 
 
 def factors(a: Complex) -> tuple[Complex, Complex, Real]:
