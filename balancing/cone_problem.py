@@ -96,9 +96,9 @@ def solve(problem: ConeProblem) -> tuple[Real, Complex]:
         if error < 1e-10 or stalled >= 4:
             break
         if error < near:
-            quality, *found = _polish(problem, with_t, x, s, z, square, at)
+            quality, point, force = _polish(problem, with_t, x, s, z, square, at)
             if quality < 16 * EPS:
-                return found[0], found[1]
+                return point, force
             near = error / 30
         # Nesterov-Todd scaling
         s_size = _size(s)

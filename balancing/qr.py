@@ -62,7 +62,7 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> Complex:
     both[..., :readings, :planes], both[..., :readings, planes] = scaled, b
     order = np.argsort(-np.abs(both[..., :planes]).max(axis=-1), axis=-1, kind="stable")
     both = both[order] if not lead else np.take_along_axis(both, order[..., None], axis=-2)
-    both = np.linalg.qr(both, mode="r")
+    both = np.asarray(np.linalg.qr(both, mode="r"))
     # [R c; 0 1]⁻¹ = [R⁻¹ -R⁻¹c; 0 1]: the solution, and what R⁻¹ tells of the planes' dependence
     both[..., planes, planes] = 1.0
     try:
