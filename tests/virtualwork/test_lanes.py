@@ -13,7 +13,7 @@ from benchmarks.stress.tapes import dimension, every_key, sizes
 from benchmarks.stress.topologies import generate
 from dalembert.arithmetic.engines import run
 from virtualwork import Mechanism
-from virtualwork.describe.errors import DescriptionError, MechanismError
+from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.formulas.asked import over_blocks
 from virtualwork.formulas.lanes import Lanes
 
