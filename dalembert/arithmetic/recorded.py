@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import cmath
 import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -307,12 +308,12 @@ class Complex:
 
 
 def binade(x: float) -> float:
-    """The largest power of two that is no larger than |x|, from 1e-308 on.
+    """The largest power of two that is no larger than |x|; 0 below the least normal number.
 
-    >>> binade(-3.0), binade(0.5)
-    (2.0, 0.5)
+    >>> binade(-3.0), binade(0.5), binade(0.0)
+    (2.0, 0.5, 0.0)
     """
-    return math.ulp(x) * 2.0**52
+    return 0.0 if abs(x) < sys.float_info.min else math.ulp(x) * 2.0**52
 
 
 def squared(z: Number) -> Number:
