@@ -51,7 +51,7 @@ def mjcf(s: Skeleton, travel: Travel, said: str) -> bytes:
     _springs(s, tendon, bodies)
     actuator = Element("actuator")
     for k, e in enumerate(m.inputs):
-        joint = next((j for j in s.joints if j.input == k), None)
+        joint = s.joint_of(k)
         motor = add(actuator, "motor", name=e.name)
         if joint is None:
             _fixed(tendon, f"input {e.name}", s.free_input(k))

@@ -20,7 +20,7 @@ from cli.imports.drawn import (
     place,
     unused,
 )
-from cli.imports.words import damaged, left_out
+from cli.imports.words import damaged
 
 
 def read(file: str, data: Any) -> list[Drawing]:
@@ -99,7 +99,7 @@ class _Reader:
             if e.get("type") == "prismatic":
                 self._prism(name, e)
             elif e.get("type") not in ("revolute", "fixed", "revolute_driver"):
-                d.notes.append(left_out(f"joint {name}", f"a joint of type {e.get('type')} has no like here"))
+                d.leave(f"joint {name}", f"a joint of type {e.get('type')} has no like here")
         self._drives(joints)
         self._traced()
         for e in self.listed(data, "forces"):
@@ -108,9 +108,9 @@ class _Reader:
             d.bodies[GROUND] = Body(d.bodies[GROUND].points)
         for key in ("load_cases", "sweep_config"):
             if data.get(key):
-                d.notes.append(left_out(key, "the drivers say what drives; ranges are given to the command"))
+                d.leave(key, "the drivers say what drives; ranges are given to the command")
         if data.get("mounting_angle"):
-            d.notes.append(left_out("mounting_angle", "it turns gravity: turn `gravity` in the file instead"))
+            d.leave("mounting_angle", "it turns gravity: turn `gravity` in the file instead")
         return d
 
     def _body(self, name: str, e: Any) -> None:
@@ -242,7 +242,7 @@ class _Reader:
                 )
             else:
                 why = "the file does not store it" if marker else "an expression is not evaluated"
-                d.notes.append(left_out(f"law of motion of {where}", why))
+                d.leave(f"law of motion of {where}", why)
                 d.drives.append(Drive(link, on, at=0.0 if d.posed else sign * offset))
         for e in self.listed(self.data, "linear_drivers"):
             self._linear(e)
@@ -320,7 +320,7 @@ class _Reader:
         elif kind == "ExternalTorque" and constant:
             d.loads.append(Load("torques", [at("body_id", None)], {"torque": real("torque")}))
         else:
-            d.notes.append(left_out(f"force of type {kind or '?'}", "it has no like here"))
+            d.leave(f"force of type {kind or '?'}", "it has no like here")
 
 
 def together(parts: list[tuple[float, Place, float]]) -> tuple[float, Place, float]:

@@ -12,7 +12,7 @@ from urllib.parse import unquote
 
 from cli.errors import DataError
 from cli.imports.drawn import GROUND, Drawing, Drive, Load, Place, Slide, direction, exact, place
-from cli.imports.words import damaged, left_out
+from cli.imports.words import damaged
 
 DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
 STRING = re.compile(r"[\w-]*\.[\w,-]*\.[\w,-]+\.\w*\.[^\s?]*")
@@ -155,9 +155,7 @@ class _String:
         real = [tokens for _, kind, tokens, *_ in rows if kind[1:] == "R"]
         unset = bool(real) and all(self._decimal("mass", t[k]) == 1 for t in real for k in (2, 3))
         if unset:
-            self.d.notes.append(
-                left_out("masses and inertias", "every link has 1 and 1, the defaults nobody set")
-            )
+            self.d.leave("masses and inertias", "every link has 1 and 1, the defaults nobody set")
         else:
             self.d.notes.append(
                 f"masses are taken as kg, inertias as kg·{self.d.length}2: the string names no unit"
@@ -179,8 +177,7 @@ class _String:
                 )
             if not unset and mass > 0:
                 body.mass = mass
-                factor = {"in": 0.0254, "cm": 0.01, "m": 1.0}[self.d.length]
-                body.inertia = inertia * factor**2
+                body.inertia = inertia * self.d.metres**2
                 body.center = place(x, y) if kind[1:] == "R" or not ids else joints[ids[0]].at
         self.members = {
             joint: [
@@ -192,8 +189,7 @@ class _String:
     def _joins(self, id_: str, j: Joint, joints: dict[str, Joint]) -> None:
         held = self.members[id_]
         if j.welded:
-            names = [*held, *([GROUND] if j.grounded and not j.prismatic else [])]
-            self.d.welds += [(names[0], other) for other in names[1:]]
+            self.d.weld([*held, GROUND] if j.grounded and not j.prismatic else held)
         if not j.prismatic:
             return
         if j.slot is not None and j.slot[0] in self.d.bodies and {j.slot[1], j.slot[2]} <= joints.keys():
@@ -202,10 +198,10 @@ class _String:
         elif j.grounded:
             on, angle = GROUND, math.degrees(j.angle)
         else:
-            self.d.notes.append(left_out(f"slider {j.name}", "the string says of no guide"))
+            self.d.leave(f"slider {j.name}", "the string says of no guide")
             return
         for link in [name for name in held if name != on][:1]:
-            self.slides[id_] = self.d.prism(id_, link, on, j.at, angle)
+            self.slides[id_] = self.d.guide(id_, link, on, j.at, angle)
 
     def _drive(self, joints: dict[str, Joint], clockwise: bool) -> None:
         try:
@@ -216,16 +212,16 @@ class _String:
             if not j.driven:
                 continue
             if self.d.drives:
-                self.d.notes.append(left_out(f"input {j.name}", "another joint is the input"))
+                self.d.leave(f"input {j.name}", "another joint is the input")
             elif j.prismatic and id_ in self.slides:
                 self.d.drives.append(Drive(slide=self.slides[id_]))
-                self.d.notes.append(left_out(f"speed {speed} rpm", f"the input {j.name} is a slide"))
+                self.d.leave(f"speed {speed} rpm", f"the input {j.name} is a slide")
             elif self.members[id_] and not j.prismatic:
                 first, *others = self.members[id_]
                 link, on = (first, GROUND) if j.grounded or not others else (others[0], first)
                 self.d.drives.append(Drive(link, on, speed=f"{-abs(speed) if clockwise else speed} rpm"))
             else:
-                self.d.notes.append(left_out(f"input {j.name}", "it drives no link"))
+                self.d.leave(f"input {j.name}", "it drives no link")
 
     def _force(self, k: int, part: str, unit: str) -> None:
         what = f"force {k}"
@@ -233,13 +229,11 @@ class _String:
         tokens = self._tokens(what, part[1:], 8)
         x1, y1, x2, y2, size = (self._decimal(what, t) for t in tokens[3:8])
         if tokens[1] not in self.d.bodies:
-            self.d.notes.append(
-                left_out(f"force {tokens[2]}", f"its link {tokens[1]} is none of the string's")
-            )
+            self.d.leave(f"force {tokens[2]}", f"its link {tokens[1]} is none of the string's")
             return
         span = math.hypot(x2 - x1, y2 - y1)
         if span == 0:
-            self.d.notes.append(left_out(f"force {tokens[2]}", "its two ends coincide: it has no direction"))
+            self.d.leave(f"force {tokens[2]}", "its two ends coincide: it has no direction")
             return
         size = size if outward else -size
         force = [f"{size * (b - a) / span!r} {unit}" for a, b in ((x1, x2), (y1, y2))]
