@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 FOLLOWED = 181
 # a rate of nothing, for an input's of one
 STILL = 1e-9
+# of the heaviest link: what a link without mass is given where a format takes none
+LIGHT = 1e-6
+# how thick a link is drawn, of the mechanism's size
+THICK = 0.008
 
 
 @dataclass
@@ -49,6 +53,11 @@ class Part:
         """What it looks like: the sides of the hull of its points, in its axes."""
         ends = hull(self.points.values())
         return list(zip(ends, ends[1:] + (ends[:1] if len(ends) > 2 else ()), strict=False))
+
+    def boxes(self, size: float) -> Iterator[tuple[complex, float, tuple[float, float, float]]]:
+        """Yield its strokes as boxes for a mechanism of this size: the middle, the direction and the sides of each."""
+        for a, b in self.strokes:
+            yield (a + b) / 2, cmath.phase(b - a), (abs(b - a), 2 * THICK * size, 2 * THICK * size)
 
     def inside(self, z: complex) -> complex:
         """Return a place of the ground in its axes."""
@@ -74,6 +83,13 @@ class Joint:
     input: int | None = None
     guide: int | None = None
     limits: tuple[float, float] | None = None
+
+    def axis(self, part: Part, sense: float) -> tuple[float, float, float]:
+        """Return its axis in those of a body: about which it turns, or along which it slides."""
+        if self.kind == "turn":
+            return 0.0, 0.0, sense
+        along = sense * cmath.rect(1.0, self.direction - part.turn)
+        return along.real, along.imag, 0.0
 
     def turn_about(self) -> None:
         """Turn `on` against `link` instead."""
@@ -245,6 +261,15 @@ class Skeleton:
         lost = [name for name in self.parts if name not in self.path]
         if lost:
             raise DataError(f"{', '.join(lost)}: no pin or guide leads there from the ground: not exported")
+
+    def world(self, body: str, z: complex) -> complex:
+        """Return where a place of a body stands, m."""
+        return self.parts[body].world(z)
+
+    def free_points(self, part: Part) -> dict[str, complex]:
+        """Return the named points of a link that no joint holds, in its axes."""
+        held = {*self.m.pins, *(j.point for j in self.joints)}
+        return {p: z for p, z in part.points.items() if p not in held and part.name != GROUND}
 
     def walk(self, parent: str = GROUND) -> Iterator[Branching]:
         """Yield the tree's joints, each branch to its end."""

@@ -62,14 +62,13 @@ class _Reader:
         self.at: dict[str, Place] = {}
         layers = 0
         for e in self.root.all("connector"):
-            id_ = e.attributes.get("id", "")
-            if not id_:
+            if not e.id:
                 raise damaged(file, f"line {e.line}: <connector>", "no id", "an id")
             if e.attributes.get("layer") in DRAWING_LAYERS:
                 layers += 1
                 continue
             x, y = place(self.number(e, "x"), self.number(e, "y"))
-            self.connectors[id_], self.at[id_] = e, (x * self.scale, y * self.scale)
+            self.connectors[e.id], self.at[e.id] = e, (x * self.scale, y * self.scale)
         self.links: dict[str, Element] = {}
         self.held: dict[str, list[str]] = {}
         for e in self.root.all("link", "element"):
@@ -77,7 +76,7 @@ class _Reader:
             if e.attributes.get("layer") in DRAWING_LAYERS:
                 layers += 1
                 continue
-            ids = [c.attributes.get("id", "") for c in e.all("connector")]
+            ids = [c.id for c in e.all("connector")]
             for c in ids:
                 if c not in self.connectors:
                     raise damaged(file, f"line {e.line}: <{e.tag}> {id_}", c, "the id of a connector")
@@ -127,39 +126,33 @@ class _Reader:
 
     def _body(self, e: Element) -> str | None:
         """Return the body of a link, or of a connector: the ground's, or the first link's that has it."""
-        id_ = e.attributes.get("id", "")
-        if e is self.links.get(id_):
-            return f"L{id_}"
-        if e is self.connectors.get(id_):
-            return next(
-                (f"L{k}" for k, held in self.held.items() if id_ in held),
-                GROUND if yes(e, "anchor") else None,
-            )
+        if e is self.links.get(e.id):
+            return f"L{e.id}"
+        if e is self.connectors.get(e.id):
+            links = (f"L{k}" for k, held in self.held.items() if e.id in held)
+            return next(links, GROUND if yes(e, "anchor") else None)
         return None
 
     def _fasten(self, e: Element) -> None:
         """`fastenlink` and `fastenconnector`, as attributes or as elements inside: rigidly joined."""
         wanted = [(k, v) for k, v in e.attributes.items() if k in ("fastenlink", "fastenconnector")]
-        wanted += [
-            (c.tag.lower(), c.attributes.get("id", "")) for c in e.all("fastenlink", "fastenconnector")
-        ]
+        wanted += [(c.tag.lower(), c.id) for c in e.all("fastenlink", "fastenconnector")]
         for kind, id_ in wanted:
             found = (self.links if kind == "fastenlink" else self.connectors).get(id_)
             if found is None:
                 self.d.leave(f"{kind} {id_} (line {e.line})", "there is none of that id")
                 continue
             mine, its = self._body(e), self._body(found)
-            here, there = e.attributes.get("id", ""), found.attributes.get("id", "")
             if mine is None and its is not None:
-                self.d.body(its).points[f"C{here}"] = self.at[here]
+                self.d.body(its).points[f"C{e.id}"] = self.at[e.id]
             elif its is None and mine is not None:
-                self.d.body(mine).points[f"C{there}"] = self.at[there]
+                self.d.body(mine).points[f"C{found.id}"] = self.at[found.id]
             elif mine is not None and its is not None and mine != its:
                 self.d.welds.append((its, mine))
 
     def _slide(self, id_: str, e: Element) -> None:
         d, what = self.d, f"slider C{id_}"
-        limits = [c.attributes.get("id", "") for c in e.all("slidelimit")]
+        limits = [c.id for c in e.all("slidelimit")]
         if len(limits) != 2 or not set(limits) <= self.at.keys():
             raise damaged(self.file, f"line {e.line}: {what}", limits, "two slidelimits that are connectors")
         if self.number(e, "slideradius", 0.0) != 0:
@@ -217,7 +210,7 @@ class _Reader:
     def _ratio(self, ratio: Element) -> None:
         d = self.d
         sides = list(ratio.all("link"))
-        ids = [e.attributes.get("id", "") for e in sides]
+        ids = [e.id for e in sides]
         if len(sides) != 2 or not set(ids) <= self.links.keys():
             raise damaged(self.file, f"line {ratio.line}: <ratio>", ids, "two links of the file")
         sizes = [self.number(e, "size", 0.0) for e in sides]

@@ -46,7 +46,8 @@ def _tables(d: Drawing, source: str) -> Iterable[tuple[str, Table]]:
     for e in d.drives:
         yield "[input]" if len(d.drives) == 1 else "[[input]]", _input(e)
     ats = [e.at for e in d.drives]
-    yield "[guess]", {"at": ats[0] if len(ats) == 1 else ats} | {n: b.turn for n, b in links.items()}
+    at: Table = {"at": ats[0] if len(ats) == 1 else ats}
+    yield "[guess]", at | {n: b.turn for n, b in links.items()}
     for load in d.loads:
         yield f"[[{load.table}]]", _ends(d, load, origins) | load.values
 
@@ -106,7 +107,7 @@ def _named(d: Drawing) -> Drawing:
     return d
 
 
-def _place(z: Place, origin: Place = ORIGIN) -> list[float]:
+def _place(z: Place, origin: Place = ORIGIN) -> object:
     return [float(z[0] - origin[0]), float(z[1] - origin[1])]
 
 
