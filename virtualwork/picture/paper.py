@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dalembert.drawing.amounts import prefixed
+from dalembert.drawing.amounts import dimensioned
 from dalembert.drawing.labels import Label, place
 from dalembert.drawing.sheet import plain, sheet
 from virtualwork.describe.parts import GROUND
@@ -75,8 +75,7 @@ class _Paper:
         self.poses, self.m = poses, poses.mechanism
         self.travel = self._travel()
         self.drawing = shapes_of(poses, self.travel)
-        # drawings are dimensioned in millimetres up to two metres
-        self.scale, self.unit = (1e3, "mm") if 2e-3 <= self.m.size < 2 else prefixed(self.m.size, "m")
+        self.scale, self.unit = dimensioned(self.m.size)
         good = np.flatnonzero(poses.assembled)
         steps = np.linspace(0, max(len(good) - 1, 0), min(DRAWN, len(good))).astype(int)
         self.shown: list[int] = list(dict.fromkeys(good[steps].tolist()))
