@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import alike
 from virtualwork.branch.assembly import Assembly
+from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.parts import Point, as_point
 from virtualwork.formulas.asked import FORCES, Key, over_blocks, pays
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy

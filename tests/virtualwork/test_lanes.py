@@ -12,7 +12,7 @@ import pytest
 from benchmarks.stress.tapes import dimension, every_key, sizes
 from benchmarks.stress.topologies import generate
 from virtualwork import Mechanism
-from virtualwork.describe.errors import DescriptionError, MechanismError
+from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.formulas.asked import over_blocks
 from virtualwork.formulas.lanes import Lanes
 

@@ -21,7 +21,7 @@ from virtualwork.formulas.asked import Key
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.formulas.statics import Column
-from virtualwork.plan.joints import Joint
+from virtualwork.plan.steps import Joint
 
 
 class ForceErrors:

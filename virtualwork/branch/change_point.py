@@ -16,8 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from virtualwork.branch.choice import Choice
-from virtualwork.formulas.linear import stack, stack_rows
-from virtualwork.formulas.numbers import EPS, Number, Reals
+from virtualwork.formulas.numbers import EPS, Number, Reals, stack, stack_rows
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.rates import Passage, Rates
 from virtualwork.plan.steps import Group, Step

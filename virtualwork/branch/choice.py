@@ -11,8 +11,7 @@ import numpy as np
 from dalembert.arithmetic.records import Record, record
 from virtualwork.describe.description import Description
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.positions import State, run
-from virtualwork.formulas.winding import principal
+from virtualwork.formulas.positions import State, principal, run
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, turns
 

@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 
 from virtualwork.branch.change_point import Along, chebyshev_nodes, put, real_roots
-from virtualwork.formulas.double_roots import settle, singular
-from virtualwork.formulas.linear import SINGULAR, solve, stack, stack_rows
-from virtualwork.formulas.newton import gaps, newton, write_unknowns
-from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.formulas.newton import gaps, newton, settle, singular, write_unknowns
+from virtualwork.formulas.numbers import SINGULAR, Number, Reals, solve, stack, stack_rows
 from virtualwork.formulas.positions import State, columns
 from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Group

@@ -15,9 +15,8 @@ import numpy as np
 
 from virtualwork.branch.track import SAME, Track
 from virtualwork.formulas.closed_forms import Gap
-from virtualwork.formulas.linear import stack_rows
 from virtualwork.formulas.newton import gaps, newton
-from virtualwork.formulas.numbers import EPS, Complexes, Reals
+from virtualwork.formulas.numbers import EPS, Complexes, Reals, stack_rows
 from virtualwork.formulas.positions import State
 from virtualwork.plan.steps import Group, turns
 

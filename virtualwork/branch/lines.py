@@ -10,12 +10,10 @@ import numpy as np
 from virtualwork.branch.change_point import Along
 from virtualwork.branch.continuation import FINEST, NODES
 from virtualwork.describe.description import Description
-from virtualwork.formulas.linear import solve, stack, stack_rows
 from virtualwork.formulas.newton import newton, write_unknowns
-from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.positions import State, columns
+from virtualwork.formulas.numbers import Reals, solve, stack, stack_rows
+from virtualwork.formulas.positions import FAR, SHORTEST, State, columns, principal
 from virtualwork.formulas.rates import Rates
-from virtualwork.formulas.winding import FAR, SHORTEST, principal
 from virtualwork.plan.steps import Group, Step
 
 

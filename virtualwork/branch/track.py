@@ -17,11 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.branch.choice import Choice
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.numbers import EPS, Number, Reals
-from virtualwork.formulas.positions import State, run
-from virtualwork.formulas.winding import NONE, Samples, follow, whole
+from virtualwork.formulas.positions import NONE, Samples, State, follow, run, whole
 from virtualwork.plan.steps import Group, Step, turns
 
 if TYPE_CHECKING:

@@ -9,18 +9,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe import DescriptionError
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort, finished, generalized, write_effort
-from virtualwork.formulas.friction import settle
 from virtualwork.formulas.loads import EXTERNAL, OWN, Load
 from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, cross, leave_out, plus, xy
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.reactions import Reactions
+from virtualwork.formulas.reactions import Reactions, settle
 from virtualwork.formulas.scene import Scene
 from virtualwork.formulas.statics import Statics
-from virtualwork.plan.joints import Joint
+from virtualwork.plan.steps import Joint
 
 
 class Dynamics:

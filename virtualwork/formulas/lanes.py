@@ -18,11 +18,10 @@ from dalembert.arithmetic.engines import floats, run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.asked import COMPLEX, FORCES, Key, names, over_blocks, quantity
 from virtualwork.formulas.dynamics import Dynamics
-from virtualwork.formulas.linear import SINGULAR
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.newton import unknowns
-from virtualwork.formulas.numbers import Number, Reals, leave_out
+from virtualwork.formulas.numbers import SINGULAR, Number, Reals, leave_out
 from virtualwork.formulas.poses import Branch, Poses
 from virtualwork.formulas.recording import NAMES, NEAR, Recording
 from virtualwork.formulas.scene import Scene

@@ -24,18 +24,17 @@ from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
 from dalembert.arithmetic.systems import regularity, solved
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
-from virtualwork.describe.loads import TorsionSpring
-from virtualwork.describe.parts import GROUND
+from virtualwork.describe.parts import GROUND, TorsionSpring
 from virtualwork.formulas.asked import FORCES, JOINTS, Key, names
 from virtualwork.formulas.block import Block, Shared, Table
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.dynamics import resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
-from virtualwork.formulas.kinds import PARTS, WRITTEN
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.newton import gaps, put_unknowns
+from virtualwork.formulas.numbers import PARTS, WRITTEN
 from virtualwork.formulas.poses import chain_rule
 from virtualwork.formulas.positions import State, columns, run
 from virtualwork.formulas.rates import Rates
