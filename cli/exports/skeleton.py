@@ -14,8 +14,7 @@ import numpy as np
 
 from cli.errors import DataError
 from cli.read.names import Groups, unused
-from virtualwork.describe.loads import TorsionSpring
-from virtualwork.describe.parts import GROUND
+from virtualwork.describe.parts import GROUND, TorsionSpring
 from virtualwork.drawing import hull
 from virtualwork.parts_of_motion import SlideMotion
 
