@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from itertools import takewhile
 from urllib.parse import unquote
 
 from cli.errors import DataError
@@ -27,11 +28,12 @@ class Joint:
     name: str
     at: Place
     angle: float
+    slot: list[str]
+    """The link that carries its slot, and the two joints on whose line that lies."""
     prismatic: bool
     driven: bool
     grounded: bool
     welded: bool
-    slot: tuple[str, str, str] | None
 
 
 def read(file: str, text: str) -> list[Drawing]:
@@ -82,19 +84,13 @@ class _String:
                 "closed by an empty part; is it cut off?"
             )
         self.settings = head
-        self.joint_parts, rest = self._until_empty(rest)
-        self.link_parts, rest = self._until_empty(rest)
+        lists = iter(rest if rest.count("") > 2 else [*rest[:-1], ""])
+        self.joint_parts, self.link_parts, self.force_parts = (list(takewhile(bool, lists)) for _ in range(3))
         self.slides: dict[str, Slide] = {}
-        self.force_parts, _ = self._until_empty(rest) if "" in rest else (rest[:-1], [])
         self.d = Drawing()
         whole = len(text) - 1
         if text[-1] != DIGITS[whole % 62]:
             self.d.notes.append("the checksum does not fit the string's length: look whether it is complete")
-
-    @staticmethod
-    def _until_empty(parts: list[str]) -> tuple[list[str], list[str]]:
-        end = parts.index("")
-        return parts[:end], parts[end + 1 :]
 
     def _decimal(self, what: str, digits: str) -> float:
         try:
@@ -136,13 +132,11 @@ class _String:
         if digits is None:
             raise damaged(self.file, what, part, "a flag digit, then id,name,x,y,angle")
         bits = flags(part[0], 6)
-        tokens = self._tokens(what, part[1:], 5)
-        id_, name, x, y, angle, *more = tokens
+        id_, name, x, y, angle, *more = self._tokens(what, part[1:], 5)
         at = place(self._decimal(what, x), self._decimal(what, y))
-        # newer strings: the link that carries the slot, and the two joints on whose line it lies
-        slot = (more[0], more[1], more[2]) if len(more) > 2 and more[0] else None
-        turn = self._decimal(what, angle)
-        return id_, Joint(name or id_, at, turn, bits[0], bits[1], bits[2], bits[3], slot)
+        # of newer strings
+        slot = more[:3] if len(more) > 2 and more[0] else []
+        return id_, Joint(name or id_, at, self._decimal(what, angle), slot, *bits[:4])
 
     def _links(self, joints: dict[str, Joint]) -> None:
         rows: list[tuple[str, str, list[str], list[str], list[str]]] = []
@@ -192,7 +186,7 @@ class _String:
             self.d.weld([*held, GROUND] if j.grounded and not j.prismatic else held)
         if not j.prismatic:
             return
-        if j.slot is not None and j.slot[0] in self.d.bodies and {j.slot[1], j.slot[2]} <= joints.keys():
+        if j.slot and j.slot[0] in self.d.bodies and {*j.slot[1:]} <= joints.keys():
             on, a, b = j.slot
             angle = direction(joints[a].at, joints[b].at)
         elif j.grounded:
