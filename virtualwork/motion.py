@@ -269,7 +269,7 @@ class Motion:
         on : str
             A link that the joint holds.
         """
-        return self.dynamics.reaction(joint, on)
+        return xy(self.value(("reaction", joint, on)))
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
         """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""
