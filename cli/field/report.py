@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -11,9 +11,9 @@ from cli.field import columns, fit_words, picture, words
 from cli.field.runs import Complex, Real
 from cli.field.solve import FieldBalancing, Solved
 from cli.field.tolerance import LastRun, first_reading, last_run, measured_verdicts, verdicts
-from cli.read.tolerance import Verdict
 from cli.read.units import degrees, from_si
 from cli.show.columns import Column, Section, Sheet, Table
+from cli.show.verdicts import verdict_columns
 
 MOST = 24  # rotors of one report
 
@@ -138,7 +138,7 @@ def _verdict(found: FieldBalancing, solved: Solved, i: int, last: LastRun | None
         planes = verdicts(found, solved, i) if last is None else measured_verdicts(found, solved, i, last)
         parts += [
             f"Residual unbalance {how}; tolerance{grade}: {whole:.6g} g·mm, shared equally.",
-            _of_planes(planes),
+            Table(verdict_columns(planes, "g_mm"), keys=("plane",)),
         ]
     if last is None:
         parts.append(
@@ -146,20 +146,6 @@ def _verdict(found: FieldBalancing, solved: Solved, i: int, last: LastRun | None
             "measured."
         )
     return parts
-
-
-def _of_planes(planes: Sequence[Verdict]) -> Table:
-    def in_g_mm(values: Sequence[float]) -> list[float]:
-        return [from_si(value, "unbalance", "g_mm") for value in values]
-
-    _, share, before, after = (list(column) for column in zip(*planes, strict=True))
-    said = ["not determined" if v.residual != v.residual else "within" if v.residual <= v.permissible else "beyond" for v in planes]  # fmt: skip
-    table = [Column("plane", "", [v.plane for v in planes])]
-    table += [
-        Column(name, "g_mm", in_g_mm(values))
-        for name, values in (("permissible", share), ("before", before), ("after", after))
-    ]
-    return Table([*table, Column("verdict", "", said)], keys=("plane",))
 
 
 def _found(found: FieldBalancing, solved: Solved, i: int) -> list[str | Table]:

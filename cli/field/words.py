@@ -178,16 +178,14 @@ def verdict(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
     lines = [
         f"tolerance{' ' + tolerance.grade if tolerance.grade else ''}: U_per = {whole:.6g} g·mm, shared equally"
     ]
-    for plane, share, *sizes in verdicts(found, solved, i):
-        before, after = (
-            "not determined"
-            if np.isnan(u)
-            else f"{from_si(u, 'unbalance', 'g_mm'):.6g} g·mm ({'within' if u <= share else 'beyond'})"
-            for u in sizes
+    for v in verdicts(found, solved, i):
+        share, before, after = (from_si(u, "unbalance", "g_mm") for u in v[1:])
+        initial, residual = (
+            said if size != size else f"{size:.6g} g·mm ({said})"
+            for size, said in ((before, v.of(v.initial)), (after, v.of(v.residual)))
         )
         lines.append(
-            f"  plane {plane}: permissible {from_si(share, 'unbalance', 'g_mm'):.6g}, initial {before}, "
-            f"residual as predicted {after}"
+            f"  plane {v.plane}: permissible {share:.6g}, initial {initial}, residual as predicted {residual}"
         )
     return lines
 
