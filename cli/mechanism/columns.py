@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cli.mechanism.studies import Document, Studies
     from cli.show.columns import Cell
     from virtualwork.motion import Motion
-    from virtualwork.plan.joints import Joint
+    from virtualwork.plan.steps import Joint
 
     Reals = NDArray[np.float64]
 

@@ -17,14 +17,14 @@ from cli.mechanism.tolerance import shown
 from virtualwork.family.motion import FamilyMotion
 from virtualwork.family.part import ASSEMBLED, Part, Solver
 from virtualwork.formulas.asked import Key
-from virtualwork.formulas.linear import condition
+from virtualwork.formulas.numbers import condition
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork.describe.description import Description
     from virtualwork.motion import Motion
-    from virtualwork.plan.joints import Joint
+    from virtualwork.plan.steps import Joint
 
 # a radicand below which a pose may be a limit: such a variant is described alone, for the marks of its poses
 MARKED = 1e-4

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from cli.mechanism.solve import Analysis
     from cli.show.columns import Document
     from virtualwork.motion import Motion
-    from virtualwork.plan.joints import Joint
+    from virtualwork.plan.steps import Joint
 
 
 def effort_name(slide: bool) -> str:
