@@ -297,7 +297,8 @@ def known_keys(entry: Mapping[str, Any], names: Collection[str], where: str, wha
     if not isinstance(entry, Mapping):
         raise wrong(where, entry, "a table")
     for key in entry:
-        known(key, names, where, what)
+        if key not in names:
+            known(key, names, where, what)
 
 
 def proper(entry: Mapping[str, Any], keys: Keys, where: str) -> None:
