@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from virtualwork.branch.assembly import Assembly, all_assemblies
+from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import MechanismError
 from virtualwork.describe.reader import read, read_text
 from virtualwork.motion import Motion
 

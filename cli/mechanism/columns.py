@@ -160,7 +160,8 @@ def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
             if "change point" not in found[i]:
                 found[i].append("change point")
     if track.has_limits:
-        for limit in track.limits():
-            for i in np.flatnonzero(np.abs(track.apart(q, limit.input)) <= near):
+        reach = motion.assembly.reach
+        for limit in reach.limits():
+            for i in np.flatnonzero(np.abs(reach.apart(q, limit.input)) <= near):
                 found[i] += [word for word in ("limit", "dead point") if word not in found[i]]
     return found

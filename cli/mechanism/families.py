@@ -15,7 +15,7 @@ from cli.mechanism.read import Inputs
 from cli.mechanism.solve import Analysis
 from virtualwork.family.part import ASSEMBLED, Part, Solver
 from virtualwork.formulas.asked import Key
-from virtualwork.formulas.linear import condition
+from virtualwork.formulas.numbers import condition
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

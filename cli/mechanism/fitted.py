@@ -20,8 +20,8 @@ from cli.read.files import read_bytes
 from cli.read.units import read_degrees
 from cli.show.columns import Column, Result, Table
 from cli.show.picture import blank
+from virtualwork.describe import DescriptionError
 from virtualwork.describe.dimensions import Dimension, value
-from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.units import Units
 
 if TYPE_CHECKING:

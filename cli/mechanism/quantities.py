@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cli.show.columns import Cell, Json
     from virtualwork import Mechanism
     from virtualwork.motion import Motion
-    from virtualwork.plan.joints import Joint
+    from virtualwork.plan.steps import Joint
 
     Reals = NDArray[np.float64]
     Numbers = Sequence[float | None]

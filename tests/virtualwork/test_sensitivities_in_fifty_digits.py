@@ -19,7 +19,7 @@ from benchmarks.stress.tapes import DIGITS, Digits
 from benchmarks.truth.mechanism import Exact
 from virtualwork import Gear, Guess, Input, Link, Mechanism, Spring, TorsionSpring
 from virtualwork.describe.dimensions import dimensions, value
-from virtualwork.describe.loads import Force, Torque
+from virtualwork.describe.parts import Force, Torque
 from virtualwork.family.sensitivity import Sensitivities
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import names

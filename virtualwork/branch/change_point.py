@@ -17,8 +17,7 @@ import numpy as np
 
 from virtualwork.branch.choice import Along
 from virtualwork.branch.roots import chebyshev_nodes
-from virtualwork.formulas.linear import stack, stack_rows
-from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.formulas.numbers import Number, Reals, stack, stack_rows
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Group

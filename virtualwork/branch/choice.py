@@ -13,9 +13,8 @@ from dalembert.arithmetic.records import Record, record
 from virtualwork.describe.description import Description
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.positions import State, run
+from virtualwork.formulas.positions import State, principal, run
 from virtualwork.formulas.rates import Passage
-from virtualwork.formulas.winding import principal
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, turns
 

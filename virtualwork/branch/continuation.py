@@ -14,10 +14,8 @@ import numpy as np
 from virtualwork.branch.choice import Along
 from virtualwork.branch.roots import chebyshev_nodes, real_roots
 from virtualwork.branch.winding import NODES, straight_lines
-from virtualwork.formulas.double_roots import settle, singular
-from virtualwork.formulas.linear import SINGULAR, solve, stack, stack_rows
-from virtualwork.formulas.newton import gaps, newton, write_unknowns
-from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.newton import gaps, newton, settle, singular, write_unknowns
+from virtualwork.formulas.numbers import SINGULAR, Reals, solve, stack, stack_rows
 from virtualwork.formulas.positions import State, columns
 from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Group, Step

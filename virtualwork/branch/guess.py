@@ -11,14 +11,11 @@ import numpy as np
 from dalembert.arithmetic.recorded import bare, squared
 from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.choice import Choice
-from virtualwork.describe.description import Description
-from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
+from virtualwork.describe import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
+from virtualwork.describe.description import Description, known_by_guess
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.linear import stack, stack_rows
-from virtualwork.formulas.numbers import Number, cross, dot
-from virtualwork.formulas.positions import State, columns, run
-from virtualwork.formulas.winding import principal
-from virtualwork.plan.guessed import known_by_guess
+from virtualwork.formulas.numbers import Number, cross, dot, stack, stack_rows
+from virtualwork.formulas.positions import State, columns, principal, run
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, Turn
 

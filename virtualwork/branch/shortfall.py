@@ -9,8 +9,8 @@ import numpy as np
 
 from virtualwork.branch.assembly import Assembly
 from virtualwork.formulas.closed_forms import Gap
-from virtualwork.formulas.linear import stack_rows
 from virtualwork.formulas.newton import gaps, newton
+from virtualwork.formulas.numbers import stack_rows
 from virtualwork.formulas.positions import State
 from virtualwork.plan.steps import Group
 

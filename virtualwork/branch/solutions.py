@@ -9,9 +9,8 @@ import numpy as np
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.linear import stack, stack_rows
 from virtualwork.formulas.newton import gaps, newton, write_unknowns
-from virtualwork.formulas.numbers import dot
+from virtualwork.formulas.numbers import dot, stack, stack_rows
 from virtualwork.formulas.positions import State, columns
 from virtualwork.plan.steps import Group
 

@@ -21,7 +21,7 @@ from virtualwork.branch.choice import Choice
 from virtualwork.branch.limits import SAME, Limit, limits, own_range, repetition
 from virtualwork.branch.radicand import lowest, rounding, vanishes
 from virtualwork.branch.winding import Winding, wind_along_lines
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.positions import State, run
 from virtualwork.plan.steps import Group, Step, turns

@@ -12,8 +12,7 @@ import numpy as np
 from virtualwork.branch.choice import Along
 from virtualwork.describe.description import Description
 from virtualwork.formulas.numbers import Number, Reals
-from virtualwork.formulas.positions import State
-from virtualwork.formulas.winding import FAR, NONE, SHORTEST, Samples, follow, principal, whole
+from virtualwork.formulas.positions import FAR, NONE, SHORTEST, Samples, State, follow, principal, whole
 from virtualwork.plan.steps import Group
 
 # of one turn

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
+from virtualwork.describe import DescriptionError, hint
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import DescriptionError, hint
 from virtualwork.describe.parts import joined
 from virtualwork.describe.units import HEADERS
 

@@ -7,10 +7,19 @@ import math
 import re
 from typing import Any
 
-from virtualwork.describe.entries import Entries, need, proper
-from virtualwork.describe.errors import DescriptionError, hint
-from virtualwork.describe.keys import FORCE, FRICTION, MOTOR, SPRING, TORQUE, TORSION_SPRING
-from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
+from virtualwork.describe import DescriptionError, hint
+from virtualwork.describe.entries import (
+    FORCE,
+    FRICTION,
+    MOTOR,
+    SPRING,
+    TORQUE,
+    TORSION_SPRING,
+    Entries,
+    need,
+    proper,
+)
+from virtualwork.describe.parts import Force, Friction, Motor, Spring, Torque, TorsionSpring
 from virtualwork.describe.units import LARGEST, wrong
 
 # the columns that a table of torque may be over

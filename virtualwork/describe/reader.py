@@ -8,16 +8,29 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from virtualwork.describe import keys
+from virtualwork.describe import DescriptionError, MechanismError, hint
 from virtualwork.describe.description import Description
-from virtualwork.describe.entries import Entries, Load, known_keys, proper
-from virtualwork.describe.errors import DescriptionError, MechanismError, hint
+from virtualwork.describe.entries import (
+    ENTRIES,
+    FILE,
+    GEAR,
+    GUESS,
+    INPUT,
+    LINK,
+    LOADS,
+    POINT,
+    SLIDER,
+    Entries,
+    Load,
+    known_keys,
+    proper,
+)
 from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link, Polar
 from virtualwork.describe.units import LARGEST, wrong
 
 D = TypeVar("D", bound=Description)
 
-TABLES = {*keys.FILE, *keys.ENTRIES}
+TABLES = {*FILE, *ENTRIES}
 
 
 def read(path: Path, make: Callable[..., D], load: Load = Path.read_bytes) -> D:
@@ -95,7 +108,7 @@ class _Reader(Entries):
 
     def loads(self) -> dict[str, Any]:
         """The loads of a file that has any."""
-        if self.data.keys().isdisjoint(keys.LOADS):
+        if self.data.keys().isdisjoint(LOADS):
             return {}
         from virtualwork.describe.load_entries import LoadEntries
 
@@ -141,7 +154,7 @@ class _Reader(Entries):
         where = f"[links.{name}]"
         if not isinstance(entry, dict):
             raise wrong(where, entry, "a table with points")
-        known_keys(entry, keys.LINK, where, "key")
+        known_keys(entry, LINK, where, "key")
         points: dict[str, complex | Polar] = {}
         given = entry.get("points", {})
         if not isinstance(given, dict):
@@ -153,14 +166,14 @@ class _Reader(Entries):
                 continue
             if not isinstance(v.get("from"), str):
                 raise DescriptionError(f"{at} from: expected the name of another point of this link")
-            proper(v, keys.POINT, at)
+            proper(v, POINT, at)
             points[p] = Polar(
                 v["from"],
                 self.number(v["length"], "length", f"{at} length"),
                 self.number(v["angle"], "angle", f"{at} angle"),
             )
-        mass = self.optional(entry, keys.LINK, "mass", where)
-        inertia = self.optional(entry, keys.LINK, "inertia", where)
+        mass = self.optional(entry, LINK, "mass", where)
+        inertia = self.optional(entry, LINK, "inertia", where)
         center = self.pair(entry["center"], "length", f"{where} center") if "center" in entry else 0j
         if mass < 0:
             raise wrong(f"{where} mass", entry["mass"], "a mass of zero or more")
@@ -173,7 +186,7 @@ class _Reader(Entries):
 
     def guide(self, entry: dict[str, Any], i: int, table: str) -> Guide:
         where = f"[[{table}]] {i}"
-        proper(entry, keys.ENTRIES[table], where)
+        proper(entry, ENTRIES[table], where)
         point = str(entry["point"])
         link = entry.get("link")
         if link is None:
@@ -193,15 +206,15 @@ class _Reader(Entries):
             raise DescriptionError(
                 f"{where} through: unknown point '{through}' of {on}{hint(through, self.bodies[on])}"
             )
-        angle = self.optional(entry, keys.SLIDER, "angle", where)
+        angle = self.optional(entry, SLIDER, "angle", where)
         turned = None
         if table == "sliders":
-            turned = self.optional(entry, keys.SLIDER, "turned", where)
+            turned = self.optional(entry, SLIDER, "turned", where)
         return Guide(point, str(link), on, through, angle, turned)
 
     def gear(self, entry: dict[str, Any], i: int) -> Gear:
         where = f"[[gears]] {i}"
-        proper(entry, keys.GEAR, where)
+        proper(entry, GEAR, where)
         links = entry["links"]
         if not isinstance(links, list) or len(links) != 2:
             raise wrong(f"{where} links", links, "two links")
@@ -218,7 +231,7 @@ class _Reader(Entries):
             raise DescriptionError("[input]: missing; nothing drives the mechanism")
         for i, entry in rows:
             where = "[input]" if len(rows) == 1 else f"[[input]] {i}"
-            known_keys(entry, keys.INPUT, where, "key")
+            known_keys(entry, INPUT, where, "key")
             slide = "slider" in entry
             wrong = {"link", "on", "angle"} & set(entry) if slide else {"position"} & set(entry)
             if wrong or not (slide or "link" in entry):
@@ -294,7 +307,7 @@ class _Reader(Entries):
         slides = {e.name for e in inputs if e.is_slide}
         for key, value in table.items():
             where = f"[guess] {key}"
-            if key in keys.GUESS:
+            if key in GUESS:
                 continue
             if key in slides and not isinstance(value, list):
                 continue

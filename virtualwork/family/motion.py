@@ -16,12 +16,12 @@ from dalembert.arithmetic.engines import as_part
 from dalembert.arithmetic.parts import in_parts
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.shortfall import shortfall
-from virtualwork.describe.errors import DescriptionError, MechanismError
+from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.parts import Point, as_point
 from virtualwork.family.part import ASSEMBLED, LANES, Part, answer, forget, room
 from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Complexes, Reals
-from virtualwork.plan.joints import joints
+from virtualwork.plan.steps import joints
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe import DescriptionError
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Complexes, Number, Reals, dot, plus, times

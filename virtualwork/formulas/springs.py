@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from virtualwork.describe.loads import Spring, TorsionSpring
+from virtualwork.describe.parts import Spring, TorsionSpring
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.loads import Load, angle_rate, times_dot
 from virtualwork.formulas.numbers import TOGETHER, Number, dot, minus, plus, times

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
-from virtualwork.formulas.kinds import imaginary_part, real_part
-from virtualwork.formulas.numbers import Number, Reals, cross
+from virtualwork.formulas.numbers import Number, Reals, cross, imaginary_part, real_part
 from virtualwork.formulas.reactions import JointForces, Reactions
-from virtualwork.plan.joints import Joint
+from virtualwork.plan.steps import Joint
 
 # ("fx" or "fy", joint, body), ("normal", joint, ""), ("moment", joint, ""), ("gear", number, ""), ...
 Column = tuple[str, str, str]

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from virtualwork.branch.assembly import Assembly
+from virtualwork.describe import AssemblyError
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import AssemblyError
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.constraints import Constraints, coordinates, dependent
 from virtualwork.formulas.poses import Poses
