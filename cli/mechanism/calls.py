@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from cli.mechanism.clashes import refuse_clashes
-from cli.mechanism.read import names, wanted
+from cli.mechanism.options import names, refuse_clashes
+from cli.mechanism.read import wanted
 from cli.mechanism.result import csv_parts, result_of, told
 from cli.mechanism.solve import ORDERS, Analysis, load
 from cli.mechanism.studies import Request
 from cli.show.columns import Result
 
 if TYPE_CHECKING:
-    from cli.mechanism.command import Options
+    from cli.mechanism.options import Options
     from cli.mechanism.many import Many
     from cli.mechanism.variants import Variants
     from cli.show.commands import ShowOptions
@@ -138,12 +138,7 @@ class Call:
             analysis, self.request, asked.states, asked.explain, asked.graph, self.about, show.digits
         )
         if spreads:
-            from cli.mechanism.tolerance import Tolerances
-
-            its = Tolerances(
-                analysis, asked.forces, asked.draws or 0, asked.seed, asked.distribution, asked.workers or 1
-            )
-            return its.added_to(result)
+            return self._with_tolerances(result, analysis)
         return self._with_page(result, lambda: self._page([("", analysis)]))
 
     def _of_variants(self, analysis: Analysis, several: Variants) -> Result:
@@ -160,6 +155,25 @@ class Call:
         )  # fmt: skip
         many = Many(question, several, asked.workers or 1)
         return self._with_page(self._of_many(many), lambda: self._page(many.alone()))
+
+    def _with_tolerances(self, result: Result, analysis: Analysis) -> Result:
+        """Poses with what the tolerances do to them, in every form."""
+        from cli.mechanism.tolerance import Tolerances
+        from cli.mechanism.tolerance_picture import draw
+
+        a = self.asked
+        found = Tolerances(analysis, a.forces, a.draws or 0, a.seed, a.distribution, a.workers or 1)
+        before, said = result.document, found.remarks()
+        _, *others = result.tables.items()
+        return replace(
+            result,
+            document=lambda: {**before(), "tolerance": found.document()},
+            tables={"poses": found.table, **dict(others)},
+            screen=None,
+            afterword=found.words,
+            figure=lambda: draw(found),
+            warnings=[*result.warnings, *said],
+        )
 
     def _long(self, analysis: Analysis) -> Result:
         """The table of a long sweep, a block of poses at a time."""

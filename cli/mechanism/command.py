@@ -2,28 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
-import typer
-
-from cli.show.commands import ShowOptions, suffix_among
+from cli.mechanism.options import Options
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.columns import Result
-
-
-def _print_schema(asked: bool) -> None:
-    if asked:
-        import json
-
-        from virtualwork.describe.schema import schema
-
-        typer.echo(json.dumps(schema(), indent=2, ensure_ascii=False))
-        raise typer.Exit
-
+    from cli.show.commands import ShowOptions
 
 EXAMPLE = "klann"
 OPTIONS = """
@@ -71,50 +57,6 @@ Output: of the mechanism:
   html FILE.html  Write a page that moves to FILE: play, slider, curves, values; with --forces their arrows.
   schema  Print the JSON Schema of FILE.toml, for editors; needs no FILE.
 """
-
-
-# each method that dataclass makes costs a tenth of a millisecond at every start
-@dataclass(eq=False, repr=False)
-class Options:
-    """The options of its own, in the order in which the help lists them."""
-
-    file: str
-    at: list[str] | None = None
-    sweep: str | None = None
-    inputs: str | None = None
-    only: str | None = None
-    order: Literal["position", "velocity", "acceleration", "jerk"] | None = None
-    branch: str | None = None
-    newton: bool = False
-    check: bool = False
-    explain: bool = False
-    forces: bool = False
-    equilibrium: bool = False
-    flywheel: float | None = None
-    counterweights: str | None = None
-    graph: str | None = None
-    time: str | None = None
-    accuracy: str | None = None
-    until: str | None = None
-    states: Annotated[Path | None, typer.Option(callback=suffix_among(".csv"))] = None
-    html: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None
-    change: list[str] | None = None
-    vary: list[str] | None = None
-    variants: str | None = None
-    tolerance: bool = False
-    draws: int | None = None
-    seed: Annotated[int, typer.Option(min=0)] = 0
-    distribution: Literal["normal", "uniform"] = "normal"
-    workers: Annotated[int | None, typer.Option(min=1)] = None
-    fit: list[str] | None = None
-    point: list[str] | None = None
-    link: list[str] | None = None
-    slide: list[str] | None = None
-    free: list[str] | None = None
-    weight: list[str] | None = None
-    starts: Annotated[int | None, typer.Option(min=1)] = None
-    best: Annotated[int | None, typer.Option(min=1)] = None
-    schema: Annotated[bool, typer.Option(is_eager=True, callback=_print_schema)] = False
 
 
 @command(OPTIONS, Options)

@@ -27,7 +27,7 @@ from virtualwork.describe.units import Units
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.mechanism.command import Options
+    from cli.mechanism.options import Options
     from cli.show.columns import Document, Json
     from virtualwork import Mechanism
     from virtualwork.family.fitting import Fit

@@ -102,11 +102,6 @@ class Sweep:
         return self._whole.steps
 
 
-def names(text: str) -> list[str]:
-    """Names between commas."""
-    return [name.strip() for name in text.split(",") if name.strip()]
-
-
 def wanted(
     m: Mechanism,
     at: list[str] | None,

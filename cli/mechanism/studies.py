@@ -12,7 +12,7 @@ import numpy as np
 
 from cli.errors import DataError
 from cli.mechanism.quantities import column, effort_name
-from cli.mechanism.read import names
+from cli.mechanism.options import names
 from cli.mechanism.solve import Analysis
 from cli.show.columns import Table
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from cli.mechanism import columns, quantities
 from cli.mechanism.quantities import Quantity, cells, keys_of
 from cli.mechanism.solve import Analysis
 from cli.read.options import processes
-from cli.show.columns import Column, Result, Table
+from cli.show.columns import Column, Table
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, spread, summary
 from virtualwork.formulas.asked import Key
@@ -199,22 +199,6 @@ class Tolerances:
                 lines.append(f"{header}: {told}")
         return (
             "shares of the variance, the largest, means over the poses:\n" + "\n".join(lines) if lines else ""
-        )
-
-    def added_to(self, result: Result) -> Result:
-        """A result of poses with what the tolerances do to it, in every form."""
-        from cli.mechanism.tolerance_picture import draw
-
-        before, said = result.document, self.remarks()
-        _, *others = result.tables.items()
-        return replace(
-            result,
-            document=lambda: {**before(), "tolerance": self.document()},
-            tables={"poses": self.table, **dict(others)},
-            screen=None,
-            afterword=self.words,
-            figure=lambda: draw(self),
-            warnings=[*result.warnings, *said],
         )
 
 
