@@ -15,8 +15,8 @@ from cli.mechanism.studies import Request
 from cli.show.columns import Result
 
 if TYPE_CHECKING:
-    from cli.mechanism.options import Options
     from cli.mechanism.many import Many
+    from cli.mechanism.options import Options
     from cli.mechanism.variants import Variants
     from cli.show.commands import ShowOptions
     from dalembert.page import Page
