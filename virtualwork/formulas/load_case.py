@@ -18,10 +18,11 @@ from virtualwork.formulas.loads import (
     InertiaForce,
     InertiaTorque,
     Load,
+    SpringEnd,
     Tabled,
+    TorsionEnd,
 )
 from virtualwork.formulas.quantities import Combination, Quantities
-from virtualwork.formulas.springs import SpringEnd, TorsionEnd
 from virtualwork.plan.order import combined
 from virtualwork.plan.steps import Joint, Path, Place, Plan, Term, joints
 
