@@ -350,7 +350,7 @@ class Motion:
     @cached_property
     def drawing(self) -> Drawing:
         """What the mechanism is drawn as, its guides as long as they are used; `at(shape.body, z)` carries shapes along."""
-        from virtualwork.picture.shapes import shapes_of
+        from virtualwork.picture.paper import shapes_of
 
         return shapes_of(self.poses)
 
