@@ -12,7 +12,14 @@ if TYPE_CHECKING:
     from virtualwork.bounds.quantities import Bounds
 
 
-class Whole(Protocol):
+class Asked(Protocol):
+    """What has quantities: the motion of one mechanism, (n,) each, or of variants, (v, n) each."""
+
+    def value(self, key: Key) -> Any:
+        """A quantity by its key (`Recording.value`)."""
+
+
+class Whole(Asked, Protocol):
     """A motion of a mechanism."""
 
     @property
@@ -27,31 +34,21 @@ class Whole(Protocol):
     def rounding(self) -> Bounds:
         """Bounds of its rounding errors."""
 
-    def value(self, key: Key) -> Any:
-        """A quantity by its key (`Recording.value`)."""
-
     def derivative(self, key: Key, path: str) -> Any:
         """The derivative of a quantity to a number of the description."""
 
 
-class PointMotion:
-    """Motion of one point of a link.
+class PointRates:
+    """A point of a link: its position and derivatives in time, of one mechanism or (v, ...) of variants."""
 
-    Attributes
-    ----------
-    position, velocity, acceleration, jerk : array (n, 2)
-        m, m/s, m/s², m/s³, in ground axes; NaN where the pose cannot be assembled.
-    """
-
-    def __init__(self, motion: Whole, body: str, place: complex, node: str | None = None) -> None:
+    def __init__(self, motion: Asked, body: str, place: complex, node: str | None = None) -> None:
         self.motion, self.body, self.place, self.node = motion, body, place, node
-
-    def __repr__(self) -> str:
-        return f"PointMotion({self.node or self.place!r} of {self.body}, {self.motion.n} poses)"
+        # a named point stands wherever the description, or a variant, has it
+        self._where = 0j if node is not None else place
 
     @property
     def position(self) -> Reals:
-        """(n, 2) m."""
+        """(n, 2) m; NaN where the pose cannot be assembled."""
         return xy(self.complex(0))
 
     @property
@@ -75,7 +72,22 @@ class PointMotion:
 
     def key(self, order: int = 0) -> Key:
         """What the position or a time derivative is asked for by (`Recording.value`)."""
-        return "point", self.body, self.place, self.node, order
+        return "point", self.body, self._where, self.node, order
+
+
+class PointMotion(PointRates):
+    """Motion of one point of a link.
+
+    Attributes
+    ----------
+    position, velocity, acceleration, jerk : array (n, 2)
+        m, m/s, m/s², m/s³, in ground axes; NaN where the pose cannot be assembled.
+    """
+
+    motion: Whole
+
+    def __repr__(self) -> str:
+        return f"PointMotion({self.node or self.place!r} of {self.body}, {self.motion.n} poses)"
 
     def error_estimate(self, order: int = 0) -> Reals:
         """Return a bound (n,) of the rounding error of the position (order 0), velocity (1), acceleration (2) or jerk.
@@ -124,29 +136,18 @@ class PointMotion:
 
     def coefficient(self, j: int = 0) -> Complexes:
         """The velocity coefficient dP/dq_j as x + iy, (n,): the point's virtual displacement for a unit of input j."""
-        return self.motion.value(("dpoint", self.body, self.place, self.node, j, 1))  # type: ignore[no-any-return]
+        return self.motion.value(("dpoint", self.body, self._where, self.node, j, 1))  # type: ignore[no-any-return]
 
 
-class LinkMotion:
-    """Motion of one link.
+class LinkRates:
+    """A link: its angle and derivatives in time, of one mechanism or (v, ...) of variants."""
 
-    Attributes
-    ----------
-    angle : array (n,)
-        rad, of the link's own x-axis, in (−π, π].
-    omega, alpha, jerk : array (n,)
-        rad/s, rad/s², rad/s³.
-    """
-
-    def __init__(self, motion: Whole, body: str) -> None:
+    def __init__(self, motion: Asked, body: str) -> None:
         self.motion, self.body = motion, body
-
-    def __repr__(self) -> str:
-        return f"LinkMotion({self.body}, {self.motion.n} poses)"
 
     @property
     def angle(self) -> Reals:
-        """(n,) rad."""
+        """(n,) rad, of the link's own x-axis, in (−π, π]."""
         return self._rate(0)
 
     @property
@@ -171,6 +172,23 @@ class LinkMotion:
         """What the angle or a time derivative is asked for by (`Recording.value`)."""
         return "angle", self.body, order
 
+
+class LinkMotion(LinkRates):
+    """Motion of one link.
+
+    Attributes
+    ----------
+    angle : array (n,)
+        rad, of the link's own x-axis, in (−π, π].
+    omega, alpha, jerk : array (n,)
+        rad/s, rad/s², rad/s³.
+    """
+
+    motion: Whole
+
+    def __repr__(self) -> str:
+        return f"LinkMotion({self.body}, {self.motion.n} poses)"
+
     def error_estimate(self, order: int = 0) -> Reals:
         """Return a bound (n,) of the rounding error of the angle (order 0, rad), ω (1), α (2) or the angular jerk (3).
 
@@ -190,14 +208,11 @@ class LinkMotion:
         return self.motion.value(("dangle", self.body, j, 1))  # type: ignore[no-any-return]
 
 
-class SlideMotion:
-    """Motion along one guide: `position`, `speed`, `acceleration`, `jerk`, each (n,), m from the guide's `through`."""
+class SlideRates:
+    """A slide: its position along the guide and derivatives in time, of one mechanism or (v, ...) of variants."""
 
-    def __init__(self, motion: Whole, guide: int) -> None:
+    def __init__(self, motion: Asked, guide: int) -> None:
         self.motion, self.guide = motion, guide
-
-    def __repr__(self) -> str:
-        return f"SlideMotion({self.motion.mechanism.guides[self.guide].point}, {self.motion.n} poses)"
 
     @property
     def position(self) -> Reals:
@@ -225,6 +240,15 @@ class SlideMotion:
     def key(self, order: int = 0) -> Key:
         """What the slide or a time derivative is asked for by (`Recording.value`)."""
         return "slide", self.guide, order
+
+
+class SlideMotion(SlideRates):
+    """Motion along one guide: `position`, `speed`, `acceleration`, `jerk`, each (n,), m from the guide's `through`."""
+
+    motion: Whole
+
+    def __repr__(self) -> str:
+        return f"SlideMotion({self.motion.mechanism.guides[self.guide].point}, {self.motion.n} poses)"
 
     def error_estimate(self, order: int = 0) -> Reals:
         """Return a bound (n,) of the rounding error of the slide (order 0, m), its speed (1), acceleration (2) or jerk (3).

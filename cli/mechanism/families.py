@@ -14,7 +14,7 @@ from cli.mechanism.forces import with_forces
 from cli.mechanism.read import Inputs
 from cli.mechanism.solve import Analysis
 from cli.mechanism.tolerance import shown
-from virtualwork.family.motion import FamilyMotion
+from virtualwork.family.family import FamilyMotion
 from virtualwork.family.part import ASSEMBLED, Part, Solver
 from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import condition

@@ -176,7 +176,7 @@ def test_points_out_of_order_are_an_order_defect():
 
 @pytest.mark.parametrize("exact", [True, False])
 def test_a_mechanism_off_the_tape_is_fitted_alone_and_with_differences(monkeypatch, exact):
-    from virtualwork.family.alone import Alone
+    from virtualwork.family.design import Alone
     from virtualwork.family.part import Solver
 
     monkeypatch.setattr(Solver, "written", None)
