@@ -198,6 +198,15 @@ def stephenson():
     return Mechanism.from_toml(str(files("cli") / "examples" / "stephenson-six-bar" / "stephenson.toml"))
 
 
+def test_a_design_that_cannot_be_put_together_has_no_number_in_any_row():
+    m = stephenson()
+    design = m.design(["links.left.B.x"], "points.E", "links.coupler")
+    x = [100 * m.size], [m.at[0], m.at[0] + 0.1]
+    assert np.isnan(design(*x)).all()
+    assert design(*x).shape == (3, 2)
+    assert np.isnan(design.slopes(*x)).all()
+
+
 @pytest.mark.parametrize("timed", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_path_of_a_group_without_a_closed_form_is_met_with_exact_derivatives(timed):
     truth = stephenson()
