@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from cli.body.inertias import PLACES, Check
+from cli.body.inertias import Check
 from cli.errors import DataError
-from cli.read.robots.robot import Robot
+from cli.read.robots.robot import PLACES, Robot
 from cli.show.columns import Column, Table
 
 if TYPE_CHECKING:

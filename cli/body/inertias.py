@@ -10,14 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.read.robots.robot import Inertial, Robot, RobotLink
+from cli.read.robots.robot import DIAGONAL_FIRST, PLACES, ROWS, Inertial, Robot, RobotLink, symmetric
 from rigidbody3d import inertia
 
 Array = NDArray[np.float64]
 
-PLACES = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
-# the orders in which formats and tables print a tensor
-ORDERS = (("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
 SLIPS = {1: "a slipped decimal", 2: "a slipped decimal", 3: "g for kg", 6: "mm for m"}
 ROUNDING = 1e-12
 # without shapes a link is taken to reach no farther than this many times its joints
@@ -123,12 +120,8 @@ class Check:
 
     def _reordered(self) -> Array:
         """The same numbers, typed in the other order."""
-        typed, meant = ORDERS
-        made = np.zeros((3, 3))
-        for here, there in zip(typed, meant, strict=True):
-            i, j = PLACES[there]
-            made[i, j] = made[j, i] = self.held.tensor[PLACES[here]]
-        return made
+        pairs = zip(ROWS, DIAGONAL_FIRST, strict=True)
+        return symmetric({meant: float(self.held.tensor[PLACES[typed]]) for typed, meant in pairs})
 
     def _too_large(self) -> str | None:
         """A body that reaches no farther than r from its centre has no moment above m·r²."""
