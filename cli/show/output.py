@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from cli.errors import one_line
+from cli.read.about import HEAD
 from cli.read.files import named, refuse_inputs
 from cli.show.colour import coloured
 from cli.show.commands import FORMS, ShowOptions, with_options
@@ -20,6 +21,8 @@ from cli.show.commands import FORMS, ShowOptions, with_options
 if TYPE_CHECKING:
     from cli.show.columns import Result, Table
     from cli.show.expect import Comparison
+
+    Made = Callable[[], bytes | Iterable[bytes]]
 
 
 def command(options: str) -> Callable[[Callable[..., Result]], Callable[..., None]]:
@@ -34,7 +37,7 @@ def command(options: str) -> Callable[[Callable[..., Result]], Callable[..., Non
 def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
     """Write the files asked for, print the result; status 1 if an expectation is not met, or nothing was found."""
     from cli.read.headers import check_renamed
-    from cli.show.files import write, write_all
+    from cli.show.files import write_all
     from cli.show.text import csv_text, paragraphs, table_text
 
     if options.form == ".toml" and result.toml is None:
@@ -58,34 +61,27 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
     if options.digits:
         result, cut = _with_digits_that_hold(result, first)
         first = cache(lambda: cut)
-    pages = reported(result, options, asked, checked)
-    tables = _tables_beside(result, options)
-    refuse_inputs(
-        [path for path in (output, options.plot, *result.beside, *pages, *tables) if path is not None]
+    pages = _report(result, options, asked, checked)
+    beside: dict[Path, Made] = (
+        {}
+        if output is None or not options.holds_one
+        else {
+            output.with_name(f"{output.stem}-{name}{output.suffix}"): partial(
+                _one_table, options.form, result.tables[name]
+            )
+            for name in result.companions
+        }
     )
-    of_tables = {path: partial(_one_table, options.form, table_of) for path, table_of in tables.items()}
-    write_all({**of_tables, **result.beside, **pages})
+    names = (output, options.plot, *result.beside, *pages, *beside)
+    refuse_inputs([path for path in names if path is not None])
+    files = {**beside, **result.beside, **pages}
     if options.plot is not None and result.figure is not None:
         from cli.show.picture import drawn
 
-        write(options.plot, drawn(result.figure, options.plot.suffix.lower()[1:]))
-    if output is not None and options.form == ".json":
-        write(output, (part.encode() for part in _json_parts(result)))
-    elif output is not None and options.form == ".toml" and result.toml is not None:
-        write(output, result.toml())
-    elif output is not None and options.holds_one:
-        write(output, _one_table(options.form, first))
-    elif output is not None:
-        (name, _), *others = result.tables.items()
-        formed = {name.strip("-"): first()} | {name.strip("-"): table() for name, table in others}
-        if options.form == ".xlsx":
-            from cli.show.parts import workbook
-
-            write(output, workbook({name: [table] for name, table in formed.items()}))
-        else:
-            from cli.show.handed_on import handed_on
-
-            write(output, handed_on(options.form, formed, result.warnings))
+        files[options.plot] = partial(drawn, result.figure, options.plot.suffix.lower()[1:])
+    if output is not None:
+        files[output] = partial(_formed, result, options.form, first)
+    write_all(files)
     # a long table would carry the warnings out of sight
     at_the_end = output is None and not options.json and sys.stdout.isatty()
     if not at_the_end:
@@ -111,9 +107,29 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         raise typer.Exit(1)
 
 
-def reported(
+def reported(options: str) -> Callable[[Callable[..., Result]], Callable[..., None]]:
+    """Make a command of a function that returns the files to be written and what a report says of them.
+
+    `options` is what the help says of its own. The files are `beside` of its result, `notes` is what goes to standard
+    output, `warnings` are the remarks.
+    """
+    return lambda find: with_options(find, options, ("report", *HEAD), _hand_on)
+
+
+def _hand_on(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
+    from cli.show.files import write_all
+
+    files = [*result.beside.items(), *_report(result, options, asked).items()]
+    refuse_inputs(path for path, _ in files)
+    for note in result.warnings:
+        print(f"note: {one_line(note)}", file=sys.stderr)
+    write_all(dict(files))
+    sys.stdout.write(result.notes())
+
+
+def _report(
     result: Result, options: ShowOptions, asked: Mapping[str, str], checked: Comparison | None = None
-) -> dict[Path, Callable[[], bytes]]:
+) -> dict[Path, Made]:
     """Return the files of --report."""
     if options.report is None:
         return {}
@@ -122,17 +138,6 @@ def reported(
     head, units, digits = options.head, options.units, options.digits
     files = pages(options.report, result, head, asked, named(), units, digits, checked)
     return {path: partial(bytes, page) for path, page in files.items()}
-
-
-def _tables_beside(result: Result, options: ShowOptions) -> dict[Path, Callable[[], Table]]:
-    """Return the tables that go beside a file of one table, each in a file of its own."""
-    output = options.output
-    if output is None or not options.holds_one:
-        return {}
-    return {
-        output.with_name(f"{output.stem}-{name}{output.suffix}"): result.tables[name]
-        for name in result.companions
-    }
 
 
 def _in_chosen_units(result: Result, units: str | None) -> Result:
@@ -172,14 +177,34 @@ def _stream(result: Result, options: ShowOptions) -> None:
         raise typer.Exit(1)
 
 
+def _formed(result: Result, form: str, first: Callable[[], Table]) -> bytes | Iterable[bytes]:
+    """Return the file of -o."""
+    if form == ".json":
+        return (part.encode() for part in _json_parts(result))
+    if form == ".toml":
+        assert result.toml is not None
+        return result.toml()
+    if form in (".csv", ".parquet"):
+        return _one_table(form, first)
+    name = next(iter(result.tables))
+    formed = {name.strip("-"): table() for name, table in {**result.tables, name: first}.items()}
+    if form == ".xlsx":
+        from cli.show.parts import workbook
+
+        return workbook({name: [table] for name, table in formed.items()})
+    from cli.show.handed_on import handed_on
+
+    return handed_on(form, formed, result.warnings)
+
+
 def _one_table(form: str, table: Callable[[], Table]) -> bytes | Iterator[bytes]:
     """Return a file of a single table."""
-    from cli.show.text import csv_text
-
     if form == ".parquet":
         from cli.show.parts import parquet
 
         return parquet([table()])
+    from cli.show.text import csv_text
+
     return csv_text(table().cells).encode()
 
 

@@ -14,7 +14,7 @@ from cli.read.files import load
 from cli.read.sources import open_source
 from cli.read.units import UNITS, dimensions, is_number, parse_quantity, written
 from cli.show.columns import Column, Section, Sheet, Table
-from cli.show.text import has_names, heading, in_blocks, printed
+from cli.show.text import Grid, has_names, heading, in_blocks, printed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,15 +27,6 @@ LINES = 100  # so many lines of a file
 WIDE = 88  # characters beside each other that fit A4 and Letter
 TINY = 1e-9  # a number smaller than this may be the rounding of zero
 _THINNED = ("step", "t_s")  # of tables that begin so every k-th row is shown: they are sweeps
-
-
-@dataclass(frozen=True)
-class Grid:
-    """A table as it is printed: a header and rows of text, and which columns are numbers, to the right."""
-
-    header: list[str]
-    rows: list[list[str]]
-    numbers: list[bool]
 
 
 Part = str | Grid

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from cli.show.columns import Cell, Values
+    from cli.show.columns import Values
 
 GOOD, BAD = ("ok", "within", "stable"), ("WRONG", "beyond", "unstable")
 """Verdicts, as they stand in cells and sentences."""
+
+
+class Grid(NamedTuple):
+    """A table as it is printed: a header and rows of text, and which columns are numbers, to the right."""
+
+    header: list[str]
+    rows: list[list[str]]
+    numbers: list[bool]
 
 
 def csv_text(columns: Mapping[str, Values], header: bool = True) -> str:
@@ -103,8 +111,3 @@ def angle_text(degrees: float, spec: str) -> str:
 def paragraphs(*parts: str) -> str:
     """Join what is not empty with a blank line between."""
     return "\n".join(part.rstrip("\n") + "\n" for part in parts if part)
-
-
-def transposed(rows: Sequence[Mapping[str, Cell]]) -> dict[str, list[Cell]]:
-    """Return rows as columns."""
-    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
