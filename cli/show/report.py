@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from cli.read.about import HEAD
 from cli.read.files import load
 from cli.read.sources import open_source
-from cli.read.units import UNITS, dimensions, is_number, parse_quantity, written
+from cli.read.units import UNITS, is_number, parse_quantity, parted, written
 from cli.show.columns import Column, Section, Sheet, Table
 from cli.show.text import Grid, has_names, heading, in_blocks, printed
 
@@ -242,6 +242,10 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
+# units of results that no input has
+_RESULTS = ("kg_m2_s", "J", "W", "rad_s3", "m_s3")
+
+
 def said(header: str) -> str:
     """Return a header that stands in a cell as people write it: `inertia_x_kg_m2` is inertia x [kg·m²]."""
     of, colon, rest = header.rpartition(": ")
@@ -249,9 +253,5 @@ def said(header: str) -> str:
         return f"{of}: {said(rest)}"
     if " " in header or "_" not in header:
         return header
-    parts = header.split("_")
-    for k in range(1, len(parts)):
-        unit = "_".join(parts[k:])
-        if dimensions(unit) or unit in ("kg_m2_s", "J", "W", "rad_s3", "m_s3"):
-            return f"{' '.join(parts[:k])} [{written(unit)}]"
-    return _words(header)
+    name, unit = parted(header, further=_RESULTS)
+    return f"{_words(name)} [{written(unit)}]" if unit else _words(name)
