@@ -37,8 +37,6 @@ def command(options: str) -> Callable[[Callable[..., Result]], Callable[..., Non
 def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
     """Write the files asked for, print the result; status 1 if an expectation is not met, or nothing was found."""
     from cli.read.headers import check_renamed
-    from cli.show.files import write_all
-    from cli.show.text import csv_text, paragraphs, table_text
 
     if options.form == ".toml" and result.toml is None:
         raise typer.BadParameter(
@@ -49,62 +47,82 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         _stream(result, options)
         return
     result = _in_chosen_units(result, options.units)
-    first, output = cache(next(iter(result.tables.values()))), options.output
+    whole = cache(_first(result))
+    result = _with_first(result, whole)
     checked = None
     if options.expect is not None:
         from cli.show.expect import compare
 
         further = [*([] if result.screen is None else [result.screen]), *result.expected]
-        checked = compare(first(), str(options.expect), options.rtol, further)
-        verdict = f"{table_text(checked.columns)}\n{checked.summary}"
+        checked = compare(whole(), str(options.expect), options.rtol, further)
     check_renamed()
     if options.digits:
-        result, cut = _with_digits_that_hold(result, first)
-        first = cache(lambda: cut)
-    pages = _report(result, options, asked, checked)
-    beside: dict[Path, Made] = (
-        {}
-        if output is None or not options.holds_one
-        else {
-            output.with_name(f"{output.stem}-{name}{output.suffix}"): partial(
-                _one_table, options.form, result.tables[name]
-            )
-            for name in result.companions
-        }
-    )
-    names = (output, options.plot, *result.beside, *pages, *beside)
+        result = _with_digits_that_hold(result)
+    # a report cuts the digits of each of its tables
+    pages = _report(_with_first(result, whole), options, asked, checked)
+    _write(result, options, pages)
+    # a long table would carry the warnings out of sight
+    at_the_end = options.output is None and not options.json and sys.stdout.isatty()
+    if not at_the_end:
+        _warn(result.warnings, options)
+    _print(result, options, checked)
+    if at_the_end:
+        _warn(result.warnings, options)
+    if result.failed() or (checked is not None and not checked.passed):
+        raise typer.Exit(1)
+
+
+def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> None:
+    """Write the files; where one of them is an input, none."""
+    from cli.show.files import write_all
+
+    output = options.output
+    files: dict[Path, Made] = {}
+    if output is not None and options.holds_one:
+        for name in result.companions:
+            beside = output.with_name(f"{output.stem}-{name}{output.suffix}")
+            files[beside] = partial(_one_table, options.form, result.tables[name])
+    names = (output, options.plot, *result.beside, *pages, *files)
     refuse_inputs([path for path in names if path is not None])
-    files = {**beside, **result.beside, **pages}
+    files |= {**result.beside, **pages}
     if options.plot is not None and result.figure is not None:
         from cli.show.picture import drawn
 
         files[options.plot] = partial(drawn, result.figure, options.plot.suffix.lower()[1:])
     if output is not None:
-        files[output] = partial(_formed, result, options.form, first)
+        files[output] = partial(_formed, result, options.form)
     write_all(files)
-    # a long table would carry the warnings out of sight
-    at_the_end = output is None and not options.json and sys.stdout.isatty()
-    if not at_the_end:
-        _warn(result.warnings, options)
+
+
+def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> None:
+    """Print what was asked for, in the form that standard output asks for."""
+    from cli.show.text import csv_text, paragraphs, table_text
+
+    verdict = "" if checked is None else f"{table_text(checked.columns)}\n{checked.summary}"
     if options.json:
         sys.stdout.writelines(_json_parts(result))
         if checked is not None:
             print(verdict, file=sys.stderr)
     elif checked is not None:
         print(coloured(verdict, sys.stdout, not options.no_color))
-    elif options.text or (sys.stdout.isatty() and output is None):
-        table = (result.screen or first)()
+    elif options.text or (sys.stdout.isatty() and options.output is None):
+        table = (result.screen or _first(result))()
         width = get_terminal_size().columns if sys.stdout.isatty() else None
         text = table_text(table.cells, table.keys, width)
         said = paragraphs(result.notes(), text, result.afterword())
         sys.stdout.write(coloured(said, sys.stdout, not options.no_color))
-    elif output is None:
-        sys.stdout.write(csv_text(first().cells))
+    elif options.output is None:
+        sys.stdout.write(csv_text(_first(result)().cells))
     sys.stdout.flush()
-    if at_the_end:
-        _warn(result.warnings, options)
-    if result.failed() or (checked is not None and not checked.passed):
-        raise typer.Exit(1)
+
+
+def _first(result: Result) -> Callable[[], Table]:
+    return next(iter(result.tables.values()))
+
+
+def _with_first(result: Result, table: Callable[[], Table]) -> Result:
+    """Return the result with another first table."""
+    return replace(result, tables={**result.tables, next(iter(result.tables)): table})
 
 
 def reported(options: str) -> Callable[[Callable[..., Result]], Callable[..., None]]:
@@ -177,7 +195,7 @@ def _stream(result: Result, options: ShowOptions) -> None:
         raise typer.Exit(1)
 
 
-def _formed(result: Result, form: str, first: Callable[[], Table]) -> bytes | Iterable[bytes]:
+def _formed(result: Result, form: str) -> bytes | Iterable[bytes]:
     """Return the file of -o."""
     if form == ".json":
         return (part.encode() for part in _json_parts(result))
@@ -185,9 +203,8 @@ def _formed(result: Result, form: str, first: Callable[[], Table]) -> bytes | It
         assert result.toml is not None
         return result.toml()
     if form in (".csv", ".parquet"):
-        return _one_table(form, first)
-    name = next(iter(result.tables))
-    formed = {name.strip("-"): table() for name, table in {**result.tables, name: first}.items()}
+        return _one_table(form, _first(result))
+    formed = {name.strip("-"): table() for name, table in result.tables.items()}
     if form == ".xlsx":
         from cli.show.parts import workbook
 
@@ -197,7 +214,7 @@ def _formed(result: Result, form: str, first: Callable[[], Table]) -> bytes | It
     return handed_on(form, formed, result.warnings)
 
 
-def _one_table(form: str, table: Callable[[], Table]) -> bytes | Iterator[bytes]:
+def _one_table(form: str, table: Callable[[], Table]) -> bytes | Iterable[bytes]:
     """Return a file of a single table."""
     if form == ".parquet":
         from cli.show.parts import parquet
@@ -226,16 +243,16 @@ def _json_parts(result: Result) -> Iterator[str]:
     return json_parts({**result.document(), "warnings": result.warnings})
 
 
-def _with_digits_that_hold(result: Result, first: Callable[[], Table]) -> tuple[Result, Table]:
+def _with_digits_that_hold(result: Result) -> Result:
     """Cut the first table and that of the terminal."""
     from cli.show.digits import digits_that_hold
 
-    table, unknown = digits_that_hold(first())
+    table, unknown = digits_that_hold(_first(result)())
     screen = result.screen if result.screen is None else cache(result.screen)
     if screen is not None and not any(column.error for column in table.columns):
         unknown = digits_that_hold(screen())[1]
     return replace(
-        result,
+        _with_first(result, lambda: table),
         warnings=[*result.warnings, *_unknown(unknown)],
         screen=None if screen is None else lambda: digits_that_hold(screen())[0],
-    ), table
+    )
