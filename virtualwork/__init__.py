@@ -4,9 +4,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from virtualwork.describe.errors import AssemblyError, DescriptionError, MechanismError, MobilityError
-    from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
-    from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link
+    from virtualwork.describe import AssemblyError, DescriptionError, MechanismError, MobilityError
+    from virtualwork.describe.parts import (
+        GROUND,
+        Force,
+        Friction,
+        Gear,
+        Guess,
+        Guide,
+        Input,
+        Link,
+        Motor,
+        Spring,
+        Torque,
+        TorsionSpring,
+    )
     from virtualwork.family.target import Target
     from virtualwork.formulas.effort import ledger
     from virtualwork.mechanism import Mechanism, equilibria
@@ -66,27 +78,25 @@ __all__ = [
 
 # where each name stands; a room is loaded when one of its names is asked for
 _ROOMS = {
-    "virtualwork.describe.errors": (
+    "virtualwork.describe": (
         "AssemblyError",
         "DescriptionError",
         "MechanismError",
         "MobilityError",
     ),
-    "virtualwork.describe.loads": (
-        "Force",
-        "Friction",
-        "Motor",
-        "Spring",
-        "Torque",
-        "TorsionSpring",
-    ),
     "virtualwork.describe.parts": (
         "GROUND",
+        "Force",
+        "Friction",
         "Gear",
         "Guess",
         "Guide",
         "Input",
         "Link",
+        "Motor",
+        "Spring",
+        "Torque",
+        "TorsionSpring",
     ),
     "virtualwork.formulas.effort": ("ledger",),
     "virtualwork.mechanism": (

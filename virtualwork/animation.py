@@ -28,7 +28,7 @@ from virtualwork.table import columns
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from virtualwork.plan.joints import Joint
+    from virtualwork.plan.steps import Joint
 
 TURN = 6.0
 """A turn of the input takes so many seconds at speed 1."""

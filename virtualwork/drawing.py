@@ -19,8 +19,7 @@ from itertools import chain
 from math import isfinite, pi
 
 from virtualwork.describe.description import Description
-from virtualwork.describe.loads import Spring
-from virtualwork.describe.parts import GROUND, Gear, Guide
+from virtualwork.describe.parts import GROUND, Gear, Guide, Spring
 
 ROLES = {
     "rail": "the walls of a guide in the ground",

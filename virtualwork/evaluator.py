@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from virtualwork.branch.assembly import Assembly
-from virtualwork.describe.errors import DescriptionError, hint
+from virtualwork.describe import DescriptionError, hint
 from virtualwork.formulas.asked import COMPLEX, Key
 from virtualwork.formulas.lanes import Lanes, Ready, ready, recorded, taped
 from virtualwork.formulas.numbers import xy

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import alike
 from virtualwork.branch.assembly import Assembly
+from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.parts import Point, as_point
 from virtualwork.formulas.asked import FORCES, Key, over_blocks, pays
 from virtualwork.formulas.numbers import Complexes, Number, Reals, xy
@@ -269,7 +269,7 @@ class Motion:
         on : str
             A link that the joint holds.
         """
-        return self.dynamics.reaction(joint, on)
+        return xy(self.value(("reaction", joint, on)))
 
     def applied(self, link: str) -> tuple[Complexes, Reals]:
         """What acts on a link but its weight and inertia, reduced to its centre of mass: (n,) complex N, (n,) N·m."""

@@ -34,7 +34,71 @@ class Whole(Protocol):
         """The derivative of a quantity to a number of the description."""
 
 
-class PointMotion:
+class PartOfMotion:
+    """What moves: a point, a link, or along a guide; `order` 0 is its position or angle, 1 to 3 are its rates in time."""
+
+    def __init__(self, motion: Whole) -> None:
+        self.motion = motion
+
+    def key(self, order: int = 0) -> Key:
+        """What the position, the angle or a rate is asked for by (`Recording.value`)."""
+        raise NotImplementedError
+
+    def value(self, order: int) -> Reals:
+        """The position, the angle or a rate, (n,)."""
+        return self.motion.value(self.key(order))  # type: ignore[no-any-return]
+
+    def error_estimate(self, order: int = 0) -> Reals:
+        """Return a bound (n,) of the rounding error of the position or angle (order 0), or of its rate of that order.
+
+        It has the unit of the quantity, and is the length of a point's error; the dimensions and the input are taken as
+        exact. Infinite where no digit is known, within rounding of a limit of the input. See `virtualwork.bounds`.
+
+        Examples
+        --------
+        A crank of length 1 at 60°: y = √3/2.
+
+        >>> import math
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
+        >>> point = crank.motion(math.pi / 3).point("P")
+        >>> bool(abs(point.position[0, 1] - math.sqrt(0.75)) <= point.error_estimate()[0] < 1e-15)
+        True
+        """
+        return self.motion.rounding.of(self.key(order))
+
+    def sensitivity(self, path: str, order: int = 0) -> Reals:
+        """Return the derivative of the position or angle (order 0), or of a rate, to a number of the description.
+
+        Parameters
+        ----------
+        path : str
+            Of the number, such as "links.crank.B.x"; angles count in radians.
+        order : int
+
+        Returns
+        -------
+        array (n,); (n, 2) of a point
+
+        Raises
+        ------
+        DescriptionError
+            Where the path names no number.
+
+        Examples
+        --------
+        A crank's end moves along with its length:
+
+        >>> import math
+        >>> from virtualwork import Input, Link, Mechanism
+        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
+        >>> crank.motion(math.pi / 2).point("P").sensitivity("links.crank.P.x").round(15)
+        array([[0., 1.]])
+        """
+        return self.motion.derivative(self.key(order), path)  # type: ignore[no-any-return]
+
+
+class PointMotion(PartOfMotion):
     """Motion of one point of a link.
 
     Attributes
@@ -44,7 +108,8 @@ class PointMotion:
     """
 
     def __init__(self, motion: Whole, body: str, place: complex, node: str | None = None) -> None:
-        self.motion, self.body, self.place, self.node = motion, body, place, node
+        super().__init__(motion)
+        self.body, self.place, self.node = body, place, node
 
     def __repr__(self) -> str:
         return f"PointMotion({self.node or self.place!r} of {self.body}, {self.motion.n} poses)"
@@ -74,52 +139,9 @@ class PointMotion:
         return self.motion.value(self.key(order))  # type: ignore[no-any-return]
 
     def key(self, order: int = 0) -> Key:
-        """What the position or a time derivative is asked for by (`Recording.value`)."""
         return "point", self.body, self.place, self.node, order
 
-    def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the position (order 0), velocity (1), acceleration (2) or jerk.
-
-        It is the length of the error, in the unit of the quantity; the dimensions and the input are taken as exact.
-        Infinite where no digit is known, within rounding of a limit of the input. See `virtualwork.bounds`.
-
-        Examples
-        --------
-        A crank of length 1 at 60°: y = √3/2.
-
-        >>> import math
-        >>> from virtualwork import Input, Link, Mechanism
-        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
-        >>> point = crank.motion(math.pi / 3).point("P")
-        >>> bool(abs(point.position[0, 1] - math.sqrt(0.75)) <= point.error_estimate()[0] < 1e-15)
-        True
-        """
-        return self.motion.rounding.of(self.key(order))
-
     def sensitivity(self, path: str, order: int = 0) -> Reals:
-        """Return the derivative (n, 2) of the position (order 0), velocity (1), ... to a number of the description.
-
-        Parameters
-        ----------
-        path : str
-            Of the number, such as "links.crank.B.x"; angles count in radians.
-        order : int
-
-        Raises
-        ------
-        DescriptionError
-            Where the path names no number.
-
-        Examples
-        --------
-        A crank's end moves along with its length:
-
-        >>> import math
-        >>> from virtualwork import Input, Link, Mechanism
-        >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
-        >>> crank.motion(math.pi / 2).point("P").sensitivity("links.crank.P.x").round(15)
-        array([[0., 1.]])
-        """
         return xy(self.motion.derivative(self.key(order), path))
 
     def coefficient(self, j: int = 0) -> Complexes:
@@ -127,7 +149,7 @@ class PointMotion:
         return self.motion.value(("dpoint", self.body, self.place, self.node, j, 1))  # type: ignore[no-any-return]
 
 
-class LinkMotion:
+class LinkMotion(PartOfMotion):
     """Motion of one link.
 
     Attributes
@@ -139,7 +161,8 @@ class LinkMotion:
     """
 
     def __init__(self, motion: Whole, body: str) -> None:
-        self.motion, self.body = motion, body
+        super().__init__(motion)
+        self.body = body
 
     def __repr__(self) -> str:
         return f"LinkMotion({self.body}, {self.motion.n} poses)"
@@ -147,54 +170,37 @@ class LinkMotion:
     @property
     def angle(self) -> Reals:
         """(n,) rad."""
-        return self._rate(0)
+        return self.value(0)
 
     @property
     def omega(self) -> Reals:
         """(n,) rad/s (Ibrahim eq. 1.4.2)."""
-        return self._rate(1)
+        return self.value(1)
 
     @property
     def alpha(self) -> Reals:
         """(n,) rad/s² (Ibrahim eq. 1.5.2)."""
-        return self._rate(2)
+        return self.value(2)
 
     @property
     def jerk(self) -> Reals:
         """(n,) rad/s³ (Ibrahim eq. 1.5.3)."""
-        return self._rate(3)
-
-    def _rate(self, order: int) -> Reals:
-        return self.motion.value(self.key(order))  # type: ignore[no-any-return]
+        return self.value(3)
 
     def key(self, order: int = 0) -> Key:
-        """What the angle or a time derivative is asked for by (`Recording.value`)."""
         return "angle", self.body, order
-
-    def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the angle (order 0, rad), ω (1), α (2) or the angular jerk (3).
-
-        The dimensions and the input are taken as exact. See `virtualwork.bounds`.
-        """
-        return self.motion.rounding.of(self.key(order))
-
-    def sensitivity(self, path: str, order: int = 0) -> Reals:
-        """Return the derivative (n,) of the angle (order 0, rad), ω (1), α (2) to a number of the description.
-
-        `path` names the number, such as "links.crank.B.x".
-        """
-        return self.motion.derivative(self.key(order), path)  # type: ignore[no-any-return]
 
     def coefficient(self, j: int = 0) -> Reals:
         """The velocity coefficient dθ/dq_j, (n,): the link's virtual rotation for a unit of input j."""
         return self.motion.value(("dangle", self.body, j, 1))  # type: ignore[no-any-return]
 
 
-class SlideMotion:
+class SlideMotion(PartOfMotion):
     """Motion along one guide: `position`, `speed`, `acceleration`, `jerk`, each (n,), m from the guide's `through`."""
 
     def __init__(self, motion: Whole, guide: int) -> None:
-        self.motion, self.guide = motion, guide
+        super().__init__(motion)
+        self.guide = guide
 
     def __repr__(self) -> str:
         return f"SlideMotion({self.motion.mechanism.guides[self.guide].point}, {self.motion.n} poses)"
@@ -202,37 +208,22 @@ class SlideMotion:
     @property
     def position(self) -> Reals:
         """(n,) m."""
-        return self._rate(0)
+        return self.value(0)
 
     @property
     def speed(self) -> Reals:
         """(n,) m/s."""
-        return self._rate(1)
+        return self.value(1)
 
     @property
     def acceleration(self) -> Reals:
         """(n,) m/s²."""
-        return self._rate(2)
+        return self.value(2)
 
     @property
     def jerk(self) -> Reals:
         """(n,) m/s³."""
-        return self._rate(3)
-
-    def _rate(self, order: int) -> Reals:
-        return self.motion.value(self.key(order))  # type: ignore[no-any-return]
+        return self.value(3)
 
     def key(self, order: int = 0) -> Key:
-        """What the slide or a time derivative is asked for by (`Recording.value`)."""
         return "slide", self.guide, order
-
-    def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the slide (order 0, m), its speed (1), acceleration (2) or jerk (3).
-
-        The dimensions and the input are taken as exact. See `virtualwork.bounds`.
-        """
-        return self.motion.rounding.of(self.key(order))
-
-    def sensitivity(self, path: str, order: int = 0) -> Reals:
-        """Return the derivative (n,) of the slide (order 0, m), its speed (1), ... to a number of the description."""
-        return self.motion.derivative(self.key(order), path)  # type: ignore[no-any-return]

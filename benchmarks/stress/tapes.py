@@ -13,8 +13,8 @@ from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.rounding import rounding_bounds
 from dalembert.arithmetic.tape import Tape
 from virtualwork import Mechanism
+from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.asked import Key, names
 from virtualwork.formulas.lanes import Lanes, taped
 from virtualwork.motion import Motion

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cli.errors import DataError
-from virtualwork.describe.loads import TorsionSpring
-from virtualwork.describe.parts import GROUND
+from virtualwork.describe.parts import GROUND, TorsionSpring
 from virtualwork.drawing import hull
 from virtualwork.parts_of_motion import SlideMotion
 

@@ -41,7 +41,7 @@ class Travel:
         if len(m.inputs) != 1:
             return None
         track = m.assembly.track
-        low, high = self.limits or (track.start, track.start + (track.period or track.length))
+        low, high = self.limits or (track.start, track.start + (m.assembly.reach.period or track.length))
         found = self.m.check.input_limits
         if self.limits is None and found is not None:
             low, high = (

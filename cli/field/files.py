@@ -120,7 +120,7 @@ class Stored:
         state = self.table.texts.get("state")
         speeds = {channel.speed for channel in channels}
         if len(speeds) > 1 and np.isnan(self.speed[list(mine)]).any():
-            runs.warn(
+            runs.warnings.append(
                 f"{self.table.file}: coefficients without a speed are used at each of {len(speeds)} speeds"
             )
         at = np.zeros((len(channels), len(planes)), dtype=np.intp)

@@ -11,7 +11,7 @@ import numpy as np
 from cli.imports.drawn import GROUND, Drawing
 from cli.imports.toml import text
 from virtualwork import Mechanism
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 
 # degrees of an input that says nothing of where it begins
 TRIED = tuple(range(0, 360, 15))

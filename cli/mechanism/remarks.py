@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork.branch.assembly import Assembly
-    from virtualwork.branch.track import Track
 
 GROUND = "ground"
 
@@ -27,13 +26,14 @@ def warnings(studies: Studies) -> list[str]:
     return [*said, *of_forces(analysis)] if studies.request.forces else said
 
 
-def _on_branch(analysis: Analysis, track: Track, found: list[float], digits: int) -> list[float]:
+def _on_branch(analysis: Analysis, assembly: Assembly, found: list[float], digits: int) -> list[float]:
     """Inputs as they are shown, each once, deg in [0, period of the branch) or m."""
     if analysis.mechanism.inputs[0].is_slide:
         return sorted({round(v, digits) for v in found})
-    if track.turns is None:
+    turns = assembly.reach.turns
+    if turns is None:
         return sorted({round(math.degrees(v), digits) for v in found})
-    full = 360.0 * track.turns
+    full = 360.0 * turns
     return sorted({round(math.degrees(v) % full, digits) % full for v in found})
 
 
@@ -53,7 +53,7 @@ def limits(analysis: Analysis, counted: list[tuple[int, int]] | None = None) -> 
             text = f"{missing} of {analysis.inputs.n} poses cannot be assembled"
             if track.active:
                 slide = analysis.mechanism.inputs[0].is_slide
-                shown = _on_branch(analysis, track, [v.input for v in track.limits()], 12)
+                shown = _on_branch(analysis, assembly, [v.input for v in assembly.reach.limits()], 12)
                 unit = "m" if slide else "deg"
                 if shown:
                     values = ", ".join(f"{v:.13g}" for v in shown)
@@ -66,10 +66,8 @@ def limits(analysis: Analysis, counted: list[tuple[int, int]] | None = None) -> 
 
 def _shortfall(analysis: Analysis, assembly: Assembly, i: int) -> str:
     """By how much a pose does not close, and the nearest input where it would."""
-    from virtualwork.branch.shortfall import shortfall
-
     pose = analysis.inputs.part(i, i + 1)
-    found = shortfall(assembly, tuple(pose.values[0].tolist()))
+    found = assembly.reach.shortfall(tuple(pose.values[0].tolist()))
     if found is None:
         return ""
     factor, unit = (1e3, "mm") if analysis.mechanism.size < 2 else (1.0, "m")
@@ -98,7 +96,7 @@ def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
         inside = [c for c in changes if low - 1e-12 <= c.input <= high + 1e-12]
         if not inside:
             continue
-        at = _on_branch(analysis, track, [c.input for c in inside], 9)
+        at = _on_branch(analysis, assembly, [c.input for c in inside], 9)
         c = inside[0]
         group = next(g for g in assembly.plan.groups if g.name == c.group)
         names = [*group.angles, *(analysis.mechanism.guides[g].point for g in group.slides)]

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.errors import DataError
-from cli.mechanism import columns, poses, remarks, words
-from cli.mechanism import forces as of_forces
+from cli.mechanism import columns, remarks, words
 from cli.mechanism.solve import Analysis
 from cli.mechanism.states import table as link_states
 from cli.mechanism.studies import Request, Studies
+from cli.mechanism.studies import tables as study_tables
 from cli.show.columns import Result, Sheet
 
 if TYPE_CHECKING:
@@ -41,13 +41,11 @@ def result_of(
         picture.check_names(analysis, graph)
 
     def of_poses() -> Table:
-        return columns.forces(analysis) if request.forces else columns.poses(analysis)
+        return columns.table(analysis, request.forces)
 
     def document() -> Document:
-        listed = poses.document(analysis)
-        if request.forces:
-            listed = of_forces.with_forces(listed, analysis)
-        return {"name": analysis.mechanism.name, "poses": listed, **found}
+        poses = columns.document(analysis, request.forces)
+        return {"name": analysis.mechanism.name, "poses": poses, **found}
 
     def figure() -> Figure:
         from cli.mechanism import picture
@@ -63,7 +61,7 @@ def result_of(
         every.motions = analysis.motions
         return csv_parts([link_states(every)], digits)
 
-    own = columns.studies(studies)
+    own = study_tables(studies)
     # the table of a study asked for alone stands in place of the poses
     alone = bool(own) and len(request.tables) == 1
     tables = {**own, "poses": of_poses} if alone else {"poses": of_poses, **own}
@@ -71,7 +69,7 @@ def result_of(
         document=document,
         tables=tables,
         screen=of_poses if alone else None,
-        expected=(lambda: columns.poses(analysis), lambda: link_states(analysis)),
+        expected=(lambda: columns.table(analysis, forces=False), lambda: link_states(analysis)),
         notes=lambda: analysis.mechanism.name,
         afterword=lambda: words.afterword(studies, explain=explain),
         figure=figure,

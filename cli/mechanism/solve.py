@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from virtualwork import Mechanism
     from virtualwork.branch.assembly import Assembly
+    from virtualwork.formulas.asked import Key
     from virtualwork.motion import Motion
 
 ORDERS = ("position", "velocity", "acceleration", "jerk")
@@ -199,8 +200,13 @@ class Analysis:
         if self.only is None:
             return motion.assembled
         whole = np.ones(motion.n, dtype=bool)
-        homes = motion.mechanism.points
-        places = [("point", homes[name][0], 0j, name, 0) for name in self.points]
-        for found in motion.values([*places, *(("angle", name, 0) for name in self.links)]):
+        for found in motion.values(self.named):
             whole &= np.isfinite(found)
         return whole
+
+    @property
+    def named(self) -> list[Key]:
+        """Places of the points and links asked for, as a motion is asked for them."""
+        homes = self.mechanism.points
+        places = [("point", homes[name][0], 0j, name, 0) for name in self.points]
+        return [*places, *(("angle", name, 0) for name in self.links)]

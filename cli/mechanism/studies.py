@@ -1,9 +1,9 @@
-"""What is found of a mechanism beside its poses, as the JSON document has it: check, iterates, cycle, equilibria."""
+"""What is found of a mechanism beside its poses, as JSON and tables: check, iterates, cycle, equilibria."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,12 +11,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.errors import DataError
-from cli.mechanism.forces import effort_name
+from cli.mechanism.options import names
+from cli.mechanism.quantities import column, effort_name
 from cli.mechanism.solve import Analysis
+from cli.show.columns import Table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cli.show.columns import Cell
+
+STUDY_KEYS = ("quantity", "of", "k", "link")
+"""The columns that name a row of a study's table."""
 # read again by the words and tables made of it: of its shape INTERFACE speaks
 Document = dict[str, Any]
 
@@ -79,8 +85,7 @@ class Studies:
         if request.equilibrium:
             found["equilibria"], said = equilibria(analysis, request.swept)
         if request.counterweights:
-            links = [name.strip() for name in request.counterweights.split(",") if name.strip()]
-            found["counterweights"] = counterweights(analysis, links)
+            found["counterweights"] = counterweights(analysis, names(request.counterweights))
         return found, said
 
 
@@ -241,3 +246,74 @@ def counterweights(analysis: Analysis, links: list[str]) -> Document:
         "shaking_rms_before_N": rms(before),
         "shaking_rms_after_N": rms(after),
     }
+
+
+# --- as tables --------------------------------------------------------------------------------------------------------
+def tables(found: Studies) -> dict[str, Callable[[], Table]]:
+    """Return the tables of the studies, by their options' names."""
+    document = found.document
+    known: dict[str, Callable[[], Table]] = {
+        "--newton": lambda: of_iterates(document),
+        "--check": lambda: of_check(document["check"]),
+        "--equilibrium": lambda: of_equilibria(document["equilibria"], found.analysis.input_names),
+        "--flywheel": lambda: of_cycle(document["cycle"]),
+        "--counterweights": lambda: of_counterweights(document["counterweights"]),
+    }
+    return {flag: known[flag] for flag in found.request.tables if flag != "--forces"}
+
+
+def of_check(document: Document) -> Table:
+    """What the mechanism is: a row for each statement, named as in the JSON."""
+    rows: list[tuple[str, str, Cell]] = [
+        ("mobility", "", document["mobility"]),
+        ("mobility_by_rank", "", document["mobility_by_rank"]),
+        *(("redundant", name, True) for name in document["redundant"]),
+        *(("group", " + ".join(g["links"]), f"{g['kind']}, {g['method']}") for g in document["groups"]),
+    ]
+    for f in document["four_bars"]:
+        links = ", ".join(f["links"])
+        rows.append(("grashof", links, f["grashof"]))
+        for word, value in zip(("least", "largest"), f["transmission_deg"], strict=True):
+            rows.append((f"{word}_transmission_deg", links, value))
+    for key in document:
+        if key.startswith(("input_limits", "dead_points", "change_points")):
+            values = ["none"] if not document[key] else ["open" if v is None else v for v in document[key]]
+            rows += [(key, str(i) if len(values) > 1 else "", v) for i, v in enumerate(values, 1)]
+    return _columns(("quantity", "of", "value"), rows)
+
+
+def of_equilibria(found: list[Document], inputs: dict[str, str]) -> Table:
+    """The positions of rest; `inputs`: the name of each input and of its quantity, `input_deg` or `input_m`."""
+    if len(inputs) == 1:
+        places = [[row[key] for key in inputs.values()] for row in found]
+        names = list(inputs.values())
+    else:
+        places = [[row["inputs"][name][key] for name, key in inputs.items()] for row in found]
+        names = [f"{name}_{key}" for name, key in inputs.items()]
+    rows = [(*place, row["stable"], row["potential_J"]) for place, row in zip(places, found, strict=True)]
+    return _columns((*names, "stable", "potential_J"), rows)
+
+
+def of_cycle(part: Document) -> Table:
+    """Mean, peak and RMS effort, work, flywheel: one row."""
+    return _records([part])
+
+
+def of_counterweights(part: Document) -> Table:
+    """A counterweight a row, with the shaking force before and after all of them."""
+    rms = {key: value for key, value in part.items() if key != "weights"}
+    return _records([w | rms for w in part["weights"]])
+
+
+def of_iterates(part: Document) -> Table:
+    """The iterates of Newton and Raphson."""
+    return _records(part["iterates"])
+
+
+def _records(rows: list[Document]) -> Table:
+    return _columns(list(rows[0]), [list(row.values()) for row in rows])
+
+
+def _columns(names: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Table:
+    columns = [column(name, [row[i] for row in rows]) for i, name in enumerate(names)]
+    return Table(columns, keys=("step", "branch", *STUDY_KEYS))

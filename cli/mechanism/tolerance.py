@@ -2,93 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cli.errors import DataError
-from cli.mechanism import columns
-from cli.mechanism.forces import effort_name, rows_of
-from cli.mechanism.poses import LINK, POINT, SLIDE, cells
+from cli.mechanism import columns, quantities
+from cli.mechanism.quantities import Quantity, cells, keys_of
 from cli.mechanism.solve import Analysis
 from cli.read.options import processes
 from cli.show.columns import Column, Table
 from virtualwork.describe.dimensions import Dimension
 from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, spread, summary
-from virtualwork.formulas.asked import COMPLEX, Key
+from virtualwork.formulas.asked import Key
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    pass
 
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
 SURE, APART = 5.0, 0.02
 NAMES = ("p0.135", "p99.865")
-
-
-@dataclass(frozen=True)
-class Shown:
-    """A number of the table: its header, the quantity it is of, and which part.
-
-    Attributes
-    ----------
-    imaginary : bool
-        Whether it is the y of a vector.
-    factor : float
-        From SI to what is shown.
-    turn : float or None
-        Of an angle.
-    """
-
-    header: str
-    key: Key
-    imaginary: bool = False
-    factor: float = 1.0
-    turn: float | None = None
-
-    def of(self, values: Any) -> NDArray[np.float64]:
-        """The number, from the quantity or its slope."""
-        part = values.imag if self.imaginary else values.real if self.key[0] in COMPLEX else values
-        return np.asarray(part * self.factor)
-
-
-def shown(analysis: Analysis, forces: bool) -> list[Shown]:
-    """Every number of the table of poses, or of forces, in its order."""
-    m, motion = analysis.mechanism, analysis.motions[0]
-    found: list[Shown] = []
-
-    def pair(first: str, second: str, key: Key) -> None:
-        found.extend((Shown(first, key), Shown(second, key, imaginary=True)))
-
-    if forces:
-        several = len(m.inputs) > 1
-        for j, entry in enumerate(m.inputs):
-            prefix, name = f"{entry.name}_" if several else "", effort_name(entry.is_slide)
-            found.append(Shown(f"{prefix}input_{name}", ("newton-euler", j)))
-            found.append(Shown(f"{prefix}virtual_work_{name}", ("effort", j)))
-        for joint, on, of in rows_of(analysis, motion):
-            lead = f"{joint.name}_{of}_on_{on}"
-            pair(f"{lead}_fx_N", f"{lead}_fy_N", ("force", joint.key, on))
-            if joint.guide is not None:
-                found.append(Shown(f"{lead}_moment_N_m", ("moment", joint.key, on)))
-        pair("shaking_fx_N", "shaking_fy_N", ("shaking",))
-        found.append(Shown("shaking_moment_N_m", ("shaking moment",)))
-        return found
-    for name in analysis.points:
-        body = next(body for body, points in m.bodies.items() if name in points)
-        for k in range(analysis.order + 1):
-            x, y = POINT[k]
-            pair(f"{name}_{x}", f"{name}_{y}", ("point", body, 0j, name, k))
-    for name in analysis.slides:
-        guide = next(i for i, g in enumerate(m.guides) if g.point == name)
-        found += [Shown(f"{name}_{SLIDE[k]}", ("slide", guide, k)) for k in range(analysis.order + 1)]
-    for name in analysis.links:
-        for k in range(analysis.order + 1):
-            key: Key = ("angle", name, k)
-            degrees = (180 / np.pi, 360.0) if k == 0 else (1.0, None)
-            found.append(Shown(f"{name}_{LINK[k]}", key, False, *degrees))
-    return found
 
 
 @dataclass
@@ -107,7 +42,6 @@ class Tolerances:
     seed: int = 0
     distribution: str = "normal"
     workers: int = 1
-    said: list[str] = field(default_factory=list)
 
     @cached_property
     def limits(self) -> dict[Dimension, float]:
@@ -121,14 +55,15 @@ class Tolerances:
         return limits(self.analysis.mechanism, given)
 
     @cached_property
-    def numbers(self) -> list[Shown]:
+    def numbers(self) -> list[Quantity]:
         """What is shown."""
-        return shown(self.analysis, self.forces)
+        every = (quantities.forces if self.forces else quantities.places)(self.analysis)
+        return [each for each in every if each.key and not each.less]
 
     @cached_property
     def keys(self) -> list[Key]:
         """The quantities that this is of."""
-        return list(dict.fromkeys(number.key for number in self.numbers))
+        return keys_of(self.numbers)
 
     @cached_property
     def slopes(self) -> dict[Key, list[Any]]:
@@ -164,7 +99,7 @@ class Tolerances:
                 found = dict(zip(self.keys, values, strict=True))
                 for number in self.numbers:
                     its, mean = number.of(found[number.key]), number.of(nominal[number.key][rows])
-                    parts[number.header].append(summary(its, mean, number.turn))
+                    parts[number.header].append(summary(its, mean, 360.0 if number.turns else None))
         joined = {
             header: Drawn(*(np.concatenate([getattr(p, name) for p in some], axis=-1) for name in _FIELDS))
             for header, some in parts.items()
@@ -230,7 +165,7 @@ class Tolerances:
 
     def table(self) -> Table:
         """The table of poses, each number with its worst case and its standard deviation."""
-        base = columns.forces(self.analysis) if self.forces else columns.poses(self.analysis)
+        base = columns.table(self.analysis, self.forces)
         found: list[Column] = []
         for column in base.columns:
             found.append(column)

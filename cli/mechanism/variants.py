@@ -13,8 +13,8 @@ from cli.errors import DataError
 from cli.mechanism.read import MOST, place_or_angle
 from cli.read import options
 from cli.read.units import UNITS, is_number, read_degrees, to_si
+from virtualwork.describe import DescriptionError
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, named
-from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.units import Units
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from cli.errors import DataError
-from cli.read.units import SMALLEST, UNITS, parse_number, parse_quantity, to_si
+from cli.read.units import SMALLEST, UNITS, is_number, parse_number, parse_quantity, to_si
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -74,6 +74,22 @@ def in_degrees(flag: str, text: str) -> float:
     """Read an angle; one given in degrees is not turned to radians and back."""
     value, unit = _read(flag, text, "angle", positive=False)
     return value if unit == "deg" else value * 180 / math.pi
+
+
+def mass_at(
+    flag: str, text: str, vector: str, dimension: str, expected: str
+) -> tuple[float, str, float, str]:
+    """Read the `MASS@ANGLE` of an option's text, each with its unit; a bare angle is in degrees."""
+    mass, mark, angle = vector.partition("@")
+    if not mark:
+        raise bad(flag, expected)
+    size = with_unit(flag, mass, dimension)
+    assert size is not None
+    if size[0] < 0:
+        raise bad(flag, f"'{text}': expected a mass that is not negative")
+    turn = with_unit(flag, f"{angle}deg" if is_number(angle) else angle, "angle")
+    assert turn is not None
+    return *size, *turn
 
 
 def two_bearings(flag: str, text: str) -> tuple[float, float]:

@@ -25,13 +25,15 @@ if TYPE_CHECKING:
     Made = Callable[[], bytes | Iterable[bytes]]
 
 
-def command(options: str) -> Callable[[Callable[..., Result]], Callable[..., None]]:
+def command(
+    options: str, asked: Callable[..., object] | None = None
+) -> Callable[[Callable[..., Result]], Callable[..., None]]:
     """Make a command of a function that returns its result: it takes the shared options too, and shows the result.
 
     `options` is what the help says of its own (`told`). Where the function has a parameter `show`, it is given the
-    shared ones.
+    shared ones; `asked` as in `with_options`.
     """
-    return lambda find: with_options(find, options, None, show)
+    return lambda find: with_options(find, options, None, show, asked)
 
 
 def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:

@@ -29,7 +29,7 @@ import numpy as np
 from dalembert.arithmetic.adjoint import PARTIALS, times
 from dalembert.arithmetic.arrays import NUMPY
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
-from dalembert.arithmetic.tape import Kind, Operation, Tape
+from dalembert.arithmetic.tape import Kind, Operation, Tape, reached
 
 UNIT_ROUNDOFF = 2.0**-53
 # lanes up to which a sweep on numbers costs less than writing it down; a tape has to be compiled besides
@@ -149,8 +149,12 @@ class _Bounds:
             for number, (name, *arguments) in enumerate(tape.operations)
             if name == "sqrt" and not _norm(tape, arguments[0])
         ]
-        reached = {name: _reached(tape, number) for name, number in tape.outputs if name in wanted and roots}
-        needed = set[int]().union(*reached.values())
+        below = {
+            name: frozenset(reached(tape.operations, [number]))
+            for name, number in tape.outputs
+            if name in wanted and roots
+        }
+        needed = set[int]().union(*below.values())
         for number, argument in roots:
             if number in needed:
                 self._root(number, argument)
@@ -159,13 +163,13 @@ class _Bounds:
             found[name] = self.values[number]
             if name in wanted:
                 found[f"error({name})"] = self.error(number)
-                found[f"tau({name})"] = self._largest(reached[name]) if roots else 0.0
+                found[f"tau({name})"] = self._largest(below[name]) if roots else 0.0
         return found
 
-    def _largest(self, reached: frozenset[int]) -> Number:
+    def _largest(self, below: frozenset[int]) -> Number:
         largest: Number = 0.0
         for number, share in self.shares.items():
-            if number in reached:
+            if number in below:
                 # what is no number counts as none: the bound is none either
                 largest = self.kind.select(share - largest, share, largest)
         return largest
@@ -351,16 +355,6 @@ def _roundings(tape: Tape, number: int, constants: float) -> float | None:
     if further and name in ("add", "sub"):
         return None
     return ROUNDINGS[name] + (constants if further and name in ("mul", "div") else 0.0)
-
-
-def _reached(tape: Tape, output: int) -> frozenset[int]:
-    """The operations that one hangs on."""
-    found = {output}
-    for number in range(output, -1, -1):
-        kind, *arguments = tape.operations[number]
-        if number in found and kind not in ("const", "input"):
-            found.update(arguments)
-    return frozenset(found)
 
 
 def _norm(tape: Tape, number: int) -> bool:

@@ -8,10 +8,11 @@ kind of number: floats, arrays, recorded numbers, many digits.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from operator import or_
+from types import MappingProxyType
 from typing import Any, Protocol
 
 Operation = tuple[str, *tuple[Any, ...]]
@@ -31,6 +32,8 @@ SIGNS = {
     # the only decision: the second where the first is positive, else the third (NaN is not positive)
     "select": "({1} if {0} > 0 else {2})",
 }
+
+EMPTY: Mapping[int, str] = MappingProxyType({})
 
 
 class Kind(Protocol):
@@ -193,23 +196,34 @@ def performed(name: str, values: list[Any], kind: Kind) -> Any:
             return getattr(kind, name)(*values)
 
 
-def shortened(operations: Iterable[Operation], outputs: Iterable[tuple[str, int]]) -> Tape:
-    """The tape of outputs: what they do not hang on is left out, and the rest numbered anew."""
-    operations, outputs = list(operations), list(outputs)
-    wanted = [False] * len(operations)
-    for _, number in outputs:
-        wanted[number] = True
-    for number in range(len(operations) - 1, -1, -1):
-        kind, *arguments = operations[number]
-        if wanted[number] and kind not in ("const", "input"):
-            for a in arguments:
-                wanted[a] = True
+def reached(
+    operations: Sequence[Operation], outputs: Iterable[int], known: Container[int] = frozenset()
+) -> list[int]:
+    """The operations that some hang on, in order, they too; what is known hangs on nothing."""
+    wanted = set(outputs)
+    for number in range(max(wanted, default=-1), -1, -1):
+        if number in wanted and number not in known:
+            kind, *arguments = operations[number]
+            if kind not in ("const", "input"):
+                wanted.update(arguments)
+    return sorted(wanted)
+
+
+def shortened(
+    operations: Sequence[Operation], outputs: Sequence[tuple[str, int]], known: Mapping[int, str] = EMPTY
+) -> Tape:
+    """The tape of outputs: what they do not hang on is left out, and the rest numbered anew.
+
+    The values of operations that are known enter, by name.
+    """
     place: dict[int, int] = {}
     kept: list[Operation] = []
-    for number, (kind, *arguments) in enumerate(operations):
-        if wanted[number]:
-            place[number] = len(kept)
-            if kind not in ("const", "input"):
-                arguments = [place[a] for a in arguments]
-            kept.append((kind, *arguments))
+    for number in reached(operations, (number for _, number in outputs), known):
+        kind, *arguments = operations[number]
+        place[number] = len(kept)
+        if number in known:
+            kind, arguments = "input", [known[number]]
+        elif kind not in ("const", "input"):
+            arguments = [place[a] for a in arguments]
+        kept.append((kind, *arguments))
     return Tape(tuple(kept), tuple((name, place[number]) for name, number in outputs))

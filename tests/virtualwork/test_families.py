@@ -10,8 +10,8 @@ import pytest
 from dalembert.arithmetic.engines import ENGINES
 from dalembert.arithmetic.processes import Processes
 from virtualwork import Force, Gear, Guess, Input, Link, Mechanism, Motor, Spring, Torque, TorsionSpring
+from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.dimensions import changed, dimensions, value
-from virtualwork.describe.errors import DescriptionError, MechanismError
 from virtualwork.family.part import Solver
 
 KINDS = ["four-bar", "slider-crank", "inverted slider-crank", "Watt", "Stephenson", "triad"]

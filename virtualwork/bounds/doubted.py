@@ -180,9 +180,7 @@ class Doubted(Recording):
         return reduced(applied_loads(paths.case.loads, link), block, self.mechanism.rigid[link].center)
 
     def _gap(self, group: str, loop: int) -> Number:
-        of = next(g for g in self.plan.groups if g.name == group)
-        self.solve(self.plan.writes(of), 0)
-        return self._left[group][loop]
+        return self._left[self.solved(group).name][loop]
 
     def _balance(self, row: int) -> Number:
         return self._balances.get(row, 0.0)

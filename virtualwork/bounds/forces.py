@@ -18,10 +18,10 @@ from virtualwork.bounds.quantities import Bounds
 from virtualwork.bounds.second_order import grown, inverse
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.asked import Key
-from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.dynamics import Dynamics, joints_at
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.formulas.statics import Column
-from virtualwork.plan.joints import Joint
+from virtualwork.plan.steps import Joint
 
 
 class ForceErrors:
@@ -97,7 +97,7 @@ class ForceErrors:
         """Of `Dynamics.reaction`, (n,): the length of the error."""
         if self._redundant is None:
             return self.bounds.of(("reaction", joint, on))
-        here = [found for found in self.dynamics.joints_named(joint) if on in found.bodies]
+        here = joints_at(self.dynamics.reactions.joints, joint, on)
         return np.asarray(sum(self.joint_force(found, on) for found in here))
 
     @cached_property

@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.linear import stack
-from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.numbers import Reals, stack
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.positions import State, columns, ratio
 from virtualwork.plan.steps import Group

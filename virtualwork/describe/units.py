@@ -11,7 +11,7 @@ import re
 from fractions import Fraction
 from typing import Any
 
-from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe import DescriptionError
 
 # SI: no quantity of a machine is larger, and no product of five of them overflows
 LARGEST = 1e60

@@ -16,9 +16,9 @@ from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
+from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed
-from virtualwork.describe.errors import MechanismError
 from virtualwork.family.part import assembled
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import COMPLEX, Key, names, over_blocks

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.engines import Repeated
+from virtualwork.describe import DescriptionError, hint
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension
-from virtualwork.describe.errors import DescriptionError, hint
 from virtualwork.family.alone import Alone
 from virtualwork.family.branches import meet_on_the_way, samples, signs
 from virtualwork.family.part import Part, Solver

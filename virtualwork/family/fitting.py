@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from dalembert.arithmetic.parts import in_parts
+from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed, dimensions, named, value
-from virtualwork.describe.errors import DescriptionError, MechanismError
 from virtualwork.family.descent import AWAY, Descent
 from virtualwork.family.design import Design, place_key
 from virtualwork.family.part import ASSEMBLED

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.engines import as_part
 from dalembert.arithmetic.parts import in_parts
 from virtualwork.branch.assembly import Assembly
-from virtualwork.branch.shortfall import shortfall
-from virtualwork.describe.errors import DescriptionError, MechanismError
+from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.parts import Point, as_point
 from virtualwork.family.part import ASSEMBLED, LANES, Part, answer, forget, room
 from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Complexes, Reals
-from virtualwork.plan.joints import joints
+from virtualwork.plan.steps import joints
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -201,7 +200,7 @@ class FamilyMotion:
             return self._reasons[i]
         q = np.broadcast_to(self.part.inputs, (*self.part.shape, self.part.inputs.shape[2]))[i, bad[0]]
         try:
-            found = shortfall(Assembly.from_guess(self.part.described(i)), tuple(q.tolist()))
+            found = Assembly.from_guess(self.part.described(i)).reach.shortfall(tuple(q.tolist()))
         except MechanismError as error:
             return str(error)
         return None if found is None else found.text()

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from dalembert.arithmetic.engines import Outputs, run_grid
 from virtualwork.branch.assembly import Assembly
+from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, changed
-from virtualwork.describe.errors import MechanismError
 from virtualwork.family.branches import chosen, stays_within
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import COMPLEX, FORCES, Key, over_blocks, quantity

@@ -16,8 +16,8 @@ from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
+from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.dimensions import Dimension, named, value
-from virtualwork.describe.errors import DescriptionError, MechanismError
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import FORCES, JOINTS, Key, quantity
 from virtualwork.formulas.lanes import Lanes

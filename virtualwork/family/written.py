@@ -12,15 +12,13 @@ from dalembert.arithmetic.tape import Tape
 from dalembert.arithmetic.varied import Varied
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import distance, sign_of_angles
-from virtualwork.describe.description import Description
+from virtualwork.describe.description import Description, known_by_guess
 from virtualwork.describe.dimensions import Dimension, changed, value
 from virtualwork.formulas.asked import FORCES, Key, names
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.kinds import WRITTEN
-from virtualwork.formulas.numbers import Number
+from virtualwork.formulas.numbers import WRITTEN, Number
 from virtualwork.formulas.positions import State, run
 from virtualwork.formulas.recording import NEAR, Recording
-from virtualwork.plan.guessed import known_by_guess
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Step, Turn
 

@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dalembert.arithmetic.varied import rotation
-from virtualwork.formulas.kinds import ONE, Folded
-from virtualwork.formulas.numbers import Kind, Number, cross
+from virtualwork.formulas.numbers import ONE, Folded, Kind, Number, cross
 from virtualwork.formulas.positions import State
 from virtualwork.plan.steps import Angle, Group, Term
 

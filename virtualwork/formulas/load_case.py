@@ -8,10 +8,9 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cached_property
 
+from virtualwork.describe import DescriptionError
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import DescriptionError
-from virtualwork.describe.loads import Force, Spring, Torque, TorsionSpring
-from virtualwork.describe.parts import GROUND
+from virtualwork.describe.parts import GROUND, Force, Spring, Torque, TorsionSpring
 from virtualwork.formulas.loads import (
     Constant,
     Follower,
@@ -19,13 +18,13 @@ from virtualwork.formulas.loads import (
     InertiaForce,
     InertiaTorque,
     Load,
+    SpringEnd,
     Tabled,
+    TorsionEnd,
 )
 from virtualwork.formulas.quantities import Combination, Quantities
-from virtualwork.formulas.springs import SpringEnd, TorsionEnd
-from virtualwork.plan.joints import Joint, joints
 from virtualwork.plan.order import combined
-from virtualwork.plan.steps import Path, Place, Plan, Term
+from virtualwork.plan.steps import Joint, Path, Place, Plan, Term, joints
 
 
 class LoadCase:

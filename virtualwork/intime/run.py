@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import Input
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.coordinates import Coordinates

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 from virtualwork.family.family import Family
 from virtualwork.family.part import Part, Solver
 from virtualwork.family.written import Written
