@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from cli.show.columns import Values
+    from cli.show.columns import Cell, Values
 
 GOOD, BAD = ("ok", "within", "stable"), ("WRONG", "beyond", "unstable")
 """Verdicts, as they stand in cells and sentences."""
@@ -111,3 +111,8 @@ def angle_text(degrees: float, spec: str) -> str:
 def paragraphs(*parts: str) -> str:
     """Join what is not empty with a blank line between."""
     return "\n".join(part.rstrip("\n") + "\n" for part in parts if part)
+
+
+def transposed(rows: Sequence[Mapping[str, Cell]]) -> dict[str, list[Cell]]:
+    """Return rows as columns."""
+    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
