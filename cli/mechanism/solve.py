@@ -156,6 +156,11 @@ class Analysis:
         """Each input and the name of its value: `input_deg`, or `input_m` of a slide."""
         return {e.name: "input_m" if e.is_slide else "input_deg" for e in self.mechanism.inputs}
 
+    @property
+    def unit(self) -> str:
+        """The unit that the first input is shown in."""
+        return "m" if any(e.is_slide for e in self.mechanism.inputs[:1]) else "deg"
+
     @cached_property
     def input_columns(self) -> tuple[str, ...]:
         """The columns of the inputs in a table."""

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.errors import DataError
-from cli.mechanism.options import names
+from cli.mechanism.options import STUDIES, names
 from cli.mechanism.quantities import column, effort_name
 from cli.mechanism.solve import Analysis
+from cli.read.options import given as flags_of
 from cli.show.columns import Table
 
 if TYPE_CHECKING:
@@ -42,15 +43,8 @@ class Request:
     @property
     def tables(self) -> list[str]:
         """The options that have a table of their own."""
-        asked = {
-            "--forces": self.forces,
-            "--newton": self.newton,
-            "--check": self.check,
-            "--equilibrium": self.equilibrium,
-            "--flywheel": self.flywheel is not None,
-            "--counterweights": self.counterweights is not None,
-        }
-        return [flag for flag, given in asked.items() if given]
+        asked = vars(self)
+        return flags_of(**{name: asked[name] for name in ("forces", *STUDIES.split())})
 
 
 @dataclass(frozen=True)
@@ -94,13 +88,12 @@ def check_document(analysis: Analysis) -> Document:
     from virtualwork.study.check import Check
 
     check = Check(analysis.mechanism.assembly)
-    slide = bool(analysis.mechanism.inputs) and analysis.mechanism.inputs[0].is_slide
-    unit = "m" if slide else "deg"
+    unit = analysis.unit
 
     def shown(values: Sequence[float] | None) -> list[float | None] | None:
         if values is None:
             return None
-        return [None if not math.isfinite(v) else (v if slide else math.degrees(v)) for v in values]
+        return [None if not math.isfinite(v) else (v if unit == "m" else math.degrees(v)) for v in values]
 
     return {
         "mobility": check.mobility,
@@ -162,22 +155,15 @@ def cycle(analysis: Analysis, coefficient: float | None) -> Document:
     if len(m.inputs) != 1:
         raise DataError(f"{analysis.file}: a cycle has one input, found {len(m.inputs)}")
     name = effort_name(m.inputs[0].is_slide)
-    empty: Document = {f"{key}_{name}": None for key in ("mean", "peak", "rms")}
-    empty |= {"work_J": None, "energy_closure_J": None, "flywheel_inertia_kg_m2": None}
+    keys = *(f"{key}_{name}" for key in ("mean", "peak", "rms")), "work_J", "energy_closure_J"
+    found: Document = dict.fromkeys((*keys, "flywheel_inertia_kg_m2"))
     if motion.n < 2 or not np.isfinite(motion.effort).all():
         analysis.warnings.append(
             "cycle: the effort is not finite at every pose of the sweep: no mean, work or flywheel"
         )
-        return empty
+        return found
     c = Cycle(motion)
-    found = {
-        f"mean_{name}": c.mean,
-        f"peak_{name}": c.peak,
-        f"rms_{name}": c.rms,
-        "work_J": c.work,
-        "energy_closure_J": c.closure,
-        "flywheel_inertia_kg_m2": None,
-    }
+    found |= zip(keys, (c.mean, c.peak, c.rms, c.work, c.closure), strict=True)
     if coefficient is not None:
         if m.inputs[0].is_slide:
             raise DataError(f"{analysis.file}: --flywheel: the input is a slide: a flywheel turns")
@@ -206,7 +192,7 @@ def equilibria(analysis: Analysis, swept: bool) -> tuple[list[Document], list[st
         values = {}
         for entry, value in zip(m.inputs, e.inputs, strict=True):
             shown = value if entry.is_slide else math.degrees(value) % 360.0
-            values[entry.name] = {"input_m" if entry.is_slide else "input_deg": shown}
+            values[entry.name] = {analysis.input_names[entry.name]: shown}
         place = next(iter(values.values())) if len(m.inputs) == 1 else {"inputs": values}
         rows.append({**place, "stable": e.stable, "potential_J": e.potential})
     said = []

@@ -123,9 +123,8 @@ class Tolerances:
             if np.nanmax(apart, initial=0.0) > sampling + APART:
                 i = int(np.nanargmax(apart))
                 shown = self.analysis.inputs.shown[i, 0]
-                unit = "m" if self.analysis.mechanism.inputs[0].is_slide else "deg"
                 lines.append(
-                    f"{header}: the first order is not enough at input {shown:g} {unit}: a standard deviation of "
+                    f"{header}: the first order is not enough at input {shown:g} {self.analysis.unit}: a standard deviation of "
                     f"{linear[i]:.6g}, but {its.sd[i]:.6g} of the drawn mechanisms"
                 )
         if whole < 1:
