@@ -170,6 +170,15 @@ class Question:
         varied = zip(self.dimensions, numbers, strict=True)
         return [Column("variant", "", names), *(Column(d.path, d.unit, values) for d, values in varied)]
 
+    def below(self, first: int, shown: Rows, tables: Sequence[Table]) -> Table:
+        """The tables of variants one below the other, each row with its variant's name and numbers."""
+        named = []
+        for i, (row, table) in enumerate(zip(shown.tolist(), tables, strict=True)):
+            n = length(table)
+            given = self.given([str(first + i)] * n, [[value] * n for value in row])
+            named.append(Table([*given, *table.columns]))
+        return joined(named)
+
 
 # --- tables of the same columns ---------------------------------------------------------------------------------------
 def length(table: Table) -> int:

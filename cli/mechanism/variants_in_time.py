@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cli.errors import DataError
-from cli.mechanism.asked import Home, Question, Said, joined, length, like
+from cli.mechanism.asked import Home, Question, Said, like
 from cli.mechanism.in_time import ENERGY, METHOD, InTime, columns_of, inputs_of, known, largest, rows_of_time
 from cli.mechanism.read import until_inputs, wanted
 from cli.mechanism.solve import Analysis
@@ -129,13 +129,9 @@ class AskedInTime(Question):
     def table(self, home: Home, first: int, shown: Rows, said: Said) -> Table:
         """The rows of some variants; one that cannot be let go has none but its own."""
         blank = Table([Column(c.name, c.unit, [None]) for c in home.pattern.columns])
-        tables = []
-        for i, of in enumerate(self.found(first, shown, said)):
-            whole = like(home.pattern, of.table) if len(of.t) else blank
-            n = length(whole)
-            given = self.given([str(first + i)] * n, [[value] * n for value in shown[i].tolist()])
-            tables.append(Table([*given, *whole.columns]))
-        return replace(joined(tables), keys=("variant", "t_s"))
+        found = self.found(first, shown, said)
+        tables = [like(home.pattern, of.table) if len(of.t) else blank for of in found]
+        return replace(self.below(first, shown, tables), keys=("variant", "t_s"))
 
     def documents(self, home: Home, first: int, shown: Rows, said: Said) -> list[Document]:
         """What JSON says of some variants."""

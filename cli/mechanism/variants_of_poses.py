@@ -9,7 +9,7 @@ from uuid import uuid4
 
 import numpy as np
 
-from cli.mechanism.asked import Home, Question, Said, emptied, joined, length, like, without_bounds
+from cli.mechanism.asked import Home, Question, Said, emptied, length, like, without_bounds
 from cli.mechanism.families import Families
 from cli.mechanism.read import Inputs, wanted
 from cli.mechanism.result import result_of
@@ -141,12 +141,9 @@ class AskedOfPoses(Question):
             return self._table_together(home.pattern, first, shown, said)
         tables = []
         for i, row in enumerate(shown):
-            name = str(first + i)
-            of, there = self._rows(home.pattern, self.one(row, name, False, said))
-            n = length(of)
-            given = self.given([name] * n, [[value] * n for value in row.tolist()])
-            tables.append(Table([*given, Column("assembled", "", there), *of.columns], self._keys(of)))
-        table = joined(tables)
+            of, there = self._rows(home.pattern, self.one(row, str(first + i), False, said))
+            tables.append(Table([Column("assembled", "", there), *of.columns]))
+        table = replace(self.below(first, shown, tables), keys=self._keys(home.pattern))
         return table if self.digits else without_bounds(table)
 
     def _rows(self, pattern: Table, found: Any) -> tuple[Table, list[Any]]:
