@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from numpy.typing import NDArray
 
+from cli.mechanism.options import Options
 from cli.mechanism.variants import Variants, in_si, with_numbers
 from cli.show.columns import Column, Table
 from virtualwork import Mechanism
@@ -104,18 +105,14 @@ class Question:
         What is varied.
     bare : mapping
         The file's units of bare numbers.
-    only, branch
-        As in `Analysis`.
     digits : bool
         Whether bounds of the errors are asked for.
     """
 
-    file: str
+    asked: Options
     mechanism: Mechanism
     dimensions: tuple[Dimension, ...]
     bare: Mapping[str, str]
-    only: list[str] | None
-    branch: str | None
     digits: bool
 
     method = ""

@@ -23,7 +23,7 @@ def warnings(studies: Studies) -> list[str]:
     """All of them, once the studies are done."""
     analysis = studies.analysis
     said = [*analysis.warnings, *limits(analysis), *studies.said]
-    return [*said, *of_forces(analysis)] if studies.request.forces else said
+    return [*said, *of_forces(analysis)] if studies.asked.forces else said
 
 
 def _on_branch(analysis: Analysis, assembly: Assembly, found: list[float], digits: int) -> list[float]:

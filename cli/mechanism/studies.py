@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.errors import DataError
-from cli.mechanism.options import STUDIES, names
+from cli.mechanism.options import Options, names
 from cli.mechanism.quantities import column, effort_name
 from cli.mechanism.solve import Analysis
-from cli.read.options import given as flags_of
 from cli.show.columns import Table
 
 if TYPE_CHECKING:
@@ -29,30 +28,11 @@ Document = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Request:
-    """Which studies are asked for."""
-
-    newton: bool = False
-    check: bool = False
-    forces: bool = False
-    equilibrium: bool = False
-    flywheel: float | None = None
-    counterweights: str | None = None
-    swept: bool = False
-
-    @property
-    def tables(self) -> list[str]:
-        """The options that have a table of their own."""
-        asked = vars(self)
-        return flags_of(**{name: asked[name] for name in ("forces", *STUDIES.split())})
-
-
-@dataclass(frozen=True)
 class Studies:
     """The studies of an analysis, each worked out once."""
 
     analysis: Analysis
-    request: Request
+    asked: Options
 
     @cached_property
     def document(self) -> Document:
@@ -66,20 +46,20 @@ class Studies:
 
     @cached_property
     def _found(self) -> tuple[Document, list[str]]:
-        analysis, request = self.analysis, self.request
+        analysis, asked = self.analysis, self.asked
         found: Document = {}
         said: list[str] = []
-        if request.newton:
+        if asked.newton:
             found |= newton_document(analysis)
-        if request.check:
+        if asked.check:
             found["check"] = check_document(analysis)
-        of_one = request.forces and len(analysis.mechanism.inputs) == 1
-        if (of_one or request.flywheel is not None) and request.swept:
-            found["cycle"] = cycle(analysis, request.flywheel)
-        if request.equilibrium:
-            found["equilibria"], said = equilibria(analysis, request.swept)
-        if request.counterweights:
-            found["counterweights"] = counterweights(analysis, names(request.counterweights))
+        of_one = asked.forces and len(analysis.mechanism.inputs) == 1
+        if (of_one or asked.flywheel is not None) and asked.swept:
+            found["cycle"] = cycle(analysis, asked.flywheel)
+        if asked.equilibrium:
+            found["equilibria"], said = equilibria(analysis, asked.swept)
+        if asked.counterweights:
+            found["counterweights"] = counterweights(analysis, names(asked.counterweights))
         return found, said
 
 
@@ -245,7 +225,7 @@ def tables(found: Studies) -> dict[str, Callable[[], Table]]:
         "--flywheel": lambda: of_cycle(document["cycle"]),
         "--counterweights": lambda: of_counterweights(document["counterweights"]),
     }
-    return {flag: known[flag] for flag in found.request.tables if flag != "--forces"}
+    return {flag: known[flag] for flag in found.asked.tables if flag != "--forces"}
 
 
 def of_check(document: Document) -> Table:

@@ -22,13 +22,13 @@ METHOD = (
 )
 
 
-def sections(studies: Studies, tables: Mapping[str, Callable[[], Table]], *, explain: bool) -> list[Section]:
+def sections(studies: Studies, tables: Mapping[str, Callable[[], Table]]) -> list[Section]:
     """What the report shows: every table, and the order of solution."""
     shown = [Section(heading(name), [table()]) for name, table in tables.items()]
-    return [*shown, Section("Order of solution", explained(studies))] if explain else shown
+    return [*shown, Section("Order of solution", explained(studies))] if studies.asked.explain else shown
 
 
-def afterword(studies: Studies, *, explain: bool) -> str:
+def afterword(studies: Studies) -> str:
     """All that was asked for, a paragraph each."""
     document = studies.document
     texts: dict[str, Callable[..., str]] = {
@@ -37,15 +37,15 @@ def afterword(studies: Studies, *, explain: bool) -> str:
         "equilibria": equilibria_text,
         "counterweights": counterweights_text,
     }
-    parts = [newton_text(document)] if studies.request.newton else []
+    parts = [newton_text(document)] if studies.asked.newton else []
     parts += [text(document[key]) for key, text in texts.items() if key in document]
-    return "\n\n".join([*parts, *(explained(studies) if explain else [])])
+    return "\n\n".join([*parts, *(explained(studies) if studies.asked.explain else [])])
 
 
 def explained(studies: Studies) -> list[str]:
     """The order of solution, and of the forces what was done."""
     analysis = studies.analysis
-    return [explain_text(analysis), *([explain_forces(analysis)] if studies.request.forces else [])]
+    return [explain_text(analysis), *([explain_forces(analysis)] if studies.asked.forces else [])]
 
 
 def check_text(document: Document) -> str:
