@@ -208,6 +208,11 @@ class Description(Record):
         entry = self.inputs[j]
         return next((motor.carrier for motor in self.motors if motor.drives == entry.link), entry.on)
 
+    @cached_property
+    def carried(self) -> list[int]:
+        """The turning inputs whose motor sits on another body than `on`."""
+        return [j for j, e in enumerate(self.inputs) if not e.is_slide and self.carrier(j) != e.on]
+
 
 def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]]:
     """Rough link angles and point positions from the guess, the ground and the inputs, as far as they reach."""

@@ -125,13 +125,20 @@ class _Reader(Entries):
             "guess": self.guess(inputs),
             "name": self.name(),
             "gravity": self.gravity(),
-            "forces": self.every("forces", self.force),
-            "torques": self.every("torques", self.torque),
-            "springs": self.every("springs", self.spring),
-            "torsion_springs": self.every("torsion_springs", self.torsion),
-            "motors": self.every("motors", self.motor),
-            "friction": self.every("friction", self.friction),
+            **self.loads(),
         }
+
+    def loads(self) -> dict[str, Any]:
+        """Every load, under the name that `Description` gives it."""
+        kinds: dict[str, Callable[[dict[str, Any], str], Any]] = {
+            "forces": self.force,
+            "torques": self.torque,
+            "springs": self.spring,
+            "torsion_springs": self.torsion,
+            "motors": self.motor,
+            "friction": self.friction,
+        }
+        return {name: self.every(name, read) for name, read in kinds.items() if name in self.data}
 
     def gravity(self) -> complex:
         """Its two components."""
