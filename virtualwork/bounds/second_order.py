@@ -24,6 +24,8 @@ from virtualwork.plan.steps import Group
 
 # a singular value is not taken for smaller: the second order decides there, and does not see it
 FLOOR = 1e-13
+# a share of the second order in the first that adds nothing
+FAR = 8e-13
 
 
 @dataclass(frozen=True)
@@ -106,12 +108,11 @@ def grown(tau: Reals, k: float) -> Reals:
 
     τ is taken a quarter larger, for the third order. One number where no pose is near a limit.
     """
-    tau = 1.25 * np.asarray(tau)
-    # far from a limit there is nothing to add
-    near = ~(tau < 1e-12)
+    tau = np.asarray(tau)
+    near = ~(tau < FAR)
     if not near.any():
         return np.ones(())
-    found, tau = np.ones(tau.shape), tau[near]
+    found, tau = np.ones(tau.shape), 1.25 * tau[near]
     more = np.expm1((0.5 - k) * np.log1p(-2 * tau)) / ((2 * k - 1) * tau)
     found[near] = np.where(tau < 0.5, more, np.inf)
     return found

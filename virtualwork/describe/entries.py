@@ -12,11 +12,14 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from virtualwork.describe import DescriptionError, hint, known
-from virtualwork.describe.parts import GROUND, Link
 from virtualwork.describe.units import EXPECTED, LARGEST, Units, wrong
+
+if TYPE_CHECKING:
+    # numpy comes with it, and the schema needs none
+    from virtualwork.describe.parts import Link
 
 Load = Callable[[Path], bytes]
 N = TypeVar("N", float, complex)
@@ -185,7 +188,7 @@ class Entries:
         self.units = Units(units)
         self.number, self.pair = self.units.number, self.units.pair
         self.links: dict[str, Link] = {}
-        self.bodies: dict[str, Mapping[str, complex]] = {GROUND: {}}
+        self.bodies: dict[str, Mapping[str, complex]] = {}
 
     def quantities(self, entry: Mapping[str, Any], keys: Keys, where: str) -> dict[str, Any]:
         """The numbers and pairs of an entry that are given, by their keys."""

@@ -100,11 +100,7 @@ def stack(cols: list[list[Number]], n: int) -> Reals:
 
 def stack_rows(rows: list[Number], n: int) -> Reals:
     """The real loop gaps (n, 2·loops) from complex ones."""
-    out = np.empty((n, 2 * len(rows)))
-    for i, w in enumerate(rows):
-        out[:, 2 * i] = np.real(w)
-        out[:, 2 * i + 1] = np.imag(w)
-    return out
+    return stack([[w] for w in rows], n)[:, :, 0]
 
 
 def solve(jacobian: Reals, right: Reals) -> Reals:
