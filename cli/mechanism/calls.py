@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from cli.mechanism.options import names, refuse_clashes
+from cli.mechanism.options import refuse_clashes
 from cli.mechanism.read import wanted
 from cli.mechanism.result import csv_parts, result_of, told
-from cli.mechanism.solve import ORDERS, Analysis, load
-from cli.mechanism.studies import Request
+from cli.mechanism.solve import Analysis, load
 from cli.show.columns import Result
 
 if TYPE_CHECKING:
@@ -73,11 +72,6 @@ class Call:
         return cls(asked, show, mechanism, bare, said, about, several)
 
     @property
-    def names(self) -> list[str] | None:
-        """What --only names."""
-        return None if self.asked.only is None else names(self.asked.only)
-
-    @property
     def count(self) -> int:
         """How many mechanisms there are."""
         return 1 if self.several is None else self.several.count
@@ -89,7 +83,7 @@ class Call:
         from cli.mechanism.in_time import InTime, times_and_accuracy
 
         asked, m, several = self.asked, self.mechanism, self.several
-        home = Analysis.of(asked.file, m, wanted(m, None, None, None, self.bare), 2, self.names, asked.branch)
+        home = Analysis.of(asked, m, wanted(m, None, None, None, self.bare), 2)
         home.warnings += self.said
         home.check_names()
         times, accuracy = times_and_accuracy(asked.time or "", asked.accuracy)
@@ -103,9 +97,8 @@ class Call:
         from cli.mechanism.variants_in_time import AskedInTime
 
         question = AskedInTime(
-            asked.file, m, several.dimensions, self.bare, self.names, asked.branch, self.show.digits, times,
-            accuracy, asked.until, asked.forces,
-        )  # fmt: skip
+            asked, m, several.dimensions, self.bare, self.show.digits, times, accuracy, asked.until
+        )
         many = Many(question, several, asked.workers or 1)
         return self._with_page(
             self._of_many(many), lambda: animation.page_in_time(many.alone(), self.show.units)
@@ -116,14 +109,13 @@ class Call:
         """Poses, forces and studies."""
         asked, show, m = self.asked, self.show, self.mechanism
         q = wanted(m, asked.at, asked.sweep, asked.inputs, self.bare)
-        order = None if asked.order is None else ORDERS.index(asked.order)
-        analysis = Analysis.of(asked.file, m, q, order, self.names, asked.branch)
+        analysis = Analysis.of(asked, m, q)
         analysis.warnings += self.said
         analysis.check_names()
         self._refuse_long(q.n)
         spreads = asked.tolerance or asked.draws is not None
         alone = self.several is None and asked.html is None and not spreads
-        if alone and self.request.tables in ([], ["--forces"]) and show.streams and analysis.is_long:
+        if alone and asked.tables in ([], ["--forces"]) and show.streams and analysis.is_long:
             return self._long(analysis)
         analysis.check_size(
             json=show.as_json,
@@ -134,9 +126,7 @@ class Call:
         )
         if self.several is not None:
             return self._of_variants(analysis, self.several)
-        result = result_of(
-            analysis, self.request, asked.states, asked.explain, asked.graph, self.about, show.digits
-        )
+        result = result_of(analysis, asked, self.about, show.digits)
         if spreads:
             return self._with_tolerances(result, analysis)
         return self._with_page(result, lambda: self._page([("", analysis)]))
@@ -147,12 +137,11 @@ class Call:
         from cli.mechanism.variants_of_poses import AskedOfPoses
 
         asked, q = self.asked, analysis.inputs
-        own_pose = asked.at is None and asked.sweep is None and asked.inputs is None and several.moves_inputs
-        order = None if asked.order is None else analysis.order
+        own_pose = asked.at is None and not asked.swept and several.moves_inputs
+        inputs = None if own_pose else q.part(0, q.n)
         question = AskedOfPoses(
-            asked.file, self.mechanism, several.dimensions, self.bare, self.names, asked.branch,
-            self.show.digits, None if own_pose else q.part(0, q.n), order, self.request,
-        )  # fmt: skip
+            asked, self.mechanism, several.dimensions, self.bare, self.show.digits, inputs
+        )
         many = Many(question, several, asked.workers or 1)
         return self._with_page(self._of_many(many), lambda: self._page(many.alone()))
 
@@ -161,8 +150,7 @@ class Call:
         from cli.mechanism.tolerance import Tolerances
         from cli.mechanism.tolerance_picture import draw
 
-        a = self.asked
-        found = Tolerances(analysis, a.forces, a.draws or 0, a.seed, a.distribution, a.workers or 1)
+        found = Tolerances(analysis, self.asked)
         before, said = result.document, found.remarks()
         _, *others = result.tables.items()
         return replace(
@@ -193,13 +181,6 @@ class Call:
         )
 
     # --- what the kinds have in common ------------------------------------------------------------------------------
-    @property
-    def request(self) -> Request:
-        """Which studies are asked for."""
-        a = self.asked
-        swept = a.sweep is not None or a.inputs is not None
-        return Request(a.newton, a.check, a.forces, a.equilibrium, a.flywheel, a.counterweights, swept)
-
     @property
     def _table(self) -> bool:
         """Whether a table is formed: that of a long sweep costs as much as its solution, and JSON alone asks for none."""
