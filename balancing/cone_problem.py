@@ -12,8 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.exact import EPS
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+
+NEAR = 1e-2
+"""From this error on Newton's method on the constraints that look active is tried: it mostly ends at the optimum."""
 
 
 @dataclass
@@ -74,7 +80,7 @@ def solve(problem: ConeProblem) -> tuple[Real, Complex]:
     z[:, 0] = 1.0 / max(float(problem.f.sum()), 1.0) if with_t else 1.0
 
     best: tuple[float, Real, Real, Real] | None = None
-    stalled = 0
+    stalled, near = 0, NEAR
     for _ in range(60):
         rx = c + flat.T @ z.ravel()
         if square is not None:
@@ -89,6 +95,11 @@ def solve(problem: ConeProblem) -> tuple[Real, Complex]:
             stalled += 1
         if error < 1e-10 or stalled >= 4:
             break
+        if error < near:
+            quality, point, force = _polish(problem, with_t, x, s, z, square, at)
+            if quality < 16 * EPS:
+                return point, force
+            near = error / 30
         # Nesterov-Todd scaling
         s_size = _size(s)
         z_size = _size(z)
@@ -144,7 +155,7 @@ def solve(problem: ConeProblem) -> tuple[Real, Complex]:
         s = s + alpha * np.matvec(scaling, ds) * beta[:, None]
         z = z + alpha * np.matvec(inverse, dz)
     assert best is not None
-    return _polish(problem, with_t, *best[1:], square, at)
+    return _polish(problem, with_t, *best[1:], square, at)[1:]
 
 
 _MIRROR = np.array([1.0, -1.0, -1.0])
@@ -179,8 +190,11 @@ def _room(lam: Real, normalised: Real, *directions: Real) -> float:
 
 def _polish(
     problem: ConeProblem, with_t: bool, x: Real, s: Real, z: Real, square: Real | None, at: Real
-) -> tuple[Real, Complex]:
-    """Finish by Newton's method on the active constraints ½(|E z + e|² - (h + f t)²) = 0 with multipliers ν."""
+) -> tuple[float, Real, Complex]:
+    """Finish by Newton's method on the active constraints ½(|E z + e|² - (h + f t)²) = 0 with multipliers ν.
+
+    Returns also how far from optimal the end is: rounding alone where the active constraints were the true ones.
+    """
     k, p = problem.e.shape
     nu = z[:, 0] / s[:, 0]
 
@@ -189,7 +203,7 @@ def _polish(
         return problem.e @ (x[:p] + 1j * x[p : 2 * p]) + problem.offset, problem.h + problem.f * t
 
     def judge(x: Real, nu: Real) -> float:
-        """How far from optimal: the violation and the gap."""
+        """How far from optimal: the conditions of Karush, Kuhn and Tucker, which of a convex problem suffice."""
         r, radius = values(x)
         gradient = np.zeros(len(x))
         pull = problem.e.conj().T @ (nu * r)
@@ -201,7 +215,8 @@ def _polish(
         slack = radius - np.abs(r)
         return max(
             float(np.abs(gradient).max()),
-            float(np.maximum(-slack, 0).max()),
+            float(-slack.min()),
+            float(-nu.min()),
             float(np.abs(nu * slack * radius).max()),
         )
 
@@ -213,7 +228,7 @@ def _polish(
     re, im = real_rows(e)
     n, m = len(x), len(active)
     if m == 0:
-        return x, nu * values(x)[0]
+        return best[0], x, nu * values(x)[0]
     for _ in range(5):
         r, radius = values(trial_x)
         ra, va = r[active], radius[active]
@@ -246,8 +261,8 @@ def _polish(
         if quality >= best[0]:
             break
         best = (quality, trial_x, trial_nu)
-    _, x, nu = best
-    return x, nu * values(x)[0]
+    quality, x, nu = best
+    return quality, x, nu * values(x)[0]
 
 
 def _consistent(system: Real, rhs: Real, largest: float) -> Real:

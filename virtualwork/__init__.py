@@ -4,9 +4,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from virtualwork.describe.errors import AssemblyError, DescriptionError, MechanismError, MobilityError
-    from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
-    from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link
+    from virtualwork.describe import AssemblyError, DescriptionError, MechanismError, MobilityError
+    from virtualwork.describe.parts import (
+        GROUND,
+        Force,
+        Friction,
+        Gear,
+        Guess,
+        Guide,
+        Input,
+        Link,
+        Motor,
+        Spring,
+        Torque,
+        TorsionSpring,
+    )
     from virtualwork.family.target import Target
     from virtualwork.formulas.effort import ledger
     from virtualwork.mechanism import Mechanism, equilibria
@@ -66,64 +78,23 @@ __all__ = [
 
 # where each name stands; a room is loaded when one of its names is asked for
 _ROOMS = {
-    "virtualwork.describe.errors": (
-        "AssemblyError",
-        "DescriptionError",
-        "MechanismError",
-        "MobilityError",
-    ),
-    "virtualwork.describe.loads": (
-        "Force",
-        "Friction",
-        "Motor",
-        "Spring",
-        "Torque",
-        "TorsionSpring",
-    ),
-    "virtualwork.describe.parts": (
-        "GROUND",
-        "Gear",
-        "Guess",
-        "Guide",
-        "Input",
-        "Link",
-    ),
-    "virtualwork.formulas.effort": ("ledger",),
-    "virtualwork.mechanism": (
-        "Mechanism",
-        "equilibria",
-    ),
-    "virtualwork.study": ("counterweights",),
-    "virtualwork.family.target": ("Target",),
-    "virtualwork.study.check": (
-        "Check",
-        "grashof_class",
-    ),
-    "virtualwork.study.cycle": ("Cycle",),
-    "virtualwork.study.equilibrium": (
-        "Equilibria",
-        "Equilibrium",
-    ),
-    "virtualwork.textbook.combinations": (
-        "block_on_bar",
-        "crank_rod_piston",
-        "on_incline",
-        "on_moving_ramp",
-        "rotation",
-        "second_point",
-        "sense",
-    ),
-    "virtualwork.textbook.link_states": (
-        "LinkStates",
-        "UnitLoad",
-        "balance",
-    ),
+    "virtualwork.describe": "AssemblyError DescriptionError MechanismError MobilityError",
+    "virtualwork.describe.parts": "GROUND Force Friction Gear Guess Guide Input Link Motor Spring Torque TorsionSpring",
+    "virtualwork.formulas.effort": "ledger",
+    "virtualwork.mechanism": "Mechanism equilibria",
+    "virtualwork.study": "counterweights",
+    "virtualwork.family.target": "Target",
+    "virtualwork.study.check": "Check grashof_class",
+    "virtualwork.study.cycle": "Cycle",
+    "virtualwork.study.equilibrium": "Equilibria Equilibrium",
+    "virtualwork.textbook.combinations": "block_on_bar crank_rod_piston on_incline on_moving_ramp rotation second_point sense",
+    "virtualwork.textbook.link_states": "LinkStates UnitLoad balance",
 }
 
 
 def __getattr__(name: str) -> object:
     for room, names in _ROOMS.items():
-        if name in names:
+        if name in names.split():
             module = import_module(room)
             value: object = getattr(module, name, None) or import_module(f"{room}.{name}")
             globals()[name] = value

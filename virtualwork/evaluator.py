@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from virtualwork.branch.assembly import Assembly
-from virtualwork.describe.errors import DescriptionError, hint
+from virtualwork.describe import DescriptionError, hint
 from virtualwork.formulas.asked import COMPLEX, Key
 from virtualwork.formulas.lanes import Lanes, Ready, ready, recorded, taped
 from virtualwork.formulas.numbers import xy
@@ -119,7 +119,7 @@ def key_of(assembly: Assembly, name: str) -> Key:
     if kind == "points" and of:
         where = {point: body for body, points in m.bodies.items() for point in points}
         body = where[known(of[0], where, "point")]
-        return "point", body, m.bodies[body][of[0]], of[0], order(POINT)
+        return "point", body, 0j, of[0], order(POINT)
     if kind == "links" and of:
         return "angle", known(of[0], m.links, "link"), order(LINK)
     if kind == "slides" and of:

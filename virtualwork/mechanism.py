@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from virtualwork.branch.assembly import Assembly, all_assemblies
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import MechanismError
 from virtualwork.describe.reader import read, read_text
 from virtualwork.motion import Motion
 
@@ -375,6 +375,8 @@ class Mechanism(Description):
 
     def assemblies(self) -> tuple[Assembly, ...]:
         """Every assembly at the input where the guess is meant, the guess's own first."""
+        from virtualwork.branch.solutions import all_assemblies
+
         return all_assemblies(self.assembly)
 
 

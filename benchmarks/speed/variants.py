@@ -23,7 +23,7 @@ from virtualwork import Mechanism
 from virtualwork.describe.dimensions import changed, value
 from virtualwork.family.family import Family
 from virtualwork.formulas.asked import Key
-from virtualwork.plan.joints import joints
+from virtualwork.plan.steps import joints
 
 Real = NDArray[np.float64]
 DOMAIN = "variants"

@@ -56,7 +56,7 @@ def wrong_dead_points(t: Topology) -> list[str]:
     """
     m = t.mechanism
     dead = np.array(m.check.dead_points)
-    period = None if m.inputs[0].is_slide else m.assembly.track.period
+    period = None if m.inputs[0].is_slide else m.assembly.reach.period
     track = m.assembly.track
     # of a slide, as far as the program has looked for them
     q = np.linspace(max(t.inputs[0] - SCANNED, track.low), min(t.inputs[0] + SCANNED, track.high), GRID)

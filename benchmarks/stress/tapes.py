@@ -13,8 +13,8 @@ from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.rounding import rounding_bounds
 from dalembert.arithmetic.tape import Tape
 from virtualwork import Mechanism
+from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import MechanismError
 from virtualwork.formulas.asked import Key, names
 from virtualwork.formulas.lanes import Lanes, taped
 from virtualwork.motion import Motion
@@ -36,6 +36,10 @@ class Digits:
 
     const = mp.mpf
     sin, cos, atan2 = staticmethod(mp.sin), staticmethod(mp.cos), staticmethod(mp.atan2)
+
+    @staticmethod
+    def binade(x: Any) -> Any:
+        return mp.ldexp(0.5, mp.frexp(abs(x))[1])
 
     @staticmethod
     def sqrt(x: Any) -> Any:

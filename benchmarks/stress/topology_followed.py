@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.stress.topologies import REGULAR, Topology, constraints, evaluate, regularity
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

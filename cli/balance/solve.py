@@ -16,7 +16,7 @@ from cli.errors import DataError, quote
 from cli.read.planes import Planes
 from cli.read.rounding import EPS, vector_error
 from cli.read.tolerance import Tolerance, Verdict
-from cli.read.units import degrees, from_si, phasor, to_si
+from cli.read.units import Scaled, degrees, from_si, phasor, to_si
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -133,6 +133,15 @@ class Balancing:
     def mass_kg(self) -> Real:
         """The masses as given out."""
         return to_si(self.mass, "mass", self.rotors.mass_unit)
+
+    @property
+    def length_unit(self) -> str:
+        """The unit in which lengths are said."""
+        return self.rotors.radius_unit or self.planes.z_unit or "mm"
+
+    def couple_size(self, couple: Scaled) -> Scaled:
+        """Return a couple unbalance in the unit of unbalances times that of lengths."""
+        return from_si(from_si(couple, "unbalance", self.rotors.unbalance_unit), "length", self.length_unit)
 
     def rows_of(self, rotor: int) -> slice:
         """Return the rows of a rotor's planes."""

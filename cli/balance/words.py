@@ -6,11 +6,12 @@ import numpy as np
 
 from balancing import GRADES
 from cli.balance import columns
-from cli.balance.read import Complex
+from cli.balance.read import Complex, Real
 from cli.balance.solve import Balancing
 from cli.read.units import degrees, from_si
 from cli.show.columns import Column, Section, Table
 from cli.show.text import angle_text
+from cli.show.verdicts import verdict_columns
 
 NEAR = 20.0  # from this growth of errors on the planes are said to be near each other
 SHOWN = 10  # so many rotors are described on the terminal
@@ -44,31 +45,34 @@ def warnings(found: Balancing) -> list[str]:
 
 def notes(found: Balancing) -> str:
     """Say what the rotors were like before and after."""
-    unit = found.rotors.unbalance_unit
-    length = found.rotors.radius_unit or found.planes.z_unit or "mm"
+    unit, length = found.rotors.unbalance_unit, found.length_unit
+    named = (
+        f"{unit.replace('_', '·')}·{length}".replace("mm·mm", "mm²")
+        .replace("in·in", "in²")
+        .replace("m·m", "m²")
+    )
     lines = []
     masses = np.bincount(found.rotors.rotor)
 
-    def couple(value: complex) -> str:
-        size = from_si(from_si(abs(value), "unbalance", unit), "length", length)
-        text = f"{size:.6g} {unit.replace('_', '·')}·{length}"
-        return text.replace("mm·mm", "mm²").replace("in·in", "in²").replace("m·m", "m²")
-
     def static(value: complex) -> str:
-        return f"{from_si(abs(value), 'unbalance', unit):.6g} {unit.replace('_', '·')}"
+        return f"static {from_si(abs(value), 'unbalance', unit):.6g} {unit.replace('_', '·')}"
+
+    def couple(value: complex) -> str:
+        return f", couple {found.couple_size(abs(value)):.6g} {named}" if found.has_couple else ""
 
     def angle(value: complex) -> str:
-        return f"{angle_text(degrees(value), '.2f')}°"
+        return f" at {angle_text(degrees(value), '.2f')}°"
 
     for r, name in enumerate(found.rotors.names[:SHOWN]):
-        lines.append(f"rotor {name}: {masses[r]} unbalance{'' if masses[r] == 1 else 's'}")
-        line = f"  initial   static {static(found.static[r])} at {angle(found.static[r])}"
-        after = f"  residual  static {static(found.residual_static[r])}"
+        line = f"  initial   {static(found.static[r])}{angle(found.static[r])}"
         if found.has_couple:
-            about = f"about z = {from_si(found.about[r], 'length', length):g} {length}"
-            line += f", couple {couple(found.couple[r])} at {angle(found.couple[r])} {about}"
-            after += f", couple {couple(found.residual_couple[r])}"
-        lines += [line, after]
+            about = from_si(found.about[r], "length", length)
+            line += f"{couple(found.couple[r])}{angle(found.couple[r])} about z = {about:g} {length}"
+        lines += [
+            f"rotor {name}: {masses[r]} unbalance{'' if masses[r] == 1 else 's'}",
+            line,
+            f"  residual  {static(found.residual_static[r])}{couple(found.residual_couple[r])}",
+        ]
     if len(found.rotors.names) > SHOWN:
         lines.append(f"… and {len(found.rotors.names) - SHOWN} further rotors")
     return "\n".join([*lines, "", f"material to {'remove' if found.request.remove else 'add'}:"])
@@ -85,13 +89,10 @@ def verdicts(found: Balancing) -> str:
     lines = [f"{named}: U_per = {whole:.6g} {unit.replace('_', '·')}"]
     for r, rotor in enumerate(found.rotors.names[:SHOWN]):
         for v in found.verdicts(r):
-            share, before, after = (
-                from_si(value, "unbalance", unit) for value in (v.permissible, v.initial, v.residual)
-            )
+            share, before, after = (from_si(value, "unbalance", unit) for value in v[1:])
             lines.append(
                 f"  rotor {rotor}, {v.plane}: permissible {share:.6g}, "
-                f"initial {before:.6g} ({'within' if v.initial <= v.permissible else 'beyond'}), "
-                f"residual {after:.6g} ({'within' if v.residual <= v.permissible else 'beyond'})"
+                f"initial {before:.6g} ({v.of(v.initial)}), residual {after:.6g} ({v.of(v.residual)})"
             )
     names = found.rotors.names
     if len(names) > SHOWN:
@@ -108,33 +109,31 @@ def verdicts(found: Balancing) -> str:
 
 def sections(found: Balancing) -> list[Section]:
     """What the report says: the corrections, the rotors before and after, the tolerance."""
-    unit = found.rotors.unbalance_unit
-    length = found.rotors.radius_unit or found.planes.z_unit or "mm"
-    action = f"Material to {'remove' if found.request.remove else 'add'}"
-    shown = [Section(action, [columns.corrections(found)]), Section("Before and after", [_states(found)])]
+    states: list[str | Table] = [_states(found)]
     if found.has_couple:
-        about = from_si(found.about[0], "length", length)
+        about = from_si(found.about[0], "length", found.length_unit)
         same = (found.about == found.about[0]).all()
-        where = f"z = {about:g} {length}" if same else "the first correction plane of each"
-        shown[1] = Section("Before and after", [_states(found), f"The couple is about {where}."])
+        where = f"z = {about:g} {found.length_unit}" if same else "the first correction plane of each"
+        states.append(f"The couple is about {where}.")
+    action = f"Material to {'remove' if found.request.remove else 'add'}"
+    shown = [Section(action, [columns.corrections(found)]), Section("Before and after", states)]
     if found.request.tolerance is not None:
-        shown.append(Section("Verdict", [*verdicts(found).splitlines()[:1], _within(found, unit)]))
+        shown.append(Section("Verdict", [*verdicts(found).splitlines()[:1], _within(found)]))
     return shown
 
 
 def _states(found: Balancing) -> Table:
-    unit, names = found.rotors.unbalance_unit, found.rotors.names
-    length = found.rotors.radius_unit or found.planes.z_unit or "mm"
+    unit, names, length = found.rotors.unbalance_unit, found.rotors.names, found.length_unit
 
     def both(before: Complex, after: Complex) -> Complex:
         # what rounding leaves is nothing
         after = np.where(np.abs(after) > 1e-12 * np.abs(before), after, 0)
         return np.stack([before, after], axis=1).ravel()
 
-    def angle(value: Complex) -> list[float | None]:
-        return [float(degrees(v)) if v else None for v in value.tolist()]
+    def angle(value: Complex) -> Real:
+        return np.where(value == 0, np.nan, degrees(value))
 
-    static = both(found.static, found.residual_static)
+    static, couple = both(found.static, found.residual_static), both(found.couple, found.residual_couple)
     table = [
         Column("rotor", "", [name for name in names for _ in range(2)]),
         Column("state", "", ["before", "after"] * len(names)),
@@ -142,25 +141,13 @@ def _states(found: Balancing) -> Table:
         Column("angle", "deg", angle(static)),
     ]
     if found.has_couple:
-        couple = both(found.couple, found.residual_couple)
-        size = from_si(from_si(np.abs(couple), "unbalance", unit), "length", length)
         of_couple = f"{unit}_{length}".replace(f"{length}_{length}", f"{length}2")
-        table += [Column("couple", of_couple, size), Column("couple_angle", "deg", angle(couple))]
+        table.append(Column("couple", of_couple, found.couple_size(np.abs(couple))))
+        table.append(Column("couple_angle", "deg", angle(couple)))
     return Table(table, keys=("rotor", "state"))
 
 
-def _within(found: Balancing, unit: str) -> Table:
-    rows = [
-        (
-            rotor,
-            v.plane,
-            *(from_si(u, "unbalance", unit) for u in v[1:]),
-            "within" if v.residual <= v.permissible else "beyond",
-        )
-        for r, rotor in enumerate(found.rotors.names)
-        for v in found.verdicts(r)
-    ]
-    names = ("rotor", "plane", "permissible", "before", "after", "verdict")
-    units = ("", "", unit, unit, unit, "")
-    columns = zip(names, units, zip(*rows, strict=True), strict=True)
-    return Table([Column(*column) for column in columns], keys=("rotor", "plane"))
+def _within(found: Balancing) -> Table:
+    rows = [(name, v) for r, name in enumerate(found.rotors.names) for v in found.verdicts(r)]
+    columns = verdict_columns([v for _, v in rows], found.rotors.unbalance_unit)
+    return Table([Column("rotor", "", [name for name, _ in rows]), *columns], keys=("rotor", "plane"))

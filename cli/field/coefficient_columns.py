@@ -109,7 +109,7 @@ def coefficients(found: FieldBalancing) -> Table:
     }
     names = dict.fromkeys(name for row in rows for name in row)
     columns = [Column(name, units.get(name, ""), [row.get(name) for row in rows]) for name in names]
-    empty = {"rotor": not found.several, "state": not any(row["state"] for row in rows)}
+    empty = {"rotor": not found.runs.several, "state": not any(row["state"] for row in rows)}
     return Table([column for column in columns if not empty.get(column.name, False)])
 
 

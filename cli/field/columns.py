@@ -1,22 +1,17 @@
-"""The corrections of measured rotors as columns, their influence coefficients, and the JSON document."""
+"""The corrections of measured rotors as columns, what they leave, and the residuals of a fit."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.field.runs import Channel, Real, Runs
+from cli.field.runs import Channel, Real
 from cli.field.solve import FieldBalancing
-from cli.field.tolerance import verdicts
 from cli.read.rounding import angle_error, size_error
 from cli.read.units import degrees, from_si
-from cli.show.columns import Column, Table, finite
-
-if TYPE_CHECKING:
-    from cli.show.columns import Document
+from cli.show.columns import Column, Table
 
 
 def corrections(found: FieldBalancing, warnings: list[str]) -> Table:
@@ -95,7 +90,7 @@ def prediction(found: FieldBalancing) -> Table:
     columns = [
         *(
             [Column("rotor", "", [found.runs.rotors[r] for r in rotor[order].tolist()])]
-            if found.several
+            if found.runs.several
             else []
         ),
         *channels(found, [known[k] for k in kind[order].tolist()]),
@@ -126,84 +121,32 @@ def split(found: FieldBalancing) -> Table:
         Column(per, unit, [found.amount(mass) for mass in masses]),
         Column("angle", "deg", list(angles)),
     ]
-    return Table(columns if found.several else columns[1:], keys=("rotor", "plane", "position"))
+    return Table(columns if found.runs.several else columns[1:], keys=("rotor", "plane", "position"))
 
 
-def mass_in(runs: Runs, plane: str, w: complex) -> Document:
-    """A mass in a plane, as the JSON has it."""
-    return {"plane": plane, f"{runs.per}_{runs.per_si}": abs(w), "angle_deg": float(degrees(complex(w)))}
+def residuals(found: FieldBalancing) -> Table:
+    """One row per reading of a fit: what was read, and how far it lies from the fitted vibration."""
+    from cli.field.fit import rows
 
-
-def document(found: FieldBalancing) -> Document:
-    """The JSON document."""
-    documents: list[Document] = []
-    suffix, key = found.runs.per_si, found.runs.per
-    for rotor, (_, solved, i) in zip(found.runs.rotors, found.each(), strict=True):
-        group = solved.group
-        spreads = found.uncertainty(solved)
-        corrections: list[Document] = []
-        for p, plane in enumerate(solved.planes):
-            w = solved.corrections[i, p]
-            entry = mass_in(found.runs, plane, w)
-            entry[f"{key}_uncertainty_{suffix}"] = None if spreads is None else finite(spreads[0][i, p])
-            entry["angle_uncertainty_deg"] = None if spreads is None else finite(spreads[1][i, p])
-            if found.request.places is not None:
-                entry["split"] = [
-                    {"position": name, "angle_deg": angle, f"{key}_{suffix}": part}
-                    for name, angle, part in found.split(w)
-                ]
-            corrections.append(entry)
-        residual = solved.residual[i]
-        size = np.abs(residual)
-        largest = float(size.max())
-        document: Document = {
-            "rotor": rotor,
-            "influence": [
-                channel.key
-                | {"plane": plane, f"magnitude_per_{suffix}": abs(solved.alpha[i, s, p])}
-                | {"phase_deg": float(degrees(solved.alpha[i, s, p]))}
-                for s, channel in enumerate(group.channels)
-                for p, plane in enumerate(solved.planes)
-            ],
-            "condition_number": finite(solved.condition[i]),
-            "corrections": corrections,
-            "residual": [
-                {
-                    **channel.key,
-                    "amplitude": abs(residual[s]),
-                    "phase_deg": None if found.request.four_run else float(degrees(residual[s])),
-                }
-                for s, channel in enumerate(group.channels)
-            ],
-            "residual_rms": largest * float(np.sqrt(np.square(size / largest).mean())) if largest else 0.0,
-            "residual_max": largest,
-            "initial_max": float(np.abs(solved.initial[i]).max()),
-            "objective": found.request.objective,
-        }
-        if solved.bound is not None:
-            document["residual_bound"] = float(solved.bound[i])
-        if solved.residual_95 is not None:
-            document["residual_max_95"] = finite(solved.residual_95[i])
-        if group.repeats:
-            document["repeats"] = {
-                "readings": int(group.counts[group.counts > 1].sum()),
-                "degrees_of_freedom": group.repeats,
-                "reading_sd": float(group.reading_sd[i]),
-            }
-        if solved.fits:
-            document["misfit"] = [
-                {"sensor": channel.sensor, "amplitude": float(misfit)}
-                for channel, misfit in zip(group.channels, solved.fits[i].misfit, strict=True)
-            ]
-            others = [-v / a for v, a in zip(group.initial[i], solved.fits[i].other, strict=True) if a == a]
-            document["alternatives"] = [mass_in(found.runs, solved.planes[0], w) for w in others]
-        if found.request.tolerance is not None:
-            document["tolerance"] = found.request.tolerance.document(verdicts(found, solved, i))
-        documents.append(document)
-    return {
-        "correction": "add",
-        "state": "as it stands" if found.request.from_here else "initial",
-        "convention": found.request.conventions,
-        "rotors": documents,
-        "amplitude_unit": found.runs.amplitude_unit,
-    }
+    unit, runs = found.runs.amplitude_unit, found.runs
+    named = [
+        (runs.rotors[r], row)
+        for solved in found.solved
+        for i, r in enumerate(solved.group.rotors.tolist())
+        for row in rows(solved.group, i)
+    ]
+    names, of_fit = zip(*named, strict=True)
+    read, left = (np.array([getattr(row, name) for row in of_fit]) for name in ("value", "residual"))
+    columns = [
+        Column("rotor", "", names),
+        Column("run", "", [row.run for row in of_fit]),
+        Column("sensor", "", [row.channel.sensor for row in of_fit]),
+        Column("state", "", [row.channel.state or "" for row in of_fit]),
+        Column("amplitude", unit, np.abs(read)),
+        Column("phase", "deg", degrees(read)),
+        Column("residual", unit, np.abs(left)),
+        Column("residual_phase", "deg", degrees(left)),
+        Column("standardized", "", [row.standardized for row in of_fit]),
+        Column("outlier", "", ["yes" if row.outlier else "" for row in of_fit]),
+    ]
+    return Table([c for c in columns if c.name != "state" or any(c.values)])

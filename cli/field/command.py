@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cli.field.fit import LogFits
     from cli.field.solve import FieldBalancing
     from cli.show.columns import Document, Result, Sheet, Table
 
@@ -105,142 +104,76 @@ def run(
     and trial_kept (yes: the trial mass stays on in all later runs). Several trial masses in one run are joined
     by ';'. Phase and mass angle are counted in one common sense. amplitude_um_pp, _pk, _rms tell how it is read.
     """
-    if not ridge < float("inf"):
-        raise options.bad("--ridge", "expected a finite number")
-    if ridge and (objective == "minimax" or max_mass or max_residual is not None):
-        raise options.bad("--ridge", "goes with the least-squares objective without limits")
     four_run = method == "four-run"
+    needs_phase: dict[str, object] = {"influence": influence, "runout": runout}
+    needs_phase |= {"reading_error": reading_error, "phase_lag": phase_lag, "rotation": rotation}
+    limited = objective == "minimax" or max_mass or max_residual is not None
+    options.refuse("expected a finite number", ridge=not ridge < float("inf"))
+    options.refuse("goes with the least-squares objective without limits", ridge=ridge and limited)
     if four_run:
-        needs_phase: dict[str, object] = {
-            "influence": influence,
-            "runout": runout,
-            "reading_error": reading_error,
-        }
-        needs_phase |= {"phase_lag": phase_lag, "rotation": rotation}
         options.refuse("has no meaning with --method four-run, which uses no phase", **needs_phase)
-    if influence and from_here:
-        raise options.bad("--from-here", "has no meaning with --influence: there are no trial masses")
-    if monte_carlo and reading_error is None:
-        raise options.bad("--monte-carlo", "needs --reading-error")
+    no_trials = "has no meaning with --influence: there are no trial masses"
+    options.refuse(no_trials, from_here=from_here and influence)
+    options.refuse("needs --reading-error", monte_carlo=monte_carlo and reading_error is None)
     arm = options.quantity("--radius", radius, "length", positive=True)
     if suggest_trial:
-        if runs is not None:
-            raise options.bad("--suggest-trial", "is for the time before the first run: expected no RUNS")
+        no_runs = "is for the time before the first run: expected no RUNS"
+        options.refuse(no_runs, suggest_trial=runs is not None)
         from cli.field.trial import suggestion
 
         return suggestion(rotor_mass, speed, arm, planes)
     if signal is not None:
-        if runs is not None:
-            raise options.bad("--signal", "reads a recording: expected no RUNS")
+        options.refuse("reads a recording: expected no RUNS", signal=runs is not None)
         from cli.field.signal import signal as recorded
 
         return recorded(signal, pulses)
-    if pulses != 1:
-        raise options.bad("--pulses", "goes with --signal")
+    options.refuse("goes with --signal", pulses=pulses != 1)
     if runs is None:
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
 
     from cli.field import request as asked
-    from cli.field.files import read_runout, read_stored, stored_alpha
-    from cli.field.layouts import alpha_of, is_log
-    from cli.field.read import NotOneInitialRun, read_runs, runs_table
-    from cli.field.runs import more_than_unknowns
+    from cli.field.measured import read_measured
     from cli.field.solve import FieldBalancing
     from cli.read.tolerance import tolerance_of
 
-    error = asked.reading_error(reading_error)
-    tolerance = tolerance_of(grade, speed, rotor_mass, permissible, None)
-    limits = asked.limits(max_mass or [])
-    ceiling = options.with_unit("--max-residual", max_residual, "amplitude", positive=True)
-    # a phase that lags, or a shaft that turns clockwise, turns the sense of the phase against the mass angles
-    against = phase_lag != (rotation == "cw")
-    files = [read_stored(path) for path in influence or ()]
-    of_fit = {"fit": fit, "exclude": exclude, "predict": predict, "suggest": suggest, "robust": robust}
-    if four_run:
-        options.refuse("fits all runs: it does not go with --method four-run", **of_fit)
-    fit = any(of_fit.values()) or len(files) > 1 or any(one.along is not None for one in files)
-    if not four_run and not fit:
-        fit = is_log(runs)
-    if fit and not files and (own := alpha_of(runs)) is not None and not own.trials:
-        files = [stored_alpha(own)]
-    stored = files[0] if files and not fit else None
-    stored_unit = None if stored is None else stored.unit
-    measured = table = None
-    if not fit:
-        table = runs_table(runs)
-        fit = stored is None and not four_run and more_than_unknowns(table)
-    if table is not None and not fit:
-        try:
-            measured = read_runs(table, lagging=against, phaseless=four_run, stored_unit=stored_unit)
-        except NotOneInitialRun:
-            if stored is not None or four_run:
-                raise
-            fit = True
-    lagging = against if phase_lag or rotation is not None else None
-    if measured is None:
-        from cli.field.log import read_log
-        from cli.field.sisters import Sisters
-
-        measured = read_log(
-            runs,
-            table,
-            lagging=lagging,
-            exclude=exclude or [],
-            sisters=Sisters(files) if files else None,
-            reading_error=error,
-        )
-    for one in files:
-        measured.warnings += one.table.warnings
-    if tolerance is not None and measured.per == "mass" and arm is None:
-        raise options.bad(
-            "--radius", "the tolerance is of unbalances: expected the radius of the trial masses"
-        )
-    lags = against or measured.lags
-    still = {sensor: v.conjugate() if lags else v for sensor, v in measured.runout.items()}
     request = asked.Request(
+        reading_error=asked.reading_error(reading_error),
+        tolerance=tolerance_of(grade, speed, rotor_mass, permissible, None),
+        max_mass=asked.limits(max_mass or []),
+        max_residual=options.with_unit("--max-residual", max_residual, "amplitude", positive=True),
         objective=objective,
-        max_mass=asked.limits_in(limits, measured) or measured.max_mass,
-        max_residual=None if ceiling is None else asked.ceiling_in(ceiling, measured),
         from_here=from_here,
-        runout=still if runout is None else read_runout(runout, measured, lagging=lags),
-        reading_error=error,
         monte_carlo=monte_carlo,
         four_run=four_run,
         ridge=ridge,
-        tolerance=tolerance,
         radius=arm,
-        conventions=asked.conventions(method, phase_lag or measured.lags, rotation),
+        phase_lag=phase_lag,
+        rotation=rotation,
         places=options.places(positions, blades, first),
-        against=against or measured.lags,
+        fit=fit,
+        exclude=exclude or (),
+        predict=predict,
+        suggest=suggest,
+        robust=robust,
     )
+    measured, stored = read_measured(runs, request, influence or (), runout)
     with options.processes(workers) as executor:
         found = FieldBalancing(measured, request, stored, executor)
-    fits = None
-    if fit:
-        from cli.field.fit import Asked, LogFits, masses_at
-
-        fits = LogFits(found, Asked(masses_at(predict, measured), suggest, robust))
-    return _result(found, fits, save_influence)
+    return _result(found, save_influence)
 
 
-def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | None) -> Result:
+def _result(found: FieldBalancing, save_influence: Path | None) -> Result:
     from cli.field import columns, remarks, words
     from cli.show.columns import Result
 
-    warnings = remarks.warnings(found)
-    if fits is not None:
-        from cli.field import fit, fit_columns, fit_words
+    warnings, fitted = remarks.warnings(found), found.runs.fitted
+    if fitted:
+        from cli.field import fit, fit_words
 
+        fit.check(found)
         warnings += fit.remarks(found)
 
-    def document() -> Document:
-        whole = columns.document(found)
-        return whole if fits is None else fit_columns.document(fits, whole)
-
-    def residuals() -> Table:
-        assert fits is not None
-        return fit_columns.residuals(fits)
-
+    # what is not always asked for is loaded where it is
     def influence() -> Table:
         from cli.field.coefficient_columns import coefficients
 
@@ -249,31 +182,36 @@ def _result(found: FieldBalancing, fits: LogFits | None, save_influence: Path | 
     def sheets() -> Iterator[Sheet]:
         from cli.field.report import sheets
 
-        return sheets(found, fits)
+        return sheets(found)
 
     def stored() -> bytes:
         from cli.show.text import csv_text
 
         return csv_text(influence().cells).encode()
 
+    def document() -> Document:
+        from cli.field.document import document
+
+        return document(found)
+
     def figure() -> Figure:
-        from cli.field import fit_picture, picture
+        from cli.field.picture import draw
 
-        few = range(min(len(found.runs.rotors), 3))
-        return picture.draw(found, few) if fits is None else fit_picture.draw(fits, few)
+        return draw(found, range(min(len(found.runs.rotors), 3)))
 
+    companions = {"prediction": lambda: columns.prediction(found)}
+    if found.request.places is not None:
+        companions["split"] = lambda: columns.split(found)
+    tables = {"corrections": lambda: columns.corrections(found, warnings), "influence": influence}
+    tables |= companions
+    if fitted:
+        tables["residuals"] = lambda: columns.residuals(found)
     return Result(
         document=document,
-        tables={
-            "corrections": lambda: columns.corrections(found, warnings),
-            "influence": influence,
-            "prediction": lambda: columns.prediction(found),
-            **({} if found.request.places is None else {"split": lambda: columns.split(found)}),
-            **({} if fits is None else {"residuals": residuals}),
-        },
-        companions=["prediction"] if found.request.places is None else ["prediction", "split"],
-        notes=lambda: (fit_words.notes(fits) if fits is not None else "") + words.notes(found),
-        afterword=lambda: words.afterword(found) + (fit_words.afterword(fits) if fits is not None else ""),
+        tables=tables,
+        companions=list(companions),
+        notes=lambda: (fit_words.notes(found) if fitted else "") + words.notes(found),
+        afterword=lambda: words.afterword(found) + (fit_words.afterword(found) if fitted else ""),
         figure=figure,
         method=words.METHOD,
         sheets=sheets,

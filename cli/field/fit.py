@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
+from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,116 +15,100 @@ from balancing import (
     NextRun,
     drift,
     least_squares,
-    outlier_probability,
     repeats,
     robust_fit,
     suggest_run,
 )
 from balancing.doubt import LEVEL
-from cli.field.runs import Channel, Complex, Group, Real, Runs
-from cli.field.solve import SHOWN, FieldBalancing, Solved
-from cli.read import options
-from cli.read.units import degrees, parse_number, parse_quantity, phasor, to_si
+from cli.field.runs import SHOWN, Channel, Complex, Group, Real
+from cli.field.solve import FieldBalancing, Solved
+from cli.read.options import bad
+from cli.read.units import degrees
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What the options ask of the fit."""
+class Row(NamedTuple):
+    """A reading, fitted."""
 
-    predict: dict[str, complex] | None = None
-    """Plane -> mass, SI; the key "" is the only plane."""
-    suggest: bool = False
-    robust: bool = False
+    run: str
+    channel: Channel
+    value: complex
+    residual: complex
+    standardized: float
+    chance: float
+    """How often by chance a residual is as large."""
+
+    @property
+    def outlier(self) -> bool:
+        """Whether it does not go with the others."""
+        return self.chance < LEVEL
 
 
-def masses_at(text: str | None, runs: Runs) -> dict[str, complex] | None:
-    """Read `10kg@-90deg`, or `A=10kg@-90deg,B=5kg@20deg`; a bare angle is in degrees."""
-    if text is None:
+def rows(group: Group, i: int) -> Iterator[Row]:
+    """Yield the readings of a rotor."""
+    fit, log = group.fit, group.logs[i]
+    assert fit is not None
+    for j, s in np.argwhere(fit.present[i]).tolist():
+        each = (fit.readings, fit.residuals, fit.standardized, group.chance)
+        yield Row(log.rows[j][0], group.channels[s], *(of[i, j, s].item() for of in each))
+
+
+def check(found: FieldBalancing) -> None:
+    """Refuse a prediction for planes that there are not, and a next run without limits."""
+    for solved in found.solved:
+        run_to_predict(found, solved.planes)
+    if found.request.suggest and not found.max_mass:
+        raise bad("--suggest", "needs --max-mass, the largest mass of the next run")
+
+
+def run_to_predict(found: FieldBalancing, planes: list[str]) -> Complex:
+    """Return the masses of the run to be predicted, (p,)."""
+    given = dict(found.predict or {})
+    if "" in given and len(planes) == 1 and planes[0] not in given:
+        given[planes[0]] = given.pop("")
+    for name in given:
+        if name not in planes:
+            said = f"no plane {name}" if name else "several planes"
+            raise bad("--predict", f"{said}: expected PLANE=MASS@ANGLE with one of {', '.join(planes)}")
+    return np.array([given.get(plane, 0) for plane in planes], dtype=complex)
+
+
+def predicted(found: FieldBalancing, solved: Solved) -> tuple[Complex, Real]:
+    """What every channel should read in the run to be predicted, and one standard deviation, (g, s) each."""
+    assert solved.balance is not None
+    on = np.broadcast_to(run_to_predict(found, solved.planes), solved.corrections.shape)
+    value = solved.balance.fit.fitted(on[:, None])[:, 0]
+    return value, solved.balance.vibration_deviation(on, reading=True)
+
+
+def suggested(solved: Solved, i: int) -> NextRun | None:
+    """The next run of a rotor; None where nothing tells how sure its corrections are."""
+    assert solved.balance is not None
+    if solved.limit is None or not np.isfinite(solved.limit).all():
+        raise bad("--suggest", f"needs a --max-mass for every plane: {', '.join(solved.planes)}")
+    one = solved.balance.machine(i)
+    if not np.isfinite(one.covariance).all():
         return None
-    out: dict[str, complex] = {}
-    for part in text.split(","):
-        plane, _, value = part.strip().rpartition("=")
-        size, mark, turn = value.partition("@")
-        try:
-            if not mark:
-                raise ValueError(f"'{part}': expected MASS@ANGLE, such as 10kg@-90deg")
-            number, unit = parse_quantity(size, runs.per)
-            if number < 0:
-                raise ValueError(f"'{part}': expected a mass that is not negative")
-            try:
-                angle, of_angle = parse_number(turn), "deg"
-            except ValueError:
-                angle, of_angle = parse_quantity(turn.replace("°", "deg"), "angle")
-        except ValueError as error:
-            raise options.bad("--predict", error) from None
-        if plane.strip() in out:
-            raise options.bad("--predict", f"'{part}': this plane is given twice")
-        on = np.array([float(to_si(number, runs.per, unit))])
-        out[plane.strip()] = complex(phasor(on, np.array([angle]), of_angle)[0])
-    return out
+    free = least_squares(one.fit.influence, one.fit.initial, one.weights).corrections
+    return suggest_run(LogBalance(one.fit, free, one.errors, one.weights), solved.limit)
 
 
-class LogFits:
-    """The fits of a log, group by group, and what is asked of them."""
-
-    def __init__(self, found: FieldBalancing, asked: Asked) -> None:
-        self.found, self.asked = found, asked
-        for solved in found.solved:
-            if asked.predict is not None:
-                self.masses(solved.planes)
-        if asked.suggest and not found.request.max_mass:
-            raise options.bad("--suggest", "needs --max-mass, the largest mass of the next run")
-
-    def masses(self, planes: list[str]) -> Complex:
-        """Return the masses to predict for, (p,)."""
-        given = dict(self.asked.predict or {})
-        if "" in given and len(planes) == 1 and planes[0] not in given:
-            given[planes[0]] = given.pop("")
-        for name in given:
-            if name not in planes:
-                said = f"no plane {name}" if name else "several planes"
-                raise options.bad(
-                    "--predict", f"{said}: expected PLANE=MASS@ANGLE with one of {', '.join(planes)}"
-                )
-        return np.array([given.get(plane, 0) for plane in planes], dtype=complex)
-
-    def predicted(self, solved: Solved) -> tuple[Complex, Real]:
-        """What every channel should read with these masses on, and one standard deviation, (g, s) each."""
-        assert solved.balance is not None
-        on = np.broadcast_to(self.masses(solved.planes), solved.corrections.shape)
-        value = solved.balance.fit.fitted(on[:, None])[:, 0]
-        return value, solved.balance.vibration_deviation(on, reading=True)
-
-    def suggested(self, solved: Solved, i: int) -> NextRun | None:
-        """The next run of a rotor; None where nothing tells how sure its corrections are."""
-        assert solved.balance is not None
-        limit = self.found.limits(solved.planes)
-        if limit is None or not np.isfinite(limit).all():
-            raise options.bad("--suggest", f"needs a --max-mass for every plane: {', '.join(solved.planes)}")
-        one = solved.balance.machine(i)
-        if not np.isfinite(one.covariance).all():
-            return None
-        free = least_squares(one.fit.influence, one.fit.initial, one.weights).corrections
-        return suggest_run(LogBalance(one.fit, free, one.errors, one.weights), limit)
-
-    def robust(self, solved: Solved) -> tuple[JointFit, Complex]:
-        """The robust fits of a group, and their corrections by least squares, (g, p), from where the others start."""
-        assert solved.balance is not None
-        assert solved.group.fit is not None
-        fit, before, readings = solved.balance.fit, solved.group.before, solved.group.fit.readings
-        if before is None:
-            fit = robust_fit(fit)
-        else:
-            # where the runs leave nothing over, the readings scatter as those of the sisters did
-            known = 0.0 if before.reading is None else before.reading[0]
-            deviation = np.where(fit.degrees_of_freedom > 0, np.nan, known)[:, None, None]
-            if (error := self.found.request.reading_error) is not None:
-                deviation = float(np.hypot(*error)) * np.abs(np.where(fit.present, readings, 0.0))
-            fit = robust_fit(fit, before.prior, deviation)
-        here = fit.initial + np.matvec(fit.influence, solved.standing)
-        return fit, least_squares(
-            fit.influence, here, solved.group.weights, ridge=self.found.request.ridge
-        ).corrections
+def robust(found: FieldBalancing, solved: Solved) -> tuple[JointFit, Complex]:
+    """The robust fits of a group, and their corrections by least squares, (g, p), from where the others start."""
+    assert solved.balance is not None
+    assert solved.group.fit is not None
+    fit, before, readings = solved.balance.fit, solved.group.before, solved.group.fit.readings
+    if before is None:
+        fit = robust_fit(fit)
+    else:
+        # where the runs leave nothing over, the readings scatter as those of the sisters did
+        known = 0.0 if before.reading is None else before.reading[0]
+        deviation = np.where(fit.degrees_of_freedom > 0, np.nan, known)[:, None, None]
+        if (error := found.request.reading_error) is not None:
+            deviation = float(np.hypot(*error)) * np.abs(np.where(fit.present, readings, 0.0))
+        fit = robust_fit(fit, before.prior, deviation)
+    here = fit.initial + np.matvec(fit.influence, solved.standing)
+    ridge = found.request.ridge
+    return fit, least_squares(fit.influence, here, solved.group.weights, ridge=ridge).corrections
 
 
 def drifts(group: Group) -> Drift | None:
@@ -133,40 +117,6 @@ def drifts(group: Group) -> Drift | None:
     if not group.logs or group.logs[0].years is None:
         return None
     return drift(group.fit, np.array([log.years for log in group.logs]))
-
-
-def outliers(group: Group) -> Real:
-    """By chance how often, (g, r, s)."""
-    assert group.fit is not None
-    return outlier_probability(group.fit)
-
-
-@dataclass(frozen=True)
-class Doubtful:
-    """A reading that does not go with the others."""
-
-    rotor: int
-    """Its place in the group."""
-    run: str
-    channel: Channel
-    apart: float
-    standardized: float
-    probability: float
-
-
-def doubtful(group: Group) -> Iterator[Doubtful]:
-    """Yield the outliers of a group."""
-    assert group.fit is not None
-    chance = outliers(group)
-    for i, j, s in np.argwhere(chance < LEVEL).tolist():
-        yield Doubtful(
-            i,
-            group.logs[i].rows[j][0],
-            group.channels[s],
-            float(abs(group.fit.residuals[i, j, s])),
-            float(group.fit.standardized[i, j, s]),
-            float(chance[i, j, s]),
-        )
 
 
 def remarks(found: FieldBalancing) -> Iterator[str]:
@@ -183,15 +133,16 @@ def remarks(found: FieldBalancing) -> Iterator[str]:
                 f"{found.of(group, int(bare[0]))}as many readings as unknowns: nothing is left over to show their scatter; expected "
                 "a further run, or --reading-error, for uncertainties"
             )
-        for k, one in enumerate(doubtful(group)):
-            if k == SHOWN:
-                yield "… and further outliers: they are marked in --json"
-                break
+        with_outliers = np.flatnonzero((group.chance < LEVEL).any(axis=(1, 2))).tolist()
+        outliers = ((i, row) for i in with_outliers for row in rows(group, i) if row.outlier)
+        for i, one in islice(outliers, SHOWN):
             yield (
-                f"{found.of(group, one.rotor)}run {one.run}, sensor {one.channel}: the reading lies {one.apart:.4g} {unit} from the "
-                f"fitted one (standardised {one.standardized:.3g}; by chance in {one.probability:.2g} of logs): an outlier; it "
+                f"{found.of(group, i)}run {one.run}, sensor {one.channel}: the reading lies {abs(one.residual):.4g} {unit} from the "
+                f"fitted one (standardised {one.standardized:.3g}; by chance in {one.chance:.2g} of logs): an outlier; it "
                 f"takes part, --exclude {one.run} leaves the run out"
             )
+        if next(outliers, None) is not None:
+            yield "… and further outliers: they are marked in --json"
         for i in range(min(len(group.logs), SHOWN)):
             yield from _repeats(found, solved, i)
         yield from _drifts(found, group)
@@ -256,46 +207,3 @@ def _more_scatter(found: FieldBalancing, solved: Solved) -> Iterator[str]:
             f"{found.of(solved.group, i)}the residuals scatter by {fit.residual_sd[i]:.4g} {found.runs.amplitude_unit} (standard "
             f"deviation), more than --reading-error says ({np.sqrt(mean[i]):.4g}): uncertainties are too small"
         )
-
-
-def polar(value: complex) -> dict[str, float | None]:
-    """Return amplitude and phase as the JSON has them."""
-    return {"amplitude": abs(value), "phase_deg": float(degrees(complex(value)))}
-
-
-@dataclass(frozen=True)
-class Row:
-    """A reading, fitted."""
-
-    run: str
-    channel: Channel
-    value: complex
-    residual: complex
-    standardized: float
-    outlier: bool
-
-
-class Fitted:
-    """The readings of a group's rotors beside their fit."""
-
-    def __init__(self, group: Group) -> None:
-        assert group.fit is not None
-        self.group, self.fit = group, group.fit
-
-    @cached_property
-    def chance(self) -> Real:
-        """By chance how often a residual is as large, (g, r, s)."""
-        return outliers(self.group)
-
-    def rows(self, i: int) -> Iterator[Row]:
-        """Yield the readings of a rotor."""
-        fit = self.fit
-        for j, s in np.argwhere(fit.present[i]).tolist():
-            yield Row(
-                self.group.logs[i].rows[j][0],
-                self.group.channels[s],
-                complex(fit.readings[i, j, s]),
-                complex(fit.residuals[i, j, s]),
-                float(fit.standardized[i, j, s]),
-                bool(self.chance[i, j, s] < LEVEL),
-            )

@@ -9,9 +9,9 @@ import numpy as np
 
 from balancing import region_factor
 from balancing.doubt import LEVEL
-from cli.field.fit import Fitted, LogFits
+from cli.field.fit import predicted, rows, run_to_predict, suggested
 from cli.field.runs import Complex, Real
-from cli.field.solve import Solved
+from cli.field.solve import FieldBalancing, Solved
 from cli.field.words import amplitude_unit
 from cli.show.picture import blank
 from dalembert.drawing.labels import Label, place
@@ -31,52 +31,52 @@ MARKS = "os^Dvp*XPhd<>8"
 BEFORE, AFTER, READ, FITTED, NEXT = "0.45", "tab:red", "tab:blue", "tab:orange", "tab:green"
 
 
-def draw(fits: LogFits, rotors: Sequence[int]) -> Figure:
+def draw(found: FieldBalancing, rotors: Sequence[int]) -> Figure:
     """Draw the history of each rotor, its corrections with their 95 % regions, and its residuals."""
     blocks = []
     for rotor in rotors:
-        k, i = fits.found.place[rotor]
-        blocks.append((rotor, fits.found.solved[k], i))
-    rows = [-(-(min(len(solved.group.channels), CIRCLES) + 3) // ACROSS) for _, solved, _ in blocks]
+        k, i = found.place[rotor]
+        blocks.append((rotor, found.solved[k], i))
+    heights = [-(-(min(len(solved.group.channels), CIRCLES) + 3) // ACROSS) for _, solved, _ in blocks]
     figure = blank()
-    sheet(11.4, 3.9 * sum(rows) + 0.5, figure)
-    parts = figure.subfigures(len(blocks), 1, height_ratios=rows, squeeze=False)[:, 0]
+    sheet(11.4, 3.9 * sum(heights) + 0.5, figure)
+    parts = figure.subfigures(len(blocks), 1, height_ratios=heights, squeeze=False)[:, 0]
     labels = []
-    for part, count, (rotor, solved, i) in zip(parts, rows, blocks, strict=True):
-        if fits.found.several:
-            part.suptitle(f"rotor {fits.found.runs.rotors[rotor]}")
-        labels += _block(part, count, fits, solved, i)
+    for part, count, (rotor, solved, i) in zip(parts, heights, blocks, strict=True):
+        if found.runs.several:
+            part.suptitle(f"rotor {found.runs.rotors[rotor]}")
+        labels += _block(part, count, found, solved, i)
     figure.get_layout_engine().set(rect=(0, 0, 1, 0.985), h_pad=0.07, w_pad=0.06)  # type: ignore[union-attr, call-arg]
-    figure.legend(handles=_handles(fits), loc="outside lower center", ncols=4, fontsize=9, frameon=False)
+    figure.legend(handles=_handles(found), loc="outside lower center", ncols=4, fontsize=9, frameon=False)
     place(labels)
     return figure
 
 
 def _block(
-    part: SubFigure, rows: int, fits: LogFits, solved: Solved, i: int
+    part: SubFigure, height: int, found: FieldBalancing, solved: Solved, i: int
 ) -> list[tuple[Axes, list[Label]]]:
-    grid = part.add_gridspec(rows, ACROSS)
-    cells = [grid[k // ACROSS, k % ACROSS] for k in range(rows * ACROSS)]
+    grid = part.add_gridspec(height, ACROSS)
+    cells = [grid[k // ACROSS, k % ACROSS] for k in range(height * ACROSS)]
     shown = min(len(solved.group.channels), CIRCLES)
-    fitted = list(Fitted(solved.group).rows(i))
+    fitted = list(rows(solved.group, i))
     labels: list[tuple[Axes, list[Label]]] = []
     for s, channel in enumerate(solved.group.channels[:shown]):
         axes: PolarAxes = part.add_subplot(cells[s], projection="polar")  # type: ignore[assignment]
-        labels.append((axes, _circle(axes, fits, solved, i, s)))
+        labels.append((axes, _circle(axes, found, solved, i, s)))
         for row in fitted:
             if row.channel == channel and row.outlier:
                 at = [np.angle(row.value)], [abs(row.value)]
                 axes.plot(*at, "o", mfc="none", mec=AFTER, ms=9, mew=1.2)
-        axes.set_title(f"sensor {channel}, {amplitude_unit(fits.found)}", pad=12, fontsize=10)
+        axes.set_title(f"sensor {channel}, {amplitude_unit(found)}", pad=12, fontsize=10)
     dial: PolarAxes = part.add_subplot(cells[shown], projection="polar")  # type: ignore[assignment]
-    labels.append((dial, _corrections(dial, fits, solved, i)))
-    _regions(part.add_subplot(cells[shown + 1]), fits, solved, i)
+    labels.append((dial, _corrections(dial, found, solved, i)))
+    _regions(part.add_subplot(cells[shown + 1]), found, solved, i)
     last = shown + 2
-    _residuals(part.add_subplot(grid[last // ACROSS, last % ACROSS :]), fits, solved, i, shown)
+    _residuals(part.add_subplot(grid[last // ACROSS, last % ACROSS :]), found, solved, i, shown)
     return labels
 
 
-def _circle(axes: PolarAxes, fits: LogFits, solved: Solved, i: int, s: int) -> list[Label]:
+def _circle(axes: PolarAxes, found: FieldBalancing, solved: Solved, i: int, s: int) -> list[Label]:
     """Draw the runs of one sensor and state, what was fitted to them, and what is to be expected."""
     assert solved.balance is not None
     balance = solved.balance
@@ -86,9 +86,9 @@ def _circle(axes: PolarAxes, fits: LogFits, solved: Solved, i: int, s: int) -> l
     fitted = read - fit.residuals[i, here, s]
     before, after = complex(solved.initial[i, s]), complex(solved.residual[i, s])
     regions = [(after, balance.vibration_spread(solved.total), AFTER)]
-    if fits.asked.predict is not None:
-        value, _ = fits.predicted(solved)
-        on = np.broadcast_to(fits.masses(solved.planes), solved.corrections.shape)
+    if found.predict is not None:
+        value, _ = predicted(found, solved)
+        on = np.broadcast_to(run_to_predict(found, solved.planes), solved.corrections.shape)
         regions.append((complex(value[i, s]), balance.vibration_spread(on, reading=True), NEXT))
     outlines = [
         _ellipse(value, spread.covariance[i, s], float(region_factor(0.95, spread.degrees_of_freedom[i, s])))
@@ -107,7 +107,7 @@ def _circle(axes: PolarAxes, fits: LogFits, solved: Solved, i: int, s: int) -> l
         axes.plot(np.angle([w, v]), np.abs([w, v]), "-", color=FITTED, lw=1.1)
     axes.plot(np.angle(fitted), np.abs(fitted), "o", mfc="none", mec=FITTED, ms=4.5, mew=1.0)
     axes.plot(np.angle(read), np.abs(read), "o", color=READ, ms=3.5)
-    if fits.asked.predict is not None:
+    if found.predict is not None:
         axes.plot([np.angle(regions[1][0])], [abs(regions[1][0])], "D", color=NEXT, ms=5)
     axes.set_rlim(0, 1.15 * scale)
     axes.set_rlabel_position(free_direction([*read, before, after]))
@@ -143,12 +143,11 @@ def _ellipse(center: complex, covariance: Real, k: float) -> Complex:
     return np.asarray(center + unit * (along + 1j * across))
 
 
-def _corrections(axes: PolarAxes, fits: LogFits, solved: Solved, i: int) -> list[Label]:
+def _corrections(axes: PolarAxes, found: FieldBalancing, solved: Solved, i: int) -> list[Label]:
     """Draw the corrections and their 95 % regions; where one is asked for, the next run's masses."""
-    found = fits.found
     masses = found.amount(solved.corrections[i])
     outlines = [
-        _ellipse(complex(w), *region) for w, region in zip(masses, _spread(fits, solved, i), strict=False)
+        _ellipse(complex(w), *region) for w, region in zip(masses, _spread(found, solved, i), strict=False)
     ]
     size = float(np.abs(masses).max()) or 1.0
     scale = min(float(np.abs(np.concatenate([masses, *outlines])).max()) or 1.0, 2.5 * size)
@@ -157,7 +156,7 @@ def _corrections(axes: PolarAxes, fits: LogFits, solved: Solved, i: int) -> list
         axes.plot(np.angle(outline), np.abs(outline), color=AFTER, lw=0.8)
     for w in masses:
         arrow(axes, w, scale, Look(AFTER, 2.2))
-    run = fits.suggested(solved, i) if fits.asked.suggest else None
+    run = suggested(solved, i) if found.request.suggest else None
     if run is not None:
         at = found.amount(run.masses)
         scale = max(scale, float(np.abs(at).max()))
@@ -173,20 +172,20 @@ def _corrections(axes: PolarAxes, fits: LogFits, solved: Solved, i: int) -> list
     ]
 
 
-def _spread(fits: LogFits, solved: Solved, i: int) -> list[tuple[Real, float]]:
+def _spread(found: FieldBalancing, solved: Solved, i: int) -> list[tuple[Real, float]]:
     """Return for each plane the covariance of the correction, in its unit, and the factor of its 95 % region."""
     if solved.covariance is None or solved.balance is None:
         return []
     factors = region_factor(0.95, solved.balance.degrees_of_freedom[i])
-    unit = fits.found.amount(1.0) ** 2
+    unit = found.amount(1.0) ** 2
     return [
         (covariance * unit, float(k)) for covariance, k in zip(solved.covariance[i], factors, strict=True)
     ]
 
 
-def _regions(axes: Axes, fits: LogFits, solved: Solved, i: int) -> None:
+def _regions(axes: Axes, found: FieldBalancing, solved: Solved, i: int) -> None:
     """Draw the 95 % regions of the corrections enlarged, each about its own correction."""
-    known = _spread(fits, solved, i)
+    known = _spread(found, solved, i)
     for k, (plane, region) in enumerate(zip(solved.planes, known, strict=False)):
         outline = _ellipse(0j, *region)
         color = AFTER if len(solved.planes) == 1 else f"C{k}"
@@ -196,8 +195,8 @@ def _regions(axes: Axes, fits: LogFits, solved: Solved, i: int) -> None:
         axes.legend(fontsize=7.5, frameon=False, loc="upper left", title="plane", title_fontsize=8)
     axes.plot([0], [0], "+", color="0.2", ms=8)
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(f"along the correction, {fits.found.unit}", fontsize=9)
-    axes.set_ylabel(f"across, {fits.found.unit}", fontsize=9)
+    axes.set_xlabel(f"along the correction, {found.unit}", fontsize=9)
+    axes.set_ylabel(f"across, {found.unit}", fontsize=9)
     axes.tick_params(labelsize=8, colors="0.3")
     plain(axes)
     told = bool(known) and bool(np.isfinite([np.sum(covariance) * k for covariance, k in known]).all())
@@ -207,20 +206,20 @@ def _regions(axes: Axes, fits: LogFits, solved: Solved, i: int) -> None:
     axes.set_title(title, pad=8, fontsize=10)
 
 
-def _residuals(axes: Axes, fits: LogFits, solved: Solved, i: int, shown: int) -> None:
+def _residuals(axes: Axes, found: FieldBalancing, solved: Solved, i: int, shown: int) -> None:
     """Draw the standardised residuals, run by run, and from where on one is an outlier."""
     group = solved.group
-    rows = list(Fitted(group).rows(i))
+    read = list(rows(group, i))
     runs = group.logs[i].runs
     place = {run: k for k, run in enumerate(runs)}
     for s, channel in enumerate(group.channels):
-        mine = [row for row in rows if row.channel == channel]
+        mine = [row for row in read if row.channel == channel]
         style = MARKS[s % len(MARKS)] if s < shown else "."
         at = [place[row.run] + 0.5 * ((s + 1) / (len(group.channels) + 1) - 0.5) for row in mine]
         axes.plot(at, [row.standardized for row in mine], style, ms=4.5, label=str(channel))
     assert group.fit is not None
     nu = int(group.fit.degrees_of_freedom[i])
-    told = int(np.isfinite([row.standardized for row in rows]).sum())
+    told = int(np.isfinite([row.standardized for row in read]).sum())
     if nu >= 2 and told:
         limit = float(np.sqrt(nu * (1 - (LEVEL / told) ** (1 / (nu - 1)))))
         axes.axhline(limit, color=AFTER, lw=1.0, ls="--")
@@ -234,7 +233,7 @@ def _residuals(axes: Axes, fits: LogFits, solved: Solved, i: int, shown: int) ->
             fontsize=8,
             color=AFTER,
         )
-        axes.set_ylim(0, 1.25 * max(limit, *(row.standardized for row in rows if row.standardized < np.inf)))
+        axes.set_ylim(0, 1.25 * max(limit, *(row.standardized for row in read if row.standardized < np.inf)))
     else:
         axes.set_ylim(0, None)
     few = range(0, len(runs), 1 + len(runs) // 16)
@@ -255,7 +254,7 @@ def _quiet(axes: PolarAxes) -> None:
     axes.grid(color="0.87")
 
 
-def _handles(fits: LogFits) -> list[Line2D]:
+def _handles(found: FieldBalancing) -> list[Line2D]:
     from matplotlib.lines import Line2D
 
     handles = [
@@ -264,15 +263,15 @@ def _handles(fits: LogFits) -> list[Line2D]:
         Line2D([], [], color=BEFORE, lw=1.3, ls="--", label="fitted without masses"),
         Line2D([], [], color=AFTER, lw=1.8, label="with the corrections; with its 95 % region"),
     ]
-    if any((Fitted(solved.group).chance < LEVEL).any() for solved in fits.found.solved):
+    if any((solved.group.chance < LEVEL).any() for solved in found.solved):
         handles.append(Line2D([], [], color=AFTER, marker="o", mfc="none", ls="", ms=8, label="outlier"))
-    if fits.asked.predict is not None:
+    if found.predict is not None:
         handles.append(
             Line2D(
                 [], [], color=NEXT, marker="D", ls="", ms=5, label="predicted run, 95 % region of a reading"
             )
         )
-    if fits.asked.suggest:
+    if found.request.suggest:
         handles.append(
             Line2D([], [], color="tab:purple", marker="s", ls="", ms=6, label="masses of the next run")
         )

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from balancing.doubt import LEVEL
-from cli.field.fit import Fitted, LogFits, drifts
-from cli.field.solve import Solved
-from cli.field.words import FEW, amplitude_unit
+from cli.field.fit import drifts, predicted, robust, rows, run_to_predict, suggested
+from cli.field.runs import Complex
+from cli.field.solve import FieldBalancing, Solved
+from cli.field.words import FEW, amplitude_unit, masses_said
 from cli.read.units import degrees
-from cli.show.text import angle_text, table_text
+from cli.show.text import angle_text, table_text, transposed
 
 if TYPE_CHECKING:
     from cli.show.columns import Cell
@@ -19,28 +20,32 @@ if TYPE_CHECKING:
     Columns = dict[str, list[Cell]]
 
 
-def history(fits: LogFits, solved: Solved, i: int) -> Columns:
+def history(found: FieldBalancing, solved: Solved, i: int) -> Columns:
     """The readings of a rotor, a row each, beside how far they lie from the fitted vibration."""
-    unit = amplitude_unit(fits.found)
-    rows = list(Fitted(solved.group).rows(i))
-    return {
-        "run": [row.run for row in rows],
-        "sensor": [str(row.channel) for row in rows],
-        f"read {unit}": [abs(row.value) for row in rows],
-        "phase°": [round(float(degrees(row.value)), 2) for row in rows],
-        f"off {unit}": [abs(row.residual) for row in rows],
-        "standardised": [row.standardized if np.isfinite(row.standardized) else "" for row in rows],
-        "": ["outlier" if row.outlier else "" for row in rows],
-    }
+    unit = amplitude_unit(found)
+    return transposed(
+        [
+            {
+                "run": row.run,
+                "sensor": str(row.channel),
+                f"read {unit}": abs(row.value),
+                "phase°": round(degrees(row.value), 2),
+                f"off {unit}": abs(row.residual),
+                "standardised": row.standardized if np.isfinite(row.standardized) else "",
+                "": "outlier" if row.outlier else "",
+            }
+            for row in rows(solved.group, i)
+        ]
+    )
 
 
-def summary(fits: LogFits, solved: Solved, i: int) -> str:
+def summary(found: FieldBalancing, solved: Solved, i: int) -> str:
     """How many runs and readings were fitted, and how well."""
     fit, log = solved.group.fit, solved.group.logs[i]
     assert fit is not None
     nu = int(fit.degrees_of_freedom[i])
     spread = (
-        f"they lie {fit.residual_sd[i]:.4g} {amplitude_unit(fits.found)} from it (standard deviation of a reading as a vector)"
+        f"they lie {fit.residual_sd[i]:.4g} {amplitude_unit(found)} from it (standard deviation of a reading as a vector)"
         if nu
         else "nothing is left over to show their scatter"
     )
@@ -64,57 +69,47 @@ def summary(fits: LogFits, solved: Solved, i: int) -> str:
     )
 
 
-def notes(fits: LogFits) -> str:
+def notes(found: FieldBalancing) -> str:
     """Above the terminal's table."""
-    parts = []
-    for rotor, solved, i in fits.found.each(FEW):
-        name = f"rotor {rotor}: " if fits.found.several else ""
-        parts.append(f"{name}{summary(fits, solved, i)}\n{table_text(history(fits, solved, i))}")
+    parts = (
+        f"{found.of(solved.group, i)}{summary(found, solved, i)}\n{table_text(history(found, solved, i))}"
+        for _, solved, i in found.each(FEW)
+    )
     return "\n".join(parts) + "\n"
 
 
-def afterword(fits: LogFits) -> str:
+def afterword(found: FieldBalancing) -> str:
     """Below the terminal's table: what the next run should read, which run to make."""
-    found, lines = fits.found, []
-    for rotor, solved, i in found.each(FEW):
-        name = f"rotor {rotor}: " if found.several else ""
-        lines += [f"{name}{line}" for line in expected(fits, solved, i)]
-    return "\n" + "\n".join(lines)
+    return "\n" + "\n".join(
+        f"{found.of(solved.group, i)}{line}"
+        for _, solved, i in found.each(FEW)
+        for line in expected(found, solved, i)
+    )
 
 
-def expected(fits: LogFits, solved: Solved, i: int) -> list[str]:
+def expected(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
     """What the next run should read, which run would tell most, and what a robust fit says."""
-    found, lines = fits.found, []
-    unit = amplitude_unit(found)
-    if fits.asked.predict is not None:
-        value, sd = (part[i] for part in fits.predicted(solved))
-        lines.append(f"a run with {_masses(fits, solved, fits.masses(solved.planes))} should read")
+    lines, asked, planes, unit = [], found.request, solved.planes, amplitude_unit(found)
+
+    def said(masses: Complex) -> str:
+        return ", ".join(masses_said(found, planes, masses, ".2f"))
+
+    if found.predict is not None:
+        value, sd = (part[i] for part in predicted(found, solved))
+        lines.append(f"a run with {said(run_to_predict(found, planes))} should read")
         lines += [
-            f"  at sensor {channel}: {abs(v):.4g}{_plus_minus(u)} {unit} at {angle_text(degrees(v), '.2f')}°"
+            f"  at sensor {channel}: {abs(v):.4g}{f' ± {u:.2g}' * bool(np.isfinite(u))} {unit} at {angle_text(degrees(v), '.2f')}°"
             for channel, v, u in zip(solved.group.channels, value, sd, strict=True)
         ]
-    if fits.asked.suggest:
-        run = fits.suggested(solved, i)
+    if asked.suggest:
+        run = suggested(solved, i)
         if run is None:
             lines.append("no run is suggested: nothing tells how sure the corrections are")
         else:
             lines.append(
-                f"the next run that tells most (A-optimal): {_masses(fits, solved, run.masses)}; the corrections' uncertainty falls "
+                f"the next run that tells most (A-optimal): {said(run.masses)}; the corrections' uncertainty falls "
                 f"from {found.amount(run.before):.4g} to {found.amount(run.after):.4g} {found.unit}"
             )
-    if fits.asked.robust:
-        lines.append(f"a robust fit (Huber) corrects with {_masses(fits, solved, fits.robust(solved)[1][i])}")
+    if asked.robust:
+        lines.append(f"a robust fit (Huber) corrects with {said(robust(found, solved)[1][i])}")
     return lines
-
-
-def _plus_minus(sd: float) -> str:
-    return f" ± {sd:.2g}" if np.isfinite(sd) else ""
-
-
-def _masses(
-    fits: LogFits, solved: Solved, masses: np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
-) -> str:
-    return ", ".join(
-        f"{fits.found.amount(abs(w)):.6g} {fits.found.unit} at {angle_text(degrees(complex(w)), '.2f')}° in {plane}"
-        for plane, w in zip(solved.planes, masses, strict=True)
-    )

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from cli.errors import DataError
+from cli.field.read import runs_table
 from cli.read.decoding import LINE
 from cli.read.sources import Source, open_source
-from cli.read.tables import Cells, Numbers, Table, read
+from cli.read.tables import Cells, Numbers, Table
 from cli.read.units import parse_number, phasor
 
 NAMES = {
@@ -117,14 +118,8 @@ def log_table(path: str) -> Layout:
     text = _keyed_text(source)
     if text is not None:
         return _vectors(source.file, text)
-    table = read(
-        path,
-        numbers={"speed": "speed", "amplitude": "amplitude", "phase": "angle", "weight": "number"},
-        texts=["rotor", "run", "sensor", "state", "trial_plane", "trial_kept", "ref", "use", "date"],
-        cells={"trial_mass": "mass", "trial_unbalance": "unbalance", "trial_angle": "angle"},
-        blank=["speed", "weight", "amplitude", "phase"],
-        headers=headed,
-    )
+    texts = ("rotor", "run", "sensor", "state", "trial_plane", "trial_kept", "ref", "use", "date")
+    table = runs_table(path, texts, headed)
     states = [WITH.fullmatch(state.lower()) for state in table.texts.get("state", ())]
     if states and all(states) and "trial_mass" not in table.cells:
         _states_are_masses(table, [match for match in states if match])
@@ -223,7 +218,10 @@ def _vectors(file: str, text: str) -> Layout:
         "trial_angle": Cells("U", "deg", [turn for _, turn in on]),
     }
     size, turn = (np.array([float(read[k]) for _, _, read in runs]) for k in (0, 1))
-    table.numbers = {"amplitude": Numbers("A", "um", size), "phase": Numbers("A", "deg", turn)}
+    table.numbers = {
+        "amplitude": Numbers("A", "um", size, "amplitude"),
+        "phase": Numbers("A", "deg", turn, "angle"),
+    }
     for key in set(given) - {
         "A",
         "B",

@@ -49,18 +49,7 @@ def read_log(
         raise DataError(f"{table.file}: expected one column of masses, found {found}")
     size = table.cells[both[0]] if both else Cells("", sisters.unit if sisters else "kg", [""] * table.rows)
     names, rotor = table.numbered("rotor", "1")
-    speed = table.numbers.get("speed")
-    runs = Runs(
-        table,
-        names,
-        [],
-        amplitude.unit,
-        "mass" if size.unit in UNITS["mass"] else "unbalance",
-        size.unit,
-        speed.unit if speed is not None else "rpm",
-        max_mass=layout.max_mass,
-        runout=layout.runout,
-    )
+    runs = Runs(table, names, size.unit, max_mass=layout.max_mass, runout=layout.runout)
     if sisters is not None and sisters.unit not in UNITS[runs.per]:
         raise DataError(
             f"{table.file}: the runs have a {runs.per}, the stored coefficients are per {sisters.unit}"
@@ -82,10 +71,8 @@ def read_log(
         if name not in run_names:
             raise bad("--exclude", f"no run {quote(name)} in {table.file}")
     share = float(vector_error(np.ones(table.rows), turn, phase.unit).max())
-    rows = LogRows(
-        table, rotor, names, vibration, channel, channels, masses, run, run_names, when, share, mass_share
-    )
-    Logs(rows, runs, lagging, set(exclude), sisters, reading_error).read()
+    rows = LogRows(runs, rotor, vibration, channel, channels, masses, run, run_names, when, share, mass_share)
+    Logs(rows, lagging, set(exclude), sisters, reading_error).read()
     runs.warnings = [*table.warnings, *runs.warnings]
     return runs
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from balancing import JointFit, determined, fit_with_prior, joint_fit, phase_sense
 from cli.errors import DataError
 from cli.field.log_rows import LogRows, Part, Sorted
-from cli.field.read import SHOWN
-from cli.field.runs import Before, Complex, Group, Real, Rows, Runs
+from cli.field.runs import SHOWN, Before, Complex, Group, Real, Rows, Runs
 from cli.field.sisters import Sisters
 
 Flags = NDArray[np.bool_]
@@ -26,11 +25,10 @@ def _sense(
     against = np.flatnonzero(told < 0)
     nu = np.maximum(fit.degrees_of_freedom, 1)
     for i in against[:SHOWN].tolist():
-        of = f"rotor {runs.rotors[rotors[i]]}: " if len(runs.rotors) > 1 else ""
         sds = [float(np.sqrt(square[i] / nu[i])) for square in (taken, other)]
         word = "lags" if turn > 0 else "leads"
         said = (
-            f"{of}the runs say that the instrument's phase {word}: residuals of {sds[1]:.4g} {runs.amplitude_unit} (standard "
+            f"{runs.of(rotors[i])}the runs say that the instrument's phase {word}: residuals of {sds[1]:.4g} {runs.amplitude_unit} (standard "
             f"deviation), in the other sense {sds[0]:.4g}"
         )
         runs.warnings.append(
@@ -51,21 +49,19 @@ class Logs:
     def __init__(
         self,
         rows: LogRows,
-        runs: Runs,
         lagging: bool | None,
         exclude: set[str],
         sisters: Sisters | None,
         reading_error: tuple[float, float] | None,
     ) -> None:
-        self.rows, self.runs, self.lagging, self.exclude = rows, runs, lagging, exclude
+        self.rows, self.runs, self.lagging, self.exclude = rows, rows.of, lagging, exclude
         self.sisters, self.reading_error = sisters, reading_error
-        self.several = len(rows.rotors) > 1
         self.lost = 0
 
     def read(self) -> None:
         """Read and fit all rotors."""
         rows = Sorted(self.rows, self.exclude)
-        named = None if self.sisters is None else [self.sisters.key(name) for name in self.rows.rotors]
+        named = None if self.sisters is None else [self.sisters.key(name) for name in self.runs.rotors]
         for part in rows.parts(named):
             self._fit(part)
         self.runs.warnings += rows.warnings
@@ -73,9 +69,6 @@ class Logs:
             self.runs.warnings.append(
                 f"… and {self.lost - SHOWN} further channels that the runs do not determine"
             )
-
-    def _of(self, part: Part, i: int) -> str:
-        return f"rotor {self.rows.rotors[part.rotors[i]]}: " if self.several else ""
 
     def _fit(self, part: Part) -> None:
         if self.sisters is not None:
@@ -98,7 +91,7 @@ class Logs:
         channels, planes, readings, masses = part.channels, part.planes, part.readings, part.masses
         known = None
         if self.sisters is not None:
-            known = self.sisters.known(self.rows.rotors[part.rotors[0]], channels, self.runs)
+            known = self.sisters.known(self.runs.rotors[part.rotors[0]], channels, self.runs)
         fit = self._fitted(readings, masses, known)
         if known is None or determined(masses, np.isfinite(readings)).all():
             fit, part.lines.senses = _sense(
@@ -115,9 +108,7 @@ class Logs:
                 fit.initial,
                 np.zeros((g, 0, s), dtype=complex),
                 none,
-                none,
                 part.kept,
-                [],
                 part.weights,
                 np.ones((1, s), dtype=np.intp),
                 np.zeros((g, 1, s)),
@@ -131,7 +122,7 @@ class Logs:
     def _errors(self, fit: JointFit) -> tuple[Real, Real, Real]:
         """Bound the errors of the readings (g, r, s) and masses (g, r, p) of a fit against the decimals of the table."""
         size = np.abs(fit.masses)
-        if {"ref", "trial_kept"} & set(self.rows.table.texts):
+        if {"ref", "trial_kept"} & set(self.runs.table.texts):
             # each may be a sum of all that went before
             size = 2 * size.sum(axis=1, keepdims=True) + 0 * size
         readings = np.abs(np.where(fit.present, fit.readings, 0.0))
@@ -153,14 +144,14 @@ class Logs:
     def _in_known_planes(self, part: Part) -> Part:
         """Return rotors with the planes whose coefficients are known before; a log that names none has the only one."""
         assert self.sisters is not None
-        known = self.sisters.planes(self.rows.rotors[part.rotors[0]])
+        known = self.sisters.planes(self.runs.rotors[part.rotors[0]])
         planes = part.planes
-        if len(known) == 1 and "trial_plane" not in self.rows.table.texts:
+        if len(known) == 1 and "trial_plane" not in self.runs.table.texts:
             planes = known[: len(planes)]
         for plane in planes:
             if plane not in known:
                 raise DataError(
-                    f"{self.rows.table.file}: {self._of(part, 0)}a mass in plane {plane}, of which no coefficient is stored: "
+                    f"{self.runs.table.file}: {self.runs.of(part.rotors[0])}a mass in plane {plane}, of which no coefficient is stored: "
                     f"expected {', '.join(known)}"
                 )
         at = [known.index(plane) for plane in planes]
@@ -175,7 +166,7 @@ class Logs:
         some = keep.any(axis=1)
         if not some.all():
             i = int(np.argmin(some))
-            raise DataError(f"{self.rows.table.file}: {self._lost(part, i, 0)}")
+            raise DataError(f"{self.runs.table.file}: {self._lost(part, i, 0)}")
         for i, s in np.argwhere(~keep).tolist():
             self.lost += 1
             if self.lost <= SHOWN:
@@ -190,7 +181,7 @@ class Logs:
         known = "its vibration without masses is known, " if not masses.any() else ""
         times = "once" if len(read) == 1 else f"{len(read)} times"
         return (
-            f"{self._of(part, i)}sensor {part.channels[s]} was read {times} (run{'s' * (len(runs) > 1)} {', '.join(runs)}), which "
+            f"{self.runs.of(part.rotors[i])}sensor {part.channels[s]} was read {times} (run{'s' * (len(runs) > 1)} {', '.join(runs)}), which "
             f"does not determine {1 + len(part.planes)} unknowns: {known}{_missing(part.planes, masses)}"
         )
 

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError
-from cli.field.read import NO, SHOWN, YES
-from cli.field.runs import Channel, Complex, Log, Real, Rows
-from cli.read.tables import Table
+from cli.field.read import NO, YES
+from cli.field.runs import SHOWN, Channel, Complex, Log, Real, Rows, Runs
 
 
 class Masses(NamedTuple):
@@ -55,9 +54,9 @@ class Masses(NamedTuple):
 class LogRows:
     """What each row of the table says, by row."""
 
-    table: Table
+    of: Runs
+    """What the rows are of."""
     rotor: Rows
-    rotors: list[str]
     vibration: Complex
     channel: Rows
     channels: list[Channel]
@@ -177,18 +176,13 @@ class Sorted:
         self.rows = rows
         self.order = np.argsort(rows.rotor, kind="stable")
         self.rotor = rows.rotor[self.order]
-        self.several = len(rows.rotors) > 1
         self.warnings: list[str] = []
-        self.runs = _Listed(self.rotor, rows.run[self.order], len(rows.rotors))
+        self.runs = _Listed(self.rotor, rows.run[self.order], len(rows.of.rotors))
         self.run = self.runs.number
         """Of each row its rotor's run."""
         out = np.array([name in excluded for name in rows.runs])
         self.takes_part = ~out[self.runs.code]
         self._on()
-
-    def of(self, rotor: int) -> str:
-        """Return what a sentence about a rotor begins with, where there are several."""
-        return f"rotor {self.rows.rotors[rotor]}: " if self.several else ""
 
     def _on(self) -> None:
         """Tell what was on in each run, and what stays on after the last one of each rotor."""
@@ -207,7 +201,7 @@ class Sorted:
         # planes in the order of the runs
         by_run = np.argsort(self.run[at], kind="stable")
         at, plane, value = at[by_run], plane[by_run], value[by_run]
-        rotors = len(rows.rotors)
+        rotors = len(rows.of.rotors)
         self.planes = _Listed(self.rotor[at], plane, rotors)
         width = int(self.planes.count.max(initial=0))
         on = np.zeros((len(first), width), dtype=complex)
@@ -224,7 +218,7 @@ class Sorted:
                 on[run] += standing[mine]
                 standing[mine[stays[run]]] = on[run[stays[run]]]
             self.has |= on != 0
-        if "run" not in rows.table.texts:
+        if "run" not in rows.of.table.texts:
             # masses written as on the rotor: where runs are told apart by them the last ones are still on
             last = np.cumsum(np.bincount(self.rotor, minlength=rotors)) - 1
             never = ~np.logical_or.reduceat(stays, self.runs.start)
@@ -255,18 +249,20 @@ class Sorted:
                     bad.append(row)
         if bad:
             row = min(bad)
-            size, i = next(iter(rows.table.cells.values())), int(self.order[row])
+            size, i = next(iter(rows.of.table.cells.values())), int(self.order[row])
             name = rows.runs[rows.run[i]]
-            raise rows.table.error(i, size.header, size.values[i], f"the masses as elsewhere in run {name}")
+            raise rows.of.table.error(
+                i, size.header, size.values[i], f"the masses as elsewhere in run {name}"
+            )
 
     def _stays(self) -> NDArray[np.bool_]:
         """Whether what a run has put on stays on."""
         stays = np.zeros(len(self.runs.first), dtype=bool)
-        if "trial_kept" in self.rows.table.texts:
-            words, code = self.rows.table.numbered("trial_kept")
+        if "trial_kept" in self.rows.of.table.texts:
+            words, code = self.rows.of.table.numbered("trial_kept")
             for k, word in enumerate(words):
                 if word.lower() not in (*YES, *NO):
-                    raise self.rows.table.error(int(np.argmax(code == k)), "trial_kept", word, "yes or no")
+                    raise self.rows.of.table.error(int(np.argmax(code == k)), "trial_kept", word, "yes or no")
             kept = np.array([word.lower() in YES for word in words])
             stays[self.run[kept[code[self.order]]]] = True
         return stays
@@ -279,18 +275,18 @@ class Sorted:
 
     def parts(self, named: Sequence[str | None] | None) -> Iterator[Part]:
         """Yield rotors of like channels, planes and number of readings, and of like names where these count."""
-        rows, rotors = self.rows, len(self.rows.rotors)
+        rows, rotors = self.rows, len(self.rows.of.rotors)
         mine = np.flatnonzero(self.takes_part[self.run] & np.isfinite(rows.vibration[self.order]))
         rotor, run, channel = self.rotor[mine], self.run[mine], rows.channel[self.order[mine]]
         lacking = np.flatnonzero(np.bincount(rotor, minlength=rotors) == 0)
         if len(lacking):
-            of = self.of(int(lacking[0]))
+            of = self.rows.of.of(int(lacking[0]))
             left = (
                 "of the runs that are not excluded none was read"
                 if self.takes_part.any()
                 else "every run is excluded"
             )
-            raise DataError(f"{rows.table.file}: {of}{left}: expected runs to fit")
+            raise DataError(f"{rows.of.table.file}: {of}{left}: expected runs to fit")
         again = _again(run * len(rows.channels) + channel)
         lines = _Listed(rotor, run * (int(again.max()) + 1) + again, rotors)
         channels = _Listed(rotor, channel, rotors)
@@ -337,23 +333,23 @@ class Sorted:
             ((self.on != 0) & self.takes_part[:, None]).any(axis=1), self.runs.start
         )
         if not some.all():
-            of = self.of(int(np.argmin(some)))
+            of = self.rows.of.of(int(np.argmin(some)))
             raise DataError(
-                f"{self.rows.table.file}: {of}no mass ever changed: what a mass does to the vibration is not known; expected a "
+                f"{self.rows.of.table.file}: {of}no mass ever changed: what a mass does to the vibration is not known; expected a "
                 "run with a mass on the rotor"
             )
 
     def _weights(self, group: Rows, at: Rows) -> Real | None:
         """Return the weights of the channels (g, s), written in these rows."""
-        given = self.rows.table.numbers.get("weight")
+        given = self.rows.of.table.numbers.get("weight")
         if given is None:
             return None
         weights = np.where(np.isnan(given.values[at]), 1.0, given.values[at])
         wrong = ~(weights > 0).any(axis=1) | (weights < 0).any(axis=1)
         if wrong.any():
-            of = self.of(int(group[np.argmax(wrong)]))
+            of = self.rows.of.of(int(group[np.argmax(wrong)]))
             raise DataError(
-                f"{self.rows.table.file}: {of}the weights are zero or negative: expected one that is positive"
+                f"{self.rows.of.table.file}: {of}the weights are zero or negative: expected one that is positive"
             )
         return weights
 
@@ -376,7 +372,7 @@ class Sorted:
                 self.warnings.append("… and the same of further rotors: no date")
             elif len(self.warnings) < SHOWN:
                 self.warnings.append(
-                    f"{self.of(int(group[i]))}no date in run{'s' * (len(names) > 1)} {', '.join(names)}: drift over time is not tested"
+                    f"{self.rows.of.of(int(group[i]))}no date in run{'s' * (len(names) > 1)} {', '.join(names)}: drift over time is not tested"
                 )
 
 

@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 
 
 def draw(found: FieldBalancing, rotors: Sequence[int]) -> Figure:
-    """Draw for each rotor the vibration vectors before and after, and beside them the corrections."""
+    """Draw for each rotor the vibration vectors before and after, and beside them the corrections; of a fit its runs too."""
+    if found.runs.fitted:
+        from cli.field import fit_picture
+
+        return fit_picture.draw(found, rotors)
     figure = blank()
     vibration([_rotor(found, rotor) for rotor in rotors], amplitude_unit(found), found.unit, figure=figure)
     return figure
@@ -34,7 +38,7 @@ def _rotor(found: FieldBalancing, rotor: int) -> Vibration:
             masses[int(name) - 1] = float(found.amount(mass))
         split.append(masses)
     return Vibration(
-        found.runs.rotors[rotor] if found.several else "",
+        found.runs.rotors[rotor] if found.runs.several else "",
         [str(channel) for channel in solved.group.channels],
         solved.initial[i],
         solved.residual[i],

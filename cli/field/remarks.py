@@ -8,8 +8,8 @@ import numpy as np
 
 import balancing
 from balancing import plane_significance, trial_effect
-from cli.field.runs import Group
-from cli.field.solve import SHOWN, FieldBalancing, Solved
+from cli.field.runs import SHOWN, Group
+from cli.field.solve import FieldBalancing, Solved
 from cli.read.units import degrees
 
 NEARLY = 0.1  # a plane whose effect others bring about but for this share is said to be nearly dependent
@@ -72,8 +72,8 @@ def _remarks(found: FieldBalancing, solved: Solved) -> Iterator[str]:
                 "correction is needed"
             )
         yield from _more(len(good), "already within the permissible residual unbalance")
-    if found.request.max_residual is not None:
-        fine = (np.abs(solved.initial) <= found.request.max_residual).all(axis=1)
+    if found.ceiling is not None:
+        fine = (np.abs(solved.initial) <= found.ceiling).all(axis=1)
         for i in np.flatnonzero(fine)[:SHOWN]:
             yield (f"{found.of(group, int(i))}the initial vibration is within --max-residual already")
         yield from _more(int(fine.sum()), "initial vibration within --max-residual already")
@@ -86,10 +86,11 @@ def _remarks(found: FieldBalancing, solved: Solved) -> Iterator[str]:
 
 def _thirty(found: FieldBalancing, group: Group) -> Iterator[str]:
     """The 30/30 rule."""
+    standing = group.initial
     for j, trial in enumerate(group.trials):
+        before, standing = standing, group.runs[:, j] if trial.kept else standing
         if not trial.masses:
             continue
-        before = group.initial if group.base[j] < 0 else group.runs[:, group.base[j]]
         effect = trial_effect(before, group.runs[:, j])
         little = ~((effect.amplitude >= 0.3) | (effect.phase >= np.radians(30))).any(axis=1)
         for i in np.flatnonzero(little)[:SHOWN]:

@@ -2,36 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
-from cli.field import columns, fit_picture, fit_words, picture, words
-from cli.field.fit import LogFits
+from cli.field import columns, fit_words, picture, words
 from cli.field.runs import Complex, Real
 from cli.field.solve import FieldBalancing, Solved
 from cli.field.tolerance import LastRun, first_reading, last_run, measured_verdicts, verdicts
-from cli.read.tolerance import Verdict
 from cli.read.units import degrees, from_si
 from cli.show.columns import Column, Section, Sheet, Table
-from cli.show.text import angle_text
+from cli.show.verdicts import verdict_columns
 
 MOST = 24  # rotors of one report
 
 
-def sheets(found: FieldBalancing, fits: LogFits | None) -> Iterator[Sheet]:
+def sheets(found: FieldBalancing) -> Iterator[Sheet]:
     """Yield for each rotor what to do and what it does, and on a page of its own how it was found."""
     for rotor, (name, solved, i) in enumerate(found.each(MOST)):
         title = f"Rotor {name}" if name else ""
-        figure = partial(picture.draw, found) if fits is None else partial(fit_picture.draw, fits)
-        yield Sheet(title, list(_sections(found, fits, solved, i)), partial(figure, [rotor]))
-        yield Sheet(title, [Section("How it was found", _found(found, fits, solved, i))])
+        yield Sheet(title, list(_sections(found, solved, i)), partial(picture.draw, found, [rotor]))
+        yield Sheet(title, [Section("How it was found", _found(found, solved, i))])
     if len(found.runs.rotors) > MOST:
         yield Sheet("", [Section("Further rotors", [f"{len(found.runs.rotors) - MOST} are not shown here."])])
 
 
-def _sections(found: FieldBalancing, fits: LogFits | None, solved: Solved, i: int) -> Iterator[Section]:
+def _sections(found: FieldBalancing, solved: Solved, i: int) -> Iterator[Section]:
     last = last_run(found, solved, i)
     from_here = found.request.from_here and bool(solved.standing[i].any())
     before, said = first_reading(found, solved, i), [_convention(found)]
@@ -58,7 +55,7 @@ def _sections(found: FieldBalancing, fits: LogFits | None, solved: Solved, i: in
             "Trim: what to add now", [_amounts(found, solved, None, solved.total[i] - last.on), told]
         )
     yield Section("Verdict", _verdict(found, solved, i, last))
-    if fits is not None and (lines := fit_words.expected(fits, solved, i)):
+    if found.runs.fitted and (lines := fit_words.expected(found, solved, i)):
         yield Section("What to expect", ["\n".join(lines)])
 
 
@@ -95,14 +92,14 @@ def _four_digits(values: Real) -> list[float]:
 
 def _phases(found: FieldBalancing, vibration: Complex) -> list[float | None]:
     """Phases in the instrument's own sense, to a hundredth of a degree; none where nothing moves."""
-    shown = vibration.conj() if found.request.against else vibration
+    shown = vibration.conj() if found.against else vibration
     return [round(float(degrees(v)), 2) % 360 if abs(v) > 0 else None for v in shown.tolist()]
 
 
 def _convention(found: FieldBalancing) -> str:
     if found.request.four_run:
-        return found.request.conventions
-    if not found.request.against:
+        return words.sense(found)
+    if not found.against:
         return (
             "Phases as the instrument shows them; they and the mass angles are counted in one common sense, from one mark "
             "on the rotor."
@@ -114,11 +111,8 @@ def _convention(found: FieldBalancing) -> str:
 
 
 def _masses(found: FieldBalancing, solved: Solved, masses: Complex) -> str:
-    return " and ".join(
-        f"{found.amount(abs(w)):.6g} {found.unit} at {angle_text(degrees(complex(w)), '.6g')}° in {plane}"
-        for plane, w in zip(solved.planes, masses, strict=True)
-        if w
-    )
+    said = words.masses_said(found, solved.planes, masses, ".6g")
+    return " and ".join(text for text, w in zip(said, masses, strict=True) if w)
 
 
 def _verdict(found: FieldBalancing, solved: Solved, i: int, last: LastRun | None) -> list[str | Table]:
@@ -132,7 +126,7 @@ def _verdict(found: FieldBalancing, solved: Solved, i: int, last: LastRun | None
     parts: list[str | Table] = [
         f"Largest vibration {how}: {largest:.4g} {unit} (before: {before:.4g} {unit}{change})."
     ]
-    ceiling = found.request.max_residual
+    ceiling = found.ceiling
     if ceiling is not None:
         verdict = "within" if largest <= ceiling * (1 + 1e-9) else "beyond"
         limit = [Column("largest", found.runs.amplitude_unit, [largest]), Column("permissible", found.runs.amplitude_unit, [ceiling])]  # fmt: skip
@@ -144,7 +138,7 @@ def _verdict(found: FieldBalancing, solved: Solved, i: int, last: LastRun | None
         planes = verdicts(found, solved, i) if last is None else measured_verdicts(found, solved, i, last)
         parts += [
             f"Residual unbalance {how}; tolerance{grade}: {whole:.6g} g·mm, shared equally.",
-            _of_planes(planes),
+            Table(verdict_columns(planes, "g_mm"), keys=("plane",)),
         ]
     if last is None:
         parts.append(
@@ -154,26 +148,12 @@ def _verdict(found: FieldBalancing, solved: Solved, i: int, last: LastRun | None
     return parts
 
 
-def _of_planes(planes: Sequence[Verdict]) -> Table:
-    def in_g_mm(values: Sequence[float]) -> list[float]:
-        return [from_si(value, "unbalance", "g_mm") for value in values]
-
-    _, share, before, after = (list(column) for column in zip(*planes, strict=True))
-    said = ["not determined" if v.residual != v.residual else "within" if v.residual <= v.permissible else "beyond" for v in planes]  # fmt: skip
-    table = [Column("plane", "", [v.plane for v in planes])]
-    table += [
-        Column(name, "g_mm", in_g_mm(values))
-        for name, values in (("permissible", share), ("before", before), ("after", after))
-    ]
-    return Table([*table, Column("verdict", "", said)], keys=("plane",))
-
-
-def _found(found: FieldBalancing, fits: LogFits | None, solved: Solved, i: int) -> list[str | Table]:
+def _found(found: FieldBalancing, solved: Solved, i: int) -> list[str | Table]:
     """Readings, coefficients, figures of merit."""
     group = solved.group
     parts: list[str | Table] = []
-    if fits is not None:
-        parts += [fit_words.summary(fits, solved, i), _history(found, fits, solved, i)]
+    if found.runs.fitted:
+        parts += [fit_words.summary(found, solved, i), _history(found, solved, i)]
     for j, trial in enumerate(group.trials):
         on = _masses(found, solved, group.on[i, j]) if found.stored is None else ""
         parts += [f"Run {trial.run}{': ' + on if on else ''}{', kept' if trial.kept else ''}", _vibration(found, solved, {"amplitude": group.runs[i, j]})]  # fmt: skip
@@ -182,8 +162,8 @@ def _found(found: FieldBalancing, fits: LogFits | None, solved: Solved, i: int) 
     return [*parts, "\n".join(words.summary(found, solved, i)[1:])]
 
 
-def _history(found: FieldBalancing, fits: LogFits, solved: Solved, i: int) -> Table:
-    rows = fit_words.history(fits, solved, i)
-    if found.request.against:
+def _history(found: FieldBalancing, solved: Solved, i: int) -> Table:
+    rows = fit_words.history(found, solved, i)
+    if found.against:
         rows["phase°"] = [round(-float(v or 0) % 360, 2) for v in rows["phase°"]]
     return Table([Column(name, "", values) for name, values in rows.items()], keys=("run", "sensor"))

@@ -1,7 +1,8 @@
-"""What the options of a balancing in the field ask for, in the units of the runs."""
+"""What the options of a balancing in the field ask for."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,47 +11,43 @@ from cli.field.files import convert_amplitude
 from cli.field.runs import Runs
 from cli.read import options
 from cli.read.tolerance import Tolerance
-from cli.read.units import UNITS, amplitude_kind, parse_number, to_si
+from cli.read.units import UNITS, amplitude_kind, parse_number, phasor, to_si
+
+Given = tuple[float, str]
+"""A value and the unit it was given in."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Request:
     """What the options ask for."""
 
-    objective: str = "least-squares"
-    max_mass: dict[str, float] = field(default_factory=dict)
-    """Limit of each plane, SI; the key "" is for all."""
-    max_residual: float | None = None
-    """In the table's amplitude unit."""
-    from_here: bool = False
-    runout: dict[str, complex] = field(default_factory=dict)
     reading_error: tuple[float, float] | None = None
     """Relative, rad."""
+    tolerance: Tolerance | None = None
+    max_mass: Mapping[str, Given] = field(default_factory=dict)
+    """Limit of each plane; the key "" is for all."""
+    max_residual: Given | None = None
+    objective: str = "least-squares"
+    from_here: bool = False
     monte_carlo: int = 0
     four_run: bool = False
     ridge: float = 0.0
-    tolerance: Tolerance | None = None
     radius: float | None = None
-    conventions: str = ""
-    against: bool = False
-    """Whether the instrument counts phases against the sense of the mass angles: they were turned round."""
+    phase_lag: bool = False
+    rotation: str | None = None
     places: list[float] | None = None
     """Where masses can go, degrees: the corrections are split onto them."""
+    fit: bool = False
+    """Whether all runs are to be fitted together; from here on what else is asked of that."""
+    exclude: Sequence[str] = ()
+    predict: str | None = None
+    suggest: bool = False
+    robust: bool = False
 
-
-def conventions(method: str, phase_lag: bool, rotation: str | None) -> str:
-    """Say how phases and mass angles are counted."""
-    if method == "four-run":
-        return "Mass angles as in the table; no phase is used."
-    if rotation is None and not phase_lag:
-        return "Phases and mass angles are counted in one common sense, from one mark on the rotor."
-    lead = "lag" if phase_lag else "lead"
-    turning = (
-        f"the shaft turns {rotation} as seen against +z"
-        if rotation
-        else "phases are counted with the mass angles"
-    )
-    return f"The instrument's phases {lead} ({turning}); all phases given out are counted in the sense of the mass angles."
+    @property
+    def against(self) -> bool:
+        """Whether the instrument counts phases against the sense of the mass angles."""
+        return self.phase_lag != (self.rotation == "cw")
 
 
 def reading_error(text: str | None) -> tuple[float, float] | None:
@@ -66,15 +63,15 @@ def reading_error(text: str | None) -> tuple[float, float] | None:
             except ValueError:
                 raise options.bad("--reading-error", f"'{part}': expected a share such as 2%") from None
         else:
-            phase = options.quantity("--reading-error", part, "angle") or 0.0
+            phase = options.needed("--reading-error", part, "angle")
     if amplitude < 0 or phase < 0 or amplitude + phase == 0:
         raise options.bad("--reading-error", f"'{text}': expected positive errors, such as 2%,2deg")
     return amplitude, phase
 
 
-def limits(texts: list[str]) -> dict[str, tuple[float, str]]:
-    """Read `5g`, `A=5g`, several in one joined by commas: plane -> (value, unit)."""
-    limits: dict[str, tuple[float, str]] = {}
+def limits(texts: Sequence[str]) -> dict[str, Given]:
+    """Read `5g`, `A=5g`, several in one joined by commas."""
+    limits: dict[str, Given] = {}
     for text in ",".join(texts).split(",") if texts else ():
         plane, mark, value = text.rpartition("=")
         if mark and not plane.strip():
@@ -88,7 +85,7 @@ def limits(texts: list[str]) -> dict[str, tuple[float, str]]:
     return limits
 
 
-def limits_in(limits: dict[str, tuple[float, str]], runs: Runs) -> dict[str, float]:
+def limits_in(limits: Mapping[str, Given], runs: Runs) -> dict[str, float]:
     """Return limits in SI, in the dimension of the trials."""
     for value, unit in limits.values():
         if unit not in UNITS[runs.per]:
@@ -98,9 +95,27 @@ def limits_in(limits: dict[str, tuple[float, str]], runs: Runs) -> dict[str, flo
     return {plane: float(to_si(value, runs.per, unit)) for plane, (value, unit) in limits.items()}
 
 
-def ceiling_in(given: tuple[float, str], runs: Runs) -> float:
+def ceiling_in(given: Given | None, runs: Runs) -> float | None:
     """Return the residual limit in the table's unit; without a tag it is meant as the table's amplitudes are."""
+    if given is None:
+        return None
     value, unit = given
     if not amplitude_kind(unit)[1]:
         unit += amplitude_kind(runs.amplitude_unit)[1]
     return float(convert_amplitude(np.array([value]), unit, runs.amplitude_unit, "--max-residual")[0])
+
+
+def masses_at(text: str | None, runs: Runs) -> dict[str, complex] | None:
+    """Read `10kg@-90deg`, or `A=10kg@-90deg,B=5kg@20deg`, SI; the key "" is the only plane."""
+    if text is None:
+        return None
+    out: dict[str, complex] = {}
+    for part in text.split(","):
+        plane, _, value = part.strip().rpartition("=")
+        expected = f"'{part}': expected MASS@ANGLE, such as 10kg@-90deg"
+        size, unit, angle, of_angle = options.mass_at("--predict", part, value, runs.per, expected)
+        if plane.strip() in out:
+            raise options.bad("--predict", f"'{part}': this plane is given twice")
+        on = float(to_si(size, runs.per, unit))
+        out[plane.strip()] = complex(phasor(np.array(on), np.array(angle), of_angle))
+    return out

@@ -51,20 +51,17 @@ def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]
     initial, _, on = group.errors()
     if group.fit is not None:
         initial = _fit_errors(group)[..., 0]
-    runout = np.array([abs(request.runout.get(channel.sensor, 0)) for channel in group.channels])
-    here = solved.initial + np.matvec(solved.alpha, solved.standing)
-    of_here = initial + 8 * EPS * (runout + np.abs(solved.initial))
+    here, limit, ceiling = solved.here, solved.limit, found.ceiling
+    of_here = initial + 8 * EPS * (np.abs(found.runout(group)) + np.abs(solved.initial))
     if solved.standing.any():
         size = np.abs(solved.standing)
         of_standing = on.max(axis=1) + 4 * EPS * size
         of_here = of_here + np.matvec(of_alpha, size) + np.matvec(np.abs(solved.alpha), of_standing)
     whole = Balance(solved.alpha, here, solved.corrections, group.weights, ridge=request.ridge)
-    limit = found.limits(solved.planes)
-    if request.objective == "least-squares" and limit is None and request.max_residual is None:
+    minimax = request.objective == "minimax"
+    if not minimax and limit is None and ceiling is None:
         return whole.error_estimate(influence_error=of_alpha, initial_error=of_here)
-    ceiling = None
-    if request.max_residual is not None and request.objective == "least-squares":
-        ceiling = np.full(here.shape[-1], request.max_residual)
+    ceilings = None if ceiling is None or minimax else np.full(here.shape[-1], ceiling)
     bounds = []
     for i in range(len(here)):
         one = replace(
@@ -72,10 +69,10 @@ def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]
             influence=solved.alpha[i],
             initial=here[i],
             corrections=solved.corrections[i],
-            weights=None if group.weights is None else group.weights[i],
+            weights=group.own_weights(i),
             bound=None if solved.bound is None else float(solved.bound[i]),
             max_mass=limit,
-            max_residual=ceiling,
+            max_residual=ceilings,
         )
         bounds.append(one.error_estimate(influence_error=of_alpha[i], initial_error=of_here[i]))
         if one.error_reason:

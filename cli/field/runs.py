@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 import balancing
 from cli.read.tables import Table
+from cli.read.units import UNITS
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Rows = NDArray[np.intp]
+Value = TypeVar("Value", np.float64, np.complex128)
+
+SHOWN = 5  # of so many rotors, readings … the same is said; of the others how many they are
 
 
 @dataclass(frozen=True)
@@ -95,12 +100,8 @@ class Group:
     """(g, r, s)."""
     on: Complex
     """What was on the rotor in each trial run, (g, r, p), SI."""
-    added: Complex
-    """What was put on for each trial run, (g, r, p), SI."""
     kept: Complex
     """What stays on after the last run, (g, p), SI."""
-    base: list[int]
-    """For each trial run the run it is compared with: -1 is the initial run."""
     weights: Real | None
     counts: Rows
     """How often each sensor was read in the initial and in each trial run, (1 + r, s)."""
@@ -108,13 +109,23 @@ class Group:
     """Σ|reading - mean|² of the repeats, (g, 1 + r, s)."""
     errors: Callable[[], tuple[Real, Real, Real]]
     """Bounds of the errors of `initial`, `runs` and `on` against the decimals of the table; worked out when asked for."""
-    first: str = ""
-    """The initial run."""
     fit: balancing.JointFit | None = None
     """Where all runs were fitted at once: `initial` is fitted then, and there are no trial runs."""
     logs: Sequence[Log] = ()
     before: Before | None = None
     """Where coefficients known before take part in the fit."""
+
+    def own_weights(self, i: int) -> Real | None:
+        """The weights of one rotor's channels, (s,)."""
+        return None if self.weights is None else self.weights[i]
+
+    @cached_property
+    def chance(self) -> Real:
+        """How often by chance a residual of the fit is as large as each of them, (g, r, s)."""
+        from balancing import outlier_probability
+
+        assert self.fit is not None
+        return outlier_probability(self.fit)
 
     @property
     def repeats(self) -> int:
@@ -156,12 +167,9 @@ class Runs:
 
     table: Table
     rotors: list[str]
-    groups: list[Group]
-    amplitude_unit: str
-    per: str
-    """`mass` or `unbalance`: what the trials are."""
     mass_unit: str
-    speed_unit: str
+    """Of the trials: a mass's or an unbalance's."""
+    groups: list[Group] = field(default_factory=list)
     max_mass: dict[str, float] = field(default_factory=dict)
     """The limits that the file states, plane -> SI."""
     lags: bool = False
@@ -169,16 +177,41 @@ class Runs:
     runout: dict[str, complex] = field(default_factory=dict)
     """What the file itself states of it, sensor -> vector as read."""
     warnings: list[str] = field(default_factory=list)
+    """Shown once each, however often they stand here."""
+
+    @property
+    def amplitude_unit(self) -> str:
+        """The unit of the readings."""
+        return self.table.numbers["amplitude"].unit
+
+    @property
+    def per(self) -> str:
+        """`mass` or `unbalance`: what the trials are."""
+        return "mass" if self.mass_unit in UNITS["mass"] else "unbalance"
 
     @property
     def per_si(self) -> str:
         """The SI unit of the trials, as keys and headers have it."""
         return "kg" if self.per == "mass" else "kg_m"
 
-    def warn(self, text: str) -> None:
-        """Say something of the table once."""
-        if text not in self.warnings:
-            self.warnings.append(text)
+    @property
+    def speed_unit(self) -> str:
+        """The unit of the speeds that stand in the table."""
+        return self.table.numbers["speed"].unit if "speed" in self.table.numbers else "rpm"
+
+    @property
+    def several(self) -> bool:
+        """Whether there are several rotors, which sentences and tables then name."""
+        return len(self.rotors) > 1
+
+    @property
+    def fitted(self) -> bool:
+        """Whether all runs are fitted together."""
+        return any(group.fit is not None for group in self.groups)
+
+    def of(self, rotor: int) -> str:
+        """Return what a sentence about a rotor begins with, where there are several."""
+        return f"rotor {self.rotors[rotor]}: " if self.several else ""
 
 
 def apart(one: float | None, other: float) -> float:

@@ -60,7 +60,9 @@ class Sisters:
         alpha = np.stack([one.alpha for one in each])
         stated = [one.covariance for one in each if one.covariance is not None]
         if stated and len(stated) < len(each):
-            runs.warn("--influence: where a file states no uncertainty its coefficients count as exact")
+            runs.warnings.append(
+                "--influence: where a file states no uncertainty its coefficients count as exact"
+            )
         covariance: Complex = np.stack(
             [
                 np.zeros((*one.alpha.shape, len(planes))) if one.covariance is None else one.covariance
@@ -72,12 +74,12 @@ class Sisters:
         else:
             prior = stored_prior(alpha[0], covariance[0], each[0].degrees_of_freedom)
             if self.key(rotor) is None and stated:
-                runs.warn(
+                runs.warnings.append(
                     "--influence: one machine's coefficients do not tell how machines differ: they count with the errors of their "
                     "own runs alone; expected the files of several machines, --influence once for each"
                 )
             elif not stated:
-                runs.warn("--influence: the coefficients state no uncertainty and count as exact")
+                runs.warnings.append("--influence: the coefficients state no uncertainty and count as exact")
         told = [(one.reading_sd, one.degrees_of_freedom) for one in each if one.reading_sd > 0]
         scatter = None
         if told:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
@@ -32,8 +32,8 @@ from cli.errors import DataError
 from cli.field.files import Stored
 from cli.field.one_rotor import Sought, confidence, least_maximum, limited_samples, within_limits
 from cli.field.refusals import planes_say, trials_say
-from cli.field.request import Request
-from cli.field.runs import Complex, Group, Real, Runs
+from cli.field.request import Request, ceiling_in, limits_in, masses_at
+from cli.field.runs import SHOWN, Complex, Group, Real, Runs, Value
 from cli.read.options import bad
 from cli.read.units import Scaled, from_si
 from dalembert.arithmetic.parts import in_parts
@@ -41,38 +41,51 @@ from dalembert.arithmetic.parts import in_parts
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-Value = TypeVar("Value", np.float64, np.complex128)
 Result = TypeVar("Result")
 
 SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
 MANY = 200  # rotors whose uncertainties are worked out unasked
-SHOWN = 5  # of so many rotors the same is said, of the others together
 UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
 
 
 @dataclass(eq=False, repr=False)
-class Solved:
-    """A group's result."""
+class Problem:
+    """What the corrections of a group are found from."""
 
     group: Group
     planes: list[str]
     alpha: Complex
+    fits: list[AmplitudeFit]
+    """Of the four-run method, rotor by rotor."""
     initial: Complex
     """(g, s), run-out off."""
-    corrections: Complex
-    """(g, p), as given out (from here, where that was asked for)."""
     standing: Complex
     """(g, p): what of the trial masses is on the rotor where the corrections start from."""
+    limit: Real | None
+    """Of each plane, SI; None where there is none."""
+
+    @cached_property
+    def here(self) -> Complex:
+        """The vibration where the corrections start from, (g, s)."""
+        return self.initial + np.matvec(self.alpha, self.standing) if self.standing.any() else self.initial
+
+
+@dataclass(eq=False, repr=False)
+class Solved(Problem):
+    """A group's result."""
+
+    corrections: Complex
+    """(g, p), as given out (from here, where that was asked for)."""
     residual: Complex
     condition: Real
     bound: Real | None
+    """Of the largest residual, as the dual problem proves it."""
+    unbalance: Complex | None
+    """(g, p): the rotor's own in its initial state; NaN where the readings do not determine it."""
     covariance: Real | None = None
     residual_95: Real | None = None
-    fits: list[AmplitudeFit] = field(default_factory=list)
     balance: LogBalance | None = None
     """Where all runs were fitted at once: what the corrections leave, and how sure it is."""
-    unbalance: Complex | None = None
-    """(g, p): the rotor's own in its initial state; NaN where the readings do not determine it."""
 
     @property
     def total(self) -> Complex:
@@ -87,8 +100,17 @@ class FieldBalancing:
         self, runs: Runs, request: Request, stored: Stored | None = None, executor: Executor | None = None
     ) -> None:
         self.runs, self.request, self.stored, self.executor = runs, request, stored, executor
+        if request.tolerance is not None and runs.per == "mass" and request.radius is None:
+            raise bad("--radius", "the tolerance is of unbalances: expected the radius of the trial masses")
+        self.max_mass = limits_in(request.max_mass, runs) or runs.max_mass
+        """Limit of each plane, SI; the key "" is for all."""
+        self.ceiling = ceiling_in(request.max_residual, runs)
+        """Of the residuals, in the table's amplitude unit."""
+        self.predict = masses_at(request.predict, runs)
+        """Plane -> mass of a run to be predicted, SI; the key "" is the only plane."""
+        self.limited = bool(request.objective == "minimax" or self.max_mass or self.ceiling is not None)
+        """Whether the corrections are others than those by plain least squares."""
         self.warnings: list[str] = []
-        self.several = len(runs.rotors) > 1
         self.solved = [self._solve(group) for group in runs.groups]
         self.place: list[tuple[int, int]] = [(0, 0)] * len(runs.rotors)
         for k, group in enumerate(runs.groups):
@@ -99,15 +121,45 @@ class FieldBalancing:
 
     def of(self, group: Group, i: int = 0) -> str:
         """Return what a sentence about a rotor begins with, where there are several."""
-        return f"rotor {self.runs.rotors[group.rotors[i]]}: " if self.several else ""
+        return self.runs.of(group.rotors[i])
+
+    def runout(self, group: Group) -> Complex:
+        """Return the run-out of each channel, (s,)."""
+        return np.array(
+            [self.runs.runout.get(channel.sensor, 0) for channel in group.channels], dtype=complex
+        )
 
     def _solve(self, group: Group) -> Solved:
         request = self.request
-        runout = np.array(
-            [request.runout.get(channel.sensor, 0) for channel in group.channels], dtype=complex
-        )
-        initial = group.initial - runout
-        planes, fits = group.planes, []
+        planes, alpha, fits = self._coefficients(group)
+        standing = np.zeros((len(group.rotors), len(planes)), dtype=complex)
+        if request.from_here and self.stored is None:
+            standing = group.kept
+            if not standing.any():
+                self.warnings.append(
+                    "--from-here: no trial mass is kept on the rotor, so that it stands as in the initial run"
+                )
+        initial = group.initial - self.runout(group)
+        problem = Problem(group, planes, alpha, fits, initial, standing, self._limits(planes))
+        corrections, bound, condition = self._corrections(problem)
+        residual = problem.here + np.matvec(alpha, corrections)
+        # below the rounding of its terms a residual is zero
+        noise = np.abs(initial) + np.matvec(np.abs(alpha), np.abs(corrections) + np.abs(standing))
+        residual = np.where(np.abs(residual) > 1e-15 * noise, residual, 0)
+        unbalance = None
+        if request.tolerance is not None:
+            unbalance = initial_unbalance(alpha, initial, group.weights, singular=SINGULAR)
+        given = (group, planes, alpha, fits, initial, standing, problem.limit)
+        solved = Solved(*given, corrections, residual, condition, bound, unbalance)
+        if group.fit is not None:
+            self._doubt(solved, group.fit)
+        elif request.reading_error is not None or self._repeats_tell(group):
+            self._confidence(solved)
+        return solved
+
+    def _coefficients(self, group: Group) -> tuple[list[str], Complex, list[AmplitudeFit]]:
+        """Return the planes and their coefficients, (g, s, p): stored, of a fit, from amplitudes or from trial runs."""
+        planes = group.planes
         if self.stored is not None:
             matrices = []
             for rotor in group.rotors:
@@ -116,148 +168,111 @@ class FieldBalancing:
                 if "rotor" not in self.stored.table.texts:
                     break
             alpha = np.broadcast_to(np.stack(matrices), (len(group.rotors), *matrices[0].shape))
-        elif group.fit is not None:
-            alpha = group.fit.influence
-        elif request.four_run:
-            fits = self._amplitudes(group)
-            alpha = np.stack([fit.influence for fit in fits])[..., None]
-        else:
-            try:
-                alpha = influence_coefficients(group.initial, group.runs, group.on)
-            except DependentTrials as error:
-                raise DataError(self.of(group, *error.case) + trials_say(group, error)) from None
-        standing = np.zeros((len(group.rotors), len(planes)), dtype=complex)
-        if request.from_here and self.stored is None:
-            standing = group.kept
-            if not standing.any():
-                self.warn(
-                    "--from-here: no trial mass is kept on the rotor, so that it stands as in the initial run"
-                )
-        here = initial + np.matvec(alpha, standing) if standing.any() else initial
-        limit = self.limits(planes)
-        corrections, bounds, condition = self._corrections(group, planes, alpha, here, limit)
-        residual = here + np.matvec(alpha, corrections)
-        # below the rounding of its terms a residual is zero
-        noise = np.abs(initial) + np.matvec(np.abs(alpha), np.abs(corrections) + np.abs(standing))
-        residual = np.where(np.abs(residual) > 1e-15 * noise, residual, 0)
-        solved = Solved(
-            group, planes, alpha, initial, corrections, standing, residual, condition, bounds, fits=fits
-        )
-        if request.tolerance is not None:
-            solved.unbalance = initial_unbalance(alpha, initial, group.weights, singular=SINGULAR)
-        limited = bool(request.objective == "minimax" or request.max_mass or request.max_residual is not None)
+            return planes, alpha, []
         if group.fit is not None:
-            self._doubt(solved, group.fit, runout, limited)
-        elif request.reading_error is not None or self._repeats_tell(group, limited):
-            self._confidence(solved, runout, limited)
-        return solved
+            return planes, group.fit.influence, []
+        if self.request.four_run:
+            fits = self._amplitudes(group)
+            return planes, np.stack([fit.influence for fit in fits])[..., None], fits
+        try:
+            return planes, influence_coefficients(group.initial, group.runs, group.on), []
+        except DependentTrials as error:
+            raise DataError(self.of(group, *error.case) + trials_say(group, error)) from None
 
-    def _repeats_tell(self, group: Group, limited: bool) -> bool:
+    def _repeats_tell(self, group: Group) -> bool:
         """Whether the scatter of repeats is to give uncertainties that nobody asked for."""
         if self.request.four_run or not group.reading_sd.any():
             return False
-        if len(group.rotors) <= (SHOWN if limited else MANY):
+        if len(group.rotors) <= (SHOWN if self.limited else MANY):
             return True
-        self.warn("uncertainties of so many rotors are worked out with --reading-error alone")
+        self.warnings.append("uncertainties of so many rotors are worked out with --reading-error alone")
         return False
 
-    def limits(self, planes: list[str]) -> Real | None:
-        """Return the limit of each plane, SI; None where there is none."""
-        given = self.request.max_mass
-        if not given:
-            return None
+    def _limits(self, planes: list[str]) -> Real | None:
+        given = self.max_mass
         for name in given:
             if name and name not in planes:
                 raise bad("--max-mass", f"no plane {name}: expected one of {', '.join(planes)}")
         limit = np.array([given.get(plane, given.get("", np.inf)) for plane in planes])
         return limit if np.isfinite(limit).any() else None
 
-    def _corrections(
-        self, group: Group, planes: list[str], alpha: Complex, here: Complex, limit: Real | None
-    ) -> tuple[Complex, Real | None, Real]:
+    def _corrections(self, problem: Problem) -> tuple[Complex, Real | None, Real]:
         """Return the corrections, for minimax the proven bounds, and the condition numbers."""
-        request, weights = self.request, group.weights
-        ceiling = request.max_residual
+        request, weights = self.request, problem.group.weights
+        alpha, here, limit, ceiling = problem.alpha, problem.here, problem.limit, self.ceiling
+        minimax = request.objective == "minimax"
         fix = None
-        if request.objective == "least-squares" and limit is None and ceiling is None:
-            try:
-                fix = least_squares(alpha, here, weights, ridge=request.ridge)
-            except DependentPlanes as error:
-                raise DataError(
-                    self.of(group, *error.case[:1]) + planes_say(planes, error.combination)
-                ) from None
+        if not minimax and limit is None and ceiling is None:
+            fix = self._one(
+                problem,
+                lambda: least_squares(alpha, here, weights, ridge=request.ridge),
+            )
         condition = condition_number(alpha, weights) if fix is None else fix.condition_number
         if limit is None and not request.ridge:
             # the coefficients are differences of readings: what lies in their rounding is no information
             beyond = np.flatnonzero(~(condition < SINGULAR))
             if len(beyond):
                 i = int(beyond[0])
-                unseen_one = unseen(alpha[i], None if weights is None else weights[i])[0]
-                raise DataError(self.of(group, i) + planes_say(planes, unseen_one))
+                hidden = unseen(alpha[i], problem.group.own_weights(i))[0]
+                raise DataError(self.of(problem.group, i) + planes_say(problem.planes, hidden))
         if fix is not None:
             return fix.corrections, None, condition
-        if request.objective == "minimax":
-            proven = self._one_by_one(least_maximum, group, planes, alpha, here, limit, range(len(here)))
+        if minimax:
+            proven = self._one_by_one(least_maximum, problem, range(len(here)))
             return (
                 np.stack([fix.corrections for fix in proven]),
                 np.array([fix.bound for fix in proven], dtype=float),
                 np.array([fix.condition_number for fix in proven]),
             )
         # rotors that keep the limits by themselves all at once, the others one by one
-        corrections = np.zeros((len(here), len(planes)), dtype=complex)
-        left = np.arange(len(here))
+        corrections = np.zeros((len(here), len(problem.planes)), dtype=complex)
+        beyond = np.ones(len(here), dtype=bool)
         try:
             free = least_squares(alpha, here, weights)
             corrections[:] = free.corrections
-            beyond = np.zeros(len(here), dtype=bool)
+            beyond[:] = False
             if limit is not None:
                 beyond |= (np.abs(free.corrections) > limit).any(axis=1)
             if ceiling is not None:
                 beyond |= (np.abs(free.residual) > ceiling).any(axis=1)
-            left = np.flatnonzero(beyond)
         except DependentPlanes:
             pass
-        rest = left.tolist()
-        found = self._one_by_one(within_limits, group, planes, alpha, here, limit, rest)
-        for i, one in zip(rest, found, strict=True):
+        rest = np.flatnonzero(beyond).tolist()
+        for i, one in zip(rest, self._one_by_one(within_limits, problem, rest), strict=True):
             corrections[i] = one.corrections
         return corrections, None, condition
 
     def _one_by_one(
-        self,
-        solve: Callable[..., tuple[Balance, bool]],
-        group: Group,
-        planes: list[str],
-        alpha: Complex,
-        here: Complex,
-        limit: Real | None,
-        rotors: Sequence[int],
+        self, solve: Callable[..., tuple[Balance, bool]], problem: Problem, rotors: Sequence[int]
     ) -> list[Balance]:
         """Solve for rotors, each by itself."""
-        ceiling, weights = self.request.max_residual, group.weights
-        parts = ((alpha[i], here[i], limit, ceiling, None if weights is None else weights[i]) for i in rotors)
+        ceiling, group = self.ceiling, problem.group
+        parts = (
+            (problem.alpha[i], problem.here[i], problem.limit, ceiling, group.own_weights(i)) for i in rotors
+        )
         results, found = in_parts(solve, parts, self.executor), []
         for i in rotors:
-            fix, beyond = self._one(group, planes, i, lambda: next(results))
+            fix, beyond = self._one(problem, lambda: next(results), i)
             if beyond:
-                self.warn(
+                self.warnings.append(
                     "with these weights a residual is beyond --max-residual, which without them could be met"
                 )
             found.append(fix)
         return found
 
-    def _one(self, group: Group, planes: list[str], i: int, solve: Callable[[], Result]) -> Result:
-        """Solve for one rotor; what cannot be done is said with its name."""
+    def _one(self, problem: Problem, solve: Callable[[], Result], i: int | None = None) -> Result:
+        """Solve for one rotor, or for all; what cannot be done is said with the rotor's name."""
         try:
             return solve()
         except DependentPlanes as error:
-            raise DataError(self.of(group, i) + planes_say(planes, error.combination)) from None
+            of = self.of(problem.group, *(error.case[:1] if i is None else [i]))
+            raise DataError(of + planes_say(problem.planes, error.combination)) from None
         except Infeasible as error:
             unit = self.runs.amplitude_unit
-            with_limits = " with the limits of the masses" if self.request.max_mass else ""
+            with_limits = " with the limits of the masses" if self.max_mass else ""
             raise DataError(
-                f"{self.of(group, i)}no corrections{with_limits} leave every residual within {self.request.max_residual:g} "
-                f"{unit}: infeasible; the smallest limit that can be met is {error.smallest:.6g} {unit}"
+                f"{self.of(problem.group, i or 0)}no corrections{with_limits} leave every residual within "
+                f"{self.ceiling:g} {unit}: infeasible; the smallest limit that can be met is {error.smallest:.6g} {unit}"
             ) from None
 
     def _amplitudes(self, group: Group) -> list[AmplitudeFit]:
@@ -285,13 +300,13 @@ class FieldBalancing:
                         f"{self.runs.table.file}: {text}: expected four readings that fit one plane's effect"
                     )
                 if misfit > 0.05 * first:
-                    self.warn(text)
+                    self.warnings.append(text)
         return fits
 
-    def _confidence(self, solved: Solved, runout: Complex, limited: bool) -> None:
+    def _confidence(self, solved: Solved) -> None:
         """Propagate the reading errors, rotor by rotor."""
         relative, angle = self.request.reading_error or (0.0, 0.0)
-        group, sought = solved.group, self._sought(solved)
+        group, sought, runout = solved.group, self._sought(solved), self.runout(solved.group)
 
         def task(i: int) -> tuple[object, ...]:
             readings = Readings(
@@ -305,8 +320,8 @@ class FieldBalancing:
                 scatter=group.mean_error[i] if group.reading_sd[i] else None,
                 degrees_of_freedom=group.repeats,
             )
-            w = None if group.weights is None else group.weights[i]
-            return readings, solved.corrections[i], solved.standing[i], w, sought, limited
+            own = group.own_weights(i)
+            return readings, solved.corrections[i], solved.standing[i], own, sought, self.limited
 
         found = list(in_parts(confidence, map(task, range(len(group.rotors))), self.executor))
         solved.covariance = np.stack([covariance for covariance, _ in found])
@@ -314,12 +329,12 @@ class FieldBalancing:
 
     def _sought(self, solved: Solved) -> Sought:
         request = self.request
-        return Sought(request.objective, self.limits(solved.planes), request.ridge, request.monte_carlo)
+        return Sought(request.objective, solved.limit, request.ridge, request.monte_carlo)
 
-    def _doubt(self, solved: Solved, fit: JointFit, runout: Complex, limited: bool) -> None:
+    def _doubt(self, solved: Solved, fit: JointFit) -> None:
         """Carry the errors of a fit of all runs to the corrections."""
-        request, weights = self.request, solved.group.weights
-        before = solved.group.before
+        request, group = self.request, solved.group
+        before = group.before
         if request.reading_error is not None:
             errors = fit.stated(*request.reading_error)
         elif before is not None and before.reading is not None:
@@ -331,31 +346,36 @@ class FieldBalancing:
             )
         else:
             errors = fit.scatter()
-        still = fit.without(runout)
-        balance = LogBalance(still, solved.total, errors, weights, solved.corrections, request.ridge)
+        still = fit.without(self.runout(group))
+        balance = LogBalance(still, solved.total, errors, group.weights, solved.corrections, request.ridge)
         solved.balance = balance
         if not np.isfinite(errors.along).any():
             return
-        if len(solved.corrections) <= MANY:
+        many = len(solved.corrections) > MANY
+        if not many:
             left = [np.abs(balance.residual_samples(i)).max(axis=1) for i in range(len(solved.corrections))]
             solved.residual_95 = np.quantile(left, 0.95, axis=1)
-        if limited and len(solved.corrections) > MANY:
-            self.warn("uncertainties of so many rotors are not worked out under limits or with minimax")
-        elif limited:
+        if not self.limited:
+            solved.covariance = balance.covariance
+        elif many:
+            self.warnings.append(
+                "uncertainties of so many rotors are not worked out under limits or with minimax"
+            )
+        else:
             spreads = []
             for i, corrections in enumerate(solved.corrections):
                 draws = balance.problem_samples(i, min(request.monte_carlo or 200, 1000))
-                own = None if weights is None else weights[i]
+                own = group.own_weights(i)
                 samples = limited_samples(draws, solved.standing[i], own, self._sought(solved))
                 spreads.append(spread(samples, corrections))
             solved.covariance = np.stack(spreads)
-        else:
-            solved.covariance = balance.covariance
 
-    def warn(self, text: str) -> None:
-        """Say what was done otherwise than a reader might think, once."""
-        if text not in self.warnings:
-            self.warnings.append(text)
+    # -- in the units and by the names of the table ------------------------------------------------------
+
+    @property
+    def against(self) -> bool:
+        """Whether phases were turned round, for the instrument counts them against the sense of the mass angles."""
+        return self.request.against or self.runs.lags
 
     def in_kg_m(self, corrections: Complex) -> Real:
         """Return the unbalances of masses at the trial radius, or of unbalances as they are."""
@@ -385,7 +405,7 @@ class FieldBalancing:
     def each(self, most: int | None = None) -> Iterator[tuple[str, Solved, int]]:
         """Yield of each rotor its name as it is shown, its group's result, and its place in that."""
         for rotor, (k, i) in zip(self.runs.rotors[:most], self.place, strict=False):
-            yield rotor if self.several else "", self.solved[k], i
+            yield rotor if self.runs.several else "", self.solved[k], i
 
     @property
     def uncertain(self) -> bool:

@@ -37,7 +37,7 @@ def last_run(found: FieldBalancing, solved: Solved, i: int) -> LastRun | None:
     stands = request.from_here and bool((on == group.kept[i]).all())
     if not on.any() or not (stands or found.stored is not None):
         return None
-    return LastRun(group.trials[-1].run, on, group.runs[i, -1] - _runout(found, solved))
+    return LastRun(group.trials[-1].run, on, group.runs[i, -1] - found.runout(group))
 
 
 def first_reading(found: FieldBalancing, solved: Solved, i: int) -> Complex | None:
@@ -65,12 +65,7 @@ def _read(found: FieldBalancing, solved: Solved, i: int, run: str) -> Complex:
     sums = np.where(there, fit.readings[rows], 0).sum(axis=0)
     mean = np.full_like(sums, np.nan)
     np.divide(sums, there.sum(axis=0), out=mean, where=there.any(axis=0))
-    return np.asarray(mean - _runout(found, solved))
-
-
-def _runout(found: FieldBalancing, solved: Solved) -> Complex:
-    runout = found.request.runout
-    return np.array([runout.get(channel.sensor, 0) for channel in solved.group.channels], dtype=complex)
+    return np.asarray(mean - found.runout(solved.group))
 
 
 def verdicts(found: FieldBalancing, solved: Solved, i: int) -> list[Verdict]:
@@ -87,7 +82,8 @@ def measured_verdicts(found: FieldBalancing, solved: Solved, i: int, last: LastR
     if found.request.tolerance is None or solved.unbalance is None:
         return []
     read = np.isfinite(last.vibration)
-    weights = None if solved.group.weights is None else solved.group.weights[i][read]
+    own = solved.group.own_weights(i)
+    weights = None if own is None else own[read]
     left = initial_unbalance(solved.alpha[i][read], last.vibration[read], weights, singular=SINGULAR)
     return _of_planes(found, solved, solved.unbalance[i], left)
 

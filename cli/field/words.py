@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cli.field.runs import Complex, Real
 from cli.field.solve import FieldBalancing, Solved
 from cli.field.tolerance import verdicts
 from cli.read.units import degrees, from_si, to_si, written
@@ -25,31 +26,36 @@ METHOD = (
 )
 
 
+def sense(found: FieldBalancing) -> str:
+    """Say how phases and mass angles are counted."""
+    request = found.request
+    lags = request.phase_lag or found.runs.lags
+    if request.four_run:
+        return "Mass angles as in the table; no phase is used."
+    if request.rotation is None and not lags:
+        return "Phases and mass angles are counted in one common sense, from one mark on the rotor."
+    turning = (
+        f"the shaft turns {request.rotation} as seen against +z"
+        if request.rotation
+        else "phases are counted with the mass angles"
+    )
+    return (
+        f"The instrument's phases {'lag' if lags else 'lead'} ({turning}); all phases given out are counted in the sense of the "
+        "mass angles."
+    )
+
+
 def conventions(found: FieldBalancing) -> str:
     """Say how angles and phases are counted and what the corrections mean."""
-    request = found.request
     state = (
         "the rotor as it stands, with the trial masses that were left on it"
-        if request.from_here
+        if found.request.from_here
         else "the rotor in its initial state, all trial masses off"
     )
     return (
-        f"{request.conventions}\nCorrections: {found.runs.per}{'es' if found.runs.per == 'mass' else 's'} to ADD to {state}, "
+        f"{sense(found)}\nCorrections: {found.runs.per}{'es' if found.runs.per == 'mass' else 's'} to ADD to {state}, "
         "at the radius of the trial masses."
     )
-
-
-def runs_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
-    """The readings: a row for each sensor, amplitude and phase of each run beside each other."""
-    group = solved.group
-    columns: Columns = {"sensor": [str(channel) for channel in group.channels]}
-    for name, values in [("initial", group.initial[i])] + [
-        (f"run {trial.run}", group.runs[i, j]) for j, trial in enumerate(group.trials)
-    ]:
-        columns[f"{name}: {amplitude_unit(found)}"] = [float(abs(value)) for value in values]
-        if not found.request.four_run:
-            columns[f"{name}: phase°"] = [float(degrees(value)) for value in values]
-    return columns
 
 
 def influence_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
@@ -58,11 +64,21 @@ def influence_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
     per = f"{amplitude_unit(found)}/{found.unit}"
     for p, plane in enumerate(solved.planes):
         alpha = solved.alpha[i, :, p]
-        columns[f"{plane}: {per}"] = [
-            float(a) for a in to_si(np.abs(alpha), found.runs.per, found.runs.mass_unit)
-        ]
-        columns[f"{plane}: phase°"] = [round(float(a), 2) for a in degrees(alpha)]
+        columns[f"{plane}: {per}"] = to_si(np.abs(alpha), found.runs.per, found.runs.mass_unit).tolist()
+        columns[f"{plane}: phase°"] = _hundredths(alpha)
     return columns
+
+
+def _hundredths(values: Complex) -> list[Cell]:
+    return [round(angle, 2) for angle in degrees(values).tolist()]
+
+
+def masses_said(found: FieldBalancing, planes: list[str], masses: Complex, spec: str) -> list[str]:
+    """Say a mass in each plane."""
+    return [
+        f"{found.amount(abs(w)):.6g} {found.unit} at {angle_text(degrees(complex(w)), spec)}° in {plane}"
+        for plane, w in zip(planes, masses, strict=True)
+    ]
 
 
 def split_lines(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
@@ -79,8 +95,8 @@ def split_lines(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
     return lines
 
 
-def _known(value: float) -> Cell:
-    return float(value) if np.isfinite(value) else "unknown"
+def _known(values: Real) -> list[Cell]:
+    return [value if np.isfinite(value) else "unknown" for value in values.tolist()]
 
 
 def residual_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
@@ -88,19 +104,18 @@ def residual_table(found: FieldBalancing, solved: Solved, i: int) -> Columns:
     before, after = solved.initial[i], solved.residual[i]
     columns: Columns = {
         "sensor": [str(channel) for channel in solved.group.channels],
-        f"before {amplitude_unit(found)}": [float(abs(v)) for v in before],
-        f"predicted {amplitude_unit(found)}": [float(abs(v)) for v in after],
+        f"before {amplitude_unit(found)}": np.abs(before).tolist(),
+        f"predicted {amplitude_unit(found)}": np.abs(after).tolist(),
     }
     if solved.balance is not None:
         spread = solved.balance.vibration_deviation(solved.total)[i]
         if np.isfinite(spread).any():
-            columns[f"± {amplitude_unit(found)}"] = [_known(x) for x in spread]
-        ceiling = found.request.max_residual
-        if ceiling is not None:
-            within = solved.balance.probability_within(ceiling)[i]
-            columns[f"within {ceiling:g}: probability"] = [_known(x) for x in within]
+            columns[f"± {amplitude_unit(found)}"] = _known(spread)
+        if found.ceiling is not None:
+            within = solved.balance.probability_within(found.ceiling)[i]
+            columns[f"within {found.ceiling:g}: probability"] = _known(within)
     if not found.request.four_run:
-        columns["phase°"] = [round(float(degrees(v)), 2) for v in after]
+        columns["phase°"] = _hundredths(after)
     return columns
 
 
@@ -163,16 +178,14 @@ def verdict(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
     lines = [
         f"tolerance{' ' + tolerance.grade if tolerance.grade else ''}: U_per = {whole:.6g} g·mm, shared equally"
     ]
-    for plane, share, *sizes in verdicts(found, solved, i):
-        before, after = (
-            "not determined"
-            if np.isnan(u)
-            else f"{from_si(u, 'unbalance', 'g_mm'):.6g} g·mm ({'within' if u <= share else 'beyond'})"
-            for u in sizes
+    for v in verdicts(found, solved, i):
+        share, before, after = (from_si(u, "unbalance", "g_mm") for u in v[1:])
+        initial, residual = (
+            said if size != size else f"{size:.6g} g·mm ({said})"
+            for size, said in ((before, v.of(v.initial)), (after, v.of(v.residual)))
         )
         lines.append(
-            f"  plane {plane}: permissible {from_si(share, 'unbalance', 'g_mm'):.6g}, initial {before}, "
-            f"residual as predicted {after}"
+            f"  plane {v.plane}: permissible {share:.6g}, initial {initial}, residual as predicted {residual}"
         )
     return lines
 
@@ -180,9 +193,11 @@ def verdict(found: FieldBalancing, solved: Solved, i: int) -> list[str]:
 def notes(found: FieldBalancing) -> str:
     """Above the terminal's table: conventions, readings, coefficients."""
     parts = [conventions(found)]
-    for rotor, solved, i in found.each(FEW):
-        name = f"rotor {rotor}: " if rotor else ""
-        parts.append(f"{name}influence coefficients\n" + table_text(influence_table(found, solved, i)))
+    for _, solved, i in found.each(FEW):
+        parts.append(
+            f"{found.of(solved.group, i)}influence coefficients\n"
+            + table_text(influence_table(found, solved, i))
+        )
     if len(found.runs.rotors) > FEW:
         parts.append(f"… and {len(found.runs.rotors) - FEW} further rotors\n")
     return "\n".join(parts) + "\nmaterial to ADD:"
@@ -191,8 +206,8 @@ def notes(found: FieldBalancing) -> str:
 def afterword(found: FieldBalancing) -> str:
     """Below the terminal's table: removal, residual, confidence, verdict."""
     parts = []
-    for rotor, solved, i in found.each(FEW):
-        name = f"rotor {rotor}: " if rotor else ""
+    for _, solved, i in found.each(FEW):
+        name = found.of(solved.group, i)
         removal = ", ".join(
             f"{plane} at {angle_text(degrees(-w), '.2f')}°"
             for plane, w in zip(solved.planes, solved.corrections[i], strict=True)

@@ -8,7 +8,7 @@ from cli.mechanism.posed import posed
 from cli.show.columns import Section, Sheet
 from cli.show.report import CODE
 from virtualwork import Mechanism
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 
 
 def pages(title: str, taken: list[str], made: str) -> list[Sheet]:

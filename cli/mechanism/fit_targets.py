@@ -11,7 +11,7 @@ import numpy as np
 from cli.errors import DataError
 from cli.read import options
 from cli.read.units import to_si
-from virtualwork.describe.errors import hint
+from virtualwork.describe import hint
 
 if TYPE_CHECKING:
     from virtualwork import Mechanism

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from virtualwork.branch.assembly import Assembly
-    from virtualwork.branch.track import Track
 
 GROUND = "ground"
 
@@ -24,16 +23,17 @@ def warnings(studies: Studies) -> list[str]:
     """All of them, once the studies are done."""
     analysis = studies.analysis
     said = [*analysis.warnings, *limits(analysis), *studies.said]
-    return [*said, *of_forces(analysis)] if studies.request.forces else said
+    return [*said, *of_forces(analysis)] if studies.asked.forces else said
 
 
-def _on_branch(analysis: Analysis, track: Track, found: list[float], digits: int) -> list[float]:
+def _on_branch(analysis: Analysis, assembly: Assembly, found: list[float], digits: int) -> list[float]:
     """Inputs as they are shown, each once, deg in [0, period of the branch) or m."""
     if analysis.mechanism.inputs[0].is_slide:
         return sorted({round(v, digits) for v in found})
-    if track.turns is None:
+    turns = assembly.reach.turns
+    if turns is None:
         return sorted({round(math.degrees(v), digits) for v in found})
-    full = 360.0 * track.turns
+    full = 360.0 * turns
     return sorted({round(math.degrees(v) % full, digits) % full for v in found})
 
 
@@ -52,12 +52,12 @@ def limits(analysis: Analysis, counted: list[tuple[int, int]] | None = None) -> 
         if missing:
             text = f"{missing} of {analysis.inputs.n} poses cannot be assembled"
             if track.active:
-                slide = analysis.mechanism.inputs[0].is_slide
-                shown = _on_branch(analysis, track, [v.input for v in track.limits()], 12)
-                unit = "m" if slide else "deg"
+                shown = _on_branch(analysis, assembly, [v.input for v in assembly.reach.limits()], 12)
                 if shown:
                     values = ", ".join(f"{v:.13g}" for v in shown)
-                    text += f": the input {name} has the limit{'s' * (len(shown) > 1)} {values} {unit}"
+                    text += (
+                        f": the input {name} has the limit{'s' * (len(shown) > 1)} {values} {analysis.unit}"
+                    )
             lines.append(text + _shortfall(analysis, assembly, first))
         lines += _branch_lines(analysis, assembly)
         lines += track.warnings()
@@ -66,10 +66,8 @@ def limits(analysis: Analysis, counted: list[tuple[int, int]] | None = None) -> 
 
 def _shortfall(analysis: Analysis, assembly: Assembly, i: int) -> str:
     """By how much a pose does not close, and the nearest input where it would."""
-    from virtualwork.branch.shortfall import shortfall
-
     pose = analysis.inputs.part(i, i + 1)
-    found = shortfall(assembly, tuple(pose.values[0].tolist()))
+    found = assembly.reach.shortfall(tuple(pose.values[0].tolist()))
     if found is None:
         return ""
     factor, unit = (1e3, "mm") if analysis.mechanism.size < 2 else (1.0, "m")
@@ -79,9 +77,8 @@ def _shortfall(analysis: Analysis, assembly: Assembly, i: int) -> str:
     )
     text = f"; at {shown}: {found.text(lambda v: f'{v * factor:.6g} {unit}')}"
     if found.nearest is not None:
-        slide = analysis.mechanism.inputs[0].is_slide
-        there = found.nearest if slide else math.degrees(found.nearest)
-        text += f"; it would close at {there:.10g} {'m' if slide else 'deg'}"
+        there = found.nearest if analysis.unit == "m" else math.degrees(found.nearest)
+        text += f"; it would close at {there:.10g} {analysis.unit}"
     return text
 
 
@@ -93,12 +90,11 @@ def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
     least, largest = analysis.inputs.span
     low, high = min(least, track.start), max(largest, track.start)
     lines = []
-    slide = analysis.mechanism.inputs[0].is_slide
     for changes in track.changes.values():
         inside = [c for c in changes if low - 1e-12 <= c.input <= high + 1e-12]
         if not inside:
             continue
-        at = _on_branch(analysis, track, [c.input for c in inside], 9)
+        at = _on_branch(analysis, assembly, [c.input for c in inside], 9)
         c = inside[0]
         group = next(g for g in assembly.plan.groups if g.name == c.group)
         names = [*group.angles, *(analysis.mechanism.guides[g].point for g in group.slides)]
@@ -108,7 +104,7 @@ def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
                 f"d{n}/dq = {round(float(v), 12) + 0.0:.6g}" for n, v in zip(names, values, strict=True)
             )
 
-        text = f"change point at {', '.join(f'{v:.10g}' for v in at)} {'m' if slide else 'deg'}: the branches of {c.group} cross; "
+        text = f"change point at {', '.join(f'{v:.10g}' for v in at)} {analysis.unit}: the branches of {c.group} cross; "
         text += f"the motion goes on along its tangent ({rates(c.rates[0])})"
         if c.other is not None:
             text += f", the other branch would go with {rates(c.other)}"
@@ -192,7 +188,6 @@ def _pinned(analysis: Analysis, body: str, center: complex) -> bool:
 
 def listed(analysis: Analysis, what: str, places: list[float], count: int) -> str:
     """One line for what happens at some inputs: the first five of them, and how many more there are."""
-    unit = "m" if analysis.mechanism.inputs[0].is_slide else "deg"
-    named = ", ".join(f"{place:g} {unit}" for place in places[:5])
+    named = ", ".join(f"{place:g} {analysis.unit}" for place in places[:5])
     more = f" and {count - 5} further poses" if count > 5 else ""
     return f"at input {named}{more}: {what}"

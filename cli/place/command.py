@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.place.corrections import Correction, read_corrections
-from cli.place.read import Request, read_drill, read_planes, read_ratio, read_stock
+from cli.place.read import Request, read_corrections, read_drill, read_planes, read_ratio, read_stock
 from cli.read import options
 from cli.show.commands import ShowOptions
 from cli.show.output import command
@@ -88,33 +87,28 @@ def run(
     from cli.place.solve import Placing
     from cli.show.columns import Result, Section, Sheet
 
-    found = [
-        (
-            of,
-            Placing(
-                Request(of.vectors, chosen, limit, weights, pieces, max_pieces, ratio, drilled, moved, remove)
-            ),
-        )
-        for of in read
-    ]
+    request = Request(chosen, limit, weights, pieces, max_pieces, ratio, drilled, moved, remove)
+    found = [Placing(of, request) for of in read]
     alone = len(found) == 1
     if not alone and show.plot is not None:
         raise options.bad("--plot", "draws one correction: expected --rotor and --plane too")
 
-    def sheet(of: Correction, placing: Placing) -> Sheet:
-        parts: list[str | Table] = [words.notes(placing), columns.masses(placing), words.error(placing)]
-        return Sheet("" if alone else of.name, [Section("Masses", parts)], lambda: picture.draw(placing))
+    def sheet(placing: Placing) -> Sheet:
+        one = [placing]
+        parts: list[str | Table] = [words.notes(one), columns.masses(one), words.errors(one)]
+        title = "" if alone else placing.of.name
+        return Sheet(title, [Section("Masses", parts)], lambda: picture.draw(placing))
 
     return Result(
-        document=lambda: columns.documents(found),
-        tables={"masses": lambda: columns.several(found)},
-        notes=lambda: words.several(found),
+        document=lambda: columns.document(found),
+        tables={"masses": lambda: columns.masses(found)},
+        notes=lambda: words.notes(found),
         afterword=lambda: words.errors(found),
-        figure=(lambda: picture.draw(found[0][1])) if alone else None,
+        figure=(lambda: picture.draw(found[0])) if alone else None,
         method=words.METHOD,
-        sheets=lambda: [sheet(*each) for each in found],
+        sheets=lambda: map(sheet, found),
         about={"title": "Placement of a correction"},
         warnings=[
-            text if alone else f"{of.name}: {text}" for of, placing in found for text in placing.warnings
+            text if alone else f"{placing.of.name}: {text}" for placing in found for text in placing.warnings
         ],
     )

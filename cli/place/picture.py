@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def draw(found: Placing) -> Figure:
     """Draw for each plane its places with their masses on the rim, target and total as vectors."""
-    unit = found.request.unit
+    unit = found.of.unit
     panels = [
         Places(
             "" if share.z is None else f"z = {from_si(share.z, 'length', 'mm'):g} mm: ",

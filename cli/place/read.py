@@ -1,13 +1,15 @@
-"""What the options of a placement ask for, in SI."""
+"""What is to be placed, from vectors or from a file that `dalembert field` or `balance` wrote, and what the options ask for."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
+from cli.errors import DataError, quote
 from cli.read import options
-from cli.read.units import is_number
+from cli.read.files import SUFFIXES, read_bytes, remember, split_sheet
 
 
 class Vector(NamedTuple):
@@ -31,9 +33,8 @@ class Drill(NamedTuple):
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked for; angles in degrees."""
+    """Where and how masses go; angles in degrees."""
 
-    vectors: list[Vector]
     places: list[float] | None
     limit: float | None
     stock: list[float] | None
@@ -47,40 +48,128 @@ class Request:
     remove: bool
 
     @property
-    def unit(self) -> str:
-        """The unit masses are shown in."""
-        return self.vectors[0].mass_unit
-
-    @property
     def removes(self) -> bool:
         """Whether what is given out is material to remove."""
         return self.remove or self.drill is not None
 
 
-def read_vector(spec: str) -> Vector:
-    """Read `83.5g@308.87deg`; a bare angle is in degrees."""
-    mass, mark, angle = spec.partition("@")
-    if not mark:
-        raise options.bad("MASS@ANGLE", f"'{spec}': expected a mass and an angle, such as 83.5g@308.87deg")
-    size, turn = (
-        options.with_unit("MASS@ANGLE", mass, "mass"),
-        options.with_unit("MASS@ANGLE", f"{angle}deg" if is_number(angle) else angle, "angle"),
+class Correction(NamedTuple):
+    """A correction to be placed by itself: of a rotor's plane in a file, or of vectors that are added up."""
+
+    rotor: str
+    plane: str
+    vectors: list[Vector]
+
+    @property
+    def unit(self) -> str:
+        """The unit masses are shown in."""
+        return self.vectors[0].mass_unit
+
+    @property
+    def name(self) -> str:
+        """What it is called where there are several."""
+        return f"rotor {self.rotor}, plane {self.plane}"
+
+
+def read_corrections(given: list[str], rotor: str | None, plane: str | None) -> list[Correction]:
+    """Read MASS@ANGLE ..., or one file, of which --rotor and --plane choose."""
+    file = given[0]
+    if not _is_file(file):
+        options.refuse("chooses among the corrections of a file: expected a file", rotor=rotor, plane=plane)
+        return [Correction("1", "1", [read_vector(spec) for spec in given])]
+    if len(given) > 1:
+        raise options.bad("MASS@ANGLE", f"'{given[1]}': beside a file expected nothing")
+    found = _of_json(file) if file.lower().endswith(".json") else _of_table(file)
+    for what, wanted, field in (("rotor", rotor, 0), ("plane", plane, 1)):
+        if wanted is None:
+            continue
+        names = dict.fromkeys(str(each[field]) for each in found)
+        found = [each for each in found if each[field] == wanted]
+        if not found:
+            raise DataError(f"{file}: no {what} {quote(wanted)}: expected one of {', '.join(names)}")
+    return found
+
+
+def _is_file(text: str) -> bool:
+    """Whether a word is a file and no MASS@ANGLE."""
+    path, _ = split_sheet(text)
+    known = Path(path).suffix.lower() in (".csv", ".txt", ".json", *SUFFIXES)
+    return text == "-" or known or ("@" not in text and Path(path).is_file())
+
+
+def _of_table(path: str) -> list[Correction]:
+    from cli.read.tables import read
+
+    # what else such a table holds is known, and not needed here
+    beside = {"mass_uncertainty": "mass", "angle_uncertainty": "angle", "z": "length", "radius": "length"}
+    table = read(
+        path,
+        numbers={"mass": "mass", "angle": "angle", "unbalance": "unbalance", "weight": "force", **beside},
+        texts=["rotor", "plane"],
+        blank=list(beside),
     )
-    assert size is not None
-    assert turn is not None
-    if size[0] < 0:
-        raise options.bad("MASS@ANGLE", f"'{spec}': expected a mass that is not negative")
-    return Vector(*size, *turn)
+    if "mass" not in table.numbers and "unbalance" in table.numbers:
+        raise DataError(
+            f"{table.file}: corrections as unbalances: expected masses, as trial masses in the runs give them"
+        )
+    mass, angle = table.require("mass", "mass"), table.require("angle", "angle")
+    table.reject(mass.values < 0, "mass", "a mass that is not negative")
+    names = [table.texts.get(name) or ["1"] * table.rows for name in ("rotor", "plane")]
+    return [
+        Correction(rotor, plane, [Vector(m, mass.unit, a, angle.unit)])
+        for rotor, plane, m, a in zip(*names, mass.values.tolist(), angle.values.tolist(), strict=True)
+    ]
+
+
+def _of_json(path: str) -> list[Correction]:
+    import json
+
+    remember(path)
+    file, data = read_bytes(path)
+    try:
+        document = json.loads(data)
+    except (ValueError, RecursionError) as error:
+        raise DataError(f"{file}: no valid JSON: {error}") from None
+    try:
+        found = [
+            Correction(str(rotor["rotor"]), str(one["plane"]), [_vector(one)])
+            for rotor in document["rotors"]
+            for one in rotor["corrections"]
+        ]
+    except (KeyError, TypeError, ValueError):
+        found = []
+    if not found:
+        raise DataError(
+            f"{file}: no corrections with plane, mass_kg and angle_deg below rotors: expected the JSON of dalembert field"
+        )
+    return found
+
+
+def _vector(one: dict[str, Any]) -> Vector:
+    mass, angle = float(one["mass_kg"]), float(one["angle_deg"])
+    if not (0 <= mass <= 1e60 and abs(angle) <= 1e60):
+        raise ValueError
+    return Vector(mass, "kg", angle, "deg")
+
+
+def read_vector(spec: str) -> Vector:
+    """Read `83.5g@308.87deg`."""
+    expected = f"'{spec}': expected a mass and an angle, such as 83.5g@308.87deg"
+    return Vector(*options.mass_at("MASS@ANGLE", spec, spec, "mass", expected))
+
+
+def _both(one: str, value: object, other: str, beside: object) -> bool:
+    """Whether two options are given that go together; refuse one without the other."""
+    if (value is None) != (beside is None):
+        raise options.bad(one if value is None else other, f"expected both {one} and {other}")
+    return value is not None
 
 
 def read_ratio(at_radius: str | None, to_radius: str | None) -> float:
     """Read --at-radius and --to-radius as the one over the other."""
     at = options.quantity("--at-radius", at_radius, "length", positive=True)
     to = options.quantity("--to-radius", to_radius, "length", positive=True)
-    if (at is None) != (to is None):
-        raise options.bad(
-            "--to-radius" if to is None else "--at-radius", "expected both --at-radius and --to-radius"
-        )
+    _both("--at-radius", at, "--to-radius", to)
     return 1.0 if at is None or to is None else at / to
 
 
@@ -90,8 +179,7 @@ def read_drill(
     """Read --drill and what goes with it."""
     diameter = options.quantity("--drill", drill, "length", positive=True)
     rho = options.quantity("--density", density, "density", positive=True)
-    if (diameter is None) != (rho is None):
-        raise options.bad("--density" if rho is None else "--drill", "expected both --drill and --density")
+    _both("--drill", diameter, "--density", rho)
     deepest = options.quantity("--max-depth", max_depth, "length", positive=True)
     if deepest is not None and diameter is None:
         raise options.bad("--max-depth", "is for --drill")
@@ -113,8 +201,7 @@ def read_stock(stock: str | None) -> list[float] | None:
 def read_planes(at_z: str | None, to_z: str | None) -> tuple[float, list[float]] | None:
     """Read --at-z and --to-z."""
     at = options.quantity("--at-z", at_z, "length")
-    if (at is None) != (to_z is None):
-        raise options.bad("--to-z" if to_z is None else "--at-z", "expected both --at-z and --to-z")
+    _both("--at-z", at, "--to-z", to_z)
     if at is None or to_z is None:
         return None
     planes = [options.needed("--to-z", part, "length") for part in to_z.split(":")]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from balancing import Placement, correct, drill_depth, place, place_from_stock, transfer
 from cli.errors import DataError
-from cli.place.read import Drill, Request
+from cli.place.read import Correction, Drill, Request
 from cli.read.rounding import EPS, angle_error, size_error, vector_error
 from cli.read.units import degrees, from_si, phasor, to_si
 
@@ -50,19 +50,14 @@ class Placed(NamedTuple):
 class Placing:
     """Corrections combined and placed."""
 
-    def __init__(self, request: Request) -> None:
-        self.request = request
+    def __init__(self, of: Correction, request: Request) -> None:
+        self.of, self.request = of, request
         self.warnings: list[str] = []
-        vectors = request.vectors
-        sizes = [to_si(v.mass, "mass", v.mass_unit) for v in vectors]
-        self._largest = max(sizes)
-        self.target = sum(
-            (
-                complex(phasor(np.array(size), np.array(v.angle), v.angle_unit)[()])
-                for size, v in zip(sizes, vectors, strict=True)
-            ),
-            0j,
-        )
+        self._sizes = [to_si(v.mass, "mass", v.mass_unit) for v in of.vectors]
+        self._largest = max(self._sizes)
+        each = zip(self._sizes, of.vectors, strict=True)
+        turned = (phasor(np.array(size), np.array(v.angle), v.angle_unit) for size, v in each)
+        self.target = sum(map(complex, turned), 0j)
         if abs(self.target) <= 1e-15 * self._largest:
             self.target = 0j  # what rounding leaves of corrections that cancel
         opposite = request.drill is not None and not request.remove
@@ -87,7 +82,7 @@ class Placing:
 
     def text(self, mass: float) -> str:
         """Return a mass in the unit it is shown in."""
-        return f"{from_si(mass, 'mass', self.request.unit):.4g} {self.request.unit}"
+        return f"{from_si(mass, 'mass', self.of.unit):.4g} {self.of.unit}"
 
     def _place(self, goal: complex) -> tuple[list[float], Placement]:
         """Place what goes into one plane: the places, and what is on them."""
@@ -141,14 +136,9 @@ class Placing:
     @cached_property
     def goal_errors(self) -> list[float]:
         """Of the goals, in the shares' order."""
-        request = self.request
-        wrong = float(
-            sum(
-                vector_error(to_si(v.mass, "mass", v.mass_unit), v.angle, v.angle_unit)
-                for v in request.vectors
-            )
-        )
-        of_goal = (wrong + (len(request.vectors) + 4) * EPS * self._largest) * request.ratio
+        request, each = self.request, zip(self._sizes, self.of.vectors, strict=True)
+        wrong = float(sum(vector_error(size, v.angle, v.angle_unit) for size, v in each))
+        of_goal = (wrong + (len(self._sizes) + 4) * EPS * self._largest) * request.ratio
         if request.planes is None:
             return [of_goal]
         at, planes = request.planes

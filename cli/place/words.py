@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cli.place.corrections import Correction
 from cli.place.solve import Placing
 from cli.read.units import degrees, from_si
 from cli.show.text import angle_text
@@ -16,39 +15,35 @@ METHOD = (
 )
 
 
-def notes(found: Placing) -> str:
+def _action(found: Sequence[Placing]) -> str:
+    return "REMOVE" if found[0].request.removes else "ADD"
+
+
+def notes(found: Sequence[Placing]) -> str:
     """Say what is to be reached."""
-    lines = [f"correction: {_vector(found, found.target)} (angles counter-clockwise)"]
-    if found.request.ratio != 1:
-        lines.append(f"at the other radius: {found.text(abs(found.target) * found.request.ratio)}")
-    for share in found.shares:
+    if len(found) > 1:
+        lines = [f"{placing.of.name}: {_vector(placing, placing.target)}" for placing in found]
+        return "\n".join([*lines, f"angles counter-clockwise; material to {_action(found)}:"])
+    (alone,) = found
+    lines = [f"correction: {_vector(alone, alone.target)} (angles counter-clockwise)"]
+    if alone.request.ratio != 1:
+        lines.append(f"at the other radius: {alone.text(abs(alone.target) * alone.request.ratio)}")
+    for share in alone.shares:
         if share.z is not None:
             z = from_si(share.z, "length", "mm")
-            lines.append(f"in the plane z = {z:g} mm: {_vector(found, share.goal)}")
-    return "\n".join([*lines, f"material to {'REMOVE' if found.request.removes else 'ADD'}:"])
+            lines.append(f"in the plane z = {z:g} mm: {_vector(alone, share.goal)}")
+    return "\n".join([*lines, f"material to {_action(found)}:"])
 
 
-def several(found: Sequence[tuple[Correction, Placing]]) -> str:
-    """Say what is to be reached of each correction."""
-    if len(found) == 1:
-        return notes(found[0][1])
-    lines = [f"{of.name}: {_vector(placing, placing.target)}" for of, placing in found]
-    action = "REMOVE" if found[0][1].request.removes else "ADD"
-    return "\n".join([*lines, f"angles counter-clockwise; material to {action}:"])
-
-
-def error(found: Placing) -> str:
+def errors(found: Sequence[Placing]) -> str:
     """Say what is missed."""
-    whole = max(abs(share.goal) for share in found.shares)
-    part = f" ({abs(found.error) / whole:.3%} of the correction)" if whole else ""
-    return f"error: {_vector(found, found.error)}{part}"
-
-
-def errors(found: Sequence[tuple[Correction, Placing]]) -> str:
-    """Say what is missed of each correction."""
-    if len(found) == 1:
-        return error(found[0][1])
-    return "\n".join(f"{of.name}: {error(placing)}" for of, placing in found)
+    lines = []
+    for placing in found:
+        whole = max(abs(share.goal) for share in placing.shares)
+        part = f" ({abs(placing.error) / whole:.3%} of the correction)" if whole else ""
+        name = f"{placing.of.name}: " if len(found) > 1 else ""
+        lines.append(f"{name}error: {_vector(placing, placing.error)}{part}")
+    return "\n".join(lines)
 
 
 def _vector(found: Placing, vector: complex) -> str:

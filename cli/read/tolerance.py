@@ -17,6 +17,12 @@ class Verdict(NamedTuple):
     initial: float
     residual: float
 
+    def of(self, unbalance: float) -> str:
+        """Say of an unbalance in this plane whether it is within what is permissible."""
+        if unbalance != unbalance:
+            return "not determined"
+        return "within" if unbalance <= self.permissible else "beyond"
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Tolerance:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import cmath
 import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -35,7 +36,7 @@ class Recorder:
     """
 
     def __init__(self) -> None:
-        self._operations: list[Operation] = []
+        self.operations: list[Operation] = []
         self._known: dict[Operation, int] = {}
 
     def input(self, name: str) -> Real:
@@ -49,8 +50,8 @@ class Recorder:
         operation = (kind, *arguments)
         found = self._known.get(operation)
         if found is None:
-            found = self._known[operation] = len(self._operations)
-            self._operations.append(operation)
+            found = self._known[operation] = len(self.operations)
+            self.operations.append(operation)
         return found
 
     def difference(self, a: int, b: int) -> Real:
@@ -66,12 +67,16 @@ class Recorder:
         TypeError
             Where an output is complex: its parts are two outputs.
         """
+        return shortened(self.operations, self.numbers(outputs))
+
+    def numbers(self, outputs: Mapping[str, Number]) -> list[tuple[str, int]]:
+        """The operations that have the values of named results; see `tape`."""
         found = []
         for name, value in outputs.items():
             if isinstance(value, (Complex, complex)):
                 raise TypeError(f"output {name} is complex: record its parts")
             found.append((name, lifted(self, value).settled))
-        return shortened(self._operations, found)
+        return found
 
 
 def lifted(recorder: Recorder, value: Number) -> Real:
@@ -108,12 +113,12 @@ class Real:
         if not self.negative:
             return self.number
         # −(a − b) = b − a, and a constant factor has its sign for nothing
-        kind, *of = self.recorder._operations[self.number]
+        kind, *of = self.recorder.operations[self.number]
         if kind == "sub":
             return self.recorder.node("sub", of[1], of[0])
         if kind == "mul":
             for factor, other in (of, of[::-1]):
-                which, *value = self.recorder._operations[factor]
+                which, *value = self.recorder.operations[factor]
                 if which == "const":
                     return self.recorder.node("mul", self.recorder.node("const", -value[0]), other)
         return self.recorder.node("neg", self.number)
@@ -136,14 +141,14 @@ class Real:
         return self
 
     def __abs__(self) -> Real:
-        kind, *of = self.recorder._operations[self.number]
-        if kind in ("abs", "sqrt", "const") or (kind == "mul" and of[0] == of[1]):
+        kind, *of = self.recorder.operations[self.number]
+        if kind in ("abs", "binade", "sqrt", "const") or (kind == "mul" and of[0] == of[1]):
             return Real(self.recorder, self.number)
         return Real(self.recorder, self.recorder.node("abs", self.number))
 
     def sqrt(self) -> Real:
         """The root; NaN where the number is negative. That of a square is its factor's size, with the root's own rounding."""
-        kind, *of = self.recorder._operations[self.number]
+        kind, *of = self.recorder.operations[self.number]
         if kind == "mul" and of[0] == of[1] and not self.negative:
             return abs(Real(self.recorder, of[0]))
         return Real(self.recorder, self.recorder.node("sqrt", self.settled))
@@ -302,6 +307,15 @@ class Complex:
         return RECORDED.sqrt(squared(self))
 
 
+def binade(x: float) -> float:
+    """The largest power of two that is no larger than |x|; 0 below the least normal number.
+
+    >>> binade(-3.0), binade(0.5), binade(0.0)
+    (2.0, 0.5, 0.0)
+    """
+    return 0.0 if abs(x) < sys.float_info.min else math.ulp(x) * 2.0**52
+
+
 def squared(z: Number) -> Number:
     """|z|²."""
     return product(z.real, z.real) + product(z.imag, z.imag)
@@ -324,6 +338,10 @@ class Recorded:
     @staticmethod
     def const(value: float) -> float:
         return value
+
+    @staticmethod
+    def binade(x: Number) -> Number:
+        return Real(x.recorder, x.recorder.node("binade", x.number)) if isinstance(x, Real) else binade(x)
 
     @staticmethod
     def sqrt(x: Number) -> Number:

@@ -8,10 +8,11 @@ kind of number: floats, arrays, recorded numbers, many digits.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from operator import or_
+from types import MappingProxyType
 from typing import Any, Protocol
 
 Operation = tuple[str, *tuple[Any, ...]]
@@ -24,6 +25,8 @@ SIGNS = {
     "div": "{} / {}",
     "neg": "-{}",
     "abs": "abs({})",
+    # the largest power of two that is no larger than the size of the number
+    "binade": "binade({})",
     "sqrt": "sqrt({})",
     "sin": "sin({})",
     "cos": "cos({})",
@@ -32,11 +35,14 @@ SIGNS = {
     "select": "({1} if {0} > 0 else {2})",
 }
 
+EMPTY: Mapping[int, str] = MappingProxyType({})
+
 
 class Kind(Protocol):
     """The functions of one kind of number; sums, products, quotients and absolute values are the numbers' own."""
 
     def const(self, value: float) -> Any: ...
+    def binade(self, x: Any) -> Any: ...
     def sqrt(self, x: Any) -> Any: ...
     def sin(self, x: Any) -> Any: ...
     def cos(self, x: Any) -> Any: ...
@@ -193,23 +199,34 @@ def performed(name: str, values: list[Any], kind: Kind) -> Any:
             return getattr(kind, name)(*values)
 
 
-def shortened(operations: Iterable[Operation], outputs: Iterable[tuple[str, int]]) -> Tape:
-    """The tape of outputs: what they do not hang on is left out, and the rest numbered anew."""
-    operations, outputs = list(operations), list(outputs)
-    wanted = [False] * len(operations)
-    for _, number in outputs:
-        wanted[number] = True
-    for number in range(len(operations) - 1, -1, -1):
-        kind, *arguments = operations[number]
-        if wanted[number] and kind not in ("const", "input"):
-            for a in arguments:
-                wanted[a] = True
+def reached(
+    operations: Sequence[Operation], outputs: Iterable[int], known: Container[int] = frozenset()
+) -> list[int]:
+    """The operations that some hang on, in order, they too; what is known hangs on nothing."""
+    wanted = set(outputs)
+    for number in range(max(wanted, default=-1), -1, -1):
+        if number in wanted and number not in known:
+            kind, *arguments = operations[number]
+            if kind not in ("const", "input"):
+                wanted.update(arguments)
+    return sorted(wanted)
+
+
+def shortened(
+    operations: Sequence[Operation], outputs: Sequence[tuple[str, int]], known: Mapping[int, str] = EMPTY
+) -> Tape:
+    """The tape of outputs: what they do not hang on is left out, and the rest numbered anew.
+
+    The values of operations that are known enter, by name.
+    """
     place: dict[int, int] = {}
     kept: list[Operation] = []
-    for number, (kind, *arguments) in enumerate(operations):
-        if wanted[number]:
-            place[number] = len(kept)
-            if kind not in ("const", "input"):
-                arguments = [place[a] for a in arguments]
-            kept.append((kind, *arguments))
+    for number in reached(operations, (number for _, number in outputs), known):
+        kind, *arguments = operations[number]
+        place[number] = len(kept)
+        if number in known:
+            kind, arguments = "input", [known[number]]
+        elif kind not in ("const", "input"):
+            arguments = [place[a] for a in arguments]
+        kept.append((kind, *arguments))
     return Tape(tuple(kept), tuple((name, place[number]) for name, number in outputs))

@@ -12,8 +12,8 @@ from cli.app import COMMANDS, build
 from cli.read.about import HEAD
 from cli.read.units import UNITS
 from cli.spin.read import KEYS
-from virtualwork.describe.keys import ENTRIES, FILE, GUESS, LINK, POINT
-from virtualwork.describe.keys import UNITS as OF_FILE
+from virtualwork.describe.entries import ENTRIES, FILE, GUESS, LINK, POINT
+from virtualwork.describe.entries import UNITS as OF_FILE
 
 ROOT = Path(__file__).parents[2]
 PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs").glob("*.md"))}

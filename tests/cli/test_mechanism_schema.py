@@ -14,7 +14,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from virtualwork import Mechanism, MechanismError
-from virtualwork.describe.keys import ENTRIES, FILE, GUESS, LINK, POINT, UNITS
+from virtualwork.describe.entries import ENTRIES, FILE, GUESS, LINK, POINT, UNITS
 from virtualwork.describe.schema import schema
 
 ROOT = Path(__file__).parents[2]

@@ -88,7 +88,7 @@ def test_behind_a_limit_nothing_stands_where_a_gear_turns_by_halves() -> None:
     assert t is not None
     m = t.mechanism
     low, _ = m.check.input_limits or (0.0, 0.0)
-    assert m.assembly.track.turns == 2
+    assert m.assembly.reach.turns == 2
     assert m.motion(low + np.array([1e-6, 1.0, 6.0])).assembled.all()
     assert not m.motion(low - np.array([1e-6, 1.0, 4.0, 2 * np.pi, 7.0])).assembled.any()
 

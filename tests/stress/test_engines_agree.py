@@ -23,7 +23,7 @@ from benchmarks.stress.topologies import generate
 from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.rounding import rounding_bounds
 from virtualwork import Mechanism
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 from virtualwork.formulas.asked import names
 from virtualwork.formulas.lanes import Lanes, taped
 

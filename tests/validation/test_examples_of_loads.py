@@ -12,7 +12,7 @@ import pytest
 
 from cli.examples.command import EXAMPLES, describe, names
 from tests.conftest import Dalembert
-from virtualwork.describe.keys import ENTRIES
+from virtualwork.describe.entries import ENTRIES
 
 G = 9.81
 

@@ -101,7 +101,7 @@ def test_a_narrow_gap_between_two_samples_is_a_gap():
     """Lengths a hair off a parallelogram: 0.02 degrees cannot be assembled, and both limits are found."""
     crank, coupler = 2.0, 5.0 * (1 - 1e-8)
     m = four_bar(crank, coupler, crank, 5.0, 90, 0, 90)
-    limits = [limit.input for limit in m.assembly.track.limits()]
+    limits = [limit.input for limit in m.assembly.reach.limits()]
     assert len(limits) == 2
     # d² = (b + c)² at the ends of the gap
     edge = math.acos((crank**2 + 25.0 - (coupler + crank) ** 2) / (2 * crank * 5.0))

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring
+from virtualwork.describe import DescriptionError
 from virtualwork.describe.dimensions import changed, dimensions, named, value
-from virtualwork.describe.errors import DescriptionError
 from virtualwork.describe.parts import Polar
 
 FILE = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Guess, Input, Link, Mechanism
-from virtualwork.describe.errors import AssemblyError, MobilityError
+from virtualwork.describe import AssemblyError, MobilityError
 
 # A gripper of ten links: a swivelling cylinder swings the upper arm, a gear the lower one, a parallelogram keeps the jaw
 # level, and the palm's plate stands on three posts that are parallel and equal: by the count it is held.

@@ -42,7 +42,7 @@ def test_an_elbow_that_rubs(speeds: tuple[float, float], swap: bool) -> None:
     exact = [cross(arm, held) - rub, cross(end, held) + rub]
     assert motion.dynamics.effort[0] == pytest.approx(exact, rel=1e-13)
     assert motion.dynamics.newton_euler[0] == pytest.approx(exact, rel=1e-13)
-    (pin,) = motion.dynamics.joints_named("E")
+    (pin,) = (j for j in motion.dynamics.reactions.joints if j.name == "E")
     assert motion.dynamics.joint_moment(pin, "lower")[0] == pytest.approx(-rub, rel=1e-13)
     assert motion.dynamics.joint_moment(pin, "upper")[0] == pytest.approx(rub, rel=1e-13)
 
@@ -75,7 +75,7 @@ def test_a_slot_that_turns_and_rubs(speed: float) -> None:
         works, workless, _ = ledger(motion.dynamics.scene)
         assert sum(works.values())[i] == pytest.approx(-exact, rel=1e-13)
         assert workless == []
-        (guide,) = motion.dynamics.joints_named("B")
+        (guide,) = (j for j in motion.dynamics.reactions.joints if j.name == "B")
         force = motion.dynamics.joint_force(guide, "crank")[i]
         assert force == pytest.approx(normal * 1j * rail + rub * rail, rel=1e-13)
         assert motion.dynamics.joint_force(guide, "lever")[i] == pytest.approx(-force, rel=1e-13)

@@ -135,7 +135,7 @@ def test_an_input_between_two_moving_links_and_at_a_slide():
     )  # fmt: skip
     motion = boom.motion([0.6, 0.8], speed=0.1)
     assert np.abs(motion.point("B").complex(0) - (1 - 0.5j)) == pytest.approx([1.6, 1.8], rel=1e-15)
-    low, high = sorted(limit.input for limit in boom.assembly.track.limits())
+    low, high = sorted(limit.input for limit in boom.assembly.reach.limits())
     reach = math.hypot(1, 0.5)
     assert (low, high) == pytest.approx((2 - reach - 1, 2 + reach - 1), rel=1e-12)
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
-from virtualwork.formulas.linear import inverse_norm, solve, solve_columns, stack
 from virtualwork.formulas.newton import Iterate, newton
+from virtualwork.formulas.numbers import inverse_norm, solve, solve_columns, stack
 from virtualwork.formulas.positions import State
 from virtualwork.study.newton_table import all_at_once
 

@@ -31,7 +31,7 @@ def change_point_four_bar(dyad: bool) -> Mechanism:
 
 def test_a_branch_with_one_change_point_a_turn_has_two_turns():
     m = change_point_four_bar(dyad=False)
-    assert m.assembly.track.turns == 2
+    assert m.assembly.reach.turns == 2
     assert np.degrees(Check(m.assembly).change_points) == pytest.approx([180, 540], abs=1e-7)
 
 
@@ -42,7 +42,7 @@ def test_a_dead_point_of_the_second_turn_is_not_printed_in_the_first():
     dead = np.degrees(check.dead_points)
     q = np.radians(np.arange(0, 1440, 0.25))
     there = m.motion(q).assembled
-    assert m.assembly.track.turns == 2
+    assert m.assembly.reach.turns == 2
     # what a dense scan of the whole branch says
     edges = np.flatnonzero(there[:-1] != there[1:])
     scanned = np.unique(((np.degrees(q[edges]) + 0.125) % 720).round(3))
@@ -103,7 +103,7 @@ def test_a_mechanism_behind_a_reducing_gear_repeats_after_its_own_number_of_turn
         inputs=Input("pinion"),
         guess=Guess(0.0, {"crank": math.pi, "coupler": 0.3, "rocker": 2.0}),
     )
-    assert m.assembly.track.turns == 2
+    assert m.assembly.reach.turns == 2
     half = math.radians(46.56746344221)
     expected = sorted((-2 * (q - math.pi)) % (4 * math.pi) for q in (half, 2 * math.pi - half))
     assert Check(m.assembly).dead_points == pytest.approx(expected, abs=1e-10)
@@ -118,7 +118,7 @@ def test_a_gear_that_no_loop_hangs_on_does_not_count():
         inputs=m.inputs,
         guess=m.guess,
     )
-    assert m.assembly.track.turns == 2
+    assert m.assembly.reach.turns == 2
 
 
 def test_a_branch_that_never_repeats_has_no_period():
@@ -134,5 +134,5 @@ def test_a_branch_that_never_repeats_has_no_period():
         inputs=Input("first"),
         guess=Guess(0.3, {"last": 1.0, "left": 0.9, "right": 1.9}),
     )
-    assert m.assembly.track.turns is None
+    assert m.assembly.reach.turns is None
     assert Check(m.assembly).dead_points == ()

@@ -12,7 +12,7 @@ import pytest
 from benchmarks.stress import random_linkages
 from benchmarks.stress.topologies import generate
 from virtualwork import Guess, Guide, Input, Link, Mechanism
-from virtualwork.describe.errors import MobilityError
+from virtualwork.describe import MobilityError
 from virtualwork.plan import order, topology
 from virtualwork.plan.steps import Group, Place
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Link, Mechanism, Spring, TorsionSpring
-from virtualwork.describe.loads import Force, Torque
+from virtualwork.describe.parts import Force, Torque
 from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.recording import Recording
 

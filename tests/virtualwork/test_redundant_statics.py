@@ -95,7 +95,7 @@ def test_a_piston_in_a_prism_and_a_slot() -> None:
     assert d.newton_euler[:, 0] == pytest.approx(torque, rel=1e-11)
     rod = force * (1 - 1j * np.tan(phi))  # what crosses the rod: along it, its part along the line the load
     for name, body, sign in (("A", "rod", -1), ("A", "crank", 1), ("O", "crank", -1), ("O", GROUND, 1)):
-        (joint,) = (j for j in d.joints_named(name) if j.guide is None)
+        (joint,) = (j for j in d.reactions.joints if j.name == name and j.guide is None)
         assert d.joint_force(joint, body) == pytest.approx(sign * rod, rel=1e-11)
     prism, slot = (j for j in d.reactions.joints if j.guide is not None)
     assert np.isnan(d.joint_force(prism, "piston")).all()
@@ -131,7 +131,7 @@ def test_a_driven_piston_in_a_prism_and_a_slot() -> None:
     assert d.statics is not None
     assert d.effort[:, 0] == pytest.approx(push, rel=1e-12)
     assert d.newton_euler[:, 0] == pytest.approx(push, rel=1e-11)
-    (pin,) = (j for j in d.joints_named("A") if j.guide is None)
+    (pin,) = (j for j in d.reactions.joints if j.name == "A" and j.guide is None)
     pull = push * (1 - 1j * np.tan(phi)) * np.exp(0.6j)  # along the rod, which hangs back by φ from the line
     assert d.joint_force(pin, "crank") == pytest.approx(pull, rel=1e-11)
 

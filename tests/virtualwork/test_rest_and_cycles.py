@@ -10,7 +10,7 @@ import pytest
 
 from tests.virtualwork.mechanisms import SWEEP, four_bar, slider_crank
 from virtualwork import Force, Guess, Guide, Input, Link, Mechanism, Spring, Torque, equilibria
-from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe import DescriptionError
 from virtualwork.study.counterweights import berkof_lowen, least_squares
 from virtualwork.study.cycle import Cycle
 

@@ -240,7 +240,7 @@ def test_a_tape_of_the_bounds_gives_what_the_sweep_on_numbers_gives(monkeypatch:
 
 def test_no_estimate_for_a_pose_that_is_not_assembled_and_none_for_friction() -> None:
     m = random_linkages.four_bar(np.random.default_rng(5), 1e-3, 1.0, limit=True)[0]
-    limit = m.assembly.track.limits()[0]
+    limit = m.assembly.reach.limits()[0]
     outside = m.motion(limit.input - 0.01 * limit.side)
     assert not outside.assembled[0]
     assert np.isnan(outside.link("rocker").error_estimate()[0])

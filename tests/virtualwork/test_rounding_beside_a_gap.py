@@ -23,8 +23,7 @@ def test_another_group_of_the_pose_takes_nothing_away(
     names = ("crank", "coupler", "rocker")
     guess = Guess(six.guess.at, {name: six.guess.angles[name] for name in names})
     four = replace(six, links={name: six.links[name] for name in names}, guess=guess)
-    track = six.assembly.track
-    ends = [v for v in track.limits() if v.group != track.plan.groups[0].name]
+    ends = [v for v in six.assembly.reach.limits() if v.group != six.assembly.plan.groups[0].name]
     assert len(ends) == 6
     if where == "at the limit":
         inputs = np.array([v.input + v.side * d for v in ends for d in (0.0, 1e-15, 1e-13, 1e-11, 1e-9)])

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from virtualwork import Force, Friction, Guess, Guide, Input, Link, Mechanism, Motor, Spring, Torque
+from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.dimensions import changed, dimensions, value
-from virtualwork.describe.errors import DescriptionError, MechanismError
 from virtualwork.describe.parts import Polar
 
 KINDS = ["four-bar", "slider-crank", "inverted slider-crank", "Watt", "Stephenson", "triad"]

@@ -19,7 +19,7 @@ from benchmarks.stress.tapes import DIGITS, Digits
 from benchmarks.truth.mechanism import Exact
 from virtualwork import Gear, Guess, Input, Link, Mechanism, Spring, TorsionSpring
 from virtualwork.describe.dimensions import dimensions, value
-from virtualwork.describe.loads import Force, Torque
+from virtualwork.describe.parts import Force, Torque
 from virtualwork.family.sensitivity import Sensitivities
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import names
@@ -123,7 +123,7 @@ def test_random_mechanisms_with_loads(kind, random_mechanism) -> None:
 def test_beside_a_limit() -> None:
     """The Watt six-bar 0.001 and 1e-5 rad from where it ends: the derivatives hold as far as the pose's condition lets them."""
     m = Mechanism.from_toml(str(files("cli") / "examples" / "watt-six-bar" / "watt.toml"))
-    end = m.assembly.track.limits()[0]
+    end = m.assembly.reach.limits()[0]
     for off in (1e-3, 1e-5):
         motion = m.motion([end.input + end.side * off], 1.5, -0.7)
         worst, condition = compare(m, motion)

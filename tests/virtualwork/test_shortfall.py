@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from virtualwork import AssemblyError, Guess, Guide, Input, Link, Mechanism
-from virtualwork.branch.shortfall import shortfall
 
 
 def test_two_links_too_short():
@@ -24,13 +23,13 @@ def test_two_links_too_short():
         inputs=Input("crank"),
         guess=Guess(1.0, {"coupler": -1.0, "rocker": 1.5}),
     )
-    found = shortfall(m.assembly, (math.pi,))
+    found = m.assembly.reach.shortfall((math.pi,))
     assert (found.gap.needed, found.gap.given) == pytest.approx((1.264, 1.2), abs=1e-15)
     assert "reach 1200 mm, 1264 mm needed: 64 mm short" in found.text(lambda v: f"{v * 1e3:.6g} mm")
     # d² = 764² + 500² − 2·764·500·cos θ = 1200²
     edge = math.acos((0.764**2 + 0.25 - 1.44) / (0.764))
     assert found.nearest == pytest.approx(edge, abs=1e-12)
-    assert shortfall(m.assembly, (edge - 1e-9,)) is None
+    assert m.assembly.reach.shortfall((edge - 1e-9,)) is None
     # folded: 700 − 500 = 200 mm apart at least
     near = Mechanism(
         m.ground,
@@ -38,7 +37,7 @@ def test_two_links_too_short():
         inputs=m.inputs,
         guess=m.guess,
     )
-    found = shortfall(near.assembly, (0.0,))
+    found = near.assembly.reach.shortfall((0.0,))
     assert (found.gap.needed, found.gap.given) == pytest.approx((0.05, 0.2), abs=1e-15)
     assert "come no nearer than 0.2 m, 0.05 m needed: 0.15 m too long" in found.text()
 
@@ -51,10 +50,10 @@ def test_a_rod_too_short_for_its_line():
         inputs=Input("crank"),
         guess=Guess(0.0, {"rod": 0.1}),
     )
-    found = shortfall(m.assembly, (math.pi / 2,))
+    found = m.assembly.reach.shortfall((math.pi / 2,))
     assert found.text(lambda v: f"{v * 1e3:.4g} mm") == "rod reaches 50 mm, 50.2 mm needed: 0.2 mm short"
     assert found.nearest == pytest.approx(math.asin(0.05 / 0.0502), abs=1e-12)
-    assert shortfall(m.assembly, (0.3,)) is None
+    assert m.assembly.reach.shortfall((0.3,)) is None
 
 
 def test_a_slot_that_runs_past_its_pin():
@@ -66,7 +65,7 @@ def test_a_slot_that_runs_past_its_pin():
         inputs=Input("crank"),
         guess=Guess(2.0, {"bar": 0.0}),
     )
-    found = shortfall(m.assembly, (0.0,))
+    found = m.assembly.reach.shortfall((0.0,))
     assert (found.gap.needed, found.gap.given) == pytest.approx((0.01, 0.02), abs=1e-15)
     assert "0.01 m too far" in found.text()
     edge = math.acos((0.05**2 + 0.06**2 - 0.02**2) / (2 * 0.05 * 0.06))
@@ -81,8 +80,8 @@ def test_two_guides_that_become_parallel():
         inputs=Input("crank"),
         guess=Guess(1.0),
     )
-    assert shortfall(m.assembly, (1.0,)) is None
-    assert "parallel, 0.03 m apart, and do not meet" in shortfall(m.assembly, (0.0,)).text()
+    assert m.assembly.reach.shortfall((1.0,)) is None
+    assert "parallel, 0.03 m apart, and do not meet" in m.assembly.reach.shortfall((0.0,)).text()
 
 
 def test_a_group_without_a_closed_form_says_what_is_left():
@@ -101,10 +100,10 @@ def test_a_group_without_a_closed_form_says_what_is_left():
     q = np.linspace(-math.pi, math.pi, 73)
     there = m.motion(q).assembled
     assert 0 < there.sum() < len(q)
-    found = shortfall(m.assembly, (q[np.flatnonzero(~there)[0]],))
+    found = m.assembly.reach.shortfall((q[np.flatnonzero(~there)[0]],))
     assert 0 < found.gap.needed < 0.2
     assert "where they come nearest" in found.text()
-    assert shortfall(m.assembly, (q[np.flatnonzero(there)[0]],)) is None
+    assert m.assembly.reach.shortfall((q[np.flatnonzero(there)[0]],)) is None
 
 
 def test_the_guess_says_it_too():

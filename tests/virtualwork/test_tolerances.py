@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Guess, Input, Link, Mechanism
-from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe import DescriptionError
 from virtualwork.family.tolerance import STREAM, drawn, drawn_numbers, limits, spread, summary
 
 KEY = ("point", "coupler", 0j, "H", 0)

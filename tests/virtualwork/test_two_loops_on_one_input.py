@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Guess, Input, Link, Mechanism
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 from virtualwork.study.check import Check
 
 

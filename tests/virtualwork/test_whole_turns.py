@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from virtualwork import Gear, Guess, Guide, Input, Link, Mechanism
-from virtualwork.describe.loads import TorsionSpring
+from virtualwork.describe.parts import TorsionSpring
 
 PAST = [0.1, -0.1, 1e-3, -1e-3, 1e-4, -1e-4, 1e-5, -1e-5]
 

@@ -10,6 +10,7 @@ Joint friction exchanges loads and forces until neither changes; its poses have 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
 
 import numpy as np
@@ -18,10 +19,10 @@ from virtualwork.bounds.quantities import Bounds
 from virtualwork.bounds.second_order import grown, inverse
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.asked import Key
-from virtualwork.formulas.dynamics import Dynamics
+from virtualwork.formulas.dynamics import Dynamics, joints_at
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.formulas.statics import Column
-from virtualwork.plan.joints import Joint
+from virtualwork.plan.steps import Joint
 
 
 class ForceErrors:
@@ -32,8 +33,12 @@ class ForceErrors:
         self.mechanism = dynamics.poses.mechanism
         self.bounds = Bounds(dynamics.poses)
 
-    def together(self) -> None:
-        """Form the bounds of all forces that `bounds` has, which have most of the sweep in common."""
+    def together(self, reactions: Iterable[Key] | None = None) -> None:
+        """Form the bounds of some joints' forces, or of all that `bounds` has: they have most of the sweep in common."""
+        if reactions is not None:
+            if self._redundant is None:
+                self.bounds.together(reactions)
+            return
         inputs, joints = range(len(self.mechanism.inputs)), self.dynamics.reactions.joints
         keys: list[Key] = [("shaking",), ("shaking moment",), *(("effort", j) for j in inputs)]
         if self._redundant is None:
@@ -97,7 +102,7 @@ class ForceErrors:
         """Of `Dynamics.reaction`, (n,): the length of the error."""
         if self._redundant is None:
             return self.bounds.of(("reaction", joint, on))
-        here = [found for found in self.dynamics.joints_named(joint) if on in found.bodies]
+        here = joints_at(self.dynamics.reactions.joints, joint, on)
         return np.asarray(sum(self.joint_force(found, on) for found in here))
 
     @cached_property

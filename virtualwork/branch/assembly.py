@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from virtualwork.formulas.numbers import Number, Reals
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.rates import Passage
 from virtualwork.plan.steps import Group, Step
+
+if TYPE_CHECKING:
+    from virtualwork.branch.limits import Reach
 
 
 class Assembly(Choice):
@@ -48,19 +51,28 @@ class Assembly(Choice):
         return {}
 
     @cached_property
+    def recordings(self) -> dict[Any, Any]:
+        """What has been written down of it on tapes."""
+        return {}
+
+    # --- along the input ------------------------------------------------------------------------------------------
+    @cached_property
     def track(self) -> Track:
         """Change points and limits along the input."""
         return Track(self)
+
+    @cached_property
+    def reach(self) -> Reach:
+        """How far the input goes, and after how many turns the branch repeats itself."""
+        # poses that all close, asked for by their inputs, do not load it
+        from virtualwork.branch.limits import Reach
+
+        return Reach(self.track)
 
     @property
     def passage(self) -> Passage | None:
         """How derivatives go through change points; None with several inputs."""
         return self.track if self.track.active else None
-
-    @cached_property
-    def recordings(self) -> dict[Any, Any]:
-        """What has been written down of it on tapes."""
-        return {}
 
     @property
     def turning_over(self) -> frozenset[str]:
@@ -84,22 +96,17 @@ class Assembly(Choice):
     def may_open(self) -> bool:
         """Whether it cannot be assembled somewhere in what was covered, as far as is known."""
         track = self.track
-        simple = (
-            track.active
-            and not self.mechanism.inputs[0].is_slide
-            and len(self.plain) == len(self.plan.groups)
-        )
+        simple = track.active and not track.slides and len(self.plain) == len(self.plan.groups)
         return not simple or track.has_limits or not self._stands
 
     @cached_property
     def _stands(self) -> bool:
         """Whether it is assembled at the guess."""
-        st = self.state(self.mechanism.at)
-        return all(margin >= 0 for margin in st.margin.values())
+        return all(margin >= 0 for margin in self.state(self.mechanism.at).margin.values())
 
     def sign(self, group: str, q: Reals) -> Number:
         """The sign of a closed form at inputs."""
-        return self.track.sign(self.cases[group].group, q)
+        return self.track.sign(group, q)
 
     def close_to_change(self, q: Reals) -> NDArray[np.bool_]:
         """Which inputs are close to a change point."""
@@ -122,60 +129,13 @@ class Assembly(Choice):
         """Work out positions, step by step."""
         self.track.run(steps, st)
 
-    def state(self, inputs: tuple[float, ...], targets: Iterable[str] | None = None) -> State:
+    def state(self, inputs: tuple[float, ...]) -> State:
         """Positions of one pose, as Python numbers."""
         st = State(list(inputs))
-        steps = self.plan.steps if targets is None else self.needed(targets)
         try:
-            self.run(steps, st)
+            self.run(self.plan.steps, st)
         except ZeroDivisionError:
             st = State([np.array([q]) for q in inputs], many=True)
             with np.errstate(all="ignore"):
-                self.run(steps, st)
+                self.run(self.plan.steps, st)
         return st
-
-
-def all_assemblies(chosen: Assembly) -> tuple[Assembly, ...]:
-    """Every assembly at the guess's input: all signs of the closed forms, all solutions found for the others."""
-    found = [chosen]
-    for signs, starts in _combinations(chosen):
-        if signs != chosen.signs or any(
-            np.abs(np.exp(1j * np.asarray(starts[k])) - np.exp(1j * np.asarray(chosen.starts[k]))).max()
-            > 1e-6
-            for k in starts
-        ):
-            found.append(
-                Assembly(chosen.mechanism, chosen.plan, signs, starts, len(found) + 1, phases=chosen.phases)
-            )
-    return tuple(found)
-
-
-def _combinations(chosen: Assembly) -> list[tuple[dict[str, int], dict[str, Any]]]:
-    """Walk the steps at the guess's input and fork wherever a group closes in more than one way."""
-    from virtualwork.branch.solutions import every_solution
-    from virtualwork.formulas.newton import write_unknowns
-
-    m = chosen.mechanism
-    fronts: list[tuple[State, dict[str, int], dict[str, Any]]] = [(State(list(m.at)), {}, {})]
-    for step in chosen.plan.steps:
-        after: list[tuple[State, dict[str, int], dict[str, Any]]] = []
-        for st, signs, starts in fronts:
-            if not isinstance(step, Group):
-                chosen.run_untracked([step], st)
-                after.append((st, signs, starts))
-            elif step.kind == "Newton":
-                for x in every_solution(step, st, m.size):
-                    trial = st.copy()
-                    write_unknowns(step, trial, x[None])
-                    after.append((trial, signs, starts | {step.name: tuple(map(float, x))}))
-            else:
-                for sign in (1,) if step.kind == "PRP" else (1, -1):
-                    trial = st.copy()
-                    try:
-                        chosen.cases[step.name].solve(trial, sign, m.size)
-                    except ZeroDivisionError:
-                        continue
-                    if trial.margin[step.name] >= 0:
-                        after.append((trial, signs | {step.name: sign}, starts))
-        fronts = after
-    return [(signs, starts) for _, signs, starts in fronts]

@@ -1,4 +1,4 @@
-"""A change point: the tangents through it, and every higher derivative there.
+"""A change point: where two branches cross, the tangents through it, and every higher derivative there.
 
 Where the Jacobian Φ of a group vanishes while its loops still close on both sides, two branches cross. With the left
 null vector n of Φ, the n-component of the k-th derivative of the loops holds no k-th derivative of the unknowns:
@@ -11,22 +11,36 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from math import factorial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from virtualwork.branch.choice import Along
-from virtualwork.branch.roots import chebyshev_nodes
-from virtualwork.formulas.linear import stack, stack_rows
-from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.branch.choice import Choice
+from virtualwork.formulas.numbers import EPS, Number, Reals, stack, stack_rows
 from virtualwork.formulas.positions import State
-from virtualwork.formulas.rates import Rates
-from virtualwork.plan.steps import Group
+from virtualwork.formulas.rates import Passage, Rates
+from virtualwork.plan.steps import Group, Step
 
 # of the series through a change point
 ORDER = 12
 # share of the series' radius of convergence, within which it replaces the closed form
 REACH = 0.03
+# a last coefficient below this share of the largest is none: what is divided by it would overflow
+NONE = 1e-100
+
+
+class Along(Passage, Protocol):
+    """The way of the one input, as change points and continuations need it."""
+
+    assembly: Choice
+    start: float
+    length: float
+    whole: bool
+    flips: dict[str, Reals]
+    folded: set[str]
+
+    def run(self, steps: Iterable[Step], st: State) -> None:
+        """Work out positions, each group on its branch."""
 
 
 @dataclass(frozen=True)
@@ -218,19 +232,41 @@ def _at_centre(nodes: Reals) -> Reals:
     return np.asarray(w / w.sum())
 
 
-def near_by(changes: Iterable[ChangePoint], q: Number) -> Iterator[tuple[ChangePoint, Any, Number]]:
+# --- poses close to one ------------------------------------------------------------------------------------------
+def mend(changes: Iterable[ChangePoint], group: Group, st: State) -> None:
+    """Replace positions close to a change point by the series through it."""
+    for change, near, delta in _close_by(changes, st.inputs[0]):
+        move = change.unknown(delta, 0)
+        for j, body in enumerate(group.angles):
+            put(st.turn, body, near, change.turn[j] * np.exp(1j * move[..., j]))
+        for j, g in enumerate(group.slides):
+            put(st.slide, g, near, change.slide[j] + move[..., len(group.angles) + j])
+        put(st.margin, group.name, near, np.zeros(np.shape(delta)))
+        for tie in group.ties:
+            st.turn[tie.body] = st.rotate(tie.angle)
+
+
+def mend_rates(changes: Iterable[ChangePoint], q: Number, k: int, x: list[Number]) -> list[Number]:
+    """The same for the unknowns' k-th derivatives."""
+    for change, near, delta in _close_by(changes, q):
+        rate = change.unknown(delta, k)
+        for j in range(len(x)):
+            put(x, j, near, rate[..., j])
+    return x
+
+
+def _close_by(changes: Iterable[ChangePoint], q: Number) -> Iterator[tuple[ChangePoint, Any, Number]]:
     """The change points close to inputs q: each with which of the inputs (None: the one), and how far they are."""
+    one = np.ndim(q) == 0
     for change in changes:
-        if np.ndim(q) == 0:
-            if abs(q - change.input) < change.reach:
-                yield change, None, q - change.input
-        else:
-            near = np.abs(q - change.input) < change.reach
-            if near.any():
-                yield change, near, q[near] - change.input
+        near = abs(q - change.input) < change.reach
+        if one and near:
+            yield change, None, q - change.input
+        elif not one and near.any():
+            yield change, near, q[near] - change.input
 
 
-def put(store: dict[Any, Any], key: Any, near: Any, value: Any) -> None:
+def put(store: Any, key: Any, near: Any, value: Any) -> None:
     """Replace a value, or those of some poses."""
     if near is None:
         store[key] = complex(value) if np.iscomplexobj(value) else float(value)
@@ -238,3 +274,56 @@ def put(store: dict[Any, Any], key: Any, near: Any, value: Any) -> None:
     whole = np.array(np.broadcast_to(store[key], near.shape))
     whole[near] = value
     store[key] = whole
+
+
+# --- smooth functions of the input ---------------------------------------------------------------------------------
+def chebyshev_nodes(n: int) -> Reals:
+    """The n Chebyshev points of the first kind in (−1, 1)."""
+    return np.cos(np.pi * (np.arange(n) + 0.5) / n)
+
+
+def real_roots(series: np.polynomial.Chebyshev, within: float) -> Reals:
+    """The real roots of a series within ±`within`; none of a series that is zero or not finite.
+
+    Examples
+    --------
+    >>> from numpy.polynomial import Chebyshev
+    >>> nodes = chebyshev_nodes(8)
+    >>> real_roots(Chebyshev.fit(nodes, 1e-300 * (nodes - 0.25), 6, domain=[-1, 1]), 1.0).round(12)
+    array([0.25])
+    >>> real_roots(Chebyshev([np.nan, 1.0]), 1.0)
+    array([], dtype=float64)
+    """
+    largest = float(np.abs(series.coef).max(initial=0.0))
+    if not (np.isfinite(largest) and largest > 0):
+        return np.empty(0)
+    # by a power of two, which rounds nothing
+    scaled = type(series)(np.ldexp(series.coef, -int(np.frexp(largest)[1]))).trim(NONE)
+    roots = scaled.roots()
+    return np.asarray(np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= within)]))
+
+
+def lowest(
+    margin: Callable[[Reals], Reals], a: float, b: float, rounding: float
+) -> tuple[float, float, float] | None:
+    """The lowest point of a radicand near a sampled dip: where, how low, and the rounding in that depth.
+
+    The radicand is smooth: it is fitted at Chebyshev points, and its slope's root is free of cancellation.
+    """
+    centre, half = (a + b) / 2, (b - a) / 2
+    for widen in (1.0, 4.0):
+        nodes = chebyshev_nodes(14)
+        m = margin(centre + widen * half * nodes)
+        if not np.isfinite(m).all():
+            if widen == 1.0:
+                return None
+            break
+        fit = np.polynomial.Chebyshev.fit(nodes, m, 11, domain=[-1, 1])
+        real = real_roots(fit.deriv(), 1.2)
+        if not len(real):
+            return None
+        best = real[np.argmin(np.abs(fit(real)))]
+        where, depth = centre + widen * half * float(best), float(fit(best))
+        level = float(np.abs(m).max())
+        centre = where
+    return where, depth, rounding + 1e-9 * EPS * level

@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Protocol
 
 import numpy as np
 
 from dalembert.arithmetic.records import Record, record
 from virtualwork.describe.description import Description
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.numbers import Reals
-from virtualwork.formulas.positions import State, run
-from virtualwork.formulas.rates import Passage
-from virtualwork.formulas.winding import principal
+from virtualwork.formulas.positions import State, principal, run
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, turns
 
@@ -50,8 +46,14 @@ class Choice(Record):
 
     @cached_property
     def cases(self) -> dict[str, Case]:
-        """The groups with a closed form, ready to be solved."""
-        return {g.name: Case(g) for g in self.plan.groups if g.kind != "Newton"}
+        """The closed forms that are ready to be solved, by their group's name."""
+        return {}
+
+    def case(self, group: Group) -> Case:
+        """The closed form of a group, made ready once."""
+        if group.name not in self.cases:
+            self.cases[group.name] = Case(group)
+        return self.cases[group.name]
 
     @cached_property
     def merged(self) -> tuple[Plan, Group | None]:
@@ -71,9 +73,9 @@ class Choice(Record):
     def plain(self) -> dict[str, Callable[[State], None]]:
         """The closed forms that keep their sign wherever the input goes, as far as is known, each ready to be solved."""
         return {
-            name: partial(self.cases[name].solve, sign=sign, size=self.mechanism.size)
-            for name, sign in self.signs.items()
-            if name in self.cases and self.geared.isdisjoint(self.cases[name].group.members)
+            g.name: partial(self.case(g).solve, sign=self.signs[g.name], size=self.mechanism.size)
+            for g in self.plan.groups
+            if g.name in self.signs and self.geared.isdisjoint(g.members)
         }
 
     @cached_property
@@ -97,20 +99,7 @@ class Choice(Record):
         run(steps, st, self._close)
 
     def _close(self, group: Group, st: State) -> None:
-        self.cases[group.name].solve(st, self.signs[group.name], self.mechanism.size)
+        sign = self.signs[group.name]
+        self.case(group).solve(st, sign, self.mechanism.size)
         for body in self.geared.intersection(group.members):
             st.angle[body] = principal(np.angle(st.turn[body]))
-
-
-class Along(Passage, Protocol):
-    """The way of the one input, as change points and continuations need it."""
-
-    assembly: Choice
-    start: float
-    length: float
-    whole: bool
-    flips: dict[str, Reals]
-    folded: set[str]
-
-    def run(self, steps: Iterable[Step], st: State) -> None:
-        """Work out positions, each group on its branch."""

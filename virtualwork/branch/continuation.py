@@ -6,22 +6,19 @@ corrected by Newton-Raphson on all poses together, so that no error accumulates.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from virtualwork.branch.choice import Along
-from virtualwork.branch.roots import chebyshev_nodes, real_roots
-from virtualwork.branch.winding import NODES, straight_lines
-from virtualwork.formulas.double_roots import settle, singular
-from virtualwork.formulas.linear import SINGULAR, solve, stack, stack_rows
-from virtualwork.formulas.newton import gaps, newton, write_unknowns
-from virtualwork.formulas.numbers import Reals
+from virtualwork.branch.change_point import Along, chebyshev_nodes, put, real_roots
+from virtualwork.formulas.newton import gaps, newton, settle, singular, write_unknowns
+from virtualwork.formulas.numbers import SINGULAR, Number, Reals, solve, stack, stack_rows
 from virtualwork.formulas.positions import State, columns
 from virtualwork.formulas.rates import Rates
-from virtualwork.plan.steps import Group, Step
+from virtualwork.plan.steps import Group
 
+# of one turn
+NODES = 120
 # of one turn: a step this short has met a limit
 FINEST = 1e-7
 # of one turn: nodes this near to where they are to end have reached it
@@ -248,6 +245,16 @@ class Continuation:
                 out[j] = fit.deriv(order)(0.0) / half**order
         return out
 
+    def bridge_rates(self, q: Number, k: int, x: list[Number], singular: Any) -> None:
+        """Replace the unknowns' k-th derivatives at poses where the Jacobian is singular though the branch goes on."""
+        for i in np.flatnonzero(singular):
+            rate = self.bridge(float(np.atleast_1d(q)[i]), k)
+            # close to a limit nothing goes on: what the Jacobian gives is kept
+            if np.isfinite(rate).all():
+                here = np.arange(np.size(q)) == i if np.ndim(q) else None
+                for j in range(len(x)):
+                    put(x, j, here, rate[j])
+
     def _limit(self, side: int) -> float:
         """The limit itself: det² is smooth in the input there and goes to zero; extrapolated from the last nodes."""
         order = slice(-6, None) if side > 0 else slice(0, 6)
@@ -339,54 +346,3 @@ class Continuation:
         st.margin[self.group.name] = (
             np.where(closed & inside, 1.0, -1.0) if st.many else (1.0 if closed[0] else -1.0)
         )
-
-
-def along_lines(track: Along, group: Group, st: State) -> None:
-    """With several inputs: every pose on its own straight line of inputs from the guess, all poses together."""
-    assembly = track.assembly
-    m = assembly.mechanism
-    before = assembly.before(group)
-    at, way, longest = straight_lines(m, st)
-    n = len(way)
-    x: Any = np.tile(np.asarray(assembly.starts[group.name], dtype=float), (n, 1))
-    # of each pose: the share of its way that is gone, the next step, and dx of the whole way
-    gone, step = np.zeros(n), longest.copy()
-    slope = _slope(track, group, before, at + 0 * way, way, x)
-    angles = np.arange(x.shape[1]) < len(group.angles)
-    left = np.asarray(np.isfinite(way).all(axis=1))
-    closed = left.copy()
-    while left.any():
-        i = np.flatnonzero(left)
-        to = np.minimum(gone[i] + step[i], 1.0)
-        trial = State(list((at + to[:, None] * way[i]).T), many=True)
-        moved = (to - gone[i])[:, None]
-        with np.errstate(all="ignore"):
-            track.run(before, trial)
-            start = x[i] + moved * slope[i]
-            found, ok = newton(group, trial, start, m.size, limit=8)
-            far = np.where(angles, 1.0, np.maximum(np.abs(x[i]), m.size))
-            change = np.abs((found - x[i]) / far).max(axis=1, initial=0.0)
-            new = _slope(track, group, before, at + to[:, None] * way[i], way[i], found)
-            # the cubic's own defect, as along one input
-            defect = np.abs((found - x[i] - moved * 0.5 * (slope[i] + new)) / far).max(axis=1, initial=0.0)
-            ok &= (defect <= 0.05 * np.maximum(change, 1e-6)) & (change < 0.5)
-        some = i[ok]
-        x[some], slope[some], gone[some] = found[ok], new[ok], to[ok]
-        step[some] = np.minimum(2 * step[some], longest[some])
-        step[i[~ok]] /= 2
-        closed &= step > FINEST * longest
-        left &= closed & (gone < 1)
-    x[~closed] = np.nan
-    write_unknowns(group, st, x)
-    st.margin[group.name] = np.where(closed, 1.0, -1.0) if st.many else (1.0 if closed[0] else -1.0)
-
-
-def _slope(track: Along, group: Group, before: Sequence[Step], inputs: Reals, way: Reals, x: Reals) -> Reals:
-    """dx of a group's unknowns where every input changes by its way; none where it is singular."""
-    st, n = State(list(inputs.T), many=True), len(x)
-    with np.errstate(all="ignore"):
-        track.run(before, st)
-        write_unknowns(group, st, x)
-        d = Rates(track.assembly.plan, st, [[rate] for rate in way.T])
-        d.advance(before, 1)
-        return np.nan_to_num(solve(stack(columns(group, st), n), -stack_rows(d.right_side(group, 1), n)))

@@ -11,14 +11,11 @@ import numpy as np
 from dalembert.arithmetic.recorded import bare, squared
 from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.choice import Choice
-from virtualwork.describe.description import Description
-from virtualwork.describe.errors import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
+from virtualwork.describe import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
+from virtualwork.describe.description import Description, known_by_guess
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.linear import stack, stack_rows
-from virtualwork.formulas.numbers import Number, cross, dot
-from virtualwork.formulas.positions import State, columns, run
-from virtualwork.formulas.winding import principal
-from virtualwork.plan.guessed import known_by_guess
+from virtualwork.formulas.numbers import Number, cross, dot, stack, stack_rows
+from virtualwork.formulas.positions import State, columns, principal, run
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, Turn
 
@@ -42,14 +39,18 @@ class _Chooser:
     """Reads the guess and picks each group's assembly in the order of solution."""
 
     def __init__(self, m: Description) -> None:
-        self.m = m
-        self.plan = plan(m)
+        self.m, self.plan = m, plan(m)
         if not m.inputs:
             raise MobilityError("[input]: missing")
         self.angles, self.points = known_by_guess(m)
+        # what an assembly holds, as far as it is known; of gears: Σ c·θ
+        self.signs: dict[str, int] = {}
+        self.starts: dict[str, tuple[float, ...]] = {}
         self.warnings: list[str] = []
-        # of the gears: Σ c·θ
         self.phases: dict[int, float] = {}
+        self.cases: dict[str, Case] = {}
+        # of the first input: 1 rad, or the mechanism's size
+        self.unit = m.size if m.inputs[0].is_slide else 1.0
 
     def choose(self, make: Callable[..., C]) -> C:
         """The assembly; a mechanism of which a part floats is refused by that part's name."""
@@ -58,7 +59,7 @@ class _Chooser:
             loose = any(2 * len(g.closures) < len(g.angles) + len(g.slides) for g in self.plan.groups)
             if loose or not self.plan.anchors.keys() >= self.m.links.keys():
                 raise MobilityError("[input]: constraints that depend on each other leave a part free")
-            found = self._choose(make, st)
+            self._walk(st)
         except ParallelGuidesError:
             raise
         except (MechanismError, ZeroDivisionError) as error:
@@ -70,6 +71,12 @@ class _Chooser:
             ) from None
         if self._singular(st):
             self._refuse_floating()
+        return self._made(make, tuple(self.warnings))
+
+    def _made(self, make: Callable[..., C], warnings: tuple[str, ...] = ()) -> C:
+        """What is chosen so far."""
+        found = make(self.m, self.plan, self.signs, self.starts, 1, warnings, self.phases)
+        found.cases.update(self.cases)
         return found
 
     def _singular(self, st: State) -> bool:
@@ -104,10 +111,28 @@ class _Chooser:
                 "depend on each other; join the part that is free"
             )
 
-    def _choose(self, make: Callable[..., C], st: State) -> C:
-        signs: dict[str, int] = {}
-        starts: dict[str, Any] = {}
-        helper = Choice(self.m, self.plan)
+    def _refuse_overdriven(self, st: State) -> None:
+        """Constraints that depend on each other may leave less motion than there are inputs."""
+        from virtualwork.formulas.constraints import Constraints, coordinates
+
+        jacobian = Constraints.at(self.m, coordinates(self.m, self.plan, st), {}).jacobian
+        try:
+            s = np.linalg.svd(jacobian, compute_uv=False)
+        except np.linalg.LinAlgError:
+            raise AssemblyError(
+                "the lengths of the links differ too much to tell the mechanism's mobility"
+            ) from None
+        inputs = self.m.inputs
+        left = 3 * len(self.m.links) - int((s > 1e-9 * s[0]).sum())
+        counted = self.plan.blocks.mobility
+        if left < len(inputs) or 1 <= counted < len(inputs):
+            left = min(left, counted) if counted >= 1 else left
+            names = ", ".join(e.name for e in inputs)
+            what = "the joints leave no motion, it is a structure" if left == 0 else f"mobility {left}"
+            raise MobilityError(f"[input]: {len(inputs)} input(s) ({names}), but {what}")
+
+    def _walk(self, st: State) -> None:
+        """Pick the assembly of each group, and the constants of gears, in the order of solution."""
         waiting: list[Step] = []
         for i, step in enumerate(self.plan.steps):
             open_ = step
@@ -120,42 +145,23 @@ class _Chooser:
                 step = replace(step, ties=tuple(self._phased(tie, st) for tie in step.ties))
             if step is not open_:
                 self.plan = replace(self.plan, steps=(*self.plan.steps[:i], step, *self.plan.steps[i + 1 :]))
-            if isinstance(step, Group):
-                if step.kind == "Newton":
-                    starts[step.name] = tuple(map(float, self._newton(step, st)))
-                else:
-                    signs[step.name] = self._sign(step, helper.cases[step.name], st, signs)
-                    st.angle.update({b: float(principal(np.angle(st.turn[b]))) for b in step.members})
-            else:
+            if not isinstance(step, Group):
                 waiting.append(step)
+            elif step.kind == "Newton":
+                self.starts[step.name] = tuple(map(float, self._newton(step, st)))
+            else:
+                case = self.cases[step.name] = Case(step)
+                self.signs[step.name] = self._sign(step, case, st)
+                st.angle.update({b: float(principal(np.angle(st.turn[b]))) for b in step.members})
         run(waiting, st)
         if self.plan.blocks.redundant:
-            self._refuse_overdriven(self.plan, st)
-        phases = {
+            self._refuse_overdriven(st)
+        self.phases = {
             i: sum(c * float(st.angle[body]) for body, c in gear.shares().items())
             for i, gear in enumerate(self.m.gears)
         }
-        return make(self.m, self.plan, signs, starts, 1, tuple(self.warnings), phases)
 
-    def _refuse_overdriven(self, done: Plan, st: State) -> None:
-        """Constraints that depend on each other may leave less motion than there are inputs."""
-        from virtualwork.formulas.constraints import Constraints, coordinates
-
-        jacobian = Constraints.at(self.m, coordinates(self.m, done, st), {}).jacobian
-        try:
-            s = np.linalg.svd(jacobian, compute_uv=False)
-        except np.linalg.LinAlgError:
-            raise AssemblyError(
-                "the lengths of the links differ too much to tell the mechanism's mobility"
-            ) from None
-        left = 3 * len(self.m.links) - int((s > 1e-9 * s[0]).sum())
-        counted = done.blocks.mobility
-        if left < len(self.m.inputs) or 1 <= counted < len(self.m.inputs):
-            left = min(left, counted) if counted >= 1 else left
-            names = ", ".join(e.name for e in self.m.inputs)
-            what = "the joints leave no motion, it is a structure" if left == 0 else f"mobility {left}"
-            raise MobilityError(f"[input]: {len(self.m.inputs)} input(s) ({names}), but {what}")
-
+    # --- gears --------------------------------------------------------------------------------------------------
     def _phased(self, step: Turn, st: State) -> Turn:
         """A turn with the constants of its gears: its link stands at its guess, where one of them is open still.
 
@@ -178,71 +184,9 @@ class _Chooser:
         shares = self.m.gears[gear].shares().items()
         return sum(c * float(st.angle[b] if b in st.angle else self.angles.get(b, 0.0)) for b, c in shares)
 
-    def solutions(self, group: Group, case: Case, st: State) -> list[tuple[int, State]]:
-        found = []
-        for sign in (1, -1):
-            trial = st.copy()
-            try:
-                case.solve(trial, sign, self.m.size)
-            except ZeroDivisionError:
-                continue
-            if all(np.isfinite(trial.turn[b]) for b in group.members) and all(
-                np.isfinite(trial.slide[g]) for g in group.slides
-            ):
-                found.append((sign, trial))
-        return found
-
-    def _meeting(self, group: Group) -> str:
-        return (
-            f"[guess] at: {group.name} stands at a change point or a limit there, where its two assemblies "
-            "meet; taken is the one whose links stand still or turn with the input; another `at` chooses the other"
-        )
-
-    def _near(self, group: Group, case: Case, st: State, signs: Mapping[str, int], sign: int) -> None:
-        """Put the group into the state as it stands just beyond a point where its closed form has no direction."""
-        beside = State([q + 1e-7 * (self.m.size if self.m.inputs[0].is_slide else 1.0) for q in self.m.at])
-        before = Choice(self.m, self.plan, signs)
-        before.run_untracked(before.before(group), beside)
-        case.solve(beside, sign, self.m.size)
-        st.turn.update({b: beside.turn[b] for b in group.members})
-        st.slide.update({g: beside.slide[g] for g in group.slides})
-
-    def _ahead(
-        self, group: Group, case: Case, signs: Mapping[str, int], here: State | None = None
-    ) -> list[float] | None:
-        """How far the group's two assemblies go a little beyond the guess.
-
-        Each link's least distance to standing still or to turning with the input, so that a parallelogram is
-        preferred to its antiparallel twin; where the pose itself is not determined, the distance to the guess.
-        """
-        if len(self.m.inputs) != 1:
-            return None
-        step = BESIDE * (self.m.size if self.m.inputs[0].is_slide else 1.0)
-        before = Choice(self.m, self.plan, signs)
-        for side in (1, -1):
-            st = State([self.m.at[0] + side * step])
-            try:
-                before.run_untracked(before.before(group), st)
-            except (KeyError, ZeroDivisionError):
-                return None
-            found = self.solutions(group, case, st)
-            if len(found) == 2:
-                # seen from before the point, the Jacobian has the other sign on the same branch
-                distances = [self._distance(group, trial) for _, trial in found]
-                if here is not None and group.members:
-                    turned = complex(np.exp(1j * side * step))
-                    distances = [
-                        sum(
-                            min(abs(e - trial.turn[b]), abs(e * turned - trial.turn[b]))
-                            for b in group.members
-                            for e in [here.turn[b]]
-                        )
-                        for _, trial in found
-                    ]
-                return distances if side > 0 else distances[::-1]
-        return None
-
-    def _sign(self, group: Group, case: Case, st: State, signs: Mapping[str, int]) -> int:
+    # --- closed forms -------------------------------------------------------------------------------------------
+    def _sign(self, group: Group, case: Case, st: State) -> int:
+        """The sign of a closed form, which is put into the state."""
         if group.kind == "PRP":
             try:
                 case.solve(st, 1, self.m.size)
@@ -252,45 +196,88 @@ class _Chooser:
                     "guides of different directions (`angle`)"
                 ) from None
             return 1
-        found = self.solutions(group, case, st)
+        found = self._solutions(group, case, st)
         if not found:
-            ahead = self._ahead(group, case, signs)
-            if ahead is not None and informed(self.m, group):
-                self.warnings.append(self._meeting(group))
-                sign = (1, -1)[int(np.argmin(ahead))]
-                self._near(group, case, st, signs, sign)
-                return sign
-            st.turn.update({b: complex(np.nan, np.nan) for b in group.members})
-            st.slide.update(dict.fromkeys(group.slides, np.nan))
-            return self._sign_of_guess(group, case, st)
+            ahead = self._ahead(group, case)
+            if ahead is None or not informed(self.m, group):
+                st.turn.update({b: complex(np.nan, np.nan) for b in group.members})
+                st.slide.update(dict.fromkeys(group.slides, np.nan))
+                return self._sign_of_guess(group, case, st)
+            # no direction is determined there: it stands as just beyond
+            self.warnings.append(self._meeting(group))
+            sign, near = (1, -1)[int(np.argmin(ahead))], self._beside(group, 1e-7 * self.unit)
+            case.solve(near, sign, self.m.size)
+            st.turn.update({b: near.turn[b] for b in group.members})
+            st.slide.update({g: near.slide[g] for g in group.slides})
+            return sign
         distances = [self._distance(group, trial) for _, trial in found]
         # a guess to full precision tells apart even assemblies that all but meet; distances are squares
         told = min(distances) < 1e-3 * max(distances) and max(distances) > 1e-28
         if len(found) == 2 and abs(found[0][1].margin[group.name]) < 1e-14 and not told:
-            ahead = self._ahead(group, case, signs, found[0][1])
+            ahead = self._ahead(group, case, found[0][1])
             if ahead is not None:
                 distances = ahead
             self.warnings.append(self._meeting(group))
         elif len(found) == 2 and not informed(self.m, group):
             raise AssemblyError(self._choices(group, [t for _, t in found]))
-        best = int(np.argmin(distances))
-        sign, chosen = found[best]
+        sign, chosen = found[int(np.argmin(distances))]
         for name in ("turn", "point", "slide", "angle", "margin"):
             getattr(st, name).update(getattr(chosen, name))
         return sign
 
-    def _choices(self, group: Group, states: list[State]) -> str:
-        texts = []
-        for st in states:
-            parts = [f"{b} = {np.degrees(np.angle(st.turn[b])):.4g} deg" for b in group.members]
-            parts += [f"{self.m.guides[g].point} at {st.slide[g]:.4g} m" for g in group.slides]
-            texts.append(", ".join(parts))
-        return f"[guess]: {group.name} can be assembled in {len(texts)} ways; choose one: " + "; or ".join(
-            texts
-        )
+    def _solutions(self, group: Group, case: Case, st: State) -> list[tuple[int, State]]:
+        """The signs of which a closed form has a solution, each with that."""
+        found = []
+        for sign in (1, -1):
+            trial = st.copy()
+            try:
+                case.solve(trial, sign, self.m.size)
+            except ZeroDivisionError:
+                continue
+            unknowns = [*(trial.turn[b] for b in group.members), *(trial.slide[g] for g in group.slides)]
+            if all(map(np.isfinite, unknowns)):
+                found.append((sign, trial))
+        return found
 
-    def _distance(self, group: Group, st: State) -> float:
-        return float(distance(group, st, self.plan, self.m, self.angles, self.points))
+    def _beside(self, group: Group, apart: float) -> State:
+        """What a group hangs on, with the one input as far beside the guess, rad or m."""
+        st = State([self.m.at[0] + apart])
+        chosen = self._made(Choice)
+        chosen.run_untracked(chosen.before(group), st)
+        return st
+
+    def _ahead(self, group: Group, case: Case, here: State | None = None) -> list[float] | None:
+        """How far the group's two assemblies go a little beyond the guess.
+
+        Each link's least distance to standing still or to turning with the input, so that a parallelogram is
+        preferred to its antiparallel twin; where the pose itself is not determined, the distance to the guess.
+        """
+        if len(self.m.inputs) != 1:
+            return None
+        step = BESIDE * self.unit
+        for side in (1, -1):
+            try:
+                st = self._beside(group, side * step)
+            except (KeyError, ZeroDivisionError):
+                return None
+            found = self._solutions(group, case, st)
+            if len(found) < 2:
+                continue
+            if here is None or not group.members:
+                distances = [self._distance(group, trial) for _, trial in found]
+            else:
+                turned = complex(np.exp(1j * side * step))
+                distances = [
+                    sum(
+                        min(abs(e - trial.turn[b]), abs(e * turned - trial.turn[b]))
+                        for b in group.members
+                        for e in [here.turn[b]]
+                    )
+                    for _, trial in found
+                ]
+            # seen from before the point, the Jacobian has the other sign on the same branch
+            return distances if side > 0 else distances[::-1]
+        return None
 
     def _sign_of_guess(self, group: Group, case: Case, st: State) -> int:
         """Not assembled at the guess: the sign that the guessed angles would have."""
@@ -305,7 +292,25 @@ class _Chooser:
             seen = None
         return 1 if seen is None or seen >= 0 else -1
 
-    # --- groups with no closed form ------------------------------------------------------------------------
+    def _meeting(self, group: Group) -> str:
+        return (
+            f"[guess] at: {group.name} stands at a change point or a limit there, where its two assemblies "
+            "meet; taken is the one whose links stand still or turn with the input; another `at` chooses the other"
+        )
+
+    def _choices(self, group: Group, states: list[State]) -> str:
+        texts = []
+        for st in states:
+            parts = [f"{b} = {np.degrees(np.angle(st.turn[b])):.4g} deg" for b in group.members]
+            parts += [f"{self.m.guides[g].point} at {st.slide[g]:.4g} m" for g in group.slides]
+            texts.append(", ".join(parts))
+        ways = "; or ".join(texts)
+        return f"[guess]: {group.name} can be assembled in {len(texts)} ways; choose one: {ways}"
+
+    def _distance(self, group: Group, st: State) -> float:
+        return float(distance(group, st, self.plan, self.m, self.angles, self.points))
+
+    # --- groups with no closed form -------------------------------------------------------------------------------
     def _newton(self, group: Group, st: State) -> Any:
         # a mechanism whose groups all have a closed form does not load these
         from virtualwork.branch.solutions import every_solution, guessed_unknowns

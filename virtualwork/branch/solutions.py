@@ -1,19 +1,22 @@
-"""The assemblies of a group with no closed form, at one input: the one that the guess means, and all others."""
+"""All assemblies at one input: of a group with no closed form, from the guess or from many starts; of a whole mechanism."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 
+from virtualwork.branch.choice import Choice
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.linear import stack, stack_rows
 from virtualwork.formulas.newton import gaps, newton, write_unknowns
-from virtualwork.formulas.numbers import dot
+from virtualwork.formulas.numbers import dot, stack, stack_rows
 from virtualwork.formulas.positions import State, columns
 from virtualwork.plan.steps import Group
+
+C = TypeVar("C", bound=Choice)
 
 
 def guessed_unknowns(
@@ -98,3 +101,44 @@ def every_solution(group: Group, st: State, size: float) -> Any:
         else:
             keep.append(row)
     return np.array(keep)
+
+
+def all_assemblies(chosen: C) -> tuple[C, ...]:
+    """Every assembly at the guess's input: all signs of the closed forms, all solutions found for the others."""
+    found = [chosen]
+    for signs, starts in _combinations(chosen):
+        if signs != chosen.signs or any(
+            np.abs(np.exp(1j * np.asarray(starts[k])) - np.exp(1j * np.asarray(chosen.starts[k]))).max()
+            > 1e-6
+            for k in starts
+        ):
+            found.append(replace(chosen, signs=signs, starts=starts, number=len(found) + 1, warnings=()))
+    return tuple(found)
+
+
+def _combinations(chosen: Choice) -> list[tuple[dict[str, int], dict[str, Any]]]:
+    """Walk the steps at the guess's input and fork wherever a group closes in more than one way."""
+    m = chosen.mechanism
+    fronts: list[tuple[State, dict[str, int], dict[str, Any]]] = [(State(list(m.at)), {}, {})]
+    for step in chosen.plan.steps:
+        after: list[tuple[State, dict[str, int], dict[str, Any]]] = []
+        for st, signs, starts in fronts:
+            if not isinstance(step, Group):
+                chosen.run_untracked([step], st)
+                after.append((st, signs, starts))
+            elif step.kind == "Newton":
+                for x in every_solution(step, st, m.size):
+                    trial = st.copy()
+                    write_unknowns(step, trial, x[None])
+                    after.append((trial, signs, starts | {step.name: tuple(map(float, x))}))
+            else:
+                for sign in (1,) if step.kind == "PRP" else (1, -1):
+                    trial = st.copy()
+                    try:
+                        chosen.case(step).solve(trial, sign, m.size)
+                    except ZeroDivisionError:
+                        continue
+                    if trial.margin[step.name] >= 0:
+                        after.append((trial, signs | {step.name: sign}, starts))
+        fronts = after
+    return [(signs, starts) for _, signs, starts in fronts]

@@ -11,24 +11,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from virtualwork.branch.change_point import ChangePoint, near_by, put, through
 from virtualwork.branch.choice import Choice
-from virtualwork.branch.limits import SAME, Limit, limits, own_range, repetition
-from virtualwork.branch.radicand import lowest, rounding, vanishes
-from virtualwork.branch.winding import Winding, wind_along_lines
-from virtualwork.describe.errors import MechanismError
-from virtualwork.formulas.numbers import Number, Reals
-from virtualwork.formulas.positions import State, run
+from virtualwork.describe import MechanismError
+from virtualwork.formulas.closed_forms import Case
+from virtualwork.formulas.numbers import EPS, Number, Reals
+from virtualwork.formulas.positions import NONE, Samples, State, follow, run, whole
 from virtualwork.plan.steps import Group, Step, turns
 
 if TYPE_CHECKING:
+    # a mechanism that passes no change point, and whose groups all have a closed form, loads neither
+    from virtualwork.branch.change_point import ChangePoint
     from virtualwork.branch.continuation import Continuation
 
+# places nearer than this share of a turn are one
+SAME = 1e-6
 # of one turn, or of one mechanism's size of slide
 SAMPLES = 720
 # a radicand below this may touch zero between two samples
@@ -51,7 +52,8 @@ class Track:
         self.changes: dict[str, list[ChangePoint]] = {}
         self.brackets: list[tuple[str, float, float]] = []
         self.continuations: dict[str, Continuation] = {}
-        self._winding = Winding(self)
+        # of bodies of which a gear of fractional ratio needs the angle itself
+        self._samples: dict[str, Samples] = {}
         # one turn says it all where every turn of a body is a whole number of turns of the input
         factors = [k for t in turns(self.plan.steps) for _, k in (*t.angle.inputs, *t.angle.bases)]
         self.whole = not self.slides and all(float(k).is_integer() for k in factors)
@@ -75,18 +77,23 @@ class Track:
         if group.kind == "Newton":
             self._close_newton(group, st)
             return
-        case, size = self.assembly.cases[group.name], self.assembly.mechanism.size
+        case, size = self.assembly.case(group), self.assembly.mechanism.size
         if group.name in self.flips and group.name not in self.folded:
-            case.solve(st, self.sign(group, st.inputs[0]), size)
-            self.mend(group, st)
+            from virtualwork.branch.change_point import mend
+
+            case.solve(st, self.sign(group.name, st.inputs[0]), size)
+            mend(self.changes.get(group.name, ()), group, st)
         else:
             case.solve(st, self.assembly.signs[group.name], size, group.name in self.folded)
         bodies = self.assembly.geared.intersection(group.members)
-        if not self.active:
+        if bodies and not self.active:
+            from virtualwork.branch.lines import wind_along_lines
+
             wind_along_lines(self, group, st, bodies)
             return
         for body in bodies:
-            st.angle[body] = self._winding.angle(body, st.inputs[0], np.angle(st.turn[body]))
+            found = whole(self._samples.get(body, NONE), st.inputs[0], np.angle(st.turn[body]))
+            st.angle[body] = found if np.ndim(st.inputs[0]) else float(found)
 
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""
@@ -162,56 +169,25 @@ class Track:
                     self.flips[name] = np.sort(np.append(self.flips[name], where))
                     self.changes[name].append(replace(change, input=where))
 
-    def sign(self, group: Group, q: Number) -> Number:
-        """The sign of the group's Jacobian at inputs q."""
-        base = self.assembly.signs[group.name]
-        flips = self.flips.get(group.name)
+    def sign(self, group: str, q: Number) -> Number:
+        """The sign of a closed form's Jacobian at inputs q."""
+        base = self.assembly.signs[group]
+        flips = self.flips.get(group)
         if flips is None or not len(flips):
             return base
         passed = np.searchsorted(flips, q, "right") - np.searchsorted(flips, self.start, "right")
         return base * (1 - 2 * (passed & 1))
 
-    def mend(self, group: Group, st: State) -> None:
-        """Replace positions close to a change point by the series through it."""
-        for change, near, delta in near_by(self.changes.get(group.name, ()), st.inputs[0]):
-            move = change.unknown(delta, 0)
-            for j, body in enumerate(group.angles):
-                put(st.turn, body, near, change.turn[j] * np.exp(1j * move[..., j]))
-            for j, g in enumerate(group.slides):
-                put(st.slide, g, near, change.slide[j] + move[..., len(group.angles) + j])
-            put(st.margin, group.name, near, np.zeros(np.shape(delta)))
-            for tie in group.ties:
-                st.turn[tie.body] = st.rotate(tie.angle)
-
     def mend_rates(self, group: Group, q: Number, k: int, x: list[Number]) -> list[Number]:
-        """The same for the unknowns' k-th derivatives."""
-        for change, near, delta in near_by(self.changes.get(group.name, ()), q):
-            rate = change.unknown(delta, k)
-            for j in range(len(x)):
-                if near is None:
-                    x[j] = float(rate[..., j])
-                else:
-                    x[j] = np.array(np.broadcast_to(x[j], np.shape(q)))
-                    x[j][near] = rate[..., j]
-        return x
+        """The k-th derivatives of a group's unknowns with those close to a change point replaced by the series through it."""
+        from virtualwork.branch.change_point import mend_rates
+
+        return mend_rates(self.changes.get(group.name, ()), q, k, x)
 
     def bridge_rates(self, group: Group, q: Number, k: int, x: list[Number], singular: Any) -> list[Number]:
         """Derivatives of a Newton group at poses where its Jacobian is singular though the branch goes on."""
-        if not self.active or group.name not in self.continuations:
-            return x
-        for i in np.flatnonzero(singular):
-            rate = self.continuations[group.name].bridge(float(np.atleast_1d(q)[i]), k)
-            if not np.isfinite(
-                rate
-                # close to a limit nothing goes on: what the Jacobian gives is kept
-            ).all():
-                continue
-            for j in range(len(x)):
-                if np.ndim(q) == 0:
-                    x[j] = float(rate[j])
-                else:
-                    x[j] = np.array(np.broadcast_to(x[j], np.shape(q)))
-                    x[j][i] = rate[j]
+        if self.active and group.name in self.continuations:
+            self.continuations[group.name].bridge_rates(q, k, x, singular)
         return x
 
     def _fold(self, name: str) -> None:
@@ -231,7 +207,7 @@ class Track:
                     return
                 self.assembly.run_untracked([s], st)
                 if isinstance(s, Group) and s.kind != "PRP":
-                    case, size = self.assembly.cases[s.name], self.assembly.mechanism.size
+                    case, size = self.assembly.case(s), self.assembly.mechanism.size
                     if vanishes(st.margin[s.name], rounding(case, size)):
                         self._fold(s.name)
                         case.solve(st, 1, size, folded=True)
@@ -277,17 +253,25 @@ class Track:
                 if self._look(s, q, m, a, b):
                     self.close(s, st)
                 for body in self.assembly.geared.intersection(s.members):
-                    self._winding.follow(body, q)
-                    st.angle[body] = self._winding.angle(body, q, np.angle(st.turn[body]))
+                    known = self._samples.get(body, NONE)
+                    samples = follow(partial(self._angle, body), q, self.start, self.length, known)
+                    self._samples[body] = samples
+                    st.angle[body] = whole(samples, q, np.angle(st.turn[body]))
             else:
                 self._continued(s).extend(a, b)
                 if self._continued(s).singular():
                     self._fold(s.name)
                 self.close(s, st)
 
+    def _angle(self, body: str, q: Reals) -> Reals:
+        """A body's angle at inputs q, but for whole turns."""
+        st = State([q], many=True)
+        self.run(self.assembly.needed((f"angle:{body}",)), st)
+        return np.broadcast_to(np.angle(st.turn[body]), q.shape)
+
     def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
         """Find where the radicand crosses or touches zero; say whether a change point was found."""
-        noise = rounding(self.assembly.cases[group.name], self.assembly.mechanism.size)
+        noise = rounding(self.assembly.case(group), self.assembly.mechanism.size)
         if vanishes(m, noise):
             self._fold(group.name)
             return True
@@ -300,6 +284,10 @@ class Track:
             if np.isfinite(m[i]) and np.isfinite(m[i + 1]) and inside[i] | inside[i + 1]:
                 self.brackets.append((group.name, float(q[i]), float(q[i + 1])))
         dips = 1 + np.flatnonzero((m[1:-1] <= m[:-2]) & (m[1:-1] < m[2:]) & (np.abs(m[1:-1]) < DIP))
+        if not len(dips):
+            return False
+        from virtualwork.branch.change_point import lowest, through
+
         fresh: list[float] = []
         for i in dips:
             found = lowest(partial(self.margin, group), float(q[i - 1]), float(q[i + 1]), noise)
@@ -332,52 +320,6 @@ class Track:
         """Was any limit met in what was covered?"""
         return bool(self.brackets) or any(way.ends for way in self.continuations.values())
 
-    # --- the branch's own scale -----------------------------------------------------------------------------------
-    @cached_property
-    def turns(self) -> int | None:
-        """How many turns of the input tell the poses of the branch apart: its period.
-
-        A branch between two limits needs what tells its own inputs apart; any other as many as bring every group back
-        to where it stood. None with a slide or several inputs, and where no number of turns up to `limits.TURNS` does it.
-        """
-        n = self.repetition
-        if n == 1 or self.slides or not self.has_limits:
-            return n
-        low, high = self.range
-        return max(1, int(np.ceil((high - low) / self.length))) if np.isfinite(high - low) else n
-
-    @cached_property
-    def repetition(self) -> int | None:
-        """How many turns of the input bring every group back to where it stood, as far as poses can be compared.
-
-        A branch that passes an odd number of change points in a turn needs two; a fractional gear its own number.
-        """
-        return repetition(self)
-
-    @property
-    def period(self) -> float | None:
-        """The input's span after which the branch repeats, rad; None where it does not, or with a slide."""
-        return None if self.turns is None else self.turns * self.length
-
-    def apart(self, q: Reals, from_: float) -> Reals:
-        """How far inputs are from one, by the nearest way round the branch."""
-        d = np.asarray(q - from_)
-        return d if self.period is None else d - self.period * np.round(d / self.period)
-
-    # --- limits ---------------------------------------------------------------------------------------------------
-    @cached_property
-    def range(self) -> tuple[float, float]:
-        """The ends of the input's range around the guess, rad or m; infinite where none was met."""
-        return own_range(self)
-
-    def limits(self) -> list[Limit]:
-        """Where the input can go no further, over one period of the branch or what was covered, to full precision.
-
-        The poses of a branch between two limits are told apart over less than brings them back: ends of other ranges
-        are those of the turns in which its own lies.
-        """
-        return limits(self)
-
     @property
     def crossings(self) -> list[float]:
         """Inputs at which two branches cross, in what was covered: of closed forms, and met on the way of the others."""
@@ -387,7 +329,6 @@ class Track:
     # --- groups with no closed form ------------------------------------------------------------------------------
     def _continued(self, group: Group) -> Continuation:
         if group.name not in self.continuations:
-            # four files: a mechanism whose groups all have a closed form does not load them
             from virtualwork.branch.continuation import Continuation
 
             self.continuations[group.name] = Continuation(self, group)
@@ -398,6 +339,19 @@ class Track:
         if self.active:
             self._continued(group).close(st)
         else:
-            from virtualwork.branch.continuation import along_lines
+            from virtualwork.branch.lines import along_lines
 
             along_lines(self, group, st)
+
+
+def rounding(case: Case, size: float) -> float:
+    """The rounding of a group's radicand, by its shortest arm and the mechanism's size."""
+    shortest = min((abs(a) for a in case.arms if a), default=size)
+    return 256 * EPS * (1 + (size / shortest) ** 2 if shortest else 1)
+
+
+def vanishes(margin: Number, noise: float) -> bool:
+    """Whether a radicand is zero to rounding wherever there is one."""
+    m = np.abs(np.atleast_1d(margin))
+    m = m[np.isfinite(m)]
+    return len(m) > 4 and bool((m <= noise).all())

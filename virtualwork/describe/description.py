@@ -1,30 +1,39 @@
 """A mechanism as its designer describes it: who is pinned, guided, geared, driven and loaded by what. Frozen, SI.
 
-Nothing is solved here: this is what the order of solution, the formulas and the studies work on.
+What it must not say is refused: unknown names, links of zero length, gears that are none. Nothing is solved here:
+this is what the order of solution, the formulas and the studies work on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
 from dalembert.arithmetic.records import Record, record
-from virtualwork.describe.checks import refuse
-from virtualwork.describe.loads import Force, Friction, Motor, Spring, Torque, TorsionSpring
+from dalembert.arithmetic.varied import heading, rotation
+from virtualwork.describe import DescriptionError, known
 from virtualwork.describe.parts import (
     GROUND,
+    Force,
+    Friction,
     Gear,
     Guess,
     Guide,
     Input,
     Link,
+    Motor,
     Point,
     Rigid,
+    Spring,
+    Torque,
+    TorsionSpring,
     as_point,
     as_points,
 )
+
+Bodies = Mapping[str, Mapping[str, complex]]
 
 
 @record
@@ -91,17 +100,7 @@ class Description(Record):
         }
         for key, value in values.items():
             object.__setattr__(self, key, value)
-        refuse(
-            self.links,
-            self.bodies,
-            self.pins,
-            self.guides,
-            self.gears,
-            self.inputs,
-            self.guess,
-            {"forces": self.forces, "torques": self.torques},
-            self.springs,
-        )
+        refuse(self)
 
     def __repr__(self) -> str:
         counts = ((len(self.links), "link"), (len(self.pins) + len(self.guides) + len(self.gears), "joint"))
@@ -208,3 +207,126 @@ class Description(Record):
         """The body that feels the reaction of input j's torque: the carrier of its motor, else what it is driven on."""
         entry = self.inputs[j]
         return next((motor.carrier for motor in self.motors if motor.drives == entry.link), entry.on)
+
+    @cached_property
+    def carried(self) -> list[int]:
+        """The turning inputs whose motor sits on another body than `on`."""
+        return [j for j, e in enumerate(self.inputs) if not e.is_slide and self.carrier(j) != e.on]
+
+
+def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]]:
+    """Rough link angles and point positions from the guess, the ground and the inputs, as far as they reach."""
+    angles = dict(m.guess.angles)
+    points = dict(m.ground) | dict(m.guess.points)
+    for j, e in enumerate(m.inputs):
+        if e.link is not None and e.on == GROUND:
+            angles[e.link] = m.at[j]
+    for g in m.guides:
+        if g.turned is not None and g.on == GROUND:
+            angles.setdefault(g.link, g.angle + g.turned)
+        if g.turned is not None and g.link == GROUND:
+            angles.setdefault(g.on, -(g.angle + g.turned))
+    before = -1
+    while len(angles) + len(points) > before:
+        before = len(angles) + len(points)
+        for name, link in m.links.items():
+            here = [p for p in link.points if p in points]
+            if name not in angles and len(here) >= 2:
+                ends = max(
+                    ((a, b) for a in here for b in here),
+                    key=lambda ab: abs(link.points[ab[1]] - link.points[ab[0]]),
+                )
+                local = link.points[ends[1]] - link.points[ends[0]]
+                seen = points[ends[1]] - points[ends[0]]
+                if local and seen:
+                    angles[name] = heading(seen / local)
+            if name in angles and here:
+                turn = rotation(angles[name])
+                for p, z in link.points.items():
+                    points.setdefault(p, points[here[0]] + (z - link.points[here[0]]) * turn)
+    return angles, points
+
+
+def refuse(m: Description) -> None:
+    """Refuse unknown names and impossible sizes, each with its place.
+
+    Raises
+    ------
+    DescriptionError
+    """
+    if GROUND in m.links:
+        raise DescriptionError("[links.ground]: 'ground' is the fixed body; give this link another name")
+    if not m.links:
+        raise DescriptionError("[links]: the mechanism has no links")
+    for name, link in m.links.items():
+        _link(name, link, m.pins, {g.point for g in m.guides if g.link == name})
+    for i, guide in enumerate(m.guides, 1):
+        _guide(f"[[{'sliders' if guide.is_slider else 'slots'}]] {i} ({guide.point})", guide, m.bodies)
+    for i, gear in enumerate(m.gears, 1):
+        for body in (*gear.links, gear.arm):
+            known(body, m.bodies, f"[[gears]] {i}", "link")
+        if gear.ratio == 0 or len({*gear.links, gear.arm}) < 3:
+            raise DescriptionError(
+                f"[[gears]] {i}: expected two links, an arm that is neither, and a ratio other than 0"
+            )
+    for i, entry in enumerate(m.inputs, 1):
+        _input("[input]" if len(m.inputs) == 1 else f"[[input]] {i}", entry, m)
+    if m.guess.at is not None and len(m.guess.at) != len(m.inputs):
+        raise DescriptionError(
+            f"[guess] at: found {len(m.guess.at)} values, expected one for each of {len(m.inputs)} inputs"
+        )
+    for name in m.guess.angles:
+        known(name, m.links, f"[guess] {name}", "link or point")
+    loads: Mapping[str, Sequence[Force | Torque]] = {"forces": m.forces, "torques": m.torques}
+    for table, entries in loads.items():
+        for i, load in enumerate(entries, 1):
+            known(load.link, m.links, f"[[{table}]] {i} link", "link")
+            if isinstance(load, Force) and isinstance(load.point, str):
+                what = f"point of link {load.link}"
+                known(load.point, m.bodies[load.link], f"[[{table}]] {i} point", what)
+    for i, spring in enumerate(m.springs, 1):
+        for body, point in spring.between:
+            known(body, m.bodies, f"[[springs]] {i} between", "link")
+            if isinstance(point, str):
+                known(point, m.bodies[body], f"[[springs]] {i} between", f"point of {body}")
+
+
+def _link(name: str, link: Link, pins: Collection[str], guided: Collection[str]) -> None:
+    seen: dict[complex, str] = {}
+    for point, z in link.points.items():
+        if not (abs(z) < float("inf")):
+            raise DescriptionError(f"[links.{name}] points.{point}: found {z}, expected finite coordinates")
+        shared = point in pins or point in guided
+        if z in seen and shared and seen[z] in pins:
+            raise DescriptionError(
+                f"[links.{name}] points: {seen[z]} and {point} are both joints at the same place: "
+                "a link of zero length; pin the links at one point name instead"
+            )
+        if shared:
+            seen[z] = point
+    if link.mass < 0 or link.inertia < 0:
+        raise DescriptionError(f"[links.{name}]: mass and inertia must not be negative")
+
+
+def _guide(where: str, guide: Guide, bodies: Bodies) -> None:
+    known(guide.link, bodies, where + " link", "link")
+    known(guide.on, bodies, where + " on", "link")
+    owner = GROUND if guide.link == GROUND else f"link {guide.link}"
+    known(guide.point, bodies[guide.link], where + " point", f"point of {owner}")
+    if isinstance(guide.through, str):
+        known(guide.through, bodies[guide.on], where + " through", f"point of {guide.on}")
+    if guide.link == guide.on:
+        raise DescriptionError(f"{where}: link '{guide.link}' cannot be guided by itself")
+
+
+def _input(where: str, entry: Input, m: Description) -> None:
+    names = [guide.point for guide in m.guides]
+    if (entry.link is None) == (entry.slider is None):
+        raise DescriptionError(f"{where}: expected either a link or a slider")
+    if entry.slider is None:
+        known(entry.link, m.links, where + " link", "link")
+        known(entry.on, m.bodies, where + " on", "link")
+        return
+    known(entry.slider, names, where + " slider", "slot or slider")
+    if names.count(entry.slider) > 1:
+        raise DescriptionError(f"{where} slider: '{entry.slider}' runs in more than one guide")

@@ -1,21 +1,181 @@
-"""The tables of a TOML description, walked: every complaint names the table and the key."""
+"""The tables of a mechanism's TOML file: their keys, each said once, and how they are walked.
+
+The reader refuses other keys, the schema tells an editor; every complaint names the table and the key.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
+import math
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from virtualwork.describe.errors import DescriptionError, hint
-from virtualwork.describe.keys import UNITS, Keys
-from virtualwork.describe.parts import GROUND, Link
-from virtualwork.describe.units import Units, wrong
+from virtualwork.describe import DescriptionError, hint, known
+from virtualwork.describe.units import EXPECTED, LARGEST, Units, wrong
+
+if TYPE_CHECKING:
+    # numpy comes with it, and the schema needs none
+    from virtualwork.describe.parts import Link
 
 Load = Callable[[Path], bytes]
+N = TypeVar("N", float, complex)
 P = TypeVar("P")
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key: what it holds, what it means, whether it must be there, and what holds where it is not.
+
+    `kind` is a quantity of `units.EXPECTED`, `pair of` one, or a form that `schema` knows (text, two texts, ...).
+    """
+
+    kind: str
+    told: str
+    needed: bool = False
+    default: Any = None
+
+
+Keys = Mapping[str, Key]
+
+UNITS: Keys = {
+    "length": Key("text", "the unit of bare lengths", default="m"),
+    "angle": Key("text", "the unit of bare angles", default="rad"),
+}
+
+LINK: Keys = {
+    "points": Key("points", "named points in the link's own axes; links that share a name are pinned there"),
+    "mass": Key("mass", "the mass, kg", default=0),
+    "center": Key("pair of length", "the centre of mass in the link's own axes", default=[0, 0]),
+    "inertia": Key("inertia", "the moment of inertia about the centre of mass, kg m2", default=0),
+}
+
+POINT: Keys = {
+    "from": Key("text", "another point of this link", needed=True),
+    "length": Key("length", "the distance from there", needed=True),
+    "angle": Key("angle", "its direction against the link's x-axis", needed=True),
+}
+
+SLOT: Keys = {
+    "point": Key("text", "the point that is guided", needed=True),
+    "link": Key("text", "the link of the point; where it is left out, the only one that has it"),
+    "on": Key("text", "the link that carries the line", default="ground"),
+    "through": Key("point", "a point of the line: a name on that link or [x, y]", default=[0, 0]),
+    "angle": Key("angle", "the direction of the line against the carrier's x-axis", default=0),
+}
+
+SLIDER: Keys = {
+    **SLOT,
+    "turned": Key("angle", "the link's x-axis against the line", default=0),
+}
+
+GEAR: Keys = {
+    "links": Key("two texts", "the two toothed links", needed=True),
+    "ratio": Key("number", "speed of the second over that of the first, against the arm", needed=True),
+    "arm": Key("text", "the link that carries both", default="ground"),
+}
+
+INPUT: Keys = {
+    "link": Key("text", "the link that is driven by its angle"),
+    "on": Key("text", "the link against which the angle is measured", default="ground"),
+    "slider": Key("text", "the point of the slot or slider that is driven by its position"),
+    "angle": Key("angle", "the angle of the link in the file's own pose"),
+    "position": Key("length", "the position of the slider in the file's own pose"),
+    "speed": Key("speed", "the speed: rad/s of a link, m/s of a slider"),
+    "acceleration": Key("acceleration", "the acceleration: rad/s2 of a link, m/s2 of a slider"),
+    "jerk": Key("jerk", "the jerk: rad/s3 of a link, m/s3 of a slider"),
+    "law": Key("text", "a table beside the file: time_s and the angle or position"),
+}
+
+FORCE: Keys = {
+    "link": Key("text", "the link it acts on", needed=True),
+    "point": Key("point", "a point of the link by name or [x, y] in its axes; else its centre of mass"),
+    "force": Key("pair of force", "its two components, N"),
+    "frame": Key("frame", "the axes of the components", default="ground"),
+    "table": Key("text", "a table beside the file in place of force: the input, fx_N and fy_N"),
+}
+
+TORQUE: Keys = {
+    "link": Key("text", "the link it acts on", needed=True),
+    "torque": Key(
+        "torque or table",
+        "counter-clockwise, N m; or a table beside the file: torque_N_m over t_s, angle_deg or speed_rad_s of the link",
+        needed=True,
+    ),
+}
+
+SPRING: Keys = {
+    "between": Key("two texts", "its ends: two points such as crank.B and ground.D", needed=True),
+    "stiffness": Key("stiffness", "N/m", default=0),
+    "free_length": Key("length", "the length without force", default=0),
+    "damping": Key("damping", "of a damper beside the spring, N s/m", default=0),
+}
+
+TORSION_SPRING: Keys = {
+    "links": Key("two texts", "the two links; its angle is the second's less the first's", needed=True),
+    "stiffness": Key("torsion stiffness", "N m/rad", default=0),
+    "free_angle": Key("angle", "the angle without torque", default=0),
+    "damping": Key("torsion damping", "of a damper beside the spring, N m s/rad", default=0),
+}
+
+MOTOR: Keys = {
+    "carrier": Key("text", "the link that carries it", needed=True),
+    "drives": Key("text", "the link that it drives", needed=True),
+    "mass": Key("mass", "its mass, which joins the carrier, kg", default=0),
+    "center": Key("pair of length", "its centre in the carrier's axes", default=[0, 0]),
+}
+
+FRICTION: Keys = {
+    "joint": Key("text", "the point of the pin or guide", needed=True),
+    "coefficient": Key("number", "the coefficient of friction", needed=True),
+    "radius": Key("length", "the radius of the pin; 0 in a guide", default=0),
+}
+
+# the tables of loads, with the keys of an entry
+LOADS: Mapping[str, Keys] = {
+    "forces": FORCE,
+    "torques": TORQUE,
+    "springs": SPRING,
+    "torsion_springs": TORSION_SPRING,
+    "motors": MOTOR,
+    "friction": FRICTION,
+}
+
+# the file's tables that may stand once or many times
+ENTRIES: Mapping[str, Keys] = {
+    "input": INPUT,
+    "slots": SLOT,
+    "sliders": SLIDER,
+    "gears": GEAR,
+    **LOADS,
+}
+
+# everything else that stands at the top of the file
+FILE: Keys = {
+    "name": Key("name", "what the mechanism is called", default=""),
+    "source": Key("anything", "where it is from; not evaluated"),
+    "note": Key("anything", "a remark; not evaluated"),
+    "report": Key("texts", "the head of a report: title, machine, customer, date, author; not evaluated"),
+    "gravity": Key("pair of slide acceleration", "its two components, m/s2", default=[0, 0]),
+    "units": Key("units", "what bare lengths and angles mean"),
+    "ground": Key("ground", "named fixed points [x, y]"),
+    "links": Key("links", "the moving links by name", needed=True),
+    "guess": Key("guess", "roughly how it stands: this chooses the assembly"),
+    "tolerances": Key(
+        "tolerances", 'limits of dimensions by their paths: "links.crank.B.x" = "0.05 mm" is ± that'
+    ),
+}
+
+# keys of [guess] that name no link, point or input
+GUESS: Keys = {"at": Key("inputs", "the input, or every input, for which the guess holds")}
+
+
+def numbers(keys: Keys) -> dict[str, str]:
+    """The keys that hold a quantity or a pair of them, with its kind."""
+    return {name: key.kind for name, key in keys.items() if key.kind.removeprefix("pair of ") in EXPECTED}
 
 
 class Entries:
@@ -28,11 +188,24 @@ class Entries:
         self.units = Units(units)
         self.number, self.pair = self.units.number, self.units.pair
         self.links: dict[str, Link] = {}
-        self.bodies: dict[str, Mapping[str, complex]] = {GROUND: {}}
+        self.bodies: dict[str, Mapping[str, complex]] = {}
 
-    def optional(self, entry: Mapping[str, Any], keys: Keys, key: str, where: str) -> float:
-        """A quantity that is 0 where it is not given."""
-        return self.number(entry[key], keys[key].kind, f"{where} {key}") if key in entry else 0.0
+    def quantities(self, entry: Mapping[str, Any], keys: Keys, where: str) -> dict[str, Any]:
+        """The numbers and pairs of an entry that are given, by their keys."""
+        found: dict[str, Any] = {}
+        for name, kind in numbers(keys).items():
+            if name in entry:
+                one = kind.removeprefix("pair of ")
+                read = self.number if one == kind else self.pair
+                found[name] = read(entry[name], one, f"{where} {name}")
+        return found
+
+    def two(self, entry: Mapping[str, Any], key: str, where: str, what: str) -> tuple[Any, Any]:
+        """A list of two."""
+        found = entry[key]
+        if not isinstance(found, list) or len(found) != 2:
+            raise wrong(f"{where} {key}", found, what)
+        return found[0], found[1]
 
     def table(self, name: str) -> dict[str, Any]:
         """A table of the file; empty where it is not there."""
@@ -41,54 +214,83 @@ class Entries:
             raise wrong(f"[{name}]", value, "a table")
         return value
 
-    def rows(self, name: str) -> Iterable[tuple[int, dict[str, Any]]]:
-        """An array of tables, counted from 1."""
+    def rows(self, name: str) -> list[dict[str, Any]]:
+        """An array of tables."""
         value = self.data.get(name, [])
         if isinstance(value, dict):
             value = [value]
         if not isinstance(value, list) or not all(isinstance(e, dict) for e in value):
             raise wrong(f"[[{name}]]", value, "an array of tables")
-        return enumerate(value, 1)
+        return value
 
-    def every(self, name: str, read: Callable[[dict[str, Any], int], P]) -> list[P]:
-        """Every entry of an array of tables, read."""
-        return [read(entry, i) for i, entry in self.rows(name)] if name in self.data else []
+    def every(self, name: str, read: Callable[[dict[str, Any], str], P]) -> list[P]:
+        """Every entry of an array of tables, read; `[[springs]] 2` is the second."""
+        found = []
+        for i, entry in enumerate(self.rows(name), 1):
+            where = f"[[{name}]] {i}"
+            proper(entry, ENTRIES[name], where)
+            found.append(read(entry, where))
+        return found
 
-    def csv(self, name: Any, where: str) -> list[dict[str, str]]:
-        """The rows of a CSV file beside this one."""
+    def curve(
+        self,
+        name: Any,
+        where: str,
+        over: Collection[str],
+        values: Collection[str],
+        told: str,
+        pair: Callable[[dict[str, str], str], tuple[float, N]],
+    ) -> tuple[list[tuple[float, N]], str]:
+        """The rows of a CSV file beside this one, each as `pair` reads it, and the column that they are over.
+
+        Parameters
+        ----------
+        over, values : collection of str
+            Columns of which one must be there.
+        told : str
+            How a complaint calls them.
+        pair : function of a row and the column that it is over
+        """
         try:
-            return table_rows(self.load(self.folder / str(name)))
+            rows = table_rows(self.load(self.folder / str(name)))
         except (OSError, ValueError, csv.Error):
             raise wrong(where, name, "a CSV file that can be read") from None
+        column = next((c for c in over if rows and c in rows[0]), None)
+        if column is None or rows[0].keys().isdisjoint(values):
+            raise wrong(where, name, f"columns {told}")
+        try:
+            found = [pair(row, column) for row in rows]
+        except (TypeError, ValueError):
+            raise wrong(where, name, "numbers in every row") from None
+        if not all(math.hypot(at, abs(value)) <= LARGEST for at, value in found):
+            raise wrong(where, name, "finite numbers in every row")
+        return found, column
 
     def body(self, name: Any, where: str, ground: bool = True) -> str:
         """The name of a link, or of the ground."""
-        names = self.bodies if ground else self.links
-        if not isinstance(name, str) or name not in names:
-            raise DescriptionError(f"{where}: unknown link '{name}'{hint(str(name), names)}")
-        return name
+        known(name, self.bodies if ground else self.links, where, "link")
+        return str(name)
 
     def place(self, link: str, value: Any, where: str) -> complex | str:
         """A point of a link: its name, or [x, y] in the link's axes."""
-        if isinstance(value, str):
-            if value not in self.bodies[link]:
-                raise DescriptionError(
-                    f"{where}: unknown point '{value}' of {link}{hint(str(value), self.bodies[link])}"
-                )
-            return value
-        return self.pair(value, "length", where)
+        if not isinstance(value, str):
+            return self.pair(value, "length", where)
+        points = self.bodies[link]
+        if value not in points:
+            raise DescriptionError(f"{where}: unknown point '{value}' of {link}{hint(value, points)}")
+        return value
 
-    def point_of(self, name: Any, where: str) -> tuple[str, str]:
+    def point_of(self, name: Any, where: str) -> tuple[str, complex | str]:
         """`crank.B`, or the plain name of a point that one body alone has: the body and the point."""
         link, dot, point = str(name).rpartition(".")
         if dot:
-            return self.body(link, where), point
-        owners = [body for body, points in self.bodies.items() if name in points]
+            return self.body(link, where), self.place(link, point, where)
+        owners = [body for body, points in self.bodies.items() if str(name) in points]
         if len(owners) != 1:
-            known = {p for points in self.bodies.values() for p in points}
+            names = {p for points in self.bodies.values() for p in points}
             expected = " or ".join(f'"{body}.{name}"' for body in owners)
             raise wrong(
-                where, name, expected or f'a link and its point such as "crank.B"{hint(str(name), known)}'
+                where, name, expected or f'a link and its point such as "crank.B"{hint(str(name), names)}'
             )
         return owners[0], str(name)
 
@@ -99,20 +301,15 @@ def known_keys(entry: Mapping[str, Any], names: Collection[str], where: str, wha
         raise wrong(where, entry, "a table")
     for key in entry:
         if key not in names:
-            raise DescriptionError(f"{where}: unknown {what} '{key}'{hint(str(key), names)}")
-
-
-def need(entry: Mapping[str, Any], keys: tuple[str, ...], where: str) -> None:
-    """Refuse an entry in which a key is missing."""
-    for key in keys:
-        if key not in entry:
-            raise DescriptionError(f"{where}: '{key}' is missing")
+            known(key, names, where, what)
 
 
 def proper(entry: Mapping[str, Any], keys: Keys, where: str) -> None:
     """Refuse unknown keys, and an entry in which one is missing that must be there."""
     known_keys(entry, keys, where, "key")
-    need(entry, tuple(name for name, key in keys.items() if key.needed), where)
+    for name, key in keys.items():
+        if key.needed and name not in entry:
+            raise DescriptionError(f"{where}: '{name}' is missing")
 
 
 def table_rows(data: bytes) -> list[dict[str, str]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from virtualwork.describe.keys import ENTRIES, FILE, GUESS, LINK, POINT, UNITS, Keys
+from virtualwork.describe.entries import ENTRIES, FILE, GUESS, LINK, POINT, UNITS, Keys
 from virtualwork.describe.units import EXPECTED
 
 Schema = dict[str, Any]

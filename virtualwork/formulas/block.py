@@ -14,13 +14,11 @@ import numpy as np
 
 from dalembert.arithmetic.varied import rotation
 from virtualwork.describe.description import Description
-from virtualwork.describe.loads import TorsionSpring
-from virtualwork.describe.parts import GROUND
+from virtualwork.describe.parts import GROUND, TorsionSpring
 from virtualwork.formulas.numbers import Number, Reals, plus, times
 from virtualwork.formulas.poses import Poses, part
-from virtualwork.formulas.positions import State
+from virtualwork.formulas.positions import Samples, State, follow, whole
 from virtualwork.formulas.rates import Rates
-from virtualwork.formulas.winding import Samples, follow, whole
 from virtualwork.plan.steps import Path, Plan
 
 

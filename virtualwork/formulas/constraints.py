@@ -18,8 +18,7 @@ from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import State
-from virtualwork.plan.joints import joints, relations
-from virtualwork.plan.steps import Plan
+from virtualwork.plan.steps import Plan, joints, relations
 
 # a singular value below this share of the largest is zero
 RANK = 1e-9

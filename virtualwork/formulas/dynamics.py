@@ -9,18 +9,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe import DescriptionError
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort, finished, generalized, write_effort
-from virtualwork.formulas.friction import settle
 from virtualwork.formulas.loads import EXTERNAL, OWN, Load
 from virtualwork.formulas.numbers import TOGETHER, Complexes, Number, Reals, cross, leave_out, plus, xy
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.reactions import Reactions
+from virtualwork.formulas.reactions import Reactions, settle
 from virtualwork.formulas.scene import Scene
 from virtualwork.formulas.statics import Statics
-from virtualwork.plan.joints import Joint
+from virtualwork.plan.steps import Joint
 
 
 class Dynamics:
@@ -178,30 +177,15 @@ class Dynamics:
                 found = found + r.over(load.form)[0]
         return found
 
-    def joints_named(self, name: str) -> list[Joint]:
-        """The joints at a point: a pin, a guide, or both.
-
-        Raises
-        ------
-        DescriptionError
-            Where there is none.
-        """
-        found = [joint for joint in self.reactions.joints if joint.name == name]
-        if not found:
-            known = ", ".join(dict.fromkeys(joint.name for joint in self.reactions.joints))
-            raise DescriptionError(f"no joint at '{name}': expected one of {known}")
-        return found
-
     def reaction(self, joint: str, on: str) -> Reals:
         """The force of all others on a link at a joint, (n, 2)."""
         return xy(self.at_joint(joint, on))
 
     def at_joint(self, joint: str, on: str) -> Complexes:
         """The same, (n,) complex: of a pin and of a guide, where both are of that name."""
-        here = [found for found in self.joints_named(joint) if on in found.bodies]
-        if not here:
-            raise DescriptionError(f"link '{on}' has no joint at '{joint}'")
-        total, *others = (self.joint_force(found, on) for found in here)
+        total, *others = (
+            self.joint_force(found, on) for found in joints_at(self.reactions.joints, joint, on)
+        )
         for force in others:
             total = total + force
         return total
@@ -243,6 +227,24 @@ class Dynamics:
             force[block.rows] += 0.0 if f is None else f
             moment[block.rows] += 0.0 if m is None else m
         return force, moment
+
+
+def joints_at(joints: Iterable[Joint], name: str, on: str) -> list[Joint]:
+    """The joints of a link at a point: a pin, a guide, or both.
+
+    Raises
+    ------
+    DescriptionError
+        Where there is none.
+    """
+    named = [joint for joint in joints if joint.name == name]
+    if not named:
+        known = ", ".join(dict.fromkeys(joint.name for joint in joints))
+        raise DescriptionError(f"no joint at '{name}': expected one of {known}")
+    found = [joint for joint in named if on in joint.bodies]
+    if not found:
+        raise DescriptionError(f"link '{on}' has no joint at '{name}'")
+    return found
 
 
 def applied_loads(loads: Iterable[Load], link: str) -> list[Load]:

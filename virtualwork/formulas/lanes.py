@@ -6,7 +6,7 @@ poses. Poses close to a change point, where two branches meet, are left to `Pose
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from threading import Lock
 from typing import Any, Protocol
@@ -18,15 +18,17 @@ from dalembert.arithmetic.engines import floats, run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.asked import COMPLEX, FORCES, Key, names, over_blocks, quantity
 from virtualwork.formulas.dynamics import Dynamics
-from virtualwork.formulas.linear import SINGULAR
+from virtualwork.formulas.kept import Later, later
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.newton import unknowns
-from virtualwork.formulas.numbers import Number, Reals, leave_out
+from virtualwork.formulas.numbers import SINGULAR, Number, Reals, leave_out
 from virtualwork.formulas.poses import Branch, Poses
 from virtualwork.formulas.recording import NAMES, NEAR, Recording
 from virtualwork.formulas.scene import Scene
 
+# tapes of later requests that an assembly keeps
+MANY = 256
 # two threads that ask one assembly at once
 _writing = Lock()
 
@@ -78,6 +80,9 @@ class Lanes:
     def __init__(self, branch: Turning, poses: Poses) -> None:
         self.branch, self.poses = branch, poses
         self.known: dict[Key, Any] = {}
+        # values of operations for later requests, by their numbers; and where doubts are right
+        self._kept: dict[int, Any] = {}
+        self._bad: dict[Key, NDArray[np.bool_] | None] = {}
 
     @cached_property
     def recording(self) -> Recording:
@@ -106,9 +111,8 @@ class Lanes:
         if new and self.poses.n == 1 and self.one(tuple(new)):
             return [self.known[key] for key in keys]
         if new and not self.takes(new):
-            forces = Dynamics(self.poses)
             for key in new:
-                self.known[key] = over_blocks(self.poses, key, forces)
+                self.known[key] = over_blocks(self.poses, key, self._dynamics)
         elif new:
             self._run(new)
         return [self.known[key] for key in keys]
@@ -130,38 +134,75 @@ class Lanes:
         return True
 
     def _run(self, keys: list[Key]) -> None:
-        forces = any(key[0] in FORCES for key in keys)
-        groups = [g.name for g in self.branch.plan.groups if g.kind not in ("Newton", "PRP")]
-        more: list[Key] = [("margin", name) for name in groups] if forces else []
-        if forces or any(key[0] != "turn" and key[-1] != 0 for key in keys):
-            larger = [g.name for g in self.branch.plan.groups if g.kind == "Newton"]
-            more += [("regularity", name) for name in larger]
-        closed: dict[Key, Key] = {}
-        if self.branch.may_open:
-            closed = {key: ("closed", *self.recording.hangs_on(key)) for key in keys}
-        tape = taped(self.branch, self.recording, (*keys, *more, *dict.fromkeys(closed.values())))
-        vectors = [names(key)[0] for key in keys if key[0] in COMPLEX]
-        out = run(tape, self.entering(tape.inputs), pairs=vectors)
-        n = self.poses.n
-        careful: Any = self.branch.close_to_change(self.poses.inputs[:, 0])
-        for key in more:
-            near = np.abs(out[names(key)[0]]) < (NEAR if key[0] == "margin" else SINGULAR)
-            if np.any(near):
-                careful = careful | np.broadcast_to(near, n)
-        finite = np.isfinite(self.poses.inputs)
-        nowhere = None if finite.all() else ~finite.all(axis=1)
+        doubts = [key for key in dict.fromkeys(self._doubts(keys)) if key not in self._bad]
+        # what is asked for first may be all: from the second time on, something is kept for those to come
+        kept = dict(self._kept) if self.known and self.poses.n > 1 else None
+        asked, known = (*keys, *doubts), frozenset(kept or ())
+        cut = _cut(self.branch, self.recording, asked, None if kept is None else known)
+        given = self.entering(name for name in cut.tape.inputs if name not in cut.takes)
+        if kept:
+            given |= {name: kept[number] for name, number in cut.takes.items()}
+        out = run(cut.tape, given, pairs=[names(key)[0] for key in keys if key[0] in COMPLEX])
+        self._kept.update((number, out[name]) for name, number in cut.leaves.items())
+        for key in doubts:
+            self._bad[key] = self._where_bad(key, out[names(key)[0]])
         for key in keys:
-            value = quantity(out, key, n)
-            if key in closed:
-                leave_out(value, ~np.isfinite(np.broadcast_to(out[names(closed[key])[0]], n)))
-            if nowhere is not None:
-                leave_out(value, nowhere)
+            value = quantity(out, key, self.poses.n)
+            for nowhere in (self._nowhere, *map(self._bad.get, self._closed(key))):
+                if nowhere is not None:
+                    leave_out(value, nowhere)
             self.known[key] = value
+        careful = self._careful
+        for key in self._doubts(keys):
+            bad = self._bad[key]
+            if key[0] != "closed" and bad is not None:
+                careful = careful | bad
         if careful.any():
             some = self.poses.some(careful)
             again = Dynamics(some)
             for key in keys:
                 self.known[key][careful] = over_blocks(some, key, again)
+
+    def _doubts(self, keys: Iterable[Key]) -> Iterator[Key]:
+        """What tells where quantities cannot be had, or not from the tape."""
+        forces = False
+        for key in keys:
+            yield from self._closed(key)
+            forces = forces or key[0] in FORCES
+            if key[0] in FORCES or (key[0] != "turn" and key[-1] != 0):
+                yield from (("regularity", g.name) for g in self.branch.plan.groups if g.kind == "Newton")
+        if forces:
+            yield from (
+                ("margin", g.name) for g in self.branch.plan.groups if g.kind not in ("Newton", "PRP")
+            )
+
+    def _closed(self, key: Key) -> list[Key]:
+        """What tells where the groups that a quantity hangs on are not assembled."""
+        return [("closed", group) for group in self.recording.hangs_on(key)] if self.branch.may_open else []
+
+    def _where_bad(self, key: Key, found: Any) -> NDArray[np.bool_] | None:
+        """The poses that a doubt is right about; None where it is right about none."""
+        if key[0] == "closed":
+            bad = ~np.isfinite(found)
+        else:
+            bad = np.abs(found) < (NEAR if key[0] == "margin" else SINGULAR)
+        return np.broadcast_to(bad, self.poses.n) if np.any(bad) else None
+
+    @cached_property
+    def _dynamics(self) -> Dynamics:
+        """The forces over blocks, where the tape has them not."""
+        return Dynamics(self.poses)
+
+    @cached_property
+    def _nowhere(self) -> NDArray[np.bool_] | None:
+        """The poses whose input is no number; None where there are none."""
+        finite = np.isfinite(self.poses.inputs)
+        return None if finite.all() else ~finite.all(axis=1)
+
+    @cached_property
+    def _careful(self) -> NDArray[np.bool_]:
+        """The poses close to a change point."""
+        return self.branch.close_to_change(self.poses.inputs[:, 0])
 
     def entering(self, inputs: Iterable[str]) -> dict[str, Any]:
         """The inputs of a tape, by their names."""
@@ -246,6 +287,21 @@ def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
             branch.recordings[key] = recording.tape(keys)
     found: Tape = branch.recordings[key]
     return found
+
+
+def _cut(branch: Turning, recording: Recording, keys: tuple[Key, ...], known: frozenset[int] | None) -> Later:
+    """The tape of quantities, from what is known on; None where nothing is, nor to be left."""
+    if known is None:
+        return Later(taped(branch, recording, keys), {}, {})
+    with _writing:
+        made = branch.recordings.setdefault("later", {})
+        key = recording, keys, known
+        if key not in made:
+            if len(made) >= MANY:
+                del made[next(iter(made))]
+            made[key] = later(recording, keys, known)
+        found: Later = made[key]
+        return found
 
 
 def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:

@@ -1,4 +1,4 @@
-"""What the formulas run on: Python numbers of one pose, arrays over many poses, or any numbers that behave so.
+"""What the formulas run on: Python numbers of one pose, arrays over many poses, recorded ones; and linear systems of them.
 
 A formula needs +, −, ·, /, `abs`, `.real`, `.imag` and `.conjugate()` of its numbers. What Python has no operator for,
 roots, e^{iθ}, a complex number of two real ones, a `Kind` gives; a state carries its kind (`kinds`).
@@ -6,10 +6,15 @@ roots, e^{iθ}, a complex number of two real ones, a `Kind` gives; a state carri
 
 from __future__ import annotations
 
+import cmath
+import math
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dalembert.arithmetic.recorded import RECORDED, bare
+from dalembert.arithmetic.systems import solved
 
 # complex or float, or an array of them; None is a zero that costs nothing
 Number = Any
@@ -20,34 +25,8 @@ EPS = float(np.finfo(float).eps)
 PARALLEL = 1e-11
 # of the mechanism's size: two points nearer than this have no direction from one to the other
 TOGETHER = 64 * EPS
-
-
-class Kind(Protocol):
-    """The operations of one kind of number."""
-
-    def sqrt(self, x: Number) -> Number:
-        """The root; NaN of a negative number."""
-
-    def exp(self, angle: Number) -> Number:
-        """e^{i·angle}."""
-
-    def join(self, re: Number, im: Number) -> Number:
-        """re + i·im."""
-
-    def angle(self, z: Number) -> Number:
-        """The angle of a complex number, in (−π, π]."""
-
-    def regular(self, inverse: Number, c1: Number, c2: Number) -> Number:
-        """1/(c1 × c2); NaN where two columns are parallel to rounding, for the joint forces have no value there."""
-
-    def inverse(self, length: Number, least: float) -> Number:
-        """1/length; NaN of one that is not above the least, which has no direction."""
-
-    def solve(self, cols: list[list[Number]], right: list[Number]) -> list[Number]:
-        """Solve Σ column·x + right = 0, complex, for the real unknowns x of a group."""
-
-    def transposed(self, cols: list[list[Number]], loads: list[Number]) -> list[Number]:
-        """Solve Σ_c λ_c·column_c + load = 0 for the complex λ of a group's loops; NaN where they have no value."""
+# a singular value below this share of the largest is that of a null vector
+SINGULAR = 1e-6
 
 
 def cross(a: Number, b: Number) -> Number:
@@ -96,9 +75,300 @@ def leave_out(values: NDArray[Any], which: NDArray[np.bool_]) -> None:
 
 
 def xy(z: Complexes) -> Reals:
-    """x + iy as rows (x, y), without a copy.
+    """x + iy (..., n) as rows (x, y), (..., n, 2), without a copy.
 
     >>> xy(np.array([1 + 2j]))
     array([[1., 2.]])
     """
-    return np.ascontiguousarray(z).view(float).reshape(-1, 2)
+    z = np.ascontiguousarray(z)
+    return z.view(float).reshape(*z.shape, 2)
+
+
+# --- linear systems of loops: from complex columns to real solutions, over all poses together ------------------------
+
+
+def stack(cols: list[list[Number]], n: int) -> Reals:
+    """The real Jacobian (n, 2·loops, unknowns) from complex columns."""
+    loops, unknowns = len(cols), len(cols[0])
+    out = np.empty((n, 2 * loops, unknowns))
+    for i, row in enumerate(cols):
+        for j, c in enumerate(row):
+            out[:, 2 * i, j] = np.real(c)
+            out[:, 2 * i + 1, j] = np.imag(c)
+    return out
+
+
+def stack_rows(rows: list[Number], n: int) -> Reals:
+    """The real loop gaps (n, 2·loops) from complex ones."""
+    return stack([[w] for w in rows], n)[:, :, 0]
+
+
+def solve(jacobian: Reals, right: Reals) -> Reals:
+    """Solve Φ·x = right for each pose; with redundant loops by QR. A singular pose gives NaN, never a least norm."""
+    rows, unknowns = jacobian.shape[-2:]
+    if rows != unknowns:
+        q, r = np.linalg.qr(jacobian)
+        right = np.einsum("nij,ni->nj", q, right)
+        jacobian = r
+    good = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
+    out = np.full((len(right), unknowns), np.nan)
+    try:
+        out[good] = np.linalg.solve(jacobian[good], right[good][..., None])[..., 0]
+    except np.linalg.LinAlgError:
+        for i in np.flatnonzero(good):
+            try:
+                out[i] = np.linalg.solve(jacobian[i], right[i])
+            except np.linalg.LinAlgError:
+                continue
+    return out
+
+
+def inverse_norm(jacobian: Reals) -> Reals:
+    """‖J⁻¹‖∞ of each pose (of the pseudo-inverse, with redundant loops); inf where singular, NaN where unknown."""
+    out = np.full(len(jacobian), np.nan)
+    good = np.isfinite(jacobian).all(axis=(1, 2))
+    some = jacobian[good]
+    if some.shape[-2] != some.shape[-1]:
+        inverse = np.linalg.pinv(some)
+    else:
+        try:
+            inverse = np.linalg.inv(some)
+        except np.linalg.LinAlgError:
+            inverse = np.full_like(some, np.inf)
+            for i, j in enumerate(some):
+                try:
+                    inverse[i] = np.linalg.inv(j)
+                except np.linalg.LinAlgError:
+                    continue
+    out[good] = np.abs(inverse).sum(axis=2).max(axis=1, initial=0.0)
+    return out
+
+
+def condition(cols: list[list[Number]], angles: int, size: Number, n: int) -> Reals:
+    """‖J⁻¹‖∞ of each pose from complex columns, those of so many angles divided by the mechanism's size."""
+    with np.errstate(all="ignore"):
+        jacobian = stack(cols, n)
+        jacobian[:, :, :angles] /= np.reshape(size, (-1, 1, 1))
+        return inverse_norm(jacobian)
+
+
+def singular_values(cols: list[list[Number]], angles: int, n: int) -> Reals:
+    """The singular values of the Jacobian (lengths scaled) at each pose; NaN where it is not assembled."""
+    jacobian = stack(cols, n)
+    good = np.isfinite(jacobian).all(axis=(1, 2))
+    size = np.abs(jacobian[good][:, :, :angles]).max(initial=0.0)
+    if angles and size > 0:
+        jacobian[:, :, :angles] /= size
+    out = np.full((n, min(jacobian.shape[1:])), np.nan)
+    out[good] = np.linalg.svd(jacobian[good], compute_uv=False)
+    return out
+
+
+def singular_poses(cols: list[list[Number]], angles: int, n: int) -> NDArray[np.bool_]:
+    """Which poses have a Jacobian whose smallest singular value is below 1e-6 of its largest."""
+    s = singular_values(cols, angles, n)
+    return np.asarray(s[:, -1] < SINGULAR * s[:, 0])
+
+
+def solve_columns(cols: list[list[Number]], right: list[Number]) -> list[Number]:
+    """Solve Σ column·x + right = 0 for the unknowns' derivatives."""
+    shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(w) for w in right))
+    n = int(np.prod(shape))
+    x = solve(stack(cols, n), -stack_rows(right, n))
+    return [x[:, j] if shape else float(x[0, j]) for j in range(x.shape[1])]
+
+
+def solve_determined(cols: list[list[Number]], right: list[Number], angles: int) -> list[Number]:
+    """The same where J is singular in every pose: what a null vector of J moves is not determined, and NaN."""
+    shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(w) for w in right))
+    n = int(np.prod(shape))
+    jacobian, w = stack(cols, n), stack_rows(right, n)
+    good = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(w).all(axis=1)
+    out = np.full((n, jacobian.shape[2]), np.nan)
+    if good.any():
+        size = np.abs(jacobian[good][:, :, :angles]).max(initial=0.0) or 1.0
+        scale = np.array([1.0] * angles + [size] * (jacobian.shape[2] - angles))
+        jacobian = jacobian[good] * scale / size
+        _, s, null = np.linalg.svd(jacobian)
+        loose = (s < SINGULAR * s[:, :1]).astype(float)
+        free = np.einsum("nk,nkj->nj", loose, np.abs(null[:, : s.shape[1]])) > SINGULAR
+        least = -(np.linalg.pinv(jacobian, rcond=SINGULAR) @ (w[good] / size)[..., None])[..., 0]
+        out[good] = np.where(free, np.nan, least * scale)
+    return [out[:, j] if shape else float(out[0, j]) for j in range(out.shape[1])]
+
+
+def solve_transposed(cols: list[list[Number]], loads: list[Number]) -> list[Number]:
+    """Solve Σ_c λ_c·∂C_c/∂x + Q_x = 0 for the complex λ of the loops; None is no load."""
+    given = [0.0 if load is None else load for load in loads]
+    shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(q) for q in given))
+    n = int(np.prod(shape))
+    jacobian = np.swapaxes(stack(cols, n), -1, -2)
+    right = np.zeros((n, len(loads)))
+    for i, load in enumerate(given):
+        right[:, i] = -load
+    good = np.asarray(np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(right).all(axis=1))
+    out = np.full((n, jacobian.shape[-1]), np.nan)
+    if jacobian.shape[-1] == jacobian.shape[-2]:
+        good &= np.linalg.cond(np.where(good[:, None, None], jacobian, np.eye(len(loads)))) < 1 / PARALLEL
+        out[good] = np.linalg.solve(jacobian[good], right[good][..., None])[..., 0]
+    found = out[:, 0::2] + 1j * out[:, 1::2]
+    return [found[:, c] if shape else complex(found[0, c]) for c in range(found.shape[1])]
+
+
+# --- kinds of numbers ------------------------------------------------------------------------------------------------
+
+
+class Kind(Protocol):
+    """The operations of one kind of number."""
+
+    def sqrt(self, x: Number) -> Number:
+        """The root; NaN of a negative number."""
+
+    def exp(self, angle: Number) -> Number:
+        """e^{i·angle}."""
+
+    def join(self, re: Number, im: Number) -> Number:
+        """re + i·im."""
+
+    def angle(self, z: Number) -> Number:
+        """The angle of a complex number, in (−π, π]."""
+
+    def regular(self, inverse: Number, c1: Number, c2: Number) -> Number:
+        """1/(c1 × c2); NaN where two columns are parallel to rounding, for the joint forces have no value there."""
+
+    def inverse(self, length: Number, least: float) -> Number:
+        """1/length; NaN of one that is not above the least, which has no direction."""
+
+    def solve(self, cols: list[list[Number]], right: list[Number]) -> list[Number]:
+        """Solve Σ column·x + right = 0, complex, for the real unknowns x of a group."""
+
+    def transposed(self, cols: list[list[Number]], loads: list[Number]) -> list[Number]:
+        """Solve Σ_c λ_c·column_c + load = 0 for the complex λ of a group's loops; NaN where they have no value."""
+
+
+class One:
+    """Python numbers: a single pose."""
+
+    def sqrt(self, x: float) -> float:
+        """The root."""
+        return math.sqrt(x) if x >= 0 else math.nan
+
+    def exp(self, angle: float) -> complex:
+        """e^{i·angle}."""
+        return complex(math.cos(angle), math.sin(angle))
+
+    def regular(self, inverse: float, c1: complex, c2: complex) -> float:
+        """1/(c1 × c2), or NaN."""
+        return inverse if abs(inverse) * (abs(c1) * abs(c2)) < 1 / PARALLEL else math.nan
+
+    def inverse(self, length: float, least: float) -> float:
+        """1/length, or NaN."""
+        return 1 / length if length > least else math.nan
+
+    join, angle = complex, staticmethod(cmath.phase)
+    solve, transposed = staticmethod(solve_columns), staticmethod(solve_transposed)
+
+
+class Many:
+    """Arrays over poses; what is the same in all of them may be a Python number."""
+
+    sqrt, angle = staticmethod(np.sqrt), staticmethod(np.angle)
+    solve, transposed = staticmethod(solve_columns), staticmethod(solve_transposed)
+
+    def exp(self, angle: Number) -> Number:
+        """e^{i·angle}."""
+        if not np.ndim(angle):
+            return ONE.exp(angle)
+        z = np.empty(np.shape(angle), complex)
+        np.cos(angle, out=z.real)
+        np.sin(angle, out=z.imag)
+        return z
+
+    def join(self, re: Number, im: Number) -> Number:
+        """re + i·im."""
+        z = np.empty(np.broadcast_shapes(np.shape(re), np.shape(im)), complex)
+        z.real = re
+        z.imag = im
+        return z
+
+    def regular(self, inverse: Number, c1: Number, c2: Number) -> Number:
+        """1/(c1 × c2), or NaN."""
+        # the norms over the block are above the largest entry: in most blocks they say that no pose is near
+        bound = np.vdot(inverse, inverse).real * np.vdot(c1, c1).real * np.vdot(c2, c2).real
+        if bound < 1 / PARALLEL**2:
+            return inverse
+        return np.where(np.abs(inverse) * (np.abs(c1) * np.abs(c2)) < 1 / PARALLEL, inverse, np.nan)
+
+    def inverse(self, length: Number, least: float) -> Number:
+        """1/length, or NaN."""
+        return 1 / np.where(length > least, length, np.nan)
+
+
+class Folded:
+    """A kind for two assemblies that meet in every pose: the root is zero, and its noise is left out."""
+
+    def __init__(self, kind: Kind) -> None:
+        self.exp, self.join, self.regular = kind.exp, kind.join, kind.regular
+        self.angle, self.inverse = kind.angle, kind.inverse
+        self.solve, self.transposed = kind.solve, kind.transposed
+
+    def sqrt(self, x: Number) -> Number:
+        """Zero."""
+        return 0.0 * x
+
+
+def real_part(z: Number) -> Number:
+    """The real part of any number."""
+    return bare(z).real
+
+
+def imaginary_part(z: Number) -> Number:
+    """The imaginary part."""
+    return bare(z).imag
+
+
+PARTS = real_part, imaginary_part
+
+
+class Written:
+    """Recorded numbers, and constants of the mechanism that vary: what is done with them is written down."""
+
+    def sqrt(self, x: Number) -> Number:
+        """The root."""
+        return RECORDED.sqrt(bare(x))
+
+    def exp(self, angle: Number) -> Number:
+        """e^{i·angle}."""
+        return RECORDED.turn(bare(angle))
+
+    def join(self, re: Number, im: Number) -> Number:
+        """re + i·im."""
+        return RECORDED.join(bare(re), bare(im))
+
+    def angle(self, z: Number) -> Number:
+        """The angle."""
+        return RECORDED.angle(bare(z))
+
+    def regular(self, inverse: Number, c1: Number, c2: Number) -> Number:
+        """1/(c1 × c2), or NaN."""
+        size = (c1.conjugate() * c1).real * (c2.conjugate() * c2).real * (inverse * inverse)
+        return RECORDED.select(1 / PARALLEL**2 - bare(size), bare(inverse), math.nan)
+
+    def inverse(self, length: Number, least: Number) -> Number:
+        """1/length, or NaN."""
+        length = bare(length)
+        return 1 / RECORDED.select(length - bare(least), length, math.nan)
+
+    def solve(self, cols: list[list[Number]], right: list[Number]) -> list[Number]:
+        """Solve Σ column·x + right = 0."""
+        rows = [[part(c) for c in row] for row in cols for part in PARTS]
+        return solved(rows, [-part(w) for w in right for part in PARTS])
+
+    def transposed(self, cols: list[list[Number]], loads: list[Number]) -> list[Number]:
+        """Solve Σ_c λ_c·column_c + load = 0."""
+        rows = [[part(row[j]) for row in cols for part in PARTS] for j in range(len(loads))]
+        x = solved(rows, [0.0 if load is None else -bare(load) for load in loads], least=PARALLEL)
+        return [self.join(x[2 * c], x[2 * c + 1]) for c in range(len(cols))]
+
+
+ONE, MANY, WRITTEN = One(), Many(), Written()

@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.linear import condition
-from virtualwork.formulas.numbers import Complexes, Number, Reals
+from virtualwork.formulas.numbers import Complexes, Number, Reals, condition
 from virtualwork.formulas.positions import BLOCK, SWEEP, EvenSweep, State, columns, run
 from virtualwork.formulas.rates import Passage, Rates
 from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads

@@ -15,8 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.linear import singular_poses, solve_determined
-from virtualwork.formulas.numbers import Number, cross
+from virtualwork.formulas.numbers import Number, cross, singular_poses, solve_determined
 from virtualwork.formulas.positions import State, columns
 from virtualwork.plan.steps import Angle, Group, Path, Place, Plan, Step, Term, Turn
 

@@ -1,26 +1,35 @@
 """Joint forces by Newton and Euler over the poses of a motion, each formed when it is asked for.
 
 How they follow from each other is worked out once for a mechanism (`load_paths`); here the combinations become arrays.
+
+Coulomb friction in pins and guides are loads that hang on the reactions they change, found by iteration (`settle`). A
+pin of radius r with the reaction R resists its relative turning with μ r |R|; a guide resists sliding with μ |N|, N normal
+to it (Norton, Design of Machinery, §11.9 names the model; the iteration starts without friction). Where nothing slides
+there is no friction: its value at rest is not determined, only bounded.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort
 from virtualwork.formulas.load_paths import LoadPaths
-from virtualwork.formulas.numbers import Number, dot, leave_out, minus, plus
+from virtualwork.formulas.numbers import Number, dot, leave_out, minus, plus, times
 from virtualwork.formulas.positions import BLOCK
 from virtualwork.formulas.scene import Scene
 from virtualwork.plan.joint_forces import Side
-from virtualwork.plan.joints import Joint
-from virtualwork.plan.steps import path_reads
+from virtualwork.plan.steps import Joint
+
+# iterations of friction; each gains a factor of some μ r / l
+LIMIT = 200
+# relative change at which a pose has converged
+CLOSE = 1e-14
 
 
 class JointForces:
@@ -115,24 +124,10 @@ class Reactions(JointForces):
         super().__init__(scene.paths, scene.formed)
         self.scene = scene
 
-    @cached_property
-    def keys(self) -> tuple[str, ...]:
-        """What the places of all joints hang on."""
-        keys: set[str] = set()
-        for body in self.mechanism.links:
-            keys |= path_reads(self.scene.case.path(body, self.mechanism.rigid[body].center)) | {
-                f"angle:{body}"
-            }
-        for i in range(len(self.mechanism.guides)):
-            keys.add(f"slide:{i}")
-        for group in self.plan.groups:
-            keys |= self.plan.reads(group) | set(self.plan.writes(group))
-        return tuple(sorted(keys))
-
     def blocks(self) -> list[Block]:
         """The scene's blocks, with what all joints' places hang on."""
         self._drive()
-        return self.scene.blocks(self.keys)
+        return self.scene.blocks(self.scene.case.places)
 
     def _drive(self) -> None:
         """Form the efforts of carried motors over all poses, before the blocks are solved one by one."""
@@ -163,8 +158,64 @@ class Reactions(JointForces):
                 # over a long sweep what the quantities were made of is not kept
                 block.forget(lasting=True)
 
-        self.scene.each(self.keys, work)
+        self.scene.each(self.scene.case.places, work)
         if self.scene.lost is not None:
             for out in found:
                 leave_out(out, self.scene.lost)
         return found
+
+
+def settle(scene: Scene) -> tuple[int, NDArray[np.bool_]]:
+    """Iterate friction and reactions until neither changes.
+
+    Returns
+    -------
+    iterations : int
+    converged : array (n,) of bool
+        Where False the joints lock: no motion at this speed and coefficient is in equilibrium.
+    """
+    n = scene.poses.n
+    converged = np.zeros(n, dtype=bool)
+    count = 0
+    reactions = Reactions(scene)
+    while count < LIMIT:
+        count += 1
+        converged[:] = True
+        _anew(reactions)
+        for block in reactions.blocks():
+            change: Number = 0.0
+            scale: Number = 0.0
+            fresh: dict[int, Number] = {}
+            for number, (joint, body, other, coefficient, radius) in enumerate(scene.case.contacts):
+                force = reactions.on_side(block, (joint.key, body))
+                if force is None:
+                    continue
+                if joint.guide is None:
+                    rate = minus(block.omega(body), block.omega(other))
+                    value = times(-coefficient * radius * abs(force), None if rate is None else np.sign(rate))
+                else:
+                    rail = reactions.rail(block, joint.guide)
+                    rate = block.slide_rate(joint.guide)
+                    normal = abs(dot(force, 1j * rail))
+                    value = times(-coefficient * normal * rail, None if rate is None else np.sign(rate))
+                if value is None:
+                    continue
+                fresh[number] = value
+                before = block.friction.get(number, 0.0)
+                change = np.maximum(change, abs(value - before) / np.where(value == 0, 1.0, abs(value)))
+                scale = np.maximum(scale, abs(value))
+            block.friction.clear()
+            block.friction.update(fresh)
+            converged[block.rows] = ~(change > CLOSE * 8) & np.isfinite(scale)
+        if (converged | ~scene.poses.assembled).all():
+            break
+    _anew(reactions)
+    scene.formed.clear()
+    return count, converged
+
+
+def _anew(reactions: Reactions) -> None:
+    """Forget what was formed with the friction before."""
+    reactions.scene.setting.drive = None
+    for block in reactions.scene.blocks(reactions.scene.case.places):
+        block.forget()

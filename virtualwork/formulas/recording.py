@@ -16,32 +16,30 @@ Inputs of a tape
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
-from typing import Any
 
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
 from dalembert.arithmetic.systems import regularity, solved
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe.description import Description
-from virtualwork.describe.loads import TorsionSpring
-from virtualwork.describe.parts import GROUND
+from virtualwork.describe.parts import GROUND, TorsionSpring
 from virtualwork.formulas.asked import FORCES, JOINTS, Key, names
 from virtualwork.formulas.block import Block, Shared, Table
 from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.dynamics import resultant, shaking_loads
+from virtualwork.formulas.dynamics import joints_at, resultant, shaking_loads
 from virtualwork.formulas.effort import generalized_force
-from virtualwork.formulas.kinds import PARTS, WRITTEN
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
 from virtualwork.formulas.loads import Tabled
-from virtualwork.formulas.newton import gaps, put_unknowns
+from virtualwork.formulas.newton import gaps, put_unknowns, unknowns
+from virtualwork.formulas.numbers import PARTS, WRITTEN
 from virtualwork.formulas.poses import chain_rule
 from virtualwork.formulas.positions import State, columns, run
 from virtualwork.formulas.rates import Rates
 from virtualwork.formulas.reactions import JointForces
 from virtualwork.plan.order import plan
-from virtualwork.plan.steps import Group, Plan, Term, path_reads
+from virtualwork.plan.steps import Group, Path, Plan, Term, path_reads
 
 # sin² of a transmission angle below which a force may have no digit left
 NEAR = 1e-18
@@ -92,15 +90,9 @@ class Recording:
             for name, there in zip(NAMES[1:], moves, strict=True)
         ]
         self._cases = {g.name: Case(g, bare) for g in plan.groups if g.kind != "Newton"}
-        self._by = (
-            [Rates(plan, self.st, [[1.0]])]
-            if k == 1
-            else [Rates(plan, self.st, [[1.0] if i == j else [] for i in range(k)]) for j in range(k)]
-        )
-        self._along = None
-        if k > 1:
-            given = [[rate[j] for rate in self.rates] for j in range(k)]
-            self._along = Rates(plan, self.st, given)
+        self._by = [Rates(plan, self.st, [[1.0] if i == j else [] for i in range(k)]) for j in range(k)]
+        given = [[rate[j] for rate in self.rates] for j in range(k)]
+        self._along = Rates(plan, self.st, given) if k > 1 else None
         self._done: set[tuple[int, int, int]] = set()
         self._values: dict[Key, Number] = {}
         self._forces: tuple[LoadPaths, JointForces, Block] | None = None
@@ -112,8 +104,9 @@ class Recording:
 
     def unknowns(self, group: Group) -> list[Number]:
         """The unknowns of a group, angles and then slides, as they enter."""
-        n = len(group.angles) + len(group.slides)
-        return [self.recorder.input(f"x {group.name} {i}") for i in range(n)]
+        return [
+            self.recorder.input(f"x {group.name} {i}") for i in range(len(group.angles) + len(group.slides))
+        ]
 
     def step(self, group: Group, st: State) -> list[Number] | None:
         """By how much a group's unknowns that enter are off, to first order; None where they are exact."""
@@ -141,7 +134,7 @@ class Recording:
 
     def solve(self, targets: Iterable[str], order: int) -> None:
         """Write down what targets hang on, up to an order of derivatives."""
-        steps = self.plan.needed(tuple(t for t in targets if t != f"angle:{GROUND}"))
+        steps = self.plan.needed(targets)
         for k in range(order + 1):
             ways: list[tuple[int, Rates | None]] = [(-1, None)] if k == 0 else [*enumerate(self._by)]
             if k and self._along is not None:
@@ -175,39 +168,25 @@ class Recording:
         if self._forces is None:
             case = LoadCase(self.mechanism, self.plan, any(self.moves[:2]))
             paths = LoadPaths(case)
-            reads = set().union(*(load.reads() for load in case.everything))
-            if not reads:
-                # nothing acts: any one thing that moves will do
-                reads = {key for s in self.plan.steps for key in self.plan.writes(s)}
-            self.solve(sorted(reads), max((load.order for load in case.loads), default=1))
+            self.solve(*case.targets())
             self._forces = paths, JointForces(paths, set()), _Block(self)
         return self._forces
 
-    def _places(self, order: int = 1) -> tuple[LoadPaths, JointForces, Block]:
+    def _places(self) -> tuple[LoadPaths, JointForces, Block]:
         """The forces, with everything solved that the places of all joints hang on."""
-        paths, *_ = self.forces
-        keys: set[str] = {f"slide:{i}" for i in range(len(self.mechanism.guides))}
-        for body in self.mechanism.links:
-            keys |= path_reads(paths.case.path(body, self.mechanism.rigid[body].center)) | {f"angle:{body}"}
-        for group in self.plan.groups:
-            keys |= self.plan.reads(group) | set(self.plan.writes(group))
-        self.solve(sorted(keys), max((load.order for load in paths.case.loads), default=order))
+        case = self.forces[0].case
+        self.solve(*case.targets(case.places))
         return self.forces
 
     def efforts(self) -> list[Number]:
         """The effort at each input by virtual work, through the carriers of motors."""
         paths, _, block = self.forces
         k = len(self.mechanism.inputs)
-        moved = [
-            j
-            for j, e in enumerate(self.mechanism.inputs)
-            if not e.is_slide and self.mechanism.carrier(j) != e.on
-        ]
         force = [self._negative(generalized_force(paths, block, j)) for j in range(k)]
-        if not moved:
+        if not self.mechanism.carried:
             return force
         matrix: list[list[Number]] = [[float(i == j) for j in range(k)] for i in range(k)]
-        for j in moved:
+        for j in self.mechanism.carried:
             link, carrier = str(self.mechanism.inputs[j].link), self.mechanism.carrier(j)
             self.solve([f"angle:{link}", f"angle:{carrier}"], 1)
             for i in range(k):
@@ -260,6 +239,10 @@ class Recording:
 
     def tape(self, keys: Iterable[Key], more: Mapping[str, Number] | None = None) -> Tape:
         """The tape of quantities: outputs are called as `names` says; and of `more` numbers by name."""
+        return self.recorder.tape({**self.outputs(keys), **(more or {})})
+
+    def outputs(self, keys: Iterable[Key]) -> dict[str, Number]:
+        """The numbers of quantities, written down, by their names."""
         outputs: dict[str, Number] = {}
         for key in keys:
             value = self.value(key)
@@ -267,29 +250,31 @@ class Recording:
             if key[0] in FORCES:
                 parts = [RECORDED.unsigned(part) for part in parts]
             outputs.update(zip(names(key), parts, strict=True))
-        return self.recorder.tape({**outputs, **(more or {})})
+        return outputs
+
+    def state(self) -> Iterator[Number]:
+        """What is written down that much hangs on: directions, slides, and of forces what blocks keep too."""
+        yield from (*self.st.turn.values(), *self.st.slide.values())
+        if self._forces:
+            yield from (value[1] for of, value in self._forces[2].kept.items() if of.lasts)
 
     def _point(self, body: str, z: complex, node: str | None, order: int) -> Number:
         path = self._path(body, z, node)
-        self.solve(self._path_reads(path), order)
+        self.solve(path_reads(path), order)
         if order == 0:
             return self.st.at(path)
         return self._in_time(order, lambda k: self.along.vector(path, k))
 
     def _dpoint(self, body: str, z: complex, node: str | None, j: int, order: int = 1) -> Number:
         path = self._path(body, z, node)
-        self.solve(self._path_reads(path), order)
+        self.solve(path_reads(path), order)
         return self._by[j].vector(path, order)
 
-    def _path(self, body: str, z: complex, node: str | None) -> Any:
+    def _path(self, body: str, z: complex, node: str | None) -> Path:
         if node is not None:
             return node, ()
         base, terms = self.plan.anchors[body]
         return base, (*terms, Term(z, body))
-
-    @staticmethod
-    def _path_reads(path: Any) -> list[str]:
-        return sorted(path_reads(path) - {f"angle:{GROUND}"})
 
     def _turn(self, body: str) -> Number:
         self.solve((f"angle:{body}",), 0)
@@ -300,7 +285,7 @@ class Recording:
         if all(not self.plan.angles[body].bases for body in spring.links):
             # the inputs alone fix it, whole turns included
             return 0.0
-        self.solve([f"angle:{body}" for body in spring.links if body != GROUND], 0)
+        self.solve([f"angle:{body}" for body in spring.links], 0)
         return Shared.within(self.st, spring)
 
     def _angle(self, body: str, order: int) -> Number:
@@ -339,7 +324,7 @@ class Recording:
         return of.joint_force(block, of.by_key[joint], body)
 
     def _reaction(self, joint: str, body: str) -> Number:
-        of = [j for j in self.forces[1].joints if j.name == joint and body in j.bodies]
+        of = joints_at(self.forces[1].joints, joint, body)
         return sum((self.value(("force", j.key, body)) for j in of), 0.0)
 
     def _moment(self, joint: str, body: str) -> Number:
@@ -360,25 +345,23 @@ class Recording:
         What cancels is not on the tape: a platform that stays level has the angle 0 there, whatever carries it.
         """
         kind, *of = key
-        targets: Iterable[str] = [key for g in self.plan.groups for key in self.plan.writes(g)]
         if kind in ("margin", "size"):
-            targets = ()
-        elif kind in ("point", "dpoint"):
-            targets = self._path_reads(self._path(*of[:3]))
+            return ()
+        if kind in ("point", "dpoint"):
+            targets = path_reads(self._path(*of[:3]))
         elif kind in ("angle", "dangle", "turn"):
-            targets = [f"angle:{of[0]}"]
+            targets = {f"angle:{of[0]}"}
         elif kind in ("slide", "dslide"):
-            targets = [f"slide:{of[0]}"]
+            targets = {f"slide:{of[0]}"}
+        else:
+            targets = {key for g in self.plan.groups for key in self.plan.writes(g)}
         return tuple(step.name for step in self.plan.needed(targets) if isinstance(step, Group))
 
     def _closed(self, *groups: str) -> Number:
-        chosen = [g for g in self.plan.groups if g.name in groups]
-        self.solve([key for g in chosen for key in self.plan.writes(g)], 0)
         total: Number = 0.0
-        for group in chosen:
+        for group in map(self.solved, groups):
             if self.enters(group):
-                unknowns = [self.st.angle[b] for b in group.angles] + [self.st.slide[s] for s in group.slides]
-                total = sum((abs(x) for x in unknowns), total)
+                total = sum(map(abs, unknowns(group, self.st)), total)
             else:
                 total = total + WRITTEN.sqrt(self.st.margin[group.name])
                 if group.kind == "PRP":
@@ -386,9 +369,7 @@ class Recording:
         return total
 
     def _regularity(self, group: str) -> Number:
-        of = next(g for g in self.plan.groups if g.name == group)
-        self.solve(self.plan.writes(of), 0)
-        cols = columns(of, self.st)
+        cols = columns(self.solved(group), self.st)
         return regularity([[part(c) for c in row] for row in cols for part in PARTS])
 
     @cached_property
@@ -408,9 +389,13 @@ class Recording:
         return longest
 
     def _margin(self, group: str) -> Number:
+        return self.st.margin[self.solved(group).name]
+
+    def solved(self, group: str) -> Group:
+        """A group, with its position written down."""
         of = next(g for g in self.plan.groups if g.name == group)
         self.solve(self.plan.writes(of), 0)
-        return self.st.margin[group]
+        return of
 
 
 class _Setting(Shared):

@@ -22,10 +22,9 @@ from dalembert.arithmetic.recorded import Number
 from dalembert.arithmetic.systems import regularity
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import GROUND, Guess, Input
-from virtualwork.formulas.kinds import PARTS
-from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.numbers import PARTS, Reals
 from virtualwork.formulas.positions import columns
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.watch import Floats, Watch

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.engines import floats, run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 from virtualwork.formulas.effort import effort
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.loads import Tabled

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from dalembert.arithmetic.recorded import Number
 from dalembert.arithmetic.tape import Tape
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Reals, dot, minus
 from virtualwork.intime.equations import Equations, Lost

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.branch.assembly import Assembly
-from virtualwork.describe.errors import MechanismError
+from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import Input
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.coordinates import Coordinates
@@ -164,7 +164,7 @@ class Run:
         They have every place and rate, for a page solves nothing of a motion whose coordinates change on the way.
         """
         from virtualwork.animation import Series
-        from virtualwork.picture.shapes import shapes_of
+        from virtualwork.picture.paper import shapes_of
 
         home = self.fine.legs[0].coordinates
         poses = home.motion(self.angle, self.speed, self.acceleration, self.t).poses

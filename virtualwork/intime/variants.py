@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
-from virtualwork.describe.errors import MechanismError
-from virtualwork.family.family import Family
-from virtualwork.family.motion import FamilyMotion
+from virtualwork.describe import MechanismError
+from virtualwork.family.family import Family, FamilyMotion
 from virtualwork.family.part import Part, Solver
 from virtualwork.family.written import Written
 from virtualwork.formulas.numbers import Reals

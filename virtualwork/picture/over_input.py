@@ -15,7 +15,7 @@ from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
 from virtualwork.picture.quantities import quantities
-from virtualwork.plan.joints import Joint
+from virtualwork.plan.steps import Joint
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from virtualwork.describe.errors import DescriptionError
+from virtualwork.describe import DescriptionError
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
 

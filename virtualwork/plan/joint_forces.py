@@ -5,11 +5,10 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
+from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import MechanismError
 from virtualwork.describe.parts import GROUND
-from virtualwork.plan.joints import Joint, joints, relations
-from virtualwork.plan.steps import Group, Plan
+from virtualwork.plan.steps import Group, Joint, Plan, joints, relations
 
 # the force of a joint on a body, (joint, body); a joint is "pin:B" or "guide:0"
 Side = tuple[str, str]

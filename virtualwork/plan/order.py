@@ -17,11 +17,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from virtualwork.describe.description import Description
+from virtualwork.describe.description import Description, known_by_guess
 from virtualwork.describe.parts import GROUND
-from virtualwork.plan.graph import decompose
-from virtualwork.plan.guessed import known_by_guess
-from virtualwork.plan.joints import Relation, relations
 from virtualwork.plan.steps import (
     Angle,
     Closure,
@@ -30,14 +27,16 @@ from virtualwork.plan.steps import (
     Path,
     Place,
     Plan,
+    Relation,
     Slide,
     Slot,
     Step,
     Term,
     Turn,
     Variable,
+    relations,
 )
-from virtualwork.plan.topology import Topology
+from virtualwork.plan.topology import Topology, decompose
 
 
 class Vector:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from virtualwork.branch.assembly import Assembly
+from virtualwork.describe import AssemblyError
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import AssemblyError
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.constraints import Constraints, coordinates, dependent
 from virtualwork.formulas.poses import Poses
@@ -117,17 +117,15 @@ class Check:
             return 0.0, 0.0
         if self.mechanism.inputs[0].is_slide:
             return track.start - track.length, track.start + track.length
-        return track.start, track.start + (track.period or track.length)
+        return track.start, track.start + (self.assembly.reach.period or track.length)
 
     @cached_property
     def input_limits(self) -> tuple[float, float] | None:
         """The ends of the input's range around the guess, rad or m; None where it goes on for ever."""
-        track = self.assembly.track
-        if not track.active:
+        reach = self.assembly.reach
+        if not reach.track.active or not reach.limits():
             return None
-        if not track.limits():
-            return None
-        low, high = track.range
+        low, high = reach.range
         # on the other side it goes on as far as it was looked for
         return None if math.isinf(low) and math.isinf(high) else (low, high)
 
@@ -139,11 +137,10 @@ class Check:
         own range is longer.
 
         Angles in [0, period of the branch): where change points make a branch need two turns of the input, the
-        same angle a turn later is another pose (`virtualwork.branch.track.Track.turns`).
+        same angle a turn later is another pose (`virtualwork.branch.limits.Reach.turns`).
         """
-        return self._in_period(
-            [limit.input for limit in self.assembly.track.limits()] if self.assembly.track.active else []
-        )
+        reach = self.assembly.reach
+        return self._in_period([limit.input for limit in reach.limits()] if reach.track.active else [])
 
     @cached_property
     def change_points(self) -> tuple[float, ...]:
@@ -164,7 +161,7 @@ class Check:
 
     def _turned_back(self, q: float) -> float:
         """An input in [0, period of the branch)."""
-        period = self.assembly.track.period
+        period = self.assembly.reach.period
         if period is None or not math.isfinite(q):
             return q
         q %= period
@@ -172,7 +169,7 @@ class Check:
         return 0.0 if period - q < 1e-9 or q < 1e-9 else q
 
     def _in_period(self, found: list[float]) -> tuple[float, ...]:
-        if self.assembly.track.period is None:
+        if self.assembly.reach.period is None:
             return tuple(sorted(found))
         unique: list[float] = []
         for q in sorted(map(self._turned_back, found)):

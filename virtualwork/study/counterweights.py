@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from virtualwork.describe import AssemblyError, DescriptionError
 from virtualwork.describe.description import Description
-from virtualwork.describe.errors import AssemblyError, DescriptionError
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.dynamics import Moving
 from virtualwork.formulas.numbers import Complexes

@@ -9,12 +9,11 @@ import numpy as np
 from dalembert.arithmetic.records import record
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.solutions import guessed_unknowns
-from virtualwork.describe.errors import AssemblyError
-from virtualwork.formulas.linear import stack
+from virtualwork.describe import AssemblyError
+from virtualwork.describe.description import known_by_guess
 from virtualwork.formulas.newton import Iterate, newton, write_unknowns
-from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.numbers import Reals, stack
 from virtualwork.formulas.positions import State, columns
-from virtualwork.plan.guessed import known_by_guess
 
 
 @record

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from virtualwork.formulas.closed_forms import angle_and_slide, two_columns
-from virtualwork.formulas.kinds import MANY
+from virtualwork.formulas.numbers import MANY
 from virtualwork.plan.topology import direction
 
 if TYPE_CHECKING:

@@ -1,0 +1,71 @@
+"""Which way a file of runs is read: as an initial run and trial runs, or as a log whose runs are all fitted together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cli.field.files import Stored, read_runout, read_stored, stored_alpha
+from cli.field.layouts import alpha_of, is_log
+from cli.field.read import NotOneInitialRun, read_runs, runs_table
+from cli.field.request import Request
+from cli.field.runs import Runs, more_than_unknowns
+from cli.read import options
+from cli.read.tables import Table
+
+
+def read_measured(
+    path: str, request: Request, influence: Sequence[str], runout: str | None
+) -> tuple[Runs, Stored | None]:
+    """Read the runs, and the stored coefficients that stand for trial runs."""
+    files = [read_stored(file) for file in influence]
+    asked = {name: getattr(request, name) for name in ("fit", "exclude", "predict", "suggest", "robust")}
+    if request.four_run:
+        options.refuse("fits all runs: it does not go with --method four-run", **asked)
+        fit = False
+    else:
+        fit = any(asked.values()) or len(files) > 1 or any(one.along is not None for one in files)
+        fit = fit or is_log(path)
+    if fit and not files and (own := alpha_of(path)) is not None and not own.trials:
+        files = [stored_alpha(own)]
+    if fit:
+        runs, stored = _fitted(path, None, request, files), None
+    else:
+        runs, stored = _of_table(path, request, files)
+    for one in files:
+        runs.warnings += one.table.warnings
+    lags = request.against or runs.lags
+    if runout is not None:
+        runs.runout = read_runout(runout, runs, lagging=lags)
+    elif lags:
+        runs.runout = {sensor: vector.conjugate() for sensor, vector in runs.runout.items()}
+    return runs, stored
+
+
+def _of_table(path: str, request: Request, files: Sequence[Stored]) -> tuple[Runs, Stored | None]:
+    """Read a table of runs; where it has runs to spare, or none that is the initial one, all are fitted."""
+    table, stored, phaseless = runs_table(path), next(iter(files), None), request.four_run
+    can_fit = stored is None and not phaseless
+    if not (can_fit and more_than_unknowns(table)):
+        try:
+            unit = None if stored is None else stored.unit
+            runs = read_runs(table, lagging=request.against, phaseless=phaseless, stored_unit=unit)
+            return runs, stored
+        except NotOneInitialRun:
+            if not can_fit:
+                raise
+    return _fitted(path, table, request, files), None
+
+
+def _fitted(path: str, table: Table | None, request: Request, files: Sequence[Stored]) -> Runs:
+    from cli.field.log import read_log
+    from cli.field.sisters import Sisters
+
+    told = request.phase_lag or request.rotation is not None
+    return read_log(
+        path,
+        table,
+        lagging=request.against if told else None,
+        exclude=request.exclude,
+        sisters=Sisters(files) if files else None,
+        reading_error=request.reading_error,
+    )

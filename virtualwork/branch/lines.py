@@ -1,0 +1,126 @@
+"""With several inputs: every pose of a block on its own straight line of inputs from the guess, all poses together."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Any
+
+import numpy as np
+
+from virtualwork.branch.change_point import Along
+from virtualwork.branch.continuation import FINEST, NODES
+from virtualwork.describe.description import Description
+from virtualwork.formulas.newton import newton, write_unknowns
+from virtualwork.formulas.numbers import Reals, solve, stack, stack_rows
+from virtualwork.formulas.positions import FAR, SHORTEST, State, columns, principal
+from virtualwork.formulas.rates import Rates
+from virtualwork.plan.steps import Group, Step
+
+
+def straight_lines(m: Description, st: State) -> tuple[Reals, Reals, Reals]:
+    """From the guess to each pose of a state: the guess's inputs, the ways (n, k), the longest steps as shares of them."""
+    n = max(np.size(v) for v in st.inputs)
+    at = np.array(m.at)
+    way = np.array([np.broadcast_to(np.asarray(v, dtype=float), n) for v in st.inputs]).T - at
+    unit = np.array([m.size if e.is_slide else 2 * np.pi for e in m.inputs])
+    return at, way, 1 / np.maximum(1.0, np.abs(way / unit).max(axis=1) * NODES)
+
+
+def along_lines(track: Along, group: Group, st: State) -> None:
+    """Close a group that has no closed form: tangent prediction, Newton-Raphson correction."""
+    assembly = track.assembly
+    m = assembly.mechanism
+    before = assembly.before(group)
+    at, way, longest = straight_lines(m, st)
+    n = len(way)
+    x: Any = np.tile(np.asarray(assembly.starts[group.name], dtype=float), (n, 1))
+    # of each pose: the share of its way that is gone, the next step, and dx of the whole way
+    gone, step = np.zeros(n), longest.copy()
+    slope = _slope(track, group, before, at + 0 * way, way, x)
+    angles = np.arange(x.shape[1]) < len(group.angles)
+    left = np.asarray(np.isfinite(way).all(axis=1))
+    closed = left.copy()
+    while left.any():
+        i = np.flatnonzero(left)
+        to = np.minimum(gone[i] + step[i], 1.0)
+        trial = State(list((at + to[:, None] * way[i]).T), many=True)
+        moved = (to - gone[i])[:, None]
+        with np.errstate(all="ignore"):
+            track.run(before, trial)
+            start = x[i] + moved * slope[i]
+            found, ok = newton(group, trial, start, m.size, limit=8)
+            far = np.where(angles, 1.0, np.maximum(np.abs(x[i]), m.size))
+            change = np.abs((found - x[i]) / far).max(axis=1, initial=0.0)
+            new = _slope(track, group, before, at + to[:, None] * way[i], way[i], found)
+            # the cubic's own defect, as along one input
+            defect = np.abs((found - x[i] - moved * 0.5 * (slope[i] + new)) / far).max(axis=1, initial=0.0)
+            ok &= (defect <= 0.05 * np.maximum(change, 1e-6)) & (change < 0.5)
+        some = i[ok]
+        x[some], slope[some], gone[some] = found[ok], new[ok], to[ok]
+        step[some] = np.minimum(2 * step[some], longest[some])
+        step[i[~ok]] /= 2
+        closed &= step > FINEST * longest
+        left &= closed & (gone < 1)
+    x[~closed] = np.nan
+    write_unknowns(group, st, x)
+    st.margin[group.name] = np.where(closed, 1.0, -1.0) if st.many else (1.0 if closed[0] else -1.0)
+
+
+def _slope(track: Along, group: Group, before: Sequence[Step], inputs: Reals, way: Reals, x: Reals) -> Reals:
+    """dx of a group's unknowns where every input changes by its way; none where it is singular."""
+    st, n = State(list(inputs.T), many=True), len(x)
+    with np.errstate(all="ignore"):
+        track.run(before, st)
+        write_unknowns(group, st, x)
+        d = Rates(track.assembly.plan, st, [[rate] for rate in way.T])
+        d.advance(before, 1)
+        return np.nan_to_num(solve(stack(columns(group, st), n), -stack_rows(d.right_side(group, 1), n)))
+
+
+def wind_along_lines(track: Along, group: Group, st: State, bodies: Collection[str]) -> None:
+    """The angles of some bodies of a closed form with their whole turns, counted from the guess.
+
+    A pose that is not reached on its line has no number of turns, and is not assembled.
+    """
+    assembly = track.assembly
+    case, sign, size = assembly.case(group), assembly.signs[group.name], assembly.mechanism.size
+    before = assembly.before(group)
+    at, way, longest = straight_lines(assembly.mechanism, st)
+    n = len(way)
+    start = State(list(assembly.mechanism.at))
+    track.run(before, start)
+    case.solve(start, sign, size)
+    last = {body: np.full(n, start.turn[body], dtype=complex) for body in bodies}
+    total = {body: principal(np.angle(last[body])) for body in bodies}
+    # of each pose: the share of its way that is gone, and the next step
+    gone, step = np.zeros(n), longest.copy()
+    reached = np.asarray(np.isfinite(way).all(axis=1))
+    with np.errstate(all="ignore"):
+        while (left := np.flatnonzero(reached & (gone < 1))).size:
+            to = np.minimum(gone[left] + step[left], 1.0)
+            trial = State(list((at + to[:, None] * way[left]).T), many=True)
+            track.run(before, trial)
+            case.solve(trial, sign, size)
+            closed = np.broadcast_to(np.asarray(trial.margin[group.name]) >= 0, to.shape)
+            turned = {body: np.angle(trial.turn[body] / last[body][left]) for body in bodies}
+            divide = np.max([np.broadcast_to(np.abs(v), to.shape) for v in turned.values()], axis=0) > FAR
+            divide &= closed & (step[left] > SHORTEST * longest[left])
+            reached[left[~closed]] = False
+            step[left[divide]] /= 2
+            some = closed & ~divide
+            on = left[some]
+            for body in bodies:
+                total[body][on] += np.broadcast_to(turned[body], to.shape)[some]
+                last[body][on] = np.broadcast_to(trial.turn[body], to.shape)[some]
+            gone[on], step[on] = to[some], np.minimum(2 * step[on], longest[on])
+    for body in bodies:
+        angle = np.angle(st.turn[body])
+        # what no input moves is one number for all poses
+        wound = np.broadcast_to(angle + 2 * np.pi * np.round((total[body] - angle) / (2 * np.pi)), n)
+        turn, margin = (
+            np.where(reached, st.turn[body], np.nan),
+            np.where(reached, st.margin[group.name], -1.0),
+        )
+        st.angle[body] = np.where(reached, wound, np.nan) if st.many else float(wound[0])
+        st.turn[body] = turn if st.many else complex(turn[0])
+        st.margin[group.name] = margin if st.many else float(margin[0])

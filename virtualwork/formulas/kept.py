@@ -1,0 +1,74 @@
+"""What a motion keeps of one request for later ones: values that much hangs on, and that cost more to form than to read.
+
+The operations of a recording are numbered, whatever is asked of it. A later request's tape begins at the values that
+earlier ones have left: they enter it as `kept 0`, `kept 1`, …
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import dataclass
+
+from dalembert.arithmetic.recorded import Complex, Number, Real
+from dalembert.arithmetic.tape import Operation, Tape, reached, shortened
+from virtualwork.formulas.asked import Key
+from virtualwork.formulas.recording import Recording
+
+# operations that a value must spare those who ask later: what it takes to write an array and to read it
+WORTH = 10
+COSTS = {"sin": 10, "cos": 10, "atan2": 10, "div": 3, "sqrt": 3}
+# operations of a recording up to which it is looked through at every new request
+LONGEST = 8000
+
+
+@dataclass(frozen=True)
+class Later:
+    """The tape of a request that comes after others.
+
+    Attributes
+    ----------
+    tape : Tape
+    takes : dict of an input's name to the operation whose value it is
+    leaves : dict of an output's name to the operation whose value it is
+    """
+
+    tape: Tape
+    takes: dict[str, int]
+    leaves: dict[str, int]
+
+
+def later(recording: Recording, keys: Sequence[Key], known: Container[int]) -> Later:
+    """The tape of quantities from the values of operations that are known, and what it leaves besides."""
+    outputs = recording.recorder.numbers(recording.outputs(keys))
+    operations = recording.recorder.operations
+    below = reached(operations, (number for _, number in outputs), known)
+    takes = {number: f"kept {k}" for k, number in enumerate(number for number in below if number in known)}
+    worth = _worth_keeping(recording, operations) if len(operations) <= LONGEST else set()
+    leaves = {
+        f"left {k}": number for k, number in enumerate(sorted(worth.intersection(below) - takes.keys()))
+    }
+    tape = shortened(operations, [*outputs, *leaves.items()], takes)
+    return Later(tape, {name: number for number, name in takes.items()}, leaves)
+
+
+def _worth_keeping(recording: Recording, operations: Sequence[Operation]) -> set[int]:
+    """The operations whose values are the state of a pose and cost much, with nothing but others of these known."""
+    state = {number for value in recording.state() for number in _numbers(value)}
+    found: set[int] = set()
+    costs: list[int] = []
+    for number, (kind, *arguments) in enumerate(operations):
+        cost = 0
+        if kind not in ("const", "input"):
+            cost = COSTS.get(kind, 1) + sum(costs[a] for a in arguments)
+        if number in state and cost >= WORTH:
+            found.add(number)
+            cost = 0
+        costs.append(min(cost, WORTH))
+    return found
+
+
+def _numbers(value: Number) -> Iterator[int]:
+    if isinstance(value, Real):
+        yield value.number
+    elif isinstance(value, Complex):
+        yield from (*_numbers(value.real), *_numbers(value.imag))
