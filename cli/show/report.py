@@ -204,7 +204,10 @@ def _grids(table: Table) -> Iterator[Part]:
         headers.append(
             f"{_words(column.name)} [{written(column.unit)}]" if column.unit else _words(column.name)
         )
-    numbers = [not has_names(column.values) or all(is_number(c.replace(",", ".")) or not c for c in cells) for column, cells in zip(table.columns, texts, strict=True)]  # fmt: skip
+    numbers = [
+        not has_names(column.values) or all(not cell or is_number(cell.replace(",", ".")) for cell in cells)
+        for column, cells in zip(table.columns, texts, strict=True)
+    ]
     widths = {
         str(k): max(map(len, [*cells, *header.split()]))
         for k, (cells, header) in enumerate(zip(texts, headers, strict=True))
