@@ -247,5 +247,8 @@ def stored_alpha(given: Alpha) -> Stored:
     places = [(s, p) for s, row in enumerate(rows) for p in range(len(row))]
     table.texts = {"sensor": [str(s + 1) for s, _ in places], "plane": [str(p + 1) for _, p in places]}
     size, turn = (np.array([cell[k] for row in rows for cell in row]) for k in (0, 1))
-    table.numbers = {"magnitude_per": Numbers("ALPHA", "kg", size), "phase": Numbers("ALPHA", "deg", turn)}
+    table.numbers = {
+        "magnitude_per": Numbers("ALPHA", "kg", size, "per"),
+        "phase": Numbers("ALPHA", "deg", turn, "angle"),
+    }
     return Stored(table, "kg", phasor(size, turn, "deg"), np.full(table.rows, np.nan), None)

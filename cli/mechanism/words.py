@@ -129,7 +129,7 @@ def _operations(analysis: Analysis) -> str:
     keys: list[Key] = []
     told = []
     for order, what in enumerate(("", " with velocities", " with accelerations")[: 3 if moves else 1]):
-        keys += [("point", body, z, p, order) for body in m.links for p, z in m.bodies[body].items()]
+        keys += [("point", body, 0j, p, order) for body in m.links for p in m.bodies[body]]
         keys += [("angle", body, order) for body in m.links]
         told.append(f"{motion.lanes.operations(keys)}{what}")
     return f"operations a pose of all points and links: {', '.join(told)}"

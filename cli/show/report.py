@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 from cli.read.about import HEAD
 from cli.read.files import load
 from cli.read.sources import open_source
-from cli.read.units import UNITS, dimensions, is_number, parse_quantity, written
+from cli.read.units import UNITS, is_number, parse_quantity, parted, written
 from cli.show.columns import Column, Section, Sheet, Table
-from cli.show.text import has_names, heading, in_blocks, printed
+from cli.show.text import Grid, has_names, heading, in_blocks, printed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,15 +27,6 @@ LINES = 100  # so many lines of a file
 WIDE = 88  # characters beside each other that fit A4 and Letter
 TINY = 1e-9  # a number smaller than this may be the rounding of zero
 _THINNED = ("step", "t_s")  # of tables that begin so every k-th row is shown: they are sweeps
-
-
-@dataclass(frozen=True)
-class Grid:
-    """A table as it is printed: a header and rows of text, and which columns are numbers, to the right."""
-
-    header: list[str]
-    rows: list[list[str]]
-    numbers: list[bool]
 
 
 Part = str | Grid
@@ -251,6 +242,10 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
+# units of results that no input has
+_RESULTS = ("kg_m2_s", "J", "W", "rad_s3", "m_s3")
+
+
 def said(header: str) -> str:
     """Return a header that stands in a cell as people write it: `inertia_x_kg_m2` is inertia x [kg·m²]."""
     of, colon, rest = header.rpartition(": ")
@@ -258,9 +253,5 @@ def said(header: str) -> str:
         return f"{of}: {said(rest)}"
     if " " in header or "_" not in header:
         return header
-    parts = header.split("_")
-    for k in range(1, len(parts)):
-        unit = "_".join(parts[k:])
-        if dimensions(unit) or unit in ("kg_m2_s", "J", "W", "rad_s3", "m_s3"):
-            return f"{' '.join(parts[:k])} [{written(unit)}]"
-    return _words(header)
+    name, unit = parted(header, further=_RESULTS)
+    return f"{_words(name)} [{written(unit)}]" if unit else _words(name)

@@ -13,8 +13,8 @@ from cli.show.columns import Column, Section, Table
 from cli.show.digits import finished
 from cli.show.handed_on import markdown
 from cli.show.picture import drawn
-from cli.show.report import CODE, Grid, Page, Part, Report, report
-from cli.show.text import BAD, GOOD
+from cli.show.report import CODE, Page, Part, Report, report
+from cli.show.text import BAD, GOOD, Grid
 
 if TYPE_CHECKING:
     from cli.show.columns import Result
@@ -158,7 +158,7 @@ def _markdown(path: Path, report: Report) -> dict[Path, bytes]:
 
 def _markdown_part(part: Part) -> str:
     if isinstance(part, Grid):
-        return markdown((part.header, part.rows, part.numbers)).rstrip("\n")
+        return markdown(part).rstrip("\n")
     if part.startswith(CODE):
         return f"~~~\n{part.removeprefix(CODE)}\n~~~"
     return "  \n".join(_escaped(line.strip()) for line in part.strip("\n").splitlines())
