@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cli.mechanism.options import refuse_clashes
 from cli.mechanism.read import wanted
@@ -14,11 +14,10 @@ from cli.mechanism.solve import Analysis, load
 from cli.show.columns import Result
 
 if TYPE_CHECKING:
-    from cli.mechanism.many import Many
+    from cli.mechanism.asked import Question
     from cli.mechanism.options import Options
     from cli.mechanism.variants import Variants
     from cli.show.commands import ShowOptions
-    from dalembert.page import Page
     from virtualwork import Mechanism
 
 
@@ -79,7 +78,6 @@ class Call:
     # --- over time ------------------------------------------------------------------------------------------------
     def in_time(self) -> Result:
         """The motion under forces."""
-        from cli.mechanism import animation
         from cli.mechanism.in_time import InTime, times_and_accuracy
 
         asked, m, several = self.asked, self.mechanism, self.several
@@ -90,19 +88,13 @@ class Call:
         self._refuse_long(len(times))
         if several is None:
             motion = InTime(home, times, accuracy, asked.until, self.bare, asked.forces)
-            return self._with_page(
-                motion.result(self.about), lambda: animation.page_in_time([("", motion)], self.show.units)
-            )
-        from cli.mechanism.many import Many
+            return self._with_page(motion.result(self.about), lambda: [("", motion)])
         from cli.mechanism.variants_in_time import AskedInTime
 
         question = AskedInTime(
             asked, m, several.dimensions, self.bare, self.show.digits, times, accuracy, asked.until
         )
-        many = Many(question, several, asked.workers or 1)
-        return self._with_page(
-            self._of_many(many), lambda: animation.page_in_time(many.alone(), self.show.units)
-        )
+        return self._of_many(question, several)
 
     # --- over the inputs ------------------------------------------------------------------------------------------
     def poses(self) -> Result:
@@ -129,11 +121,10 @@ class Call:
         result = result_of(analysis, asked, self.about, show.digits)
         if spreads:
             return self._with_tolerances(result, analysis)
-        return self._with_page(result, lambda: self._page([("", analysis)]))
+        return self._with_page(result, lambda: [("", analysis)])
 
     def _of_variants(self, analysis: Analysis, several: Variants) -> Result:
         """Poses of many variants."""
-        from cli.mechanism.many import Many
         from cli.mechanism.variants_of_poses import AskedOfPoses
 
         asked, q = self.asked, analysis.inputs
@@ -142,8 +133,7 @@ class Call:
         question = AskedOfPoses(
             asked, self.mechanism, several.dimensions, self.bare, self.show.digits, inputs
         )
-        many = Many(question, several, asked.workers or 1)
-        return self._with_page(self._of_many(many), lambda: self._page(many.alone()))
+        return self._of_many(question, several)
 
     def _with_tolerances(self, result: Result, analysis: Analysis) -> Result:
         """Poses with what the tolerances do to them, in every form."""
@@ -191,8 +181,13 @@ class Call:
         """Whether many variants are written part by part."""
         return self.show.streams or self.show.streams_json
 
-    def _of_many(self, many: Many) -> Result:
-        return many.result(self._streams, self.show.as_json, self._table, self.said, self.about)
+    def _of_many(self, question: Question, several: Variants) -> Result:
+        """What is asked of each variant."""
+        from cli.mechanism.many import Many
+
+        many = Many(question, several, self.asked.workers or 1)
+        result = many.result(self._streams, self.show.as_json, self._table, self.said, self.about)
+        return self._with_page(result, many.alone)
 
     def _refuse_long(self, states: int) -> None:
         """Refuse a page of more states than it can hold."""
@@ -201,14 +196,16 @@ class Call:
 
             refuse_long(states * self.count)
 
-    def _page(self, analyses: list[tuple[str, Analysis]]) -> Page:
-        from cli.mechanism import animation
-
-        return animation.page(analyses, self.asked.forces, self.show.units)
-
-    def _with_page(self, result: Result, page: Callable[[], Page]) -> Result:
-        """Add the page that moves to what a result writes beside, where it is asked for."""
-        html = self.asked.html
+    def _with_page(self, result: Result, found: Callable[[], list[tuple[str, Any]]]) -> Result:
+        """Add the page that moves to what a result writes beside, where it is asked for; `found`: what is drawn, by variant."""
+        html, units = self.asked.html, self.show.units
         if html is None:
             return result
-        return replace(result, beside={**result.beside, html: lambda: page().html.encode()})
+        from cli.mechanism import animation
+
+        def page() -> bytes:
+            if self.asked.time is not None:
+                return animation.page_in_time(found(), units).html.encode()
+            return animation.page(found(), self.asked.forces, units).html.encode()
+
+        return replace(result, beside={**result.beside, html: page})

@@ -279,7 +279,7 @@ def _from_table(m: Mechanism, path: str) -> Inputs:
         numbers[f"{e.name.lower()}_speed"] = "velocity" if e.is_slide else "speed"
         numbers[f"{e.name.lower()}_acceleration"] = "acceleration" if e.is_slide else "angular acceleration"
     table = read(path, numbers=numbers, texts=("step",))
-    si = {key: np.asarray(to_si(c.values, numbers[key], c.unit)) for key, c in table.numbers.items()}
+    si = {key: c.si for key, c in table.numbers.items()}
     shown, values = [], []
     for name, e in names.items():
         key = name.lower()

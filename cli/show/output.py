@@ -14,7 +14,7 @@ import typer
 
 from cli.errors import one_line
 from cli.read.about import HEAD
-from cli.read.files import named, refuse_inputs
+from cli.read.files import refuse_inputs
 from cli.show.colour import coloured
 from cli.show.commands import FORMS, ShowOptions, with_options
 
@@ -155,8 +155,7 @@ def _report(
         return {}
     from cli.show.report_forms import pages
 
-    head, units, digits = options.head, options.units, options.digits
-    files = pages(options.report, result, head, asked, named(), units, digits, checked)
+    files = pages(result, options, asked, checked)
     return {path: partial(bytes, page) for path, page in files.items()}
 
 

@@ -179,7 +179,9 @@ class WorkBalance:
             assert solved.given is not None
             unit = np.stack([states.unit_power_error_estimate(of) for of in solved.given[1]], axis=-1)
             unit = unit[..., None, :] if solved.value.shape[-1] == 1 else unit
-            unknown = np.abs(solved.coefficient) * value[..., None, :]
+            # of an unknown that does no work there is no bound: infinity times nothing
+            with np.errstate(invalid="ignore"):
+                unknown = np.abs(solved.coefficient) * value[..., None, :]
             wrong = {kind: states.term_error_estimate(kind) for kind in states.terms}
             found.append(wrong | {"unknown": unknown + unit * np.abs(solved.value)[..., None, :]})
         return found
