@@ -307,9 +307,10 @@ class _Lanes:
             found, state = march(self.k, self.rates, given, state, SOON if taken < 4 * SOON else LATER)
             parts.append(found)
             taken += len(found.t)
-            # one step beyond the event is enough
-            hits = passed(parts[-2].then(found), self.levels)[:-1].any(axis=0)
-            state["left"] = np.where(hits, 0.0, state["left"])
+            if self.levels:
+                # one step beyond the event is enough
+                hits = passed(parts[-2].then(found), self.levels)[:-1].any(axis=0)
+                state["left"] = np.where(hits, 0.0, state["left"])
         whole = parts[0].then(*parts[1:])
         hits = passed(whole, self.levels)
         ended = (whole.t[-1] >= end) | hits.any(axis=0)
