@@ -10,7 +10,7 @@ from cli.errors import DataError
 from cli.imports.words import KINDS
 from cli.read.files import read_bytes
 from cli.read.options import bad
-from cli.show.reported import reported
+from cli.show.output import reported
 
 if TYPE_CHECKING:
     from cli.show.columns import Result, Sheet

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from numpy.typing import NDArray
 
+from cli.mechanism.options import Options
 from cli.mechanism.variants import Variants, in_si, with_numbers
 from cli.show.columns import Column, Table
 from virtualwork import Mechanism
@@ -104,18 +105,14 @@ class Question:
         What is varied.
     bare : mapping
         The file's units of bare numbers.
-    only, branch
-        As in `Analysis`.
     digits : bool
         Whether bounds of the errors are asked for.
     """
 
-    file: str
+    asked: Options
     mechanism: Mechanism
     dimensions: tuple[Dimension, ...]
     bare: Mapping[str, str]
-    only: list[str] | None
-    branch: str | None
     digits: bool
 
     method = ""
@@ -169,6 +166,15 @@ class Question:
         """The first columns of a table: the variant and its numbers."""
         varied = zip(self.dimensions, numbers, strict=True)
         return [Column("variant", "", names), *(Column(d.path, d.unit, values) for d, values in varied)]
+
+    def below(self, first: int, shown: Rows, tables: Sequence[Table]) -> Table:
+        """The tables of variants one below the other, each row with its variant's name and numbers."""
+        named = []
+        for i, (row, table) in enumerate(zip(shown.tolist(), tables, strict=True)):
+            n = length(table)
+            given = self.given([str(first + i)] * n, [[value] * n for value in row])
+            named.append(Table([*given, *table.columns]))
+        return joined(named)
 
 
 # --- tables of the same columns ---------------------------------------------------------------------------------------

@@ -5,21 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from cli.mechanism.options import names, refuse_clashes
+from cli.mechanism.options import refuse_clashes
 from cli.mechanism.read import wanted
 from cli.mechanism.result import csv_parts, result_of, told
-from cli.mechanism.solve import ORDERS, Analysis, load
-from cli.mechanism.studies import Request
+from cli.mechanism.solve import Analysis, load
 from cli.show.columns import Result
 
 if TYPE_CHECKING:
-    from cli.mechanism.many import Many
+    from cli.mechanism.asked import Question
     from cli.mechanism.options import Options
     from cli.mechanism.variants import Variants
     from cli.show.commands import ShowOptions
-    from dalembert.page import Page
     from virtualwork import Mechanism
 
 
@@ -73,11 +71,6 @@ class Call:
         return cls(asked, show, mechanism, bare, said, about, several)
 
     @property
-    def names(self) -> list[str] | None:
-        """What --only names."""
-        return None if self.asked.only is None else names(self.asked.only)
-
-    @property
     def count(self) -> int:
         """How many mechanisms there are."""
         return 1 if self.several is None else self.several.count
@@ -85,45 +78,36 @@ class Call:
     # --- over time ------------------------------------------------------------------------------------------------
     def in_time(self) -> Result:
         """The motion under forces."""
-        from cli.mechanism import animation
         from cli.mechanism.in_time import InTime, times_and_accuracy
 
         asked, m, several = self.asked, self.mechanism, self.several
-        home = Analysis.of(asked.file, m, wanted(m, None, None, None, self.bare), 2, self.names, asked.branch)
+        home = Analysis.of(asked, m, wanted(m, None, None, None, self.bare), 2)
         home.warnings += self.said
         home.check_names()
         times, accuracy = times_and_accuracy(asked.time or "", asked.accuracy)
         self._refuse_long(len(times))
         if several is None:
             motion = InTime(home, times, accuracy, asked.until, self.bare, asked.forces)
-            return self._with_page(
-                motion.result(self.about), lambda: animation.page_in_time([("", motion)], self.show.units)
-            )
-        from cli.mechanism.many import Many
+            return self._with_page(motion.result(self.about), lambda: [("", motion)])
         from cli.mechanism.variants_in_time import AskedInTime
 
         question = AskedInTime(
-            asked.file, m, several.dimensions, self.bare, self.names, asked.branch, self.show.digits, times,
-            accuracy, asked.until, asked.forces,
-        )  # fmt: skip
-        many = Many(question, several, asked.workers or 1)
-        return self._with_page(
-            self._of_many(many), lambda: animation.page_in_time(many.alone(), self.show.units)
+            asked, m, several.dimensions, self.bare, self.show.digits, times, accuracy, asked.until
         )
+        return self._of_many(question, several)
 
     # --- over the inputs ------------------------------------------------------------------------------------------
     def poses(self) -> Result:
         """Poses, forces and studies."""
         asked, show, m = self.asked, self.show, self.mechanism
         q = wanted(m, asked.at, asked.sweep, asked.inputs, self.bare)
-        order = None if asked.order is None else ORDERS.index(asked.order)
-        analysis = Analysis.of(asked.file, m, q, order, self.names, asked.branch)
+        analysis = Analysis.of(asked, m, q)
         analysis.warnings += self.said
         analysis.check_names()
         self._refuse_long(q.n)
         spreads = asked.tolerance or asked.draws is not None
         alone = self.several is None and asked.html is None and not spreads
-        if alone and self.request.tables in ([], ["--forces"]) and show.streams and analysis.is_long:
+        if alone and asked.tables in ([], ["--forces"]) and show.streams and analysis.is_long:
             return self._long(analysis)
         analysis.check_size(
             json=show.as_json,
@@ -134,35 +118,29 @@ class Call:
         )
         if self.several is not None:
             return self._of_variants(analysis, self.several)
-        result = result_of(
-            analysis, self.request, asked.states, asked.explain, asked.graph, self.about, show.digits
-        )
+        result = result_of(analysis, asked, self.about, show.digits)
         if spreads:
             return self._with_tolerances(result, analysis)
-        return self._with_page(result, lambda: self._page([("", analysis)]))
+        return self._with_page(result, lambda: [("", analysis)])
 
     def _of_variants(self, analysis: Analysis, several: Variants) -> Result:
         """Poses of many variants."""
-        from cli.mechanism.many import Many
         from cli.mechanism.variants_of_poses import AskedOfPoses
 
         asked, q = self.asked, analysis.inputs
-        own_pose = asked.at is None and asked.sweep is None and asked.inputs is None and several.moves_inputs
-        order = None if asked.order is None else analysis.order
+        own_pose = asked.at is None and not asked.swept and several.moves_inputs
+        inputs = None if own_pose else q.part(0, q.n)
         question = AskedOfPoses(
-            asked.file, self.mechanism, several.dimensions, self.bare, self.names, asked.branch,
-            self.show.digits, None if own_pose else q.part(0, q.n), order, self.request,
-        )  # fmt: skip
-        many = Many(question, several, asked.workers or 1)
-        return self._with_page(self._of_many(many), lambda: self._page(many.alone()))
+            asked, self.mechanism, several.dimensions, self.bare, self.show.digits, inputs
+        )
+        return self._of_many(question, several)
 
     def _with_tolerances(self, result: Result, analysis: Analysis) -> Result:
         """Poses with what the tolerances do to them, in every form."""
         from cli.mechanism.tolerance import Tolerances
         from cli.mechanism.tolerance_picture import draw
 
-        a = self.asked
-        found = Tolerances(analysis, a.forces, a.draws or 0, a.seed, a.distribution, a.workers or 1)
+        found = Tolerances(analysis, self.asked)
         before, said = result.document, found.remarks()
         _, *others = result.tables.items()
         return replace(
@@ -194,13 +172,6 @@ class Call:
 
     # --- what the kinds have in common ------------------------------------------------------------------------------
     @property
-    def request(self) -> Request:
-        """Which studies are asked for."""
-        a = self.asked
-        swept = a.sweep is not None or a.inputs is not None
-        return Request(a.newton, a.check, a.forces, a.equilibrium, a.flywheel, a.counterweights, swept)
-
-    @property
     def _table(self) -> bool:
         """Whether a table is formed: that of a long sweep costs as much as its solution, and JSON alone asks for none."""
         return not self.show.json or self.show.expect is not None or self.show.output is not None
@@ -210,8 +181,13 @@ class Call:
         """Whether many variants are written part by part."""
         return self.show.streams or self.show.streams_json
 
-    def _of_many(self, many: Many) -> Result:
-        return many.result(self._streams, self.show.as_json, self._table, self.said, self.about)
+    def _of_many(self, question: Question, several: Variants) -> Result:
+        """What is asked of each variant."""
+        from cli.mechanism.many import Many
+
+        many = Many(question, several, self.asked.workers or 1)
+        result = many.result(self._streams, self.show.as_json, self._table, self.said, self.about)
+        return self._with_page(result, many.alone)
 
     def _refuse_long(self, states: int) -> None:
         """Refuse a page of more states than it can hold."""
@@ -220,14 +196,16 @@ class Call:
 
             refuse_long(states * self.count)
 
-    def _page(self, analyses: list[tuple[str, Analysis]]) -> Page:
-        from cli.mechanism import animation
-
-        return animation.page(analyses, self.asked.forces, self.show.units)
-
-    def _with_page(self, result: Result, page: Callable[[], Page]) -> Result:
-        """Add the page that moves to what a result writes beside, where it is asked for."""
-        html = self.asked.html
+    def _with_page(self, result: Result, found: Callable[[], list[tuple[str, Any]]]) -> Result:
+        """Add the page that moves to what a result writes beside, where it is asked for; `found`: what is drawn, by variant."""
+        html, units = self.asked.html, self.show.units
         if html is None:
             return result
-        return replace(result, beside={**result.beside, html: lambda: page().html.encode()})
+        from cli.mechanism import animation
+
+        def page() -> bytes:
+            if self.asked.time is not None:
+                return animation.page_in_time(found(), units).html.encode()
+            return animation.page(found(), self.asked.forces, units).html.encode()
+
+        return replace(result, beside={**result.beside, html: page})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -130,7 +130,7 @@ def poses_of(
     condition: Reals | None,
     marks: list[list[str]],
     forces: bool,
-) -> Sequence[Document]:
+) -> Iterator[Document]:
     """The poses of one assembly, from what they have been asked for."""
     n, given, m = len(assembled), analysis.given, analysis.mechanism
     shown = {

@@ -128,7 +128,7 @@ class Families:
         marks: list[list[str]] = [[]] * (v * n)
         branch = analysis.assemblies[0].number
         listed = columns.poses_of(analysis, branch, flat, whole, conditions, marks, self.forces)
-        return Solved(listed, whole.reshape(v, n), alone)
+        return Solved(list(listed), whole.reshape(v, n), alone)
 
     def _condition(self, found: Mapping[Key, Any], assembled: NDArray[np.bool_]) -> NDArray[np.float64]:
         """(v n,): see `Motion.condition`."""

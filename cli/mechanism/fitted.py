@@ -14,7 +14,7 @@ from cli.errors import DataError
 from cli.mechanism.fit_targets import targets, wanted, weights
 from cli.mechanism.solve import load
 from cli.mechanism.tables import beside
-from cli.mechanism.variants import assigned, assignment, in_si, quantity
+from cli.mechanism.variants import assigned, in_si, one_number, quantity
 from cli.read import options
 from cli.read.files import read_bytes
 from cli.read.units import read_degrees
@@ -121,11 +121,7 @@ def _bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[
     """Every `--free PATH=LOW:HIGH` in SI."""
     found: dict[str, tuple[float, float]] = {}
     for text in free:
-        (dimension, *both), span = assignment(m, text, "--free", "LOW:HIGH")
-        if both:
-            raise options.bad("--free", f"'{text}': two numbers: expected {dimension.path} or {both[0].path}")
-        if dimension.path in found:
-            raise options.bad("--free", f"'{text}': {dimension.path} is given twice")
+        dimension, span = one_number(m, text, "--free", "LOW:HIGH", found)
         ends = span.split(":")
         if len(ends) != 2:
             raise options.bad("--free", f"'{text}': expected PATH=LOW:HIGH, such as {dimension.path}=...:...")

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
 
 
+# have a table of their own, as --forces has
+STUDIES = "newton check equilibrium flywheel counterweights"
+
+
 def _print_schema(asked: bool) -> None:
     if asked:
         import json
@@ -69,6 +73,21 @@ class Options:
     best: Annotated[int | None, typer.Option(min=1)] = None
     schema: Annotated[bool, typer.Option(is_eager=True, callback=_print_schema)] = False
 
+    @property
+    def names(self) -> list[str] | None:
+        """What --only names."""
+        return None if self.only is None else names(self.only)
+
+    @property
+    def swept(self) -> bool:
+        """Whether the poses are a cycle."""
+        return self.sweep is not None or self.inputs is not None
+
+    @property
+    def tables(self) -> list[str]:
+        """The options given that have a table of their own."""
+        return flags_of(**{name: getattr(self, name) for name in ("forces", *STUDIES.split())})
+
 
 def names(text: str) -> list[str]:
     """Names between commas."""
@@ -90,8 +109,6 @@ class Rule(NamedTuple):
     """The rule holds where one of these is given too."""
 
 
-# have a table of their own, as --forces has
-STUDIES = "newton check equilibrium flywheel counterweights"
 RULES = (
     Rule(
         "flywheel counterweights",
@@ -151,7 +168,7 @@ def refuse_clashes(asked: Options, show: ShowOptions) -> None:
         missing = rule.needs and not given(rule.needs)
         if own and (missing or others) and (not rule.where or given(rule.where)):
             raise bad(own[0], rule.message.format(first=(*others, "")[0], all=" or ".join(others)))
-    own = given(f"forces {STUDIES}")
+    own = asked.tables
     if show.holds_one and len(own) > 1:
         told = f"{' and '.join(own)} are tables of their own, and CSV holds one: ask for --json or --text"
         raise bad(own[1], told)
@@ -160,7 +177,7 @@ def refuse_clashes(asked: Options, show: ShowOptions) -> None:
 def _refuse_values(asked: Options) -> None:
     if asked.branch is not None and asked.branch != "all" and whole(asked.branch) < 1:
         raise bad("--branch", f"'{asked.branch}': expected all, or the number of an assembly")
-    if asked.only is not None and not names(asked.only):
+    if asked.names == []:
         raise bad("--only", "expected names of links or points")
     if asked.counterweights is not None and not names(asked.counterweights):
         raise bad("--counterweights", "expected names of links")

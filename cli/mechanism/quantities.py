@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from virtualwork.formulas.asked import FORCES, Key, over_blocks
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cli.show.columns import Cell, Json
+    from cli.show.columns import Cell
     from virtualwork import Mechanism
     from virtualwork.motion import Motion
     from virtualwork.plan.steps import Joint
@@ -291,13 +291,14 @@ def nested(numbers: Mapping[Quantity, Numbers], n: int) -> dict[str, Any]:
     return found
 
 
-def in_rows(tree: Any, n: int) -> Sequence[Any]:
-    """A tree of columns, its branches mappings and tuples, as n trees of their values."""
-    if isinstance(tree, dict):
-        parts = [in_rows(of, n) for of in tree.values()]
-        return [dict(zip(tree, row, strict=True)) for row in zip(*parts, strict=True)] if parts else [{}] * n
+def in_rows(tree: Any, n: int) -> Iterator[Any]:
+    """A tree of columns, its branches mappings and tuples, as n trees of their values, one after the other."""
+    if not isinstance(tree, (dict, tuple)):
+        return iter(tree)
+    if not tree:
+        return ({} if isinstance(tree, dict) else [] for _ in range(n))
+    rows = zip(*[in_rows(of, n) for of in (tree.values() if isinstance(tree, dict) else tree)], strict=True)
     if isinstance(tree, tuple):
-        parts = [in_rows(of, n) for of in tree]
-        return [list(row) for row in zip(*parts, strict=True)] if parts else [[]] * n
-    columns: Sequence[Json] = tree
-    return columns
+        return map(list, rows)
+    names = tuple(tree)
+    return (dict(zip(names, row, strict=True)) for row in rows)

@@ -120,23 +120,23 @@ def rows(analysis: Analysis) -> list[tuple[Place, Row]]:
         if order == 1 and massive:
             order = 2  # a speed alone already makes accelerations, and masses feel them
         parts = {name: _part(analysis, motion, name, order) for name in analysis.links}
-        fields: list[tuple[str, dict[str, Part], list[Mark]]] = [("", {}, [])]
-        if order >= 1:
-            k = len(analysis.mechanism.inputs)
-            fields = [("", {}, _marks(motion, None))]
-            if k > 1:
-                fields = [
-                    (e.name, {name: _virtual(motion, name, j) for name in analysis.links}, _marks(motion, j))
-                    for j, e in enumerate(analysis.mechanism.inputs)
-                ]
-        several_fields = bool(fields[0][0])
+        inputs = analysis.mechanism.inputs
+        # with several inputs a virtual velocity field for each of them, else the motion's own velocities
+        ways: list[int | None] = [*range(len(inputs))] if order >= 1 and len(inputs) > 1 else [None]
+        fields = [
+            (
+                of,
+                {} if of is None else {name: _virtual(motion, name, of) for name in analysis.links},
+                _marks(motion, of) if order >= 1 else [],
+            )
+            for of in ways
+        ]
         for i, (step, assembled) in enumerate(zip(analysis.inputs.steps, motion.assembled, strict=True)):
             head: Row = {"step": step}
             if several:
                 head["branch"] = str(assembly.number)
-            for j, (field, velocities, marks) in enumerate(fields):
-                of = j if several_fields else None
-                lead = {**head, "field": field} if field else head
+            for of, velocities, marks in fields:
+                lead = head if of is None else {**head, "field": inputs[of].name}
                 here = {
                     name: {key: values[i] for key, values in (part | velocities.get(name, {})).items()}
                     for name, part in parts.items()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.errors import DataError
-from cli.mechanism.options import names
+from cli.mechanism.options import Options, names
 from cli.mechanism.quantities import column, effort_name
 from cli.mechanism.solve import Analysis
 from cli.show.columns import Table
@@ -28,37 +28,11 @@ Document = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Request:
-    """Which studies are asked for."""
-
-    newton: bool = False
-    check: bool = False
-    forces: bool = False
-    equilibrium: bool = False
-    flywheel: float | None = None
-    counterweights: str | None = None
-    swept: bool = False
-
-    @property
-    def tables(self) -> list[str]:
-        """The options that have a table of their own."""
-        asked = {
-            "--forces": self.forces,
-            "--newton": self.newton,
-            "--check": self.check,
-            "--equilibrium": self.equilibrium,
-            "--flywheel": self.flywheel is not None,
-            "--counterweights": self.counterweights is not None,
-        }
-        return [flag for flag, given in asked.items() if given]
-
-
-@dataclass(frozen=True)
 class Studies:
     """The studies of an analysis, each worked out once."""
 
     analysis: Analysis
-    request: Request
+    asked: Options
 
     @cached_property
     def document(self) -> Document:
@@ -72,20 +46,20 @@ class Studies:
 
     @cached_property
     def _found(self) -> tuple[Document, list[str]]:
-        analysis, request = self.analysis, self.request
+        analysis, asked = self.analysis, self.asked
         found: Document = {}
         said: list[str] = []
-        if request.newton:
+        if asked.newton:
             found |= newton_document(analysis)
-        if request.check:
+        if asked.check:
             found["check"] = check_document(analysis)
-        of_one = request.forces and len(analysis.mechanism.inputs) == 1
-        if (of_one or request.flywheel is not None) and request.swept:
-            found["cycle"] = cycle(analysis, request.flywheel)
-        if request.equilibrium:
-            found["equilibria"], said = equilibria(analysis, request.swept)
-        if request.counterweights:
-            found["counterweights"] = counterweights(analysis, names(request.counterweights))
+        of_one = asked.forces and len(analysis.mechanism.inputs) == 1
+        if (of_one or asked.flywheel is not None) and asked.swept:
+            found["cycle"] = cycle(analysis, asked.flywheel)
+        if asked.equilibrium:
+            found["equilibria"], said = equilibria(analysis, asked.swept)
+        if asked.counterweights:
+            found["counterweights"] = counterweights(analysis, names(asked.counterweights))
         return found, said
 
 
@@ -94,13 +68,12 @@ def check_document(analysis: Analysis) -> Document:
     from virtualwork.study.check import Check
 
     check = Check(analysis.mechanism.assembly)
-    slide = bool(analysis.mechanism.inputs) and analysis.mechanism.inputs[0].is_slide
-    unit = "m" if slide else "deg"
+    unit = analysis.unit
 
     def shown(values: Sequence[float] | None) -> list[float | None] | None:
         if values is None:
             return None
-        return [None if not math.isfinite(v) else (v if slide else math.degrees(v)) for v in values]
+        return [None if not math.isfinite(v) else (v if unit == "m" else math.degrees(v)) for v in values]
 
     return {
         "mobility": check.mobility,
@@ -162,22 +135,15 @@ def cycle(analysis: Analysis, coefficient: float | None) -> Document:
     if len(m.inputs) != 1:
         raise DataError(f"{analysis.file}: a cycle has one input, found {len(m.inputs)}")
     name = effort_name(m.inputs[0].is_slide)
-    empty: Document = {f"{key}_{name}": None for key in ("mean", "peak", "rms")}
-    empty |= {"work_J": None, "energy_closure_J": None, "flywheel_inertia_kg_m2": None}
+    keys = *(f"{key}_{name}" for key in ("mean", "peak", "rms")), "work_J", "energy_closure_J"
+    found: Document = dict.fromkeys((*keys, "flywheel_inertia_kg_m2"))
     if motion.n < 2 or not np.isfinite(motion.effort).all():
         analysis.warnings.append(
             "cycle: the effort is not finite at every pose of the sweep: no mean, work or flywheel"
         )
-        return empty
+        return found
     c = Cycle(motion)
-    found = {
-        f"mean_{name}": c.mean,
-        f"peak_{name}": c.peak,
-        f"rms_{name}": c.rms,
-        "work_J": c.work,
-        "energy_closure_J": c.closure,
-        "flywheel_inertia_kg_m2": None,
-    }
+    found |= zip(keys, (c.mean, c.peak, c.rms, c.work, c.closure), strict=True)
     if coefficient is not None:
         if m.inputs[0].is_slide:
             raise DataError(f"{analysis.file}: --flywheel: the input is a slide: a flywheel turns")
@@ -206,7 +172,7 @@ def equilibria(analysis: Analysis, swept: bool) -> tuple[list[Document], list[st
         values = {}
         for entry, value in zip(m.inputs, e.inputs, strict=True):
             shown = value if entry.is_slide else math.degrees(value) % 360.0
-            values[entry.name] = {"input_m" if entry.is_slide else "input_deg": shown}
+            values[entry.name] = {analysis.input_names[entry.name]: shown}
         place = next(iter(values.values())) if len(m.inputs) == 1 else {"inputs": values}
         rows.append({**place, "stable": e.stable, "potential_J": e.potential})
     said = []
@@ -259,7 +225,7 @@ def tables(found: Studies) -> dict[str, Callable[[], Table]]:
         "--flywheel": lambda: of_cycle(document["cycle"]),
         "--counterweights": lambda: of_counterweights(document["counterweights"]),
     }
-    return {flag: known[flag] for flag in found.request.tables if flag != "--forces"}
+    return {flag: known[flag] for flag in found.asked.tables if flag != "--forces"}
 
 
 def of_check(document: Document) -> Table:

@@ -19,6 +19,10 @@ from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, li
 from virtualwork.formulas.asked import Key
 
 if TYPE_CHECKING:
+    from cli.mechanism.options import Options
+    from cli.mechanism.quantities import Numbers
+
+if TYPE_CHECKING:
     pass
 
 # how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
@@ -28,20 +32,15 @@ NAMES = ("p0.135", "p99.865")
 
 @dataclass
 class Tolerances:
-    """What the tolerances do, worked out when it is asked for.
-
-    Attributes
-    ----------
-    draws : int
-        How many mechanisms are drawn; 0 for none.
-    """
+    """What the tolerances do, worked out when it is asked for."""
 
     analysis: Analysis
-    forces: bool
-    draws: int = 0
-    seed: int = 0
-    distribution: str = "normal"
-    workers: int = 1
+    asked: Options
+
+    @property
+    def draws(self) -> int:
+        """How many mechanisms are drawn; 0 for none."""
+        return self.asked.draws or 0
 
     @cached_property
     def limits(self) -> dict[Dimension, float]:
@@ -57,7 +56,7 @@ class Tolerances:
     @cached_property
     def numbers(self) -> list[Quantity]:
         """What is shown."""
-        every = (quantities.forces if self.forces else quantities.places)(self.analysis)
+        every = (quantities.forces if self.asked.forces else quantities.places)(self.analysis)
         return [each for each in every if each.key and not each.less]
 
     @cached_property
@@ -88,12 +87,12 @@ class Tolerances:
     def drawn(self) -> tuple[dict[str, Drawn], float]:
         """From drawn mechanisms, by header; and which share of them is assembled in every pose."""
         m, motion, q = self.analysis.mechanism, self.analysis.motions[0], self.analysis.inputs
-        numbers = drawn_numbers(m, self.limits, self.draws, self.seed, self.distribution)
+        numbers = drawn_numbers(m, self.limits, self.draws, self.asked.seed, self.asked.distribution)
         nominal = dict(zip(self.keys, motion.sensitivities.values(self.keys), strict=True))
         parts: dict[str, list[Drawn]] = {number.header: [] for number in self.numbers}
         whole = np.ones(self.draws, dtype=bool)
         rates = q.speed, q.acceleration
-        with processes(self.workers) as pool:
+        with processes(self.asked.workers or 1) as pool:
             for rows, values, assembled in drawn(m, numbers, motion.inputs, rates, self.keys, pool):
                 whole &= assembled.all(axis=1)
                 found = dict(zip(self.keys, values, strict=True))
@@ -114,7 +113,7 @@ class Tolerances:
         lines = []
         sampling = SURE / np.sqrt(2 * max(self.draws - 1, 1))
         # a uniform distribution between the limits is wider than a normal one of a third of them
-        wider = np.sqrt(3.0) if self.distribution == "uniform" else 1.0
+        wider = np.sqrt(3.0) if self.asked.distribution == "uniform" else 1.0
         for header, its in found.items():
             linear = self.linear[header].sd * wider
             with np.errstate(invalid="ignore", divide="ignore"):
@@ -123,9 +122,8 @@ class Tolerances:
             if np.nanmax(apart, initial=0.0) > sampling + APART:
                 i = int(np.nanargmax(apart))
                 shown = self.analysis.inputs.shown[i, 0]
-                unit = "m" if self.analysis.mechanism.inputs[0].is_slide else "deg"
                 lines.append(
-                    f"{header}: the first order is not enough at input {shown:g} {unit}: a standard deviation of "
+                    f"{header}: the first order is not enough at input {shown:g} {self.analysis.unit}: a standard deviation of "
                     f"{linear[i]:.6g}, but {its.sd[i]:.6g} of the drawn mechanisms"
                 )
         if whole < 1:
@@ -151,21 +149,20 @@ class Tolerances:
             drawn, whole = self.drawn
             found["drawn"] = {
                 "columns": {
-                    header: {"mean": cells(its.mean), "sd": cells(its.sd)}
-                    | {name: cells(q) for name, q in zip(NAMES, its.quantiles, strict=True)}
+                    header: _sample(its)
                     | {f"{name}_error": cells(e) for name, e in zip(NAMES, its.errors, strict=True)}
                     for header, its in drawn.items()
                 },
                 "draws": self.draws,
-                "seed": self.seed,
-                "distribution": self.distribution,
+                "seed": self.asked.seed,
+                "distribution": self.asked.distribution,
                 "assembled": whole,
             }
         return found
 
     def table(self) -> Table:
         """The table of poses, each number with its worst case and its standard deviation."""
-        base = columns.table(self.analysis, self.forces)
+        base = columns.table(self.analysis, self.asked.forces)
         found: list[Column] = []
         for column in base.columns:
             found.append(column)
@@ -175,12 +172,8 @@ class Tolerances:
             found.append(Column(f"{column.name}_worst", column.unit, cells(its.worst)))
             found.append(Column(f"{column.name}_sd", column.unit, cells(its.sd)))
             if self.draws:
-                sample = self.drawn[0][column.header]
-                named = (("mean", sample.mean), ("sd", sample.sd), *zip(NAMES, sample.quantiles, strict=True))
-                found += [
-                    Column(f"{column.name}_drawn_{name}", column.unit, cells(values))
-                    for name, values in named
-                ]
+                sample = _sample(self.drawn[0][column.header])
+                found += [Column(f"{column.name}_drawn_{name}", column.unit, sample[name]) for name in sample]
         return Table(found, base.keys)
 
     def words(self) -> str:
@@ -200,6 +193,12 @@ class Tolerances:
         return (
             "shares of the variance, the largest, means over the poses:\n" + "\n".join(lines) if lines else ""
         )
+
+
+def _sample(its: Drawn) -> dict[str, Numbers]:
+    """Mean, standard deviation and quantiles of what was drawn, by the names that they are shown under."""
+    values = its.mean, its.sd, *its.quantiles
+    return {name: cells(each) for name, each in zip(("mean", "sd", *NAMES), values, strict=True)}
 
 
 _FIELDS = ("mean", "sd", "quantiles", "errors")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cli.errors import DataError
-from cli.mechanism.asked import Home, Question, Said, joined, length, like
+from cli.mechanism.asked import Home, Question, Said, like
 from cli.mechanism.in_time import ENERGY, METHOD, InTime, columns_of, inputs_of, known, largest, rows_of_time
 from cli.mechanism.read import until_inputs, wanted
 from cli.mechanism.solve import Analysis
@@ -48,19 +48,19 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True)
 class AskedInTime(Question):
-    """What is asked of every variant; `times`, `accuracy`, `until`, `forces` as in `InTime`."""
+    """What is asked of every variant; `times`, `accuracy`, `until` as in `InTime`."""
 
     times: list[float]
     accuracy: float
     until: str | None
-    forces: bool
 
     method = METHOD
 
     @property
     def together(self) -> bool:
         """Whether the inputs and the energy are all that is asked for, which variants have as lanes."""
-        return self.only is None and self.branch is None and not (self.forces or self.digits)
+        asked = self.asked
+        return asked.only is None and asked.branch is None and not (asked.forces or self.digits)
 
     def home(self, variants: Variants, json: bool) -> Home:
         """The columns that all tables have: those of the first variant that can be let go, from its first time alone."""
@@ -78,8 +78,8 @@ class AskedInTime(Question):
         """A variant let go alone."""
         m = self.variant(row)
         q = wanted(m, None, None, None, self.bare)
-        home = Analysis.of(self.file, m, q, 2, self.only, self.branch)
-        found = InTime(home, self.times, self.accuracy, self.until, self.bare, self.forces)
+        home = Analysis.of(self.asked, m, q, 2)
+        found = InTime(home, self.times, self.accuracy, self.until, self.bare, self.asked.forces)
         # one that cannot be let go is an error now
         _ = found.run
         return found
@@ -113,7 +113,7 @@ class AskedInTime(Question):
             family = m.vary(self.numbers(shown))
             runs = family.simulate(self.times, accuracy=self.accuracy, until=level)
         except ValueError as error:
-            raise DataError(f"{self.file}: {error}") from None
+            raise DataError(f"{self.asked.file}: {error}") from None
         for i, remarks in sorted(runs.warnings.items()):
             for remark in remarks:
                 said.add(remark, [str(first + i)])
@@ -129,13 +129,9 @@ class AskedInTime(Question):
     def table(self, home: Home, first: int, shown: Rows, said: Said) -> Table:
         """The rows of some variants; one that cannot be let go has none but its own."""
         blank = Table([Column(c.name, c.unit, [None]) for c in home.pattern.columns])
-        tables = []
-        for i, of in enumerate(self.found(first, shown, said)):
-            whole = like(home.pattern, of.table) if len(of.t) else blank
-            n = length(whole)
-            given = self.given([str(first + i)] * n, [[value] * n for value in shown[i].tolist()])
-            tables.append(Table([*given, *whole.columns]))
-        return replace(joined(tables), keys=("variant", "t_s"))
+        found = self.found(first, shown, said)
+        tables = [like(home.pattern, of.table) if len(of.t) else blank for of in found]
+        return replace(self.below(first, shown, tables), keys=("variant", "t_s"))
 
     def documents(self, home: Home, first: int, shown: Rows, said: Said) -> list[Document]:
         """What JSON says of some variants."""

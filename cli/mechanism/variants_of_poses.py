@@ -9,12 +9,11 @@ from uuid import uuid4
 
 import numpy as np
 
-from cli.mechanism.asked import Home, Question, Said, emptied, joined, length, like, without_bounds
+from cli.mechanism.asked import Home, Question, Said, emptied, length, like, without_bounds
 from cli.mechanism.families import Families
 from cli.mechanism.read import Inputs, wanted
 from cli.mechanism.result import result_of
 from cli.mechanism.solve import Analysis
-from cli.mechanism.studies import Request
 from cli.mechanism.words import METHOD
 from cli.show.columns import Column, Table
 from virtualwork import MechanismError
@@ -44,15 +43,11 @@ class AskedOfPoses(Question):
     ----------
     inputs : Inputs or None
         None: each variant's own pose.
-    order
-        As in `Analysis`.
     name : str
         Of the question, by which a process knows what it has prepared for it.
     """
 
     inputs: Inputs | None
-    order: int | None
-    request: Request
     name: str = field(default_factory=lambda: uuid4().hex)
 
     method = METHOD
@@ -61,7 +56,7 @@ class AskedOfPoses(Question):
         """The question, asked of a variant, or of the mechanism itself."""
         m = self.mechanism if row is None else self.variant(row)
         q = self.inputs or wanted(m, None, None, None, self.bare)
-        return Analysis.of(self.file, m, q, self.order, self.only, self.branch)
+        return Analysis.of(self.asked, m, q)
 
     drawn = analysis
 
@@ -83,12 +78,12 @@ class AskedOfPoses(Question):
 
     def families(self, shown: Rows, json: bool) -> Families | None:
         """How variants are solved together, for documents or for a table; None where they are not."""
-        plain = self.branch is None and self.request.tables in ([], ["--forces"])
+        plain = self.asked.branch is None and self.asked.tables in ([], ["--forces"])
         # a cycle of work, which stands in the document only, is of each variant
-        cycle = json and self.request.forces and self.request.swept and len(self.mechanism.inputs) == 1
+        cycle = json and self.asked.forces and self.asked.swept and len(self.mechanism.inputs) == 1
         if not plain or self.digits or cycle:
             return None
-        found = Families(self.analysis(), self.request.forces, Solver(self._part(shown)), json)
+        found = Families(self.analysis(), self.asked.forces, Solver(self._part(shown)), json)
         return found if found.pays else None
 
     def _part(self, shown: Rows) -> Part:
@@ -101,7 +96,7 @@ class AskedOfPoses(Question):
         """A variant's document, or its table with which poses are assembled; None where it cannot be put together."""
         try:
             analysis = self.analysis(row)
-            result = result_of(analysis, self.request, None, False, None, {})
+            result = result_of(analysis, self.asked)
             if json:
                 found: Any = result.document()
                 del found["name"]
@@ -141,12 +136,9 @@ class AskedOfPoses(Question):
             return self._table_together(home.pattern, first, shown, said)
         tables = []
         for i, row in enumerate(shown):
-            name = str(first + i)
-            of, there = self._rows(home.pattern, self.one(row, name, False, said))
-            n = length(of)
-            given = self.given([name] * n, [[value] * n for value in row.tolist()])
-            tables.append(Table([*given, Column("assembled", "", there), *of.columns], self._keys(of)))
-        table = joined(tables)
+            of, there = self._rows(home.pattern, self.one(row, str(first + i), False, said))
+            tables.append(Table([Column("assembled", "", there), *of.columns]))
+        table = replace(self.below(first, shown, tables), keys=self._keys(home.pattern))
         return table if self.digits else without_bounds(table)
 
     def _rows(self, pattern: Table, found: Any) -> tuple[Table, list[Any]]:

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dalembert.arithmetic.adjoint import PARTIALS, times
+from dalembert.arithmetic.adjoint import handed_on
 from dalembert.arithmetic.arrays import NUMPY
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
 from dalembert.arithmetic.tape import Kind, Operation, Tape, reached
@@ -193,12 +193,10 @@ class _Bounds:
             for i, a in enumerate(arguments):
                 if a not in pattern.needed or (kind == "select" and i == 0):
                     continue
-                if kind == "select":
-                    moved = self.kind.select(given[0], *((own, 0.0) if i == 1 else (0.0, own)))
-                elif number in self.slopes:
+                if number in self.slopes:
                     moved = own * self.slopes[number]
                 else:
-                    moved = times(own, PARTIALS[kind][i](self.kind, given, values[number]))
+                    moved = handed_on(self.kind, kind, i, own, given, values[number])
                 bars[a] = moved if a not in bars else bars[a] + moved
         total: Number = 0.0
         for number, terms in pattern.sums:

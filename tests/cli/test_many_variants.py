@@ -14,8 +14,8 @@ import pytest
 
 from cli.errors import DataError
 from cli.mechanism.many import Many, as_it_is
+from cli.mechanism.options import Options
 from cli.mechanism.read import wanted
-from cli.mechanism.studies import Request
 from cli.mechanism.variants import Variants
 from cli.mechanism.variants_of_poses import AskedOfPoses
 from virtualwork import Mechanism
@@ -228,8 +228,8 @@ def question(v):
     m = Mechanism.from_toml_text(FOUR_BAR)
     varied = Variants((dimensions(m)["ground.D.x"],), [np.linspace(0.1, 0.11, v)], grid=True)
     q = wanted(m, ["40deg"], None, None).part(0, 1)
-    asked = AskedOfPoses("m.toml", m, varied.dimensions, {}, None, "1", False, q, 0, Request())
-    return Many(asked, varied, 2)
+    asked = Options("m.toml", branch="1", order="position")
+    return Many(AskedOfPoses(asked, m, varied.dimensions, {}, False, q), varied, 2)
 
 
 def test_a_part_whose_worker_died_is_done_again(tmp_path):

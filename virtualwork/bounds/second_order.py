@@ -34,14 +34,12 @@ class Solution:
 
     Attributes
     ----------
-    residual : array (n, 2·loops)
     inverse : array (n, unknowns, 2·loops)
         Close to a limit larger or smaller than J⁻¹, as the second order has it.
     tau : array (n,)
         The second-order step as a share of the first.
     """
 
-    residual: Reals
     inverse: Reals
     tau: Reals
 
@@ -60,7 +58,7 @@ def solution(group: Group, poses: Poses, residual: Reals) -> Solution:
             high, low = _second(group, st, back, first, scale)
             moved[rows] = back * (scale * kept(high, low))[..., None]
             tau[rows] = high.max(axis=1, initial=0.0)
-    return Solution(residual, moved, tau)
+    return Solution(moved, tau)
 
 
 def _second(group: Group, st: State, back: Reals, first: Reals, scale: Reals) -> tuple[Reals, Reals]:

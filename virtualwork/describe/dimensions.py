@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
@@ -170,6 +170,11 @@ def _value(m: Description, dimension: Dimension) -> float:
         return m.at[int(j)] if key == "value" else 0.0
     number: float = found
     return number
+
+
+def by_path(dimensions: Iterable[Dimension], numbers: Iterable[float]) -> dict[str, float]:
+    """The numbers of dimensions, as `changed` takes them."""
+    return dict(zip((d.path for d in dimensions), numbers, strict=True))
 
 
 def changed(m: D, numbers: Mapping[str, Any]) -> D:

@@ -75,12 +75,13 @@ def leave_out(values: NDArray[Any], which: NDArray[np.bool_]) -> None:
 
 
 def xy(z: Complexes) -> Reals:
-    """x + iy as rows (x, y), without a copy.
+    """x + iy (..., n) as rows (x, y), (..., n, 2), without a copy.
 
     >>> xy(np.array([1 + 2j]))
     array([[1., 2.]])
     """
-    return np.ascontiguousarray(z).view(float).reshape(-1, 2)
+    z = np.ascontiguousarray(z)
+    return z.view(float).reshape(*z.shape, 2)
 
 
 # --- linear systems of loops: from complex columns to real solutions, over all poses together ------------------------
