@@ -39,10 +39,7 @@ def corrections(found: FieldBalancing, warnings: list[str]) -> Table:
         Column("angle", "deg", degrees(flat), angle),
     ]
     if found.uncertain:
-        pairs = [
-            found.uncertainty(solved) or (np.full(solved.corrections.shape, np.nan),) * 2
-            for solved in found.solved
-        ]
+        pairs = [solved.uncertainty for solved in found.solved]
         along, across = (found.rows([pair[k] for pair in pairs]) for k in (0, 1))
 
         def share(of: Real) -> Real:

@@ -66,11 +66,11 @@ def _amounts(found: FieldBalancing, solved: Solved, i: int | None, masses: Compl
         Column(found.runs.per, found.runs.mass_unit, found.amount(np.abs(masses))),
         Column("angle", "deg", [degrees(w) if w else None for w in masses.tolist()]),
     ]
-    spreads = found.uncertainty(solved)
-    if i is not None and spreads is not None:
+    if i is not None and solved.covariance is not None:
+        along, across = (spread[i] for spread in solved.uncertainty)
         table += [
-            Column("± ", found.runs.mass_unit, found.amount(spreads[0][i])),
-            Column("± angle", "deg", spreads[1][i]),
+            Column("± ", found.runs.mass_unit, found.amount(along)),
+            Column("± angle", "deg", across),
         ]
     return Table(table, keys=("plane",))
 
