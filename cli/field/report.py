@@ -155,7 +155,7 @@ def _found(found: FieldBalancing, solved: Solved, i: int) -> list[str | Table]:
     if found.runs.fitted:
         parts += [fit_words.summary(found, solved, i), _history(found, solved, i)]
     for j, trial in enumerate(group.trials):
-        on = _masses(found, solved, group.on[i, j]) if found.stored is None else ""
+        on = _masses(found, solved, group.on[i, j])
         parts += [f"Run {trial.run}{': ' + on if on else ''}{', kept' if trial.kept else ''}", _vibration(found, solved, {"amplitude": group.runs[i, j]})]  # fmt: skip
     influence = words.influence_table(found, solved, i)
     parts += ["Influence coefficients:", Table([Column(name, "", values) for name, values in influence.items()], keys=("sensor",))]  # fmt: skip
