@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.balance import least_squares
+from balancing.dependence import directions
 from balancing.influence import influence_coefficients
 from balancing.propagation import components, response
 from dalembert.arithmetic.records import record
@@ -52,8 +53,7 @@ class Readings:
         v = self._all
         if self.scatter is None:
             return v, v, np.full(v.shape, self.amplitude_error), np.full(v.shape, self.phase_error)
-        size = np.abs(v)
-        unit = np.where(size > 0, v / np.where(size > 0, size, 1.0), 1.0)
+        size, unit = np.abs(v), directions(v)
         along, across = (self.scatter > error * size for error in (self.amplitude_error, self.phase_error))
         return (
             np.where(along, unit, v),
@@ -182,13 +182,11 @@ class Readings:
             gain = np.zeros((1 + undo.shape[0], 1 + undo.shape[1]), dtype=complex)
             gain[0, 0], gain[1:, 0], gain[1:, 1:] = 1.0, -undo.sum(axis=1), undo
         e_along, e_across, of_size, of_phase = self._errors
-        size = np.abs(self._all.T.ravel())
-        unit = np.where(size > 0, self._all.T.ravel() / np.where(size > 0, size, 1.0), 1.0)
         return components(
             (linear @ gain).reshape(len(w), -1),
             (antilinear @ gain.conj()).reshape(len(w), -1),
             w if along is None else along,
-            unit,
+            directions(self._all.T.ravel()),
             (np.abs(e_along) * of_size).T.ravel(),
             (np.abs(e_across) * of_phase).T.ravel(),
         )
@@ -196,7 +194,6 @@ class Readings:
 
 def spread(samples: Complex, about: Complex) -> Real:
     """Return the covariance (p, 2, 2) of drawn corrections (n, p) along and across the given ones."""
-    size = np.where(np.abs(about) > 0, np.abs(about), 1.0)
-    turned = (samples - about) * np.where(np.abs(about) > 0, about.conj() / size, 1.0)
+    turned = (samples - about) * directions(about.conj())
     parts = np.stack([turned.real, turned.imag])
     return np.asarray(np.einsum("anp,bnp->pab", parts, parts) / len(samples))

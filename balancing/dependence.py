@@ -15,22 +15,21 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-class DependentPlanes(ValueError):
+class Unseen(ValueError):
+    """A combination of unknowns leaves no trace in the data; `case` says of which rotor or channel."""
+
+    def __init__(self, message: str, combination: Complex, case: tuple[int, ...] = ()) -> None:
+        self.combination = combination
+        self.case = case
+        super().__init__(message)
+
+
+class DependentPlanes(Unseen):
     """The readings cannot tell the planes apart; `combination` is one that no sensor sees, `case` which rotor."""
 
-    def __init__(self, message: str, combination: Complex, case: tuple[int, ...] = ()) -> None:
-        self.combination = combination
-        self.case = case
-        super().__init__(message)
 
-
-class DependentTrials(ValueError):
+class DependentTrials(Unseen):
     """The trial runs do not tell the planes' effects apart; `combination` is one no run has tried."""
-
-    def __init__(self, message: str, combination: Complex, case: tuple[int, ...] = ()) -> None:
-        self.combination = combination
-        self.case = case
-        super().__init__(message)
 
 
 def condition_number(influence: ArrayLike, weights: ArrayLike | None = None) -> Real:
@@ -42,9 +41,7 @@ def condition_number(influence: ArrayLike, weights: ArrayLike | None = None) -> 
     >>> float(condition_number([[1, 0], [0, 1000]]).round(3))
     1.953
     """
-    alpha = np.asarray(influence, dtype=complex)
-    if weights is not None:
-        alpha = alpha * np.sqrt(np.asarray(weights, dtype=float))[..., None]
+    alpha = _weighted(influence, weights)
     scaled, _ = columns_scaled(alpha)
     if alpha.shape[-2] < alpha.shape[-1]:
         return np.full(alpha.shape[:-2], np.inf)
@@ -76,10 +73,7 @@ def plane_significance(influence: ArrayLike, weights: ArrayLike | None = None) -
     >>> plane_significance([[1, 0, 1], [0, 1, 1], [0, 0, 0.01]]).round(4)
     array([0.01  , 0.01  , 0.0071])
     """
-    alpha = np.asarray(influence, dtype=complex)
-    if weights is not None:
-        alpha = alpha * np.sqrt(np.asarray(weights, dtype=float))[..., None]
-    scaled, _ = columns_scaled(alpha)
+    scaled, _ = columns_scaled(_weighted(influence, weights))
     norms = np.linalg.norm(scaled, axis=-2)
     unit = scaled / np.where(norms > 0, norms, 1.0)[..., None, :]
     out = np.zeros(unit.shape[:-2] + unit.shape[-1:])
@@ -106,13 +100,15 @@ def unseen(influence: ArrayLike, weights: ArrayLike | None = None) -> tuple[Comp
     >>> np.abs(unseen([[1, 2], [2, 4]])[0]).round(3)
     array([1. , 0.5])
     """
-    alpha = np.asarray(influence, dtype=complex)
-    if weights is not None:
-        alpha = alpha * np.sqrt(np.asarray(weights, dtype=float))[..., None]
-    scaled, scale = columns_scaled(alpha)
+    scaled, scale = columns_scaled(_weighted(influence, weights))
     _, sigma, vh = np.linalg.svd(scaled)
     smallest = sigma[-1] / sigma[0] if len(sigma) == scaled.shape[1] and sigma[0] > 0 else 0.0
     return _normed(vh[-1].conj() * scale), float(smallest)
+
+
+def _weighted(influence: ArrayLike, weights: ArrayLike | None) -> Complex:
+    alpha = np.asarray(influence, dtype=complex)
+    return alpha if weights is None else alpha * np.sqrt(np.asarray(weights, dtype=float))[..., None]
 
 
 def _normed(direction: Complex) -> Complex:
@@ -185,6 +181,17 @@ def require_independent(
 def adjoint(a: Complex) -> Complex:
     """Return the conjugate transpose of matrices (..., m, n)."""
     return np.swapaxes(a, -1, -2).conj()
+
+
+def design(masses: Complex) -> Complex:
+    """Return the rows (1, w) by which θ = (x₀, α) makes the vibration with masses w on, (..., p) -> (..., 1 + p)."""
+    return np.concatenate([np.ones((*masses.shape[:-1], 1), dtype=complex), masses], axis=-1)
+
+
+def directions(z: Complex) -> Complex:
+    """Return complex numbers brought to the size 1; 1 for 0."""
+    size = np.abs(z)
+    return np.where(size > 0, z / np.where(size > 0, size, 1.0), 1.0)
 
 
 def roundings(terms: int) -> float:

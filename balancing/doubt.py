@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.dependence import design
 from balancing.prior import Prior, fit_with_prior, runs_alone
 from balancing.run_log import Errors, JointFit, joint_fit
 from dalembert.arithmetic.exact import EPS
@@ -139,8 +140,7 @@ def drift(fit: JointFit, times: ArrayLike) -> Drift:
     time = time - time.mean(axis=-1, keepdims=True)
     shared = np.where(fit.present, time[..., None], 0.0)
     by_channel = np.swapaxes(shared, -1, -2)
-    rows = np.concatenate([np.ones((*fit.masses.shape[:-1], 1)), fit.masses], axis=-1)
-    followed = np.swapaxes(rows @ np.swapaxes(np.matvec(fit.gain, by_channel), -1, -2), -1, -2)
+    followed = np.swapaxes(design(fit.masses) @ np.swapaxes(np.matvec(fit.gain, by_channel), -1, -2), -1, -2)
     weights = 1.0 if fit.weights is None else np.swapaxes(fit.weights, -1, -2)
     read = np.swapaxes(fit.present, -1, -2)
     free = np.where(read, by_channel - followed, 0.0)

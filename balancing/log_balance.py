@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.dependence import design
 from balancing.propagation import components, response
 from balancing.run_log import Errors, JointFit
 from dalembert.arithmetic.records import numbers, record
@@ -247,7 +248,7 @@ class LogBalance:
         """
         w = np.asarray(masses, dtype=complex)
         value = self.fit.fitted(w[..., None, :])[..., 0, :]
-        rows = np.concatenate([np.ones((*w.shape[:-1], 1), dtype=complex), w], axis=-1)
+        rows = design(w)
         gain = np.vecmat(rows[..., None, :].conj(), self.fit.gain)
         own = components(gain[..., None, :], None, value[..., None], *self._by_channel())[..., 0, :, :]
         if reading:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import adjoint
+from balancing.dependence import adjoint, design
 from balancing.log_balance import LogBalance
 from balancing.propagation import response
 from dalembert.arithmetic.records import record
@@ -129,7 +129,7 @@ class _Spread:
 
     def after(self, masses: Complex) -> Real:
         """Return the trace after a run with each of these masses, (k, p) -> (k,)."""
-        rows = np.concatenate([np.ones((len(masses), 1), dtype=complex), masses], axis=1)
+        rows = design(masses)
         cross = np.einsum("snm,km->ksn", self.covariance, rows.conj())
         of_reading = np.einsum("kn,ksn->ks", rows, cross).real + self.own
         gain = cross / np.where(of_reading > 0, of_reading, 1.0)[..., None]

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import adjoint, columns_scaled, threshold
+from balancing.dependence import adjoint, columns_scaled, design, threshold
 from balancing.run_log import Foreknown, JointFit
 from dalembert.arithmetic.records import record
 
@@ -204,8 +204,7 @@ def fit_with_prior(
     unknowns = np.matvec(gain, b) + np.matvec(
         of_mean, np.broadcast_to(prior.mean, of_mean.shape[:-2] + t.shape[-1:])
     )
-    rows = np.concatenate([np.ones((*t.shape[:-1], 1), dtype=complex), t], axis=-1)
-    leverage = np.clip(np.einsum("...rn,...snr->...rs", rows, gain).real, 0.0, 1.0)
+    leverage = np.clip(np.einsum("...rn,...snr->...rs", design(t), gain).real, 0.0, 1.0)
     nu = np.broadcast_to(prior.degrees_of_freedom, y.shape[:-2])
     known = Foreknown(plain, of_mean @ prior.factor, nu)
     return JointFit(y, t, None, np.asarray(unknowns + 0.0), gain, leverage, foreknown=known)
@@ -222,8 +221,7 @@ def runs_alone(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None
     present = np.isfinite(y)
     w = None if weights is None else np.broadcast_to(np.asarray(weights, dtype=float), y.shape)
     root = np.swapaxes(present * (1.0 if w is None else np.sqrt(w)), -1, -2)
-    rows = np.concatenate([np.ones((*t.shape[:-1], 1), dtype=complex), t], axis=-1)[..., None, :, :]
-    scaled, scale = columns_scaled(root[..., None] * rows)
+    scaled, scale = columns_scaled(root[..., None] * design(t)[..., None, :, :])
     left, sigma, right = np.linalg.svd(scaled, full_matrices=False)
     seen = sigma > threshold(*scaled.shape[-2:]) * sigma[..., :1]
     left = np.where(seen[..., None, :], left, 0.0)

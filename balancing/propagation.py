@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.dependence import adjoint, damping_norms
+from balancing.dependence import adjoint, damping_norms, design, directions
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -48,8 +48,7 @@ def response(
     inverse = np.linalg.inv(r) * scale[..., None]
     gain = (inverse @ adjoint(q))[..., : alpha.shape[-2]] * root[..., None, :]
     m = inverse @ adjoint(inverse)
-    masses = np.concatenate([np.ones((*corrections.shape[:-1], 1), dtype=complex), corrections], axis=-1)
-    linear = -gain[..., None] * masses[..., None, None, :]
+    linear = -gain[..., None] * design(corrections)[..., None, None, :]
     antilinear = np.zeros_like(linear)
     antilinear[..., 1:] = -m[..., :, None, :] * (weights * left)[..., None, :, None]
     if ridge:
@@ -74,8 +73,7 @@ def components(
     unit, along, across
         Each reading's direction, and its standard deviation along and across it, (..., n).
     """
-    size = np.abs(direction)
-    back = np.where(size > 0, direction.conj() / np.where(size > 0, size, 1.0), 1.0)[..., None]
+    back = directions(direction.conj())[..., None]
     turned = back * linear * unit[..., None, :]
     other = 0.0 if antilinear is None else back * antilinear * unit.conj()[..., None, :]
     radial = (turned + other) * along[..., None, :]

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import adjoint, roundings, threshold
+from balancing.dependence import Unseen, adjoint, design, directions, roundings, threshold
 from balancing.qr import factors
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
@@ -32,13 +32,8 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-class Undetermined(ValueError):
+class Undetermined(Unseen):
     """The runs do not determine x₀ and α: `combination` (1 + p,) of them leaves no trace, x₀ first; `case` says where."""
-
-    def __init__(self, message: str, combination: Complex, case: tuple[int, ...] = ()) -> None:
-        self.combination = combination
-        self.case = case
-        super().__init__(message)
 
 
 @record
@@ -133,7 +128,7 @@ class JointFit:
     def residuals(self) -> Complex:
         """Reading less fitted value, (..., r, s); NaN where there is no reading, 0 within rounding."""
         left = self.readings - self.fitted(self.masses)
-        size = np.abs(_rows(self.masses)) @ np.swapaxes(np.abs(self.unknowns), -1, -2)
+        size = np.abs(design(self.masses)) @ np.swapaxes(np.abs(self.unknowns), -1, -2)
         noise = 16 * EPS * (np.abs(self.readings) + size)
         return np.asarray(np.where(np.abs(left) <= noise, 0.0, left))
 
@@ -158,7 +153,7 @@ class JointFit:
 
     def fitted(self, masses: ArrayLike) -> Complex:
         """Return the vibration with these masses on, (..., k, p) -> (..., k, s)."""
-        rows = _rows(np.asarray(masses, dtype=complex))
+        rows = design(np.asarray(masses, dtype=complex))
         return np.asarray(rows @ np.swapaxes(self.unknowns, -1, -2))
 
     @cached_property
@@ -216,7 +211,7 @@ class JointFit:
             0.0 if e is None else np.asarray(e, dtype=float) for e in (reading_error, mass_error)
         )
         y = np.swapaxes(np.where(self.present, self.readings, 0.0), -1, -2) * root
-        rows = root[..., None] * _rows(self.masses)[..., None, :, :]
+        rows = root[..., None] * design(self.masses)[..., None, :, :]
         c = roundings(rows.shape[-1])
         of_rows = c * np.abs(rows)
         of_rows[..., 1:] += root[..., None] * np.broadcast_to(of_masses, self.masses.shape)[..., None, :, :]
@@ -240,8 +235,8 @@ class JointFit:
 
     def stated(self, amplitude: float, phase: float) -> Errors:
         """Return errors that are known: relative ones of the amplitude, and those of the phase in rad."""
-        size = np.abs(np.where(self.present, self.readings, 0.0))
-        unit = np.where(size > 0, self.readings / np.where(size > 0, size, 1.0), 1.0)
+        read = np.where(self.present, self.readings, 0.0)
+        unit, size = directions(read), np.abs(read)
         known = np.full(self.readings.shape[:-2], np.inf)
         return Errors(unit, amplitude * size, phase * size, known)
 
@@ -295,7 +290,7 @@ def joint_fit(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None 
     if np.isinf(y).any() or not np.isfinite(t).all():
         raise ValueError("masses must be finite, and readings finite or NaN")
     present = np.isfinite(y)
-    rows = _rows(t)[..., None, :, :]
+    rows = design(t)[..., None, :, :]
     root: Real | None = None
     w: Real | None = None
     if weights is not None:
@@ -332,7 +327,7 @@ def determined(masses: ArrayLike, present: ArrayLike) -> NDArray[np.bool_]:
     array([ True, False])
     """
     t, read = np.asarray(masses, dtype=complex), np.asarray(present, dtype=bool)
-    rows = _rows(t)[..., None, :, :]
+    rows = design(t)[..., None, :, :]
     channels = (*np.broadcast_shapes(t.shape[:-2], read.shape[:-2]), read.shape[-1])
     if rows.shape[-2] < rows.shape[-1]:
         return np.zeros(channels, dtype=bool)
@@ -340,11 +335,6 @@ def determined(masses: ArrayLike, present: ArrayLike) -> NDArray[np.bool_]:
         # where nothing is missing one QR serves all channels
         rows = np.swapaxes(read, -1, -2)[..., None] * rows
     return np.broadcast_to(_seen(factors(rows)[1], rows.shape[-2]), channels)
-
-
-def _rows(masses: Complex) -> Complex:
-    """Return the rows (1, w) of the design, (..., r, 1 + p)."""
-    return np.concatenate([np.ones((*masses.shape[:-1], 1), dtype=complex), masses], axis=-1)
 
 
 def _seen(r: Complex, rows: int) -> NDArray[np.bool_]:

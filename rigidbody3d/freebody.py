@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,13 +14,7 @@ from rigidbody3d import attitude as quaternion
 from rigidbody3d.free_rotation import FreeRotation
 from rigidbody3d.inertia import principal
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require, tensors_off
-from rigidbody3d.states import frame_of, in_blocks, page_of, plot_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import FigureBase
-
-    from dalembert.page import Page
+from rigidbody3d.states import AtTimes, Seen, in_blocks
 
 Array = NDArray[np.float64]
 
@@ -139,7 +132,7 @@ class FreeBody:
 
 @record
 @dataclass(frozen=True, eq=False, repr=False)
-class FreeState:
+class FreeState(AtTimes):
     """The state of a free body at given times; each quantity is computed when it is first asked for."""
 
     body: FreeBody
@@ -173,24 +166,9 @@ class FreeState:
         spin = np.einsum("...ij,...j->...i", axes, self.omega)
         return np.asarray((moments * spin**2).sum(axis=-1) / 2)
 
-    def to_frame(self) -> pd.DataFrame:
-        """Return a table with a row per state: t_s, ω in body axes, attitude, momentum in space axes, energy."""
-        return frame_of(self, self.time)
-
-    def plot(self, figure: FigureBase | None = None) -> NDArray[np.object_]:
-        """Draw ω over time, the polhode, the trace of the body's axis on the sphere of space; return matplotlib's axes (3,).
-
-        One body at several times, else a ValueError. Without a figure it is a new one of pyplot's; without matplotlib
-        (the extra `plot`) an ImportError.
-        """
-        return plot_of(self, self.time, self.body.inertia, free=True, top=False, figure=figure)
-
-    def animate(self) -> Page:
-        """Return a page that moves: the body by its own clock with play, slider, curves and values.
-
-        A notebook shows it; `.save("body.html")` writes it. One body at several times, else a ValueError.
-        """
-        return page_of(self, self.time, self.body.inertia, top=False)
+    @property
+    def _seen(self) -> Seen:
+        return Seen(self.body.inertia, free=True, top=False)
 
     def error_estimate(self, of: str = "attitude", tensor: ArrayLike = 0.0) -> Array:
         """Return a bound of the rounding error of a quantity, the given data as exact.

@@ -13,7 +13,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,11 +21,7 @@ from dalembert.arithmetic.records import record
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.inertia import principal
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require, tensors_off
-from rigidbody3d.states import frame_of, plot_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import FigureBase
+from rigidbody3d.states import AtTimes, Seen
 
 Array = NDArray[np.float64]
 Torque = Callable[[float, Array, Array], ArrayLike]
@@ -44,7 +39,7 @@ STAGES = _STAGES + _STAGES[-2::-1]
 
 @record
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory:
+class Trajectory(AtTimes):
     """States at the times asked for: `.omega` (n, 3) in body axes, `.attitude` (n, 4), `.momentum` (n, 3) in space axes."""
 
     time: Array
@@ -74,17 +69,9 @@ class Trajectory:
     def _finer(self) -> Trajectory:
         return self._run_again(self.tensor)
 
-    def to_frame(self) -> pd.DataFrame:
-        """Return a table with a row per state: t_s, ω in body axes, attitude, momentum in space axes, energy."""
-        return frame_of(self, self.time)
-
-    def plot(self, figure: FigureBase | None = None) -> NDArray[np.object_]:
-        """Draw ω over time, ω in body axes, the trace of the body's axis on the sphere of space; return matplotlib's axes (3,).
-
-        One body at several times, else a ValueError. Without a figure it is a new one of pyplot's; without matplotlib
-        (the extra `plot`) an ImportError.
-        """
-        return plot_of(self, self.time, self.tensor, free=False, top=self.mgl != 0, figure=figure)
+    @property
+    def _seen(self) -> Seen:
+        return Seen(self.tensor, free=False, top=self.mgl != 0)
 
     def error_estimate(self, of: str = "attitude", tensor: ArrayLike = 0.0) -> Array:
         """Return an estimate of the error, of the method and of rounding together.

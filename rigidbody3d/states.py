@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,41 +34,65 @@ def in_blocks(work: Callable[[Array], Array], time: Array, lead: tuple[int, ...]
     return out.reshape(lead + time.shape + (width,))
 
 
-def _columns(state: State, time: Array) -> dict[str, Array]:
-    columns = {"t_s": time}
+def _columns(state: StateInTime) -> dict[str, Array]:
+    columns = {"t_s": state.time}
     columns |= components("omega_*_rad_s", state.omega)
     columns |= components("attitude_*", state.attitude, "wxyz")
     columns |= components("momentum_*_kg_m2_s", state.momentum)
     return columns | {"energy_J": state.energy}
 
 
-def frame_of(state: State, time: Array) -> pd.DataFrame:
-    """Return a table of states: t_s, ω in body axes, attitude, momentum in space axes, energy."""
-    return table(_columns(state, time), ("body", "state") if time.ndim else ("body",))
+class Seen(NamedTuple):
+    """What pictures want to know of a body: its inertia, whether no torque acts on it, whether it stands on a point."""
+
+    inertia: ArrayLike
+    free: bool
+    top: bool
 
 
-def _one_body(state: State, time: Array) -> None:
-    if np.shape(state.omega) != (np.size(time), 3) or np.size(time) < 2:
+class StateInTime(State, Protocol):
+    """A state at given times, and the body that it is of."""
+
+    @property
+    def time(self) -> Array: ...
+    @property
+    def _seen(self) -> Seen: ...
+
+
+class AtTimes:
+    """Base of states at given times: a table, a picture, a page."""
+
+    def to_frame(self: StateInTime) -> pd.DataFrame:
+        """Return a table with a row per state: t_s, ω in body axes, attitude, momentum in space axes, energy."""
+        return table(_columns(self), ("body", "state") if self.time.ndim else ("body",))
+
+    def plot(self: StateInTime, figure: FigureBase | None = None) -> NDArray[np.object_]:
+        """Draw ω over time, its path in body axes (a free body's polhode), the trace of the body's axis on the sphere of space.
+
+        Returns matplotlib's axes (3,). One body at several times, else a ValueError. Without a figure it is a new one of
+        pyplot's; without matplotlib (the extra `plot`) an ImportError.
+        """
+        from rigidbody3d.picture.rotation import rotation
+
+        _one_body(self)
+        inertia, free, top = self._seen
+        return rotation(self.time, self.omega, self.attitude, inertia, free=free, top=top, figure=figure)
+
+    def animate(self: StateInTime) -> Page:
+        """Return a page that moves: the body by its own clock with play, slider, curves and values.
+
+        A notebook shows it; `.save("body.html")` writes it. One body at several times, else a ValueError.
+        """
+        from dalembert.page import Shown
+        from rigidbody3d.animation import turning_page
+
+        _one_body(self)
+        shown = {name: Shown(values, name) for name, values in _columns(self).items()}
+        return turning_page("", self._seen.inertia, self.omega[0], shown, self._seen.top)
+
+
+def _one_body(state: StateInTime) -> None:
+    if np.shape(state.omega) != (np.size(state.time), 3) or np.size(state.time) < 2:
         raise ValueError(
             f"a picture shows one body at several times, found ω of the shape {np.shape(state.omega)}"
         )
-
-
-def page_of(state: State, time: Array, inertia: ArrayLike, *, top: bool) -> Page:
-    """Return the page of one body's states, its columns those of the table."""
-    from dalembert.page import Shown
-    from rigidbody3d.animation import turning_page
-
-    _one_body(state, time)
-    shown = {name: Shown(values, name) for name, values in _columns(state, time).items()}
-    return turning_page("", inertia, state.omega[0], shown, top)
-
-
-def plot_of(
-    state: State, time: Array, inertia: ArrayLike, *, free: bool, top: bool, figure: FigureBase | None
-) -> NDArray[np.object_]:
-    """Draw one body's states over time: ω, its path in body axes (the polhode), the trace of an axis in space."""
-    from rigidbody3d.picture.rotation import rotation
-
-    _one_body(state, time)
-    return rotation(time, state.omega, state.attitude, inertia, free=free, top=top, figure=figure)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,14 +29,8 @@ from dalembert.arithmetic.records import record
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require
-from rigidbody3d.states import frame_of, in_blocks, page_of, plot_of
+from rigidbody3d.states import AtTimes, Seen, in_blocks
 from rigidbody3d.top_roots import constants
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import FigureBase
-
-    from dalembert.page import Page
 
 Array = NDArray[np.float64]
 
@@ -140,7 +134,7 @@ class Top:
 
 @record
 @dataclass(frozen=True, eq=False, repr=False)
-class TopState:
+class TopState(AtTimes):
     """The state of a top at given times; each quantity is computed when it is first asked for."""
 
     top: Top
@@ -173,24 +167,9 @@ class TopState:
             (self._moments * self.omega**2).sum(axis=-1) / 2 + self._mgl * (w * w + z * z - x * x - y * y)
         )
 
-    def to_frame(self) -> pd.DataFrame:
-        """Return a table with a row per state: t_s, ω in body axes, attitude, momentum in space axes, energy."""
-        return frame_of(self, self.time)
-
-    def plot(self, figure: FigureBase | None = None) -> NDArray[np.object_]:
-        """Draw ω over time, ω in body axes, the trace of the body's axis on the sphere of space; return matplotlib's axes (3,).
-
-        One body at several times, else a ValueError. Without a figure it is a new one of pyplot's; without matplotlib
-        (the extra `plot`) an ImportError.
-        """
-        return plot_of(self, self.time, self.top.inertia, free=False, top=True, figure=figure)
-
-    def animate(self) -> Page:
-        """Return a page that moves: the body by its own clock with play, slider, curves and values.
-
-        A notebook shows it; `.save("body.html")` writes it. One body at several times, else a ValueError.
-        """
-        return page_of(self, self.time, self.top.inertia, top=True)
+    @property
+    def _seen(self) -> Seen:
+        return Seen(self.top.inertia, free=False, top=True)
 
     def error_estimate(self, of: str = "attitude", moments: ArrayLike = 0.0) -> Array:
         """Return a bound of the rounding error of a quantity, the given data as exact.

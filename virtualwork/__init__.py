@@ -78,62 +78,23 @@ __all__ = [
 
 # where each name stands; a room is loaded when one of its names is asked for
 _ROOMS = {
-    "virtualwork.describe": (
-        "AssemblyError",
-        "DescriptionError",
-        "MechanismError",
-        "MobilityError",
-    ),
-    "virtualwork.describe.parts": (
-        "GROUND",
-        "Force",
-        "Friction",
-        "Gear",
-        "Guess",
-        "Guide",
-        "Input",
-        "Link",
-        "Motor",
-        "Spring",
-        "Torque",
-        "TorsionSpring",
-    ),
-    "virtualwork.formulas.effort": ("ledger",),
-    "virtualwork.mechanism": (
-        "Mechanism",
-        "equilibria",
-    ),
-    "virtualwork.study": ("counterweights",),
-    "virtualwork.family.target": ("Target",),
-    "virtualwork.study.check": (
-        "Check",
-        "grashof_class",
-    ),
-    "virtualwork.study.cycle": ("Cycle",),
-    "virtualwork.study.equilibrium": (
-        "Equilibria",
-        "Equilibrium",
-    ),
-    "virtualwork.textbook.combinations": (
-        "block_on_bar",
-        "crank_rod_piston",
-        "on_incline",
-        "on_moving_ramp",
-        "rotation",
-        "second_point",
-        "sense",
-    ),
-    "virtualwork.textbook.link_states": (
-        "LinkStates",
-        "UnitLoad",
-        "balance",
-    ),
+    "virtualwork.describe": "AssemblyError DescriptionError MechanismError MobilityError",
+    "virtualwork.describe.parts": "GROUND Force Friction Gear Guess Guide Input Link Motor Spring Torque TorsionSpring",
+    "virtualwork.formulas.effort": "ledger",
+    "virtualwork.mechanism": "Mechanism equilibria",
+    "virtualwork.study": "counterweights",
+    "virtualwork.family.target": "Target",
+    "virtualwork.study.check": "Check grashof_class",
+    "virtualwork.study.cycle": "Cycle",
+    "virtualwork.study.equilibrium": "Equilibria Equilibrium",
+    "virtualwork.textbook.combinations": "block_on_bar crank_rod_piston on_incline on_moving_ramp rotation second_point sense",
+    "virtualwork.textbook.link_states": "LinkStates UnitLoad balance",
 }
 
 
 def __getattr__(name: str) -> object:
     for room, names in _ROOMS.items():
-        if name in names:
+        if name in names.split():
             module = import_module(room)
             value: object = getattr(module, name, None) or import_module(f"{room}.{name}")
             globals()[name] = value

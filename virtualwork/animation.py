@@ -88,14 +88,14 @@ class Series:
         """Return the series as the page reads it."""
         m = self.mechanism
         self._packed, self._index = [], {}
-        owners = sorted({*m.links, *(p for body in m.bodies.values() for p in body)}, key=len, reverse=True)
+        owners = sorted({*m.links, *m.points}, key=len, reverse=True)
         for name, shown in self.columns.items():
             owner = next((o for o in owners if name.startswith(f"{o}_")), "")
             exact = name in self.over or bool(_PLACE.search(name))
             k = self._add(name, shown.values, shown.header, owner, exact)
             if shown.si != 1:
                 self._packed[k]["si"] = shown.si
-        names = list(dict.fromkeys(p for body in m.bodies.values() for p in body))
+        names = list(m.points)
         timed = any(np.any(rate) for rate in self.poses.rates[0]) and all(
             f"{name}_vx_m_s" in self._index for name in names if name not in m.ground
         )
@@ -146,19 +146,13 @@ class Series:
 
     def _point(self, name: str, unit: bool) -> dict[str, Any]:
         m = self.mechanism
-        body = next(body for body, points in m.bodies.items() if name in points)
-        place = m.bodies[body][name]
-
-        def part(i: int) -> ArrayLike:
-            z = self.poses.point(body, place, 0, name)
-            return z.imag if i else z.real
-
+        body, place = m.points[name]
         found: dict[str, Any] = {
             "name": name,
             "moves": body != GROUND,
             "trace": name in tracers(m),
-            "x": self._column(f"{name}_x_m", lambda: part(0)),
-            "y": self._column(f"{name}_y_m", lambda: part(1)),
+            "x": self._column(f"{name}_x_m", lambda: self.poses.point(body, place, 0, name).real),
+            "y": self._column(f"{name}_y_m", lambda: self.poses.point(body, place, 0, name).imag),
         }
         for key, form in _RATES.items():
             columns = [f"{name}_{form.format(axis)}" for axis in "xy"]
@@ -167,7 +161,7 @@ class Series:
         if unit and body != GROUND:
             z = self.poses.values([("dpoint", body, place, name, 0, 1)])[0]
             found["v"] = [
-                self._add(f"{name} {axis}", z_, exact=False) for axis, z_ in (("x", z.real), ("y", z.imag))
+                self._add(f"{name} {axis}", v, exact=False) for axis, v in zip("xy", xy(z).T, strict=True)
             ]
         return found
 
@@ -209,16 +203,8 @@ class Series:
             return {}
         self._fine = np.linspace(low, high, count)
         poses = self.poses.again(self._fine[:, None])
-        found = {}
-        for name in names:
-            body = next(body for body, points in m.bodies.items() if name in points)
-            z = poses.point(body, m.bodies[body][name], 0, name)
-            found[name] = [_bytes(z.real), _bytes(z.imag)]
-        return found
-
-
-def _bytes(values: ArrayLike) -> dict[str, Any]:
-    return dict(packed(values, exact=False))
+        places = {name: poses.point(*m.points[name], 0, name) for name in names}
+        return {name: [packed(part, exact=False) for part in (z.real, z.imag)] for name, z in places.items()}
 
 
 def _pairs(points: Sequence[complex]) -> list[float]:
@@ -287,7 +273,7 @@ def moving_page(
 def _first_plots(series: Series) -> list[str]:
     """Return the columns to begin with: an effort where there is one, and the place of a point that draws a path."""
     m = series.mechanism
-    free = [p for link in m.links.values() for p in link.points if p not in m.ground]
+    free = [p for p in m.points if p not in m.ground]
     moving = dict.fromkeys([*tracers(m), *free])
     efforts = [name for name in series.columns if "virtual_work" in name]
     names = [*efforts[:1], *(f"{p}_{axis}_m" for p in moving for axis in "yx"), *series.columns]

@@ -13,7 +13,7 @@ stands is a motion's matter: a shape at a pose is its points carried along by it
 from __future__ import annotations
 
 import cmath
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from math import isfinite, pi
@@ -51,6 +51,11 @@ class Line:
     points: tuple[complex, ...]
     closed: bool = False
 
+    @property
+    def reach(self) -> tuple[complex, ...]:
+        """Places that hold it between them."""
+        return self.points
+
 
 @dataclass(frozen=True)
 class Circle:
@@ -60,6 +65,11 @@ class Circle:
     body: str
     centre: complex
     radius: float
+
+    @property
+    def reach(self) -> tuple[complex, ...]:
+        """Corners that hold it between them."""
+        return self.centre - self.radius * (1 + 1j), self.centre + self.radius * (1 + 1j)
 
 
 @dataclass(frozen=True)
@@ -103,6 +113,20 @@ class Label:
 Shape = Line | Circle | Coil
 
 
+def standing(shape: Shape, at: Callable[[str, complex], complex], unit: float = 1.0) -> Line | Circle:
+    """Return a shape where its bodies stand, in the ground's axes and a unit of so many metres: a spring as its line.
+
+    `at` returns where a place of a body stands, m.
+    """
+    if isinstance(shape, Circle):
+        return Circle(shape.role, GROUND, at(shape.body, shape.centre) / unit, shape.radius / unit)
+    if isinstance(shape, Coil):
+        points: Iterable[complex] = shape.along(*(at(*end) for end in shape.ends))
+    else:
+        points = (at(shape.body, z) for z in shape.points)
+    return Line(shape.role, GROUND, tuple(z / unit for z in points), isinstance(shape, Line) and shape.closed)
+
+
 @dataclass(frozen=True)
 class Drawing:
     """The shapes of a mechanism from the back to the front, and its names.
@@ -131,8 +155,7 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
     reach = UNKNOWN_TRAVEL * mechanism.size
     spans = [_long_enough(span, reach, s) for span in (travel or [(-reach, reach)] * len(mechanism.guides))]
     guides = list(zip(mechanism.guides, spans, strict=True))
-    wheels = [circle for gear in mechanism.gears for circle in _wheels(mechanism, gear)]
-    wheels = list(dict.fromkeys(wheels))
+    wheels = list(dict.fromkeys(chain.from_iterable(_wheels(mechanism, gear) for gear in mechanism.gears)))
     slots = {
         name: [span for span in guides if span[0].on == name and not span[0].is_slider]
         for name in mechanism.bodies
@@ -167,7 +190,7 @@ def tracers(mechanism: Description) -> list[str]:
     A fixed pin in a moving slot is the ground's; the point of any other guide runs along a line that is drawn.
     """
     held = {*mechanism.ground, *mechanism.pins, *(guide.point for guide in mechanism.guides)}
-    return list(dict.fromkeys(p for link in mechanism.links.values() for p in link.points if p not in held))
+    return [name for name in mechanism.points if name not in held]
 
 
 def _long_enough(span: tuple[float, float], reach: float, s: float) -> tuple[float, float]:
@@ -307,20 +330,11 @@ def _mass(body: str, centre: complex, s: float) -> Iterator[Shape]:
 
 def _points(mechanism: Description, s: float) -> Iterator[Circle]:
     jointed = {*mechanism.pins, *(guide.point for guide in mechanism.guides)}
-    seen: set[str] = set()
-    for body, points in mechanism.bodies.items():
-        for name, z in points.items():
-            if name not in seen:
-                yield Circle("pin", body, z, s) if name in jointed else Circle("tip", body, z, 0.6 * s)
-            seen.add(name)
+    for name, (body, z) in mechanism.points.items():
+        yield Circle("pin", body, z, s) if name in jointed else Circle("tip", body, z, 0.6 * s)
 
 
 def _labels(mechanism: Description) -> Iterator[Label]:
-    seen: set[str] = set()
-    for body, points in mechanism.bodies.items():
-        for name, z in points.items():
-            if name not in seen:
-                yield Label("point", body, z, name)
-            seen.add(name)
+    yield from (Label("point", body, z, name) for name, (body, z) in mechanism.points.items())
     for name, link in mechanism.links.items():
         yield Label("link", name, sum(link.points.values()) / len(link.points), name)

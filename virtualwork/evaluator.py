@@ -119,7 +119,7 @@ def key_of(assembly: Assembly, name: str) -> Key:
     if kind == "points" and of:
         where = {point: body for body, points in m.bodies.items() for point in points}
         body = where[known(of[0], where, "point")]
-        return "point", body, m.bodies[body][of[0]], of[0], order(POINT)
+        return "point", body, 0j, of[0], order(POINT)
     if kind == "links" and of:
         return "angle", known(of[0], m.links, "link"), order(LINK)
     if kind == "slides" and of:

@@ -226,15 +226,14 @@ class Motion:
         from virtualwork.evaluator import key_of
 
         keys = {name: key_of(self.assembly, name) for name in names}
-        forces = (
-            self.dynamics.error_estimate() if any(key[0] == "reaction" for key in keys.values()) else None
-        )
-        moved = [key for key in keys.values() if key[0] != "reaction"]
-        self.rounding.together(moved)
-        if forces is not None:
-            forces.together()
+        joints = [key for key in keys.values() if key[0] == "reaction"]
+        self.rounding.together(key for key in keys.values() if key not in joints)
+        if joints:
+            self.dynamics.error_estimate().together(joints)
         return {
-            name: self.rounding.of(key) if forces is None or key in moved else forces.reaction(*key[1:])
+            name: self.dynamics.error_estimate().reaction(*key[1:])
+            if key in joints
+            else self.rounding.of(key)
             for name, key in keys.items()
         }
 
@@ -350,7 +349,7 @@ class Motion:
     @cached_property
     def drawing(self) -> Drawing:
         """What the mechanism is drawn as, its guides as long as they are used; `at(shape.body, z)` carries shapes along."""
-        from virtualwork.picture.shapes import shapes_of
+        from virtualwork.picture.paper import shapes_of
 
         return shapes_of(self.poses)
 

@@ -12,7 +12,14 @@ if TYPE_CHECKING:
     from virtualwork.bounds.quantities import Bounds
 
 
-class Whole(Protocol):
+class Asked(Protocol):
+    """What has quantities: the motion of one mechanism, (n,) each, or of variants, (v, n) each."""
+
+    def value(self, key: Key) -> Any:
+        """A quantity by its key (`Recording.value`)."""
+
+
+class Whole(Asked, Protocol):
     """A motion of a mechanism."""
 
     @property
@@ -27,31 +34,40 @@ class Whole(Protocol):
     def rounding(self) -> Bounds:
         """Bounds of its rounding errors."""
 
-    def value(self, key: Key) -> Any:
-        """A quantity by its key (`Recording.value`)."""
-
     def derivative(self, key: Key, path: str) -> Any:
         """The derivative of a quantity to a number of the description."""
 
 
-class PointMotion:
-    """Motion of one point of a link.
+class PartOfMotion:
+    """What moves: a point, a link, or along a guide; `order` 0 is its position or angle, 1 to 3 are its rates in time.
 
-    Attributes
-    ----------
-    position, velocity, acceleration, jerk : array (n, 2)
-        m, m/s, m/s², m/s³, in ground axes; NaN where the pose cannot be assembled.
+    Of one mechanism; of variants every array has a leading axis of them.
     """
 
-    def __init__(self, motion: Whole, body: str, place: complex, node: str | None = None) -> None:
-        self.motion, self.body, self.place, self.node = motion, body, place, node
+    def __init__(self, motion: Asked) -> None:
+        self.motion = motion
 
-    def __repr__(self) -> str:
-        return f"PointMotion({self.node or self.place!r} of {self.body}, {self.motion.n} poses)"
+    def key(self, order: int = 0) -> Key:
+        """What the position, the angle or a rate is asked for by (`Recording.value`)."""
+        raise NotImplementedError
+
+    def value(self, order: int) -> Reals:
+        """The position, the angle or a rate, (n,)."""
+        return self.motion.value(self.key(order))  # type: ignore[no-any-return]
+
+
+class PointRates(PartOfMotion):
+    """A point of a link, and its rates."""
+
+    def __init__(self, motion: Asked, body: str, place: complex, node: str | None = None) -> None:
+        super().__init__(motion)
+        self.body, self.place, self.node = body, place, node
+        # a named point stands wherever the description, or a variant, has it
+        self._where = 0j if node is not None else place
 
     @property
     def position(self) -> Reals:
-        """(n, 2) m."""
+        """(n, 2) m; NaN where the pose cannot be assembled."""
         return xy(self.complex(0))
 
     @property
@@ -74,14 +90,81 @@ class PointMotion:
         return self.motion.value(self.key(order))  # type: ignore[no-any-return]
 
     def key(self, order: int = 0) -> Key:
-        """What the position or a time derivative is asked for by (`Recording.value`)."""
-        return "point", self.body, self.place, self.node, order
+        return "point", self.body, self._where, self.node, order
+
+
+class LinkRates(PartOfMotion):
+    """A link's angle, and its rates."""
+
+    def __init__(self, motion: Asked, body: str) -> None:
+        super().__init__(motion)
+        self.body = body
+
+    @property
+    def angle(self) -> Reals:
+        """(n,) rad, of the link's own x-axis, in (−π, π]."""
+        return self.value(0)
+
+    @property
+    def omega(self) -> Reals:
+        """(n,) rad/s (Ibrahim eq. 1.4.2)."""
+        return self.value(1)
+
+    @property
+    def alpha(self) -> Reals:
+        """(n,) rad/s² (Ibrahim eq. 1.5.2)."""
+        return self.value(2)
+
+    @property
+    def jerk(self) -> Reals:
+        """(n,) rad/s³ (Ibrahim eq. 1.5.3)."""
+        return self.value(3)
+
+    def key(self, order: int = 0) -> Key:
+        return "angle", self.body, order
+
+
+class SlideRates(PartOfMotion):
+    """A slide along its guide, from the guide's `through`, and its rates."""
+
+    def __init__(self, motion: Asked, guide: int) -> None:
+        super().__init__(motion)
+        self.guide = guide
+
+    @property
+    def position(self) -> Reals:
+        """(n,) m."""
+        return self.value(0)
+
+    @property
+    def speed(self) -> Reals:
+        """(n,) m/s."""
+        return self.value(1)
+
+    @property
+    def acceleration(self) -> Reals:
+        """(n,) m/s²."""
+        return self.value(2)
+
+    @property
+    def jerk(self) -> Reals:
+        """(n,) m/s³."""
+        return self.value(3)
+
+    def key(self, order: int = 0) -> Key:
+        return "slide", self.guide, order
+
+
+class OfOneMechanism(PartOfMotion):
+    """Bounds of rounding errors, and derivatives to the numbers of the description."""
+
+    motion: Whole
 
     def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the position (order 0), velocity (1), acceleration (2) or jerk.
+        """Return a bound (n,) of the rounding error of the position or angle (order 0), or of its rate of that order.
 
-        It is the length of the error, in the unit of the quantity; the dimensions and the input are taken as exact.
-        Infinite where no digit is known, within rounding of a limit of the input. See `virtualwork.bounds`.
+        It has the unit of the quantity, and is the length of a point's error; the dimensions and the input are taken as
+        exact. Infinite where no digit is known, within rounding of a limit of the input. See `virtualwork.bounds`.
 
         Examples
         --------
@@ -97,13 +180,17 @@ class PointMotion:
         return self.motion.rounding.of(self.key(order))
 
     def sensitivity(self, path: str, order: int = 0) -> Reals:
-        """Return the derivative (n, 2) of the position (order 0), velocity (1), ... to a number of the description.
+        """Return the derivative of the position or angle (order 0), or of a rate, to a number of the description.
 
         Parameters
         ----------
         path : str
             Of the number, such as "links.crank.B.x"; angles count in radians.
         order : int
+
+        Returns
+        -------
+        array (n,); (n, 2) of a point
 
         Raises
         ------
@@ -120,14 +207,30 @@ class PointMotion:
         >>> crank.motion(math.pi / 2).point("P").sensitivity("links.crank.P.x").round(15)
         array([[0., 1.]])
         """
+        return self.motion.derivative(self.key(order), path)  # type: ignore[no-any-return]
+
+
+class PointMotion(OfOneMechanism, PointRates):
+    """Motion of one point of a link.
+
+    Attributes
+    ----------
+    position, velocity, acceleration, jerk : array (n, 2)
+        m, m/s, m/s², m/s³, in ground axes; NaN where the pose cannot be assembled.
+    """
+
+    def __repr__(self) -> str:
+        return f"PointMotion({self.node or self.place!r} of {self.body}, {self.motion.n} poses)"
+
+    def sensitivity(self, path: str, order: int = 0) -> Reals:
         return xy(self.motion.derivative(self.key(order), path))
 
     def coefficient(self, j: int = 0) -> Complexes:
         """The velocity coefficient dP/dq_j as x + iy, (n,): the point's virtual displacement for a unit of input j."""
-        return self.motion.value(("dpoint", self.body, self.place, self.node, j, 1))  # type: ignore[no-any-return]
+        return self.motion.value(("dpoint", self.body, self._where, self.node, j, 1))  # type: ignore[no-any-return]
 
 
-class LinkMotion:
+class LinkMotion(OfOneMechanism, LinkRates):
     """Motion of one link.
 
     Attributes
@@ -138,101 +241,16 @@ class LinkMotion:
         rad/s, rad/s², rad/s³.
     """
 
-    def __init__(self, motion: Whole, body: str) -> None:
-        self.motion, self.body = motion, body
-
     def __repr__(self) -> str:
         return f"LinkMotion({self.body}, {self.motion.n} poses)"
-
-    @property
-    def angle(self) -> Reals:
-        """(n,) rad."""
-        return self._rate(0)
-
-    @property
-    def omega(self) -> Reals:
-        """(n,) rad/s (Ibrahim eq. 1.4.2)."""
-        return self._rate(1)
-
-    @property
-    def alpha(self) -> Reals:
-        """(n,) rad/s² (Ibrahim eq. 1.5.2)."""
-        return self._rate(2)
-
-    @property
-    def jerk(self) -> Reals:
-        """(n,) rad/s³ (Ibrahim eq. 1.5.3)."""
-        return self._rate(3)
-
-    def _rate(self, order: int) -> Reals:
-        return self.motion.value(self.key(order))  # type: ignore[no-any-return]
-
-    def key(self, order: int = 0) -> Key:
-        """What the angle or a time derivative is asked for by (`Recording.value`)."""
-        return "angle", self.body, order
-
-    def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the angle (order 0, rad), ω (1), α (2) or the angular jerk (3).
-
-        The dimensions and the input are taken as exact. See `virtualwork.bounds`.
-        """
-        return self.motion.rounding.of(self.key(order))
-
-    def sensitivity(self, path: str, order: int = 0) -> Reals:
-        """Return the derivative (n,) of the angle (order 0, rad), ω (1), α (2) to a number of the description.
-
-        `path` names the number, such as "links.crank.B.x".
-        """
-        return self.motion.derivative(self.key(order), path)  # type: ignore[no-any-return]
 
     def coefficient(self, j: int = 0) -> Reals:
         """The velocity coefficient dθ/dq_j, (n,): the link's virtual rotation for a unit of input j."""
         return self.motion.value(("dangle", self.body, j, 1))  # type: ignore[no-any-return]
 
 
-class SlideMotion:
+class SlideMotion(OfOneMechanism, SlideRates):
     """Motion along one guide: `position`, `speed`, `acceleration`, `jerk`, each (n,), m from the guide's `through`."""
-
-    def __init__(self, motion: Whole, guide: int) -> None:
-        self.motion, self.guide = motion, guide
 
     def __repr__(self) -> str:
         return f"SlideMotion({self.motion.mechanism.guides[self.guide].point}, {self.motion.n} poses)"
-
-    @property
-    def position(self) -> Reals:
-        """(n,) m."""
-        return self._rate(0)
-
-    @property
-    def speed(self) -> Reals:
-        """(n,) m/s."""
-        return self._rate(1)
-
-    @property
-    def acceleration(self) -> Reals:
-        """(n,) m/s²."""
-        return self._rate(2)
-
-    @property
-    def jerk(self) -> Reals:
-        """(n,) m/s³."""
-        return self._rate(3)
-
-    def _rate(self, order: int) -> Reals:
-        return self.motion.value(self.key(order))  # type: ignore[no-any-return]
-
-    def key(self, order: int = 0) -> Key:
-        """What the slide or a time derivative is asked for by (`Recording.value`)."""
-        return "slide", self.guide, order
-
-    def error_estimate(self, order: int = 0) -> Reals:
-        """Return a bound (n,) of the rounding error of the slide (order 0, m), its speed (1), acceleration (2) or jerk (3).
-
-        The dimensions and the input are taken as exact. See `virtualwork.bounds`.
-        """
-        return self.motion.rounding.of(self.key(order))
-
-    def sensitivity(self, path: str, order: int = 0) -> Reals:
-        """Return the derivative (n,) of the slide (order 0, m), its speed (1), ... to a number of the description."""
-        return self.motion.derivative(self.key(order), path)  # type: ignore[no-any-return]

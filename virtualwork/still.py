@@ -7,8 +7,7 @@ from html import escape
 import numpy as np
 
 from virtualwork.describe.parts import GROUND
-from virtualwork.drawing import Circle, Coil, Drawing, Label, Line, Shape
-from virtualwork.formulas.numbers import Complexes
+from virtualwork.drawing import Circle, Drawing, Label, standing
 from virtualwork.formulas.poses import Poses
 
 WIDTH, HEIGHT, EDGE = 520.0, 360.0, 26.0
@@ -43,22 +42,10 @@ def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
     def at(body: str, z: complex) -> complex:
         return complex(poses.point(body, z)[i])
 
-    def places(shape: Shape) -> Complexes:
-        if isinstance(shape, Circle):
-            return np.array([at(shape.body, shape.centre)])
-        if isinstance(shape, Coil):
-            return np.array(shape.along(*(at(*end) for end in shape.ends)))
-        return np.array([at(shape.body, z) for z in shape.points])
-
-    drawn = [(shape, places(shape)) for shape in drawing.shapes]
-    if not all(np.isfinite(z).all() for _, z in drawn):
+    drawn = [(shape, standing(shape, at)) for shape in drawing.shapes]
+    every = np.array([z for _, shape in drawn for z in shape.reach])
+    if not np.isfinite(every).all():
         return None
-    reach = [
-        z + r
-        for s, z in drawn
-        for r in ((s.radius * np.array([1 + 1j, -1 - 1j])) if isinstance(s, Circle) else [0])
-    ]
-    every = np.concatenate(reach)
     low = complex(every.real.min(), every.imag.min())
     wide, high = np.ptp(every.real), np.ptp(every.imag)
     scale = min((WIDTH - 2 * EDGE) / (wide or 1e-300), (HEIGHT - 2 * EDGE) / (high or 1e-300))
@@ -73,20 +60,20 @@ def svg(poses: Poses, drawing: Drawing, i: int = 0) -> str | None:
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.2f} {height:.2f}" '
         f'role="img" style="max-width:100%" font-family="sans-serif" font-size="12"><title>{title}</title>'
     ]
-    for shape, z in drawn:
+    for shape, stood in drawn:
         color = (
             INK if shape.body == GROUND or shape.role in ("pin", "tip", "mass") else _color(order, shape.body)
         )
         stroke, filled = LOOK.get(shape.role, (1.3, 0.0))
         fill, filled = ("white", 1) if shape.role == "pin" else (color, filled if shape.body != GROUND else 0)
-        closed = isinstance(shape, Circle) or (isinstance(shape, Line) and shape.closed)
+        closed = isinstance(stood, Circle) or stood.closed
         look = f'stroke="{color}" stroke-width="{stroke}" stroke-linejoin="round" stroke-linecap="round" '
         look += f'fill="{fill}" fill-opacity="{filled}"' if closed else 'fill="none"'
-        if isinstance(shape, Circle):
-            x, y = xy(complex(z[0]))
-            parts.append(f'<circle cx="{x}" cy="{y}" r="{max(shape.radius * scale, 2.5):.2f}" {look}/>')
+        if isinstance(stood, Circle):
+            x, y = xy(stood.centre)
+            parts.append(f'<circle cx="{x}" cy="{y}" r="{max(stood.radius * scale, 2.5):.2f}" {look}/>')
             continue
-        points = " ".join(f"{x},{y}" for x, y in map(xy, z.tolist()))
+        points = " ".join(f"{x},{y}" for x, y in map(xy, stood.points))
         parts.append(f'<{"polygon" if closed else "polyline"} points="{points}" {look}/>')
     for label in drawing.labels:
         x, y = xy(at(label.body, label.at))

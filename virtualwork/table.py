@@ -28,8 +28,8 @@ def moving_columns(m: Description, poses: Poses, orders: int) -> dict[str, Any]:
     """Return the columns of links and points that move, so many orders of them."""
     links = {f"{name}_{LINK[k]}": ("angle", name, k) for name in m.links for k in range(orders)}
     points = [
-        (name, k, ("point", *place, name, k))
-        for name, place in m.points.items()
+        (name, k, ("point", body, 0j, name, k))
+        for name, (body, _) in m.points.items()
         if name not in m.ground
         for k in range(orders)
     ]

@@ -38,6 +38,10 @@ class Digits:
     sin, cos, atan2 = staticmethod(mp.sin), staticmethod(mp.cos), staticmethod(mp.atan2)
 
     @staticmethod
+    def binade(x: Any) -> Any:
+        return mp.ldexp(0.5, mp.frexp(abs(x))[1])
+
+    @staticmethod
     def sqrt(x: Any) -> Any:
         return mp.sqrt(x) if x >= 0 else mp.nan
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cli.errors import DataError
 from cli.read.tables import Table, read
-from cli.read.units import phasor, to_si
+from cli.read.units import phasor
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -55,7 +55,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
     (amount,) = amounts
     given = table.numbers[amount]
     table.reject(given.values < 0, amount, f"a {amount} that is not negative")
-    size = to_si(given.values, known[amount], given.unit)
+    size = given.si
     radius = None
     if amount != "unbalance":
         radius = table.require("radius", "length")
@@ -63,7 +63,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         table.reject(
             (radius.values == 0) & (given.values > 0), "radius", "a positive radius, for there is a mass"
         )
-        size = size * to_si(radius.values, "length", radius.unit)
+        size = size * radius.si
         if amount == "weight":
             size = size / gravity
     angle = table.require("angle", "angle")
@@ -75,7 +75,7 @@ def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
         names,
         rotor,
         phasor(size, angle.values, angle.unit),
-        None if z is None else to_si(z.values, "length", z.unit),
+        None if z is None else z.si,
         given.unit if amount == "mass" else "kg" if amount == "weight" else given.unit.split("_")[0],
         given.unit if amount == "unbalance" else {"in": "oz_in", "m": "kg_m"}.get(radius_unit or "", "g_mm"),
         radius_unit,

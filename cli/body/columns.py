@@ -20,21 +20,23 @@ if TYPE_CHECKING:
 
 
 class Quantity(NamedTuple):
-    """A scalar or a vector with the bounds of its components' errors."""
+    """A scalar or a vector, with the bounds of its components' errors."""
 
     name: str
     unit: str
     value: ArrayLike
     error: Callable[[], ArrayLike]
 
-    @property
-    def header(self) -> str:
-        """Its name with its unit."""
-        return f"{self.name}_{self.unit}" if self.unit else self.name
+    def column(self, laid: Callable[[list[float]], list[float | None]]) -> Column:
+        """Return it as a column in which its numbers, and their bounds, are laid so."""
+
+        def error() -> list[float]:
+            return [bound or 0.0 for bound in laid(_numbers(self.error()))]
+
+        return Column(self.name, self.unit, laid(_numbers(self.value)), error)
 
 
-def _quantities(found: MovingBody) -> Iterator[Quantity]:
-    """Yield what is shown, in the order in which it is shown."""
+def _of_body(found: MovingBody) -> Iterator[Quantity]:
     body, moments = found.parts.whole, found.parts.whole.principal
 
     def tensor_error(row: int) -> Array:
@@ -53,10 +55,6 @@ def _quantities(found: MovingBody) -> Iterator[Quantity]:
     yield Quantity("principal", "kg_m2", moments.moments, lambda: principal_error().moments)
     for i in range(3):
         yield Quantity(f"principal_axis_{i + 1}", "", moments.axes[i], partial(axis_error, i))
-    if found.moving:
-        yield from _of_motion(found)
-    if found.request.shaft is not None:
-        yield from _of_shaft(found)
 
 
 def _of_motion(found: MovingBody) -> Iterator[Quantity]:
@@ -103,85 +101,81 @@ def _of_shaft(found: MovingBody) -> Iterator[Quantity]:
     )
 
 
+def _quantities(found: MovingBody) -> list[Quantity]:
+    """Return what is shown, in the order in which it is shown."""
+    return [
+        *_of_body(found),
+        *(_of_motion(found) if found.moving else ()),
+        *(_of_shaft(found) if found.request.shaft is not None else ()),
+    ]
+
+
 def axes(found: MovingBody) -> Table:
     """A row for each axis, then one for each correction plane; scalars stand in the first row."""
     corrections = found.corrections
     below = len(corrections)
 
-    def filled(value: ArrayLike) -> list[float | None]:
-        numbers = _numbers(value)
+    def in_rows(numbers: list[float]) -> list[float | None]:
         return [*numbers, *[None] * (3 - len(numbers) + below)]
-
-    def error(q: Quantity) -> list[float]:
-        return [bound or 0.0 for bound in filled(q.error())]
 
     def of_correction(name: str) -> list[float]:
         return [0.0, 0.0, 0.0, *(getattr(bound, name) for bound in found.correction_errors)]
 
     columns = [Column("axis", "", [*"xyz", *(c.plane for c in corrections)])]
-    for q in _quantities(found):
-        columns.append(Column(q.name, q.unit, filled(q.value), partial(error, q)))
-    if corrections:
-        _, z, radius, *amounts = zip(*corrections, strict=True)
-        columns.append(Column("correction_z", "m", [None, None, None, *z]))
-        columns.append(Column("correction_radius", "m", [None, None, None, *radius]))
-        for name, unit, values in zip(
-            ("unbalance", "mass", "angle"), ("kg_m", "kg", "deg"), amounts, strict=True
-        ):
-            columns.append(
-                Column(f"correction_{name}", unit, [None, None, None, *values], partial(of_correction, name))
-            )
+    columns += [quantity.column(in_rows) for quantity in _quantities(found)]
+    units = {"z": "m", "radius": "m", "unbalance": "kg_m", "mass": "kg", "angle": "deg"}
+    for name, unit in units.items() if corrections else ():
+        values = [None, None, None, *(getattr(c, name) for c in corrections)]
+        error = None if unit == "m" else partial(of_correction, name)
+        columns.append(Column(f"correction_{name}", unit, values, error))
     return Table(columns, keys=("axis",))
 
 
 def quantities(found: MovingBody) -> Table:
     """The terminal's table: a row for each quantity, then mass and angle of each correction."""
 
-    def laid(value: ArrayLike) -> list[float | None]:
-        numbers = _numbers(value)
+    def in_cells(numbers: list[float]) -> list[float | None]:
         return [*numbers, None, None, None] if len(numbers) == 1 else [None, *numbers]
 
     def of_correction(i: int, name: str) -> float:
         return float(getattr(found.correction_errors[i], name))
 
-    rows = list(_quantities(found))
+    given = _quantities(found)
     for i, c in enumerate(found.corrections):
-        rows.append(Quantity(f"plane {c.plane}: mass", "kg", c.mass, partial(of_correction, i, "mass")))
-        rows.append(Quantity(f"plane {c.plane}: angle", "deg", c.angle, partial(of_correction, i, "angle")))
-    values = zip(*(laid(row.value) for row in rows), strict=True)
+        for name, unit in (("mass", "kg"), ("angle", "deg")):
+            value, error = getattr(c, name), partial(of_correction, i, name)
+            given.append(Quantity(f"plane {c.plane}: {name}", unit, value, error))
+    rows = [quantity.column(in_cells) for quantity in given]
 
-    def error(k: int) -> list[float]:
-        return [laid(row.error())[k] or 0.0 for row in rows]
+    def bounds(k: int) -> list[float]:
+        return [in_cells(_numbers(quantity.error()))[k] or 0.0 for quantity in given]
 
-    return Table(
-        [
-            Column("quantity", "", [row.header for row in rows]),
-            *(
-                Column(name, "", column, partial(error, k))
-                for k, (name, column) in enumerate(zip(("value", "x", "y", "z"), values, strict=True))
-            ),
-        ]
-    )
+    columns = [Column("quantity", "", [row.header for row in rows])]
+    columns += [
+        Column(name, "", [row.values[k] for row in rows], partial(bounds, k))
+        for k, name in enumerate(("value", "x", "y", "z"))
+    ]
+    return Table(columns)
 
 
 def document(found: MovingBody) -> Document:
     """The JSON document."""
-    body, motion, moments, point = found.parts.whole, found.motion, found.parts.whole.principal, found.point
+    of = {quantity.name: _plain(quantity.value) for quantity in (*_of_body(found), *_of_motion(found))}
     document: Document = {
-        "mass_kg": float(body.mass),
-        "center_m": _plain(body.center),
-        "inertia_kg_m2": _plain(body.inertia),
-        "principal_kg_m2": _plain(moments.moments),
-        "principal_axes": _plain(moments.axes),
-        "momentum_kg_m2_s": _plain(motion.momentum),
-        "about_m": _plain(point),
-        "momentum_about_kg_m2_s": _plain(motion.momentum_about(point)),
-        "momentum_rate_N_m": _plain(motion.rate),
-        "momentum_rate_about_N_m": _plain(motion.rate_about(point)),
-        "rate_terms_N_m": {"relative": _plain(motion.relative), "transport": _plain(motion.transport)},
-        "inertia_force_N": _plain(motion.inertia_force),
-        "inertia_moment_N_m": _plain(motion.inertia_wrench.moment),
-        "energy_J": float(motion.energy),
+        "mass_kg": of["mass"],
+        "center_m": of["center"],
+        "inertia_kg_m2": [of[f"inertia_{axis}"] for axis in "xyz"],
+        "principal_kg_m2": of["principal"],
+        "principal_axes": [of[f"principal_axis_{i}"] for i in (1, 2, 3)],
+        "momentum_kg_m2_s": of["momentum"],
+        "about_m": _plain(found.point),
+        "momentum_about_kg_m2_s": of["momentum_about"],
+        "momentum_rate_N_m": of["momentum_rate"],
+        "momentum_rate_about_N_m": of["momentum_rate_about"],
+        "rate_terms_N_m": {term: of[f"rate_{term}"] for term in ("relative", "transport")},
+        "inertia_force_N": of["inertia_force"],
+        "inertia_moment_N_m": of["inertia_moment"],
+        "energy_J": of["energy"],
         "products": "+∫xy dm; the matrix carries -I_xy",
     }
     if found.request.shaft is None:

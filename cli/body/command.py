@@ -118,8 +118,7 @@ def run(
 def _inertias(file: str) -> Result:
     from pathlib import Path
 
-    from cli.body.inertia_columns import document, table, warnings
-    from cli.body.inertias import checks
+    from cli.body.inertias import checks, document, table, warnings
     from cli.read.files import read_bytes
     from cli.read.robots.reading import read
     from cli.show.columns import Result

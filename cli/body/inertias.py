@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.read.robots.robot import Inertial, Robot, RobotLink
+from cli.errors import DataError
+from cli.read.robots.robot import DIAGONAL_FIRST, PLACES, ROWS, Inertial, Robot, RobotLink, symmetric
+from cli.show.columns import Column, Table
 from rigidbody3d import inertia
+
+if TYPE_CHECKING:
+    from cli.show.columns import Document
 
 Array = NDArray[np.float64]
 
-PLACES = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
-# the orders in which formats and tables print a tensor
-ORDERS = (("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
 SLIPS = {1: "a slipped decimal", 2: "a slipped decimal", 3: "g for kg", 6: "mm for m"}
 ROUNDING = 1e-12
 # without shapes a link is taken to reach no farther than this many times its joints
@@ -123,12 +126,8 @@ class Check:
 
     def _reordered(self) -> Array:
         """The same numbers, typed in the other order."""
-        typed, meant = ORDERS
-        made = np.zeros((3, 3))
-        for here, there in zip(typed, meant, strict=True):
-            i, j = PLACES[there]
-            made[i, j] = made[j, i] = self.held.tensor[PLACES[here]]
-        return made
+        pairs = zip(ROWS, DIAGONAL_FIRST, strict=True)
+        return symmetric({meant: float(self.held.tensor[PLACES[typed]]) for typed, meant in pairs})
 
     def _too_large(self) -> str | None:
         """A body that reaches no farther than r from its centre has no moment above m·r²."""
@@ -178,3 +177,58 @@ def checks(robot: Robot) -> list[Check]:
             reach = max(float(np.linalg.norm(c - at)) + r for c, r in link.shapes)
         found.append(Check(link, held, reach or None))
     return found
+
+
+# -- what is shown of it: JSON, columns, words -----------------------------------------------------------
+
+
+def document(found: Sequence[Check]) -> Document:
+    """Return the JSON document."""
+    return {
+        "bodies": [
+            {
+                "link": c.link.name,
+                "valid": c.valid,
+                "principal_kg_m2": c.moments.tolist(),
+                "nearest_kg_m2": c.nearest.tolist(),
+                "likely": c.likely,
+            }
+            for c in found
+        ]
+    }
+
+
+def table(found: Sequence[Check]) -> Table:
+    """Return a row for each link: whether a body can have its tensor, its moments, the nearest tensor's entries."""
+    columns = [
+        Column("link", "", [c.link.name for c in found]),
+        Column("valid", "", ["yes" if c.valid else "no" for c in found]),
+    ]
+    columns += [Column(f"principal_{k + 1}", "kg_m2", [float(c.moments[k]) for c in found]) for k in range(3)]
+    columns += [
+        Column(f"nearest_{entry}", "kg_m2", [float(c.nearest[place]) for c in found])
+        for entry, place in PLACES.items()
+    ]
+    columns.append(Column("likely", "", [c.likely for c in found]))
+    return Table(columns, keys=("link",))
+
+
+def warnings(robot: Robot, found: Sequence[Check]) -> list[str]:
+    """Name what is broken, and what looks wrong though a body can have it."""
+    if not found:
+        raise DataError(f"{robot.file}: no link has an inertia: nothing to check")
+    said = []
+    for c in found:
+        hint = f"; likely: {c.likely}" if c.likely else ""
+        if not c.valid:
+            I1, I2, I3 = c.moments
+            why = "is negative" if I1 < 0 else f"{I1:.6g} + {I2:.6g} < {I3:.6g}"
+            moments = f"principal moments {I1:.6g}, {I2:.6g}, {I3:.6g} kg·m²"
+            said.append(
+                f"link '{c.link.name}': no body has it: {moments}: {'the first ' if I1 < 0 else ''}{why}{hint}"
+            )
+        elif hint:
+            said.append(
+                f"link '{c.link.name}': a body can have it, but it is larger than the link's reach allows{hint}"
+            )
+    return said

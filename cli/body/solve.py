@@ -70,29 +70,22 @@ class MovingBody:
     def motion(self) -> Motion:
         """The motion of the body, its components along the axes drawn."""
         w, body = self.request, self.parts.whole
+        omega, alpha, point = w.omega or ORIGIN, w.alpha or ORIGIN, w.fixed
         if w.shaft is not None:
-            spin, rate = (0.0, 0.0, w.shaft.speed), (0.0, 0.0, w.shaft.speed_rate)
-            return Motion.about_fixed_point(body.inertia, spin, rate, mass=body.mass, center=body.center)
-        omega, alpha = w.omega or ORIGIN, w.alpha or ORIGIN
-        if w.fixed is not None:
-            return Motion.about_fixed_point(
-                body.inertia,
-                omega,
-                alpha,
-                mass=body.mass,
-                center=body.center,
-                point=w.fixed,
-                frame_omega=w.frame_omega,
+            omega, alpha, point = (0.0, 0.0, w.shaft.speed), (0.0, 0.0, w.shaft.speed_rate), ORIGIN
+        if point is None:
+            velocity, acceleration = w.velocity or ORIGIN, w.acceleration or ORIGIN
+            return Motion(
+                body.inertia, omega, alpha, w.frame_omega, body.mass, body.center, velocity, acceleration
             )
-        return Motion(
+        return Motion.about_fixed_point(
             body.inertia,
             omega,
             alpha,
-            w.frame_omega,
-            body.mass,
-            body.center,
-            w.velocity or ORIGIN,
-            w.acceleration or ORIGIN,
+            mass=body.mass,
+            center=body.center,
+            point=point,
+            frame_omega=w.frame_omega,
         )
 
     @property

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.errors import DataError, nearest
-from cli.show.reported import reported
+from cli.show.output import reported
 
 if TYPE_CHECKING:
     from cli.show.columns import Result, Section

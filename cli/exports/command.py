@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from cli.errors import DataError
 from cli.read.options import bad
-from cli.show.reported import reported
+from cli.show.output import reported
 
 if TYPE_CHECKING:
     from cli.show.columns import Result, Sheet

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import cmath
 from xml.etree.ElementTree import Element
 
 from cli.exports.markup import add, digits, document, spatial
-from cli.exports.skeleton import Branching, Joint, Part, Skeleton
+from cli.exports.skeleton import LIGHT, THICK, Branching, Joint, Part, Skeleton
 from cli.exports.travel import Travel
 from virtualwork.describe.parts import GROUND
 
-# of the heaviest link: what a link without mass is given, since no simulator takes none
-LIGHT = 1e-6
 # MuJoCo takes nothing lighter
 LIGHTEST = 2e-15
-THICK = 0.008
 
 
 def mjcf(s: Skeleton, travel: Travel, said: str) -> bytes:
@@ -51,7 +47,7 @@ def mjcf(s: Skeleton, travel: Travel, said: str) -> bytes:
     _springs(s, tendon, bodies)
     actuator = Element("actuator")
     for k, e in enumerate(m.inputs):
-        joint = next((j for j in s.joints if j.input == k), None)
+        joint = s.joint_of(k)
         motor = add(actuator, "motor", name=e.name)
         if joint is None:
             _fixed(tendon, f"input {e.name}", s.free_input(k))
@@ -101,10 +97,7 @@ def _body(s: Skeleton, b: Branching, inside: Element) -> Element:
     made = add(body, "joint", name=j.name, type="hinge" if j.kind == "turn" else "slide")
     # of a slide the place means nothing to MuJoCo, but it is the point's
     made.set("pos", spatial(j.ends[1] if b.child == j.link else j.ends[0]))
-    if j.kind == "turn":
-        made.set("axis", digits(0.0, 0.0, b.sense))
-    else:
-        made.set("axis", spatial(b.sense * cmath.rect(1.0, j.direction - part.turn)))
+    made.set("axis", digits(*j.axis(part, b.sense)))
     if j.value:
         made.set("ref", digits(j.value))
     if j.limits is not None:

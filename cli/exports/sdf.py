@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import cmath
 from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement
 
 from cli.exports.markup import add, digits, document
-from cli.exports.skeleton import Joint, Part, Skeleton
+from cli.exports.skeleton import LIGHT, Joint, Part, Skeleton
 from cli.exports.travel import Travel
 from virtualwork.describe.parts import GROUND, Gear
 
 WORLD = "world"
-# of the heaviest link: what a link without mass is given, since the format takes none
-LIGHT = 1e-6
-THICK = 0.008
 SPACE = "https://dalembert.invalid/sdf"
 PLUGIN = {"filename": "gz-sim-joint-controller-system", "name": "gz::sim::systems::JointController"}
 AXES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -61,18 +57,15 @@ def _link(s: Skeleton, model: Element, part: Part, light: float) -> None:
     for name in AXES:
         # in the plane only izz acts
         add(tensor, name, digits(inertia if name[1] == name[2] else 0.0))
-    for k, (a, b) in enumerate(part.strokes, 1):
+    for k, (middle, turn, sides) in enumerate(part.boxes(s.m.size), 1):
         visual = add(link, "visual", name=f"stroke {k}")
-        at(visual, (a + b) / 2, cmath.phase(b - a))
-        box = add(add(add(visual, "geometry"), "box"), "size")
-        box.text = digits(abs(b - a), 2 * THICK * s.m.size, 2 * THICK * s.m.size)
-    for point, z in part.points.items():
-        if point not in s.m.pins and not any(point == j.point for j in s.joints):
-            frame = add(model, "frame", name=point, attached_to=part.name)
-            at(frame, z)
+        at(visual, middle, turn)
+        add(add(add(visual, "geometry"), "box"), "size", digits(*sides))
+    for point, z in s.free_points(part).items():
+        at(add(model, "frame", name=point, attached_to=part.name), z)
 
 
-def joint(model: Element, s: Skeleton, j: Joint, travel: Travel | None, ground: str = WORLD) -> None:
+def joint(model: Element, s: Skeleton, j: Joint, travel: Travel, ground: str = WORLD) -> None:
     """Add a joint; its place is seen from the link, which cannot be the ground."""
     on, link, ends, sense = j.on, j.link, j.ends, 1.0
     if link == GROUND:
@@ -83,16 +76,14 @@ def joint(model: Element, s: Skeleton, j: Joint, travel: Travel | None, ground: 
     add(made, "child", link)
     at(made, ends[1])
     axis = add(made, "axis")
-    turned = s.parts[link].turn
-    along = sense * cmath.rect(1.0, j.direction - turned)
-    add(axis, "xyz", digits(0.0, 0.0, sense) if j.kind == "turn" else digits(along.real, along.imag, 0.0))
+    add(axis, "xyz", digits(*j.axis(s.parts[link], sense)))
     limit = add(axis, "limit")
     if j.limits is not None:
         for tag, value in zip(("lower", "upper"), j.limits, strict=True):
             # the coordinate is 0 in the start pose
             add(limit, tag, digits(value - j.value))
-    peak = None if travel is None else travel.peak
-    add(limit, "effort", digits(0.0 if j.input is None else -1.0 if peak is None else peak))
+    effort = 0.0 if j.input is None else -1.0 if travel.peak is None else travel.peak
+    add(limit, "effort", digits(effort))
 
 
 def welds(model: Element, s: Skeleton) -> None:

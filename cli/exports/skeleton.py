@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cli.errors import DataError
+from cli.read.names import Groups, unused
 from virtualwork.describe.parts import GROUND, TorsionSpring
 from virtualwork.drawing import hull
 from virtualwork.parts_of_motion import SlideMotion
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
 FOLLOWED = 181
 # a rate of nothing, for an input's of one
 STILL = 1e-9
+# of the heaviest link: what a link without mass is given where a format takes none
+LIGHT = 1e-6
+# how thick a link is drawn, of the mechanism's size
+THICK = 0.008
 
 
 @dataclass
@@ -47,6 +52,11 @@ class Part:
         """What it looks like: the sides of the hull of its points, in its axes."""
         ends = hull(self.points.values())
         return list(zip(ends, ends[1:] + (ends[:1] if len(ends) > 2 else ()), strict=False))
+
+    def boxes(self, size: float) -> Iterator[tuple[complex, float, tuple[float, float, float]]]:
+        """Yield its strokes as boxes for a mechanism of this size: the middle, the direction and the sides of each."""
+        for a, b in self.strokes:
+            yield (a + b) / 2, cmath.phase(b - a), (abs(b - a), 2 * THICK * size, 2 * THICK * size)
 
     def inside(self, z: complex) -> complex:
         """Return a place of the ground in its axes."""
@@ -72,6 +82,13 @@ class Joint:
     input: int | None = None
     guide: int | None = None
     limits: tuple[float, float] | None = None
+
+    def axis(self, part: Part, sense: float) -> tuple[float, float, float]:
+        """Return its axis in those of a body: about which it turns, or along which it slides."""
+        if self.kind == "turn":
+            return 0.0, 0.0, sense
+        along = sense * cmath.rect(1.0, self.direction - part.turn)
+        return along.real, along.imag, 0.0
 
     def turn_about(self) -> None:
         """Turn `on` against `link` instead."""
@@ -136,7 +153,7 @@ class Skeleton:
         """Add a pin; an input's coordinate is that of the input, any other's is 0 in the start pose."""
         joint = Joint(self._name(point), "turn", on, link, ends, point)
         for j, e in enumerate(self.m.inputs):
-            if not e.is_slide and {e.link, e.on} == {on, link} and not any(x.input == j for x in self.joints):
+            if not e.is_slide and {e.link, e.on} == {on, link} and not self.joint_of(j):
                 joint.input, joint.value = j, self.inputs[j]
                 if e.link == on:
                     joint.turn_about()
@@ -155,7 +172,7 @@ class Skeleton:
             direction = on.turn + g.angle
             if not g.is_slider:
                 block = Part(
-                    _unused(f"block {g.point}", self.parts), link.world(at), direction, {g.point: 0j}
+                    unused(f"block {g.point}", self.parts, " "), link.world(at), direction, {g.point: 0j}
                 )
                 self.parts[block.name] = block
                 self._turn(g.point, g.link, block.name, (at, 0j))
@@ -173,24 +190,28 @@ class Skeleton:
 
     def _indirect_inputs(self) -> None:
         """Take as an input's joint one of bodies that turn as its links do: along a guide nothing turns."""
-        alike = {name: name for name in self.parts}
+        self.alike = Groups(self.parts)
         for j in self.joints:
             if j.kind == "slide":
-                alike = {name: alike[j.on] if top == alike[j.link] else top for name, top in alike.items()}
-        self.alike = alike
+                self.alike.join(j.on, j.link)
         for k, e in enumerate(self.m.inputs):
-            if e.is_slide or any(j.input == k for j in self.joints):
+            if e.is_slide or self.joint_of(k):
                 continue
-            pair = alike[str(e.link)], alike[e.on]
+            wanted = [self.alike.of(body) for body in (str(e.link), e.on)]
             for j in self.joints:
-                if j.kind == "turn" and j.input is None and {alike[j.on], alike[j.link]} == {*pair}:
+                pair = [self.alike.of(body) for body in (j.on, j.link)]
+                if j.kind == "turn" and j.input is None and set(pair) == set(wanted):
                     j.input, j.value = k, self.inputs[k]
-                    if alike[j.on] == pair[0]:
+                    if pair[0] == wanted[0]:
                         j.turn_about()
                     break
 
+    def joint_of(self, k: int) -> Joint | None:
+        """Return the joint whose coordinate is an input."""
+        return next((j for j in self.joints if j.input == k), None)
+
     def _name(self, wanted: str) -> str:
-        return _unused(wanted, (j.name for j in self.joints))
+        return unused(wanted, (j.name for j in self.joints), " ")
 
     # --- tree -------------------------------------------------------------------------------------------------
     def _branch(self) -> None:
@@ -214,7 +235,7 @@ class Skeleton:
         self.welds: list[tuple[str, str]] = []
         for j in [j for j in self.closing if j.kind == "slide"]:
             link = self.parts[j.link]
-            block = Part(_unused(f"carriage {j.point}", self.parts), link.at, link.turn)
+            block = Part(unused(f"carriage {j.point}", self.parts, " "), link.at, link.turn)
             self.parts[block.name] = block
             self.welds.append((j.link, block.name))
             self.closing.remove(j)
@@ -240,6 +261,15 @@ class Skeleton:
         if lost:
             raise DataError(f"{', '.join(lost)}: no pin or guide leads there from the ground: not exported")
 
+    def world(self, body: str, z: complex) -> complex:
+        """Return where a place of a body stands, m."""
+        return self.parts[body].world(z)
+
+    def free_points(self, part: Part) -> dict[str, complex]:
+        """Return the named points of a link that no joint holds, in its axes."""
+        held = {*self.m.pins, *(j.point for j in self.joints)}
+        return {p: z for p, z in part.points.items() if p not in held and part.name != GROUND}
+
     def walk(self, parent: str = GROUND) -> Iterator[Branching]:
         """Yield the tree's joints, each branch to its end."""
         for b in self.children.get(parent, ()):
@@ -264,7 +294,7 @@ class Skeleton:
 
     def driven(self, k: int) -> Joint | None:
         """Return the joint whose coordinate is an input; where none is, the one on which its link hangs in the tree."""
-        own = next((j for j in self.joints if j.input == k), None)
+        own = self.joint_of(k)
         if own is not None:
             return own
         unit = [[float(i == k) for i in range(len(self.inputs))]]
@@ -273,9 +303,9 @@ class Skeleton:
         )
 
         def moves(j: Joint) -> bool:
-            on, link = (self.alike[body] for body in (j.on, j.link))
-            rates = (float(motion.link(body).omega[0]) if body != GROUND else 0.0 for body in (on, link))
-            return abs(next(rates) - next(rates)) > STILL
+            bodies = (self.alike.of(body) for body in (j.on, j.link))
+            on, link = (float(motion.link(body).omega[0]) if body != GROUND else 0.0 for body in bodies)
+            return abs(on - link) > STILL
 
         hanging = (
             b.joint for b in self.walk() if b.child == self.m.inputs[k].link and b.joint.kind == "turn"
@@ -294,24 +324,5 @@ def _spanning(nodes: Iterable[str], pairs: list[tuple[str, str]]) -> list[int]:
     >>> _spanning("abc", [("a", "b"), ("b", "a"), ("b", "c"), ("a", "c")])
     [0, 2]
     """
-    root = {node: node for node in nodes}
-
-    def top(node: str) -> str:
-        while root[node] != node:
-            node = root[node]
-        return node
-
-    found = []
-    for k, (a, b) in enumerate(pairs):
-        if top(a) != top(b):
-            root[top(a)] = top(b)
-            found.append(k)
-    return found
-
-
-def _unused(wanted: str, used: Iterable[str]) -> str:
-    held, name, k = set(used), wanted, 1
-    while name in held:
-        k += 1
-        name = f"{wanted} {k}"
-    return name
+    groups = Groups(nodes)
+    return [k for k, pair in enumerate(pairs) if groups.join(*pair)]

@@ -60,9 +60,12 @@ class Travel:
     @cached_property
     def traced(self) -> list[str]:
         """The points whose curves are drawn: those that no joint holds; where there are none, all that move."""
-        m = self.m
-        moving = dict.fromkeys(p for link in m.links.values() for p in link.points if p not in m.ground)
-        return tracers(m) or list(moving)
+        return tracers(self.m) or self.moving
+
+    @property
+    def moving(self) -> list[str]:
+        """The points that are not the ground's."""
+        return [p for p in self.m.points if p not in self.m.ground]
 
     def way(self, guide: int) -> tuple[float, float] | None:
         """The least and the largest position along a guide, m."""

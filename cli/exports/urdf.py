@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 from dataclasses import replace
 from xml.etree.ElementTree import Element
 
@@ -49,11 +48,10 @@ def _link(s: Skeleton, root: Element, part: Part, origin: complex) -> None:
         add(inertial, "mass", value=part.mass)
         # in the plane only izz acts
         add(inertial, "inertia", None, **{n: part.inertia if n[1] == n[2] else 0.0 for n in sdf.AXES})
-    for a, b in part.strokes:
+    for middle, turn, sides in part.boxes(s.m.size):
         visual = add(link, "visual")
-        add(visual, "origin", xyz=spatial((a + b) / 2 - origin), rpy=digits(0.0, 0.0, cmath.phase(b - a)))
-        size = digits(abs(b - a), 2 * sdf.THICK * s.m.size, 2 * sdf.THICK * s.m.size)
-        add(add(visual, "geometry"), "box", size=size)
+        add(visual, "origin", xyz=spatial(middle - origin), rpy=digits(0.0, 0.0, turn))
+        add(add(visual, "geometry"), "box", size=digits(*sides))
 
 
 def _joint(s: Skeleton, root: Element, b: Branching, origin: dict[str, complex], travel: Travel) -> None:
@@ -64,8 +62,7 @@ def _joint(s: Skeleton, root: Element, b: Branching, origin: dict[str, complex],
     add(made, "origin", xyz=spatial(at), rpy=digits(0.0, 0.0, part.turn - parent.turn))
     add(made, "parent", link=b.parent)
     add(made, "child", link=b.child)
-    along = cmath.rect(1.0, j.direction - part.turn) * b.sense
-    add(made, "axis", xyz=digits(0.0, 0.0, b.sense) if j.kind == "turn" else spatial(along))
+    add(made, "axis", xyz=digits(*j.axis(part, b.sense)))
     if kind != "continuous" or j.input is not None:
         limit = add(made, "limit")
         low, high = (
@@ -83,9 +80,7 @@ def _joint(s: Skeleton, root: Element, b: Branching, origin: dict[str, complex],
 
 def _frames(s: Skeleton, root: Element, part: Part, origin: complex) -> None:
     """Named points that no joint holds: links without mass, fixed there."""
-    for point, z in part.points.items():
-        if part.name == GROUND or point in s.m.pins or any(point == j.point for j in s.joints):
-            continue
+    for point, z in s.free_points(part).items():
         name = point if point not in s.parts else f"{point} point"
         add(root, "link", name=name)
         made = add(root, "joint", name=f"{name} fixed", type="fixed")
@@ -99,7 +94,8 @@ def _gears(s: Skeleton, root: Element, gazebo: Element) -> None:
     boxes: list[Gear] = []
     for g in s.m.gears:
         terms = s.terms(g.shares())
-        last = [name for name in terms if not _driven(s, name)]
+        driven = {j.name for j in s.joints if j.input is not None}
+        last = [name for name in terms if name not in driven]
         joint = next((e for e in root.iter("joint") if last and e.get("name") == last[-1]), None)
         if len(terms) == 2 and joint is not None and joint.find("mimic") is None:
             (other,) = (name for name in terms if name != last[-1])
@@ -109,7 +105,3 @@ def _gears(s: Skeleton, root: Element, gazebo: Element) -> None:
         else:
             boxes.append(g)
     sdf.gearboxes(gazebo, boxes, GROUND)
-
-
-def _driven(s: Skeleton, name: str) -> bool:
-    return any(j.name == name and j.input is not None for j in s.joints)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.errors import DataError
-from cli.exports.drawing import draw
+from cli.exports.drawing import DXF_UNITS, draw, dxf, svg
 from cli.exports.skeleton import Skeleton
 from cli.exports.travel import Travel
 from cli.read.units import UNITS
@@ -35,11 +35,7 @@ def written(
     s = Skeleton(m, inputs, travel.limits)
     said = _said(m, inputs, file)
     if suffix in (".dxf", ".svg"):
-        from cli.exports.dxf import UNITS as DRAWN
-        from cli.exports.dxf import dxf
-        from cli.exports.svg import svg
-
-        if length not in DRAWN:
+        if length not in DXF_UNITS:
             length, found = "m", (1.0, found[1])
         drawing = draw(s, travel, length, found[0])
         notes = (
@@ -84,7 +80,7 @@ def _curves(travel: Travel, length: str, factor: float, angle: str) -> bytes:
         columns = {f"input_{length}": q / factor}
     else:
         columns = {"input_rad": q} if angle == "rad" else {"input_deg": np.degrees(q)}
-    for name in dict.fromkeys(p for link in m.links.values() for p in link.points if p not in m.ground):
+    for name in travel.moving:
         for k, axis in enumerate("xy"):
             columns[f"{name}_{axis}_{length}"] = travel.curve(name)[:, k] / factor
     return csv_text({name: values.tolist() for name, values in columns.items()}).encode()

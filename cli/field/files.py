@@ -26,7 +26,7 @@ def read_runout(path: str, runs: Runs, *, lagging: bool) -> dict[str, complex]:
     table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
     size = runs.in_unit(amplitude.values, amplitude.unit, f"{table.file}: the run-out")
     vectors = phasor(size, -phase.values if lagging else phase.values, phase.unit).tolist()
-    sensors = table.texts.get("sensor") or ["1"] * table.rows
+    sensors = table.named("sensor")
     known = {channel.sensor for group in runs.groups for channel in group.channels}
     out: dict[str, complex] = {}
     for i, (sensor, vector) in enumerate(zip(sensors, vectors, strict=True)):
@@ -75,7 +75,7 @@ class Stored:
         return list(dict.fromkeys(self.table.texts.get("rotor", ())))
 
     def _column(self, name: str) -> list[str]:
-        return self.table.texts.get(name) or ["1"] * self.table.rows
+        return self.table.named(name)
 
     def _rows(self, rotor: str) -> list[int]:
         texts = self.table.texts
@@ -210,13 +210,13 @@ def read_stored(path: str) -> Stored:
         # an uncertainty in all directions, where none of the phase is stated
         across = along
         if of_phase is not None:
-            turn = to_si(of_phase.values, "angle", of_phase.unit)
+            turn = of_phase.si
             across = np.where(np.isnan(turn), along, np.abs(values) * turn)
     return Stored(
         table,
         size.unit,
         values,
-        to_si(speed.values, "speed", speed.unit) if speed is not None else np.full(table.rows, np.nan),
+        speed.si if speed is not None else np.full(table.rows, np.nan),
         units.pop() if units else None,
         along,
         across,
@@ -230,5 +230,8 @@ def stored_alpha(given: Alpha) -> Stored:
     places = [(s, p) for s, row in enumerate(rows) for p in range(len(row))]
     table.texts = {"sensor": [str(s + 1) for s, _ in places], "plane": [str(p + 1) for _, p in places]}
     size, turn = (np.array([cell[k] for row in rows for cell in row]) for k in (0, 1))
-    table.numbers = {"magnitude_per": Numbers("ALPHA", "kg", size), "phase": Numbers("ALPHA", "deg", turn)}
+    table.numbers = {
+        "magnitude_per": Numbers("ALPHA", "kg", size, "per"),
+        "phase": Numbers("ALPHA", "deg", turn, "angle"),
+    }
     return Stored(table, "kg", phasor(size, turn, "deg"), np.full(table.rows, np.nan), None)

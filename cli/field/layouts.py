@@ -218,7 +218,10 @@ def _vectors(file: str, text: str) -> Layout:
         "trial_angle": Cells("U", "deg", [turn for _, turn in on]),
     }
     size, turn = (np.array([float(read[k]) for _, _, read in runs]) for k in (0, 1))
-    table.numbers = {"amplitude": Numbers("A", "um", size), "phase": Numbers("A", "deg", turn)}
+    table.numbers = {
+        "amplitude": Numbers("A", "um", size, "amplitude"),
+        "phase": Numbers("A", "deg", turn, "angle"),
+    }
     for key in set(given) - {
         "A",
         "B",

@@ -154,8 +154,8 @@ def _on_top(
     Its angle counts from the angle written in that run's row.
     """
     angle = table.cells.get("trial_angle")
-    state = table.texts.get("state") or [""] * table.rows
-    sensor = table.texts.get("sensor") or ["1"] * table.rows
+    state = table.named("state", "")
+    sensor = table.named("sensor")
     seen: dict[tuple[int, str, str], list[int]] = {}
     out: list[dict[str, complex] | None] = []
     for i, text in enumerate(table.texts["ref"]):
@@ -192,7 +192,7 @@ def _channels(table: Table, rotor: Rows) -> tuple[list[Channel], Rows]:
     speed = table.numbers.get("speed")
     if speed is None:
         return [Channel(one, None, state=of) for one, of in kinds], kind
-    given, si = speed.values, to_si(speed.values, "speed", speed.unit)
+    given, si = speed.values, speed.si
     of_rotor = numbered(rotor * len(kinds) + kind)[0]
     value = np.where(np.isnan(given), -np.inf, given)
     near, left, many = np.zeros(table.rows, dtype=np.intp), np.arange(table.rows), int(of_rotor.max()) + 1

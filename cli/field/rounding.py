@@ -10,7 +10,6 @@ from balancing import Balance, condition_number, influence_error
 from cli.field.runs import Group, Real
 from cli.field.solve import FieldBalancing, Solved
 from cli.read.rounding import EPS
-from cli.read.units import to_si
 
 
 def coefficient_errors(found: FieldBalancing, solved: Solved) -> Real:
@@ -18,7 +17,7 @@ def coefficient_errors(found: FieldBalancing, solved: Solved) -> Real:
     group = solved.group
     if found.stored is not None:
         phase = found.stored.table.require("phase", "angle")
-        turn = float(np.abs(to_si(phase.values, "angle", phase.unit)).max())
+        turn = float(np.abs(phase.si).max())
         return np.asarray(EPS * (6 + turn / 2) * np.abs(solved.alpha))
     if group.fit is not None:
         return _fit_errors(group)[..., 1:]

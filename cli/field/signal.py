@@ -11,7 +11,7 @@ from cli.errors import DataError
 from cli.read.options import bad
 from cli.read.sources import open_source
 from cli.read.tables import read
-from cli.read.units import degrees, find_unit, from_si, to_si
+from cli.read.units import degrees, find_unit, from_si
 from cli.show.columns import Column, Result, Table, finite
 
 MARKS = ("mark", "tacho", "keyphasor", "pulse", "trigger")
@@ -64,9 +64,7 @@ def read_signal(path: str, pulses: int) -> Recorded:
     signal = np.stack([table.numbers[name].values for name in units], axis=1)
     try:
         tacho = table.numbers[more[0]].values if more else None
-        found = once_per_turn(
-            to_si(t.values, "time", t.unit), signal, table.numbers[mark].values, pulses, tacho
-        )
+        found = once_per_turn(t.si, signal, table.numbers[mark].values, pulses, tacho)
     except ValueError as error:
         raise DataError(f"{table.file}: {error}") from None
     written = {name.lower(): name for name in header}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Iterator, Sequence
 from itertools import chain
 
 import numpy as np
@@ -12,6 +13,7 @@ from cli.imports.drawn import GROUND, Drawing
 from cli.imports.toml import text
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
+from virtualwork.motion import Motion
 
 # degrees of an input that says nothing of where it begins
 TRIED = tuple(range(0, 360, 15))
@@ -29,17 +31,19 @@ def described(d: Drawing, source: str) -> str:
     try:
         m = Mechanism.from_toml_text(made)
         warnings = m.assembly.warnings
-        motion = m.motion(np.array([[e.at for e in d.drives]]) if len(d.drives) > 1 else d.drives[0].at)
+        motion = _motion(m, d)
         if not motion.assembled.all():
             d.notes.append("it cannot be assembled as it is drawn")
             return made
         d.notes += warnings
-        if not _moves(d, m):
+        # a little way to one side of the drawn pose at least
+        ways = [m.size * LITTLE if e.slide is not None else LITTLE for e in d.drives]
+        if not _motion(m, d, *([side * way for way in ways] for side in (-1, 1))).assembled.any():
             d.notes.append(
                 "its input moves to neither side of the drawn pose: it stands at a limit there, or where assemblies meet"
             )
         if d.posed:
-            off, point = max(_gaps(d, m, motion), default=(0.0, ""))
+            off, point = max(_gaps(d, motion), default=(0.0, ""))
             if not off <= NEAR * m.size:
                 d.notes.append(
                     f"{point} stands {off:.3g} m from where it is drawn: singular there, or nearly"
@@ -49,26 +53,21 @@ def described(d: Drawing, source: str) -> str:
     return made
 
 
-def _moves(d: Drawing, m: Mechanism) -> bool:
-    """Return whether it is assembled a little way to one side of the drawn pose at least."""
-    ways = [m.size * LITTLE if e.slide is not None else LITTLE for e in d.drives]
-    inputs = np.array([[e.at + side * w for e, w in zip(d.drives, ways, strict=True)] for side in (-1, 1)])
-    return bool(m.motion(inputs if len(ways) > 1 else inputs[:, 0]).assembled.any())
+def _motion(m: Mechanism, d: Drawing, *ways: Sequence[float]) -> Motion:
+    """Return the motion of poses that stand so far from the drawn one; of that itself where none is given."""
+    at = np.array([e.at for e in d.drives])
+    inputs = at + np.array(ways) if ways else at[None]
+    return m.motion(inputs if len(at) > 1 else inputs[:, 0])
 
 
-def _gaps(d: Drawing, m: Mechanism, motion: object) -> list[tuple[float, str]]:
-    """Return how far each point stands from its drawn place."""
-    factor = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048}[d.length]
-    found = []
+def _gaps(d: Drawing, motion: Motion) -> Iterator[tuple[float, str]]:
+    """Yield how far each point stands from its drawn place."""
     for name, body in d.bodies.items():
-        if name == GROUND:
-            continue
         turned = cmath.rect(1.0, body.turn)
-        for point, z in body.points.items():
-            x, y = motion.point(point).position[0]  # type: ignore[attr-defined]
+        for point, z in body.points.items() if name != GROUND else ():
+            x, y = motion.point(point).position[0]
             drawn = complex(*map(float, body.at)) + complex(*map(float, z)) * turned
-            found.append((abs(complex(x, y) - drawn * factor), point))
-    return found
+            yield abs(complex(x, y) - drawn * d.metres), point
 
 
 def _seek(d: Drawing, source: str) -> None:
@@ -87,7 +86,7 @@ def _seek(d: Drawing, source: str) -> None:
                 d.bodies[e.link].turn = e.at
         try:
             m = Mechanism.from_toml_text(text(d, source))
-            motion = m.motion(np.array([[e.at for e in d.drives]]) if len(d.drives) > 1 else d.drives[0].at)
+            motion = _motion(m, d)
             if not motion.assembled.all() or m.assembly.warnings:
                 continue
             for name, body in d.bodies.items():

@@ -10,7 +10,7 @@ from cli.errors import DataError
 from cli.imports.words import KINDS
 from cli.read.files import read_bytes
 from cli.read.options import bad
-from cli.show.reported import reported
+from cli.show.output import reported
 
 if TYPE_CHECKING:
     from cli.show.columns import Result, Sheet
@@ -63,16 +63,15 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
             found.append((described(part, f"imported from {told}"), part.notes))
     if not found:
         raise DataError("; ".join([f"{name}: no mechanism: nothing in it is driven by an input", *lost]))
-    if len(found) > 1 and output is None:
+    several = len(found) > 1
+    if several and output is None:
         raise bad("-o", f"{name} holds {len(found)} mechanisms: expected a file, which becomes FILE-1.toml …")
-    paths = []
-    if output is not None:
-        paths = [output]
-        if len(found) > 1:
-            paths = [output.with_name(f"{output.stem}-{k}{output.suffix}") for k in range(1, len(found) + 1)]
+    ends = [f"-{k}" for k in range(1, len(found) + 1)] if several else [""]
+    paths = [output.with_name(f"{output.stem}{end}{output.suffix}") for end in ends] if output else []
+    titles = [path.name for path in paths] if several else [""]
     said = [
-        note if len(found) == 1 else f"{path.name}: {note}"
-        for path, (_, notes) in zip(paths or [Path()], found, strict=True)
+        f"{title}: {note}" if several else note
+        for title, (_, notes) in zip(titles, found, strict=True)
         for note in notes
     ]
 
@@ -80,7 +79,6 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
         from cli.imports.pages import pages
 
         taken = [f"{name}: {KINDS[told].partition(' (')[0]}, {len(data)} bytes"]
-        titles = [path.name for path in paths] if len(found) > 1 else [""]
         return [
             sheet
             for title, (made, its) in zip(titles, found, strict=True)
@@ -88,9 +86,7 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
         ]
 
     return Result(
-        notes=lambda: (
-            f"wrote {', '.join(map(str, paths))}\n" if len(paths) > 1 else "" if paths else found[0][0]
-        ),
+        notes=lambda: f"wrote {', '.join(map(str, paths))}\n" if several else "" if paths else found[0][0],
         beside={path: made.encode for path, (made, _) in zip(paths, found, strict=False)},
         warnings=[*lost, *said],
         sheets=sheets,

@@ -6,11 +6,14 @@ Coordinates are exact fractions of the decimals in the file, so that a differenc
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import product
 
 from cli.imports.words import damaged
+from cli.read.names import Groups, unused
+from virtualwork.describe.units import unit
 
 GROUND = "ground"
 Place = tuple[Fraction, Fraction]
@@ -99,6 +102,14 @@ class Drive:
     at: float = 0.0
     speed: str | float | None = None
 
+    @property
+    def pair(self) -> tuple[str, str]:
+        """The two bodies that it moves against each other, that which moves first."""
+        s = self.slide
+        if s is None:
+            return str(self.link), self.on
+        return (s.link, s.on) if s.link != GROUND else (s.on, s.link)
+
 
 @dataclass
 class Load:
@@ -132,6 +143,13 @@ class Drawing:
     gravity: tuple[float, float] | None = None
     notes: list[str] = field(default_factory=list)
 
+    @property
+    def metres(self) -> float:
+        """What one of its lengths is, m."""
+        found = unit(self.length)
+        assert found is not None
+        return found[0]
+
     def body(self, name: str) -> Body:
         """Return a body, made where there is none of that name."""
         return self.bodies.setdefault(name, Body())
@@ -153,11 +171,52 @@ class Drawing:
                 extents.append(max(values, default=0.0) - min(values, default=0.0))
         return max(extents)
 
-    def prism(self, point: str, link: str, on: str, at: Place, angle: float) -> Slide:
-        """Add a prism between two bodies that stand at angle 0; a point that `link` has there already serves."""
+    def holders(self, point: str) -> list[str]:
+        """Return the bodies that have a point."""
+        return [name for name, body in self.bodies.items() if point in body.points]
+
+    def leave(self, what: str, why: str) -> None:
+        """Note what has no meaning here.
+
+        >>> d = Drawing()
+        >>> d.leave("slide radius of C7", "arcs have no joint here")
+        >>> d.notes
+        ['slide radius of C7: left out: arcs have no joint here']
+        """
+        self.notes.append(f"{what}: left out: {why}")
+
+    def weld(self, names: Sequence[str]) -> None:
+        """Fix bodies to the first of them."""
+        self.welds += [(names[0], other) for other in names[1:]]
+
+    def rename(self, new: Callable[[str], str]) -> None:
+        """Give every body another name, wherever it is named beside its own place."""
+        for s in self.slides:
+            s.link, s.on = new(s.link), new(s.on)
+        for m in self.meshes:
+            m.a, m.b, m.arm = new(m.a), new(m.b), new(m.arm)
+        for e in self.drives:
+            e.link, e.on = e.link and new(e.link), new(e.on)
+        for load in self.loads:
+            load.ends = [(new(name), at) for name, at in load.ends]
+        self.welds = [(new(p), new(q)) for p, q in self.welds]
+
+    def ties(self) -> Iterator[tuple[tuple[str, ...], int]]:
+        """Yield the bodies that each joint and input ties, and for how many joints it counts: an input holds its bodies.
+
+        Shafts that share a place of the ground turn each on its own.
+        """
+        for names in self.pins().values():
+            yield from [((GROUND, n), 1) for n in names] if GROUND in names else [(tuple(names), 1)]
+        yield from (((s.link, s.on), 1) for s in self.slides)
+        yield from (((m.a, m.b, m.arm), 1) for m in self.meshes)
+        yield from ((e.pair, 2) for e in self.drives)
+
+    def guide(self, point: str, link: str, on: str, at: Place, angle: float, prism: bool = True) -> Slide:
+        """Add a prism or a slot between two bodies that stand at angle 0; a point that `link` has there already serves."""
         name = self.point_at(link, at, point)
         self.body(on)
-        self.slides.append(Slide(name, link, on, at, angle, -angle))
+        self.slides.append(Slide(name, link, on, at, angle, -angle if prism else None))
         return self.slides[-1]
 
     def cylinder(self, names: tuple[str, str], ends: tuple[str, str], at: tuple[Place, Place]) -> Slide:
@@ -181,9 +240,8 @@ class Drawing:
         (a, b), length = line, apart(*line)
         off = float((b[0] - a[0]) * (z[1] - a[1]) - (b[1] - a[1]) * (z[0] - a[0])) / length
         if abs(off) > 1e3 * SAME * length:
-            self.notes.append(
-                f"{what}: its line is moved by {abs(off):.3g} {self.length} to go through {point}"
-            )
+            by = f"{abs(off):.3g} {self.length}"
+            self.notes.append(f"{what}: its line is moved by {by} to go through {point}")
 
     def fresh(self, wanted: str) -> str:
         """Return a point's name that no body uses yet."""
@@ -191,20 +249,16 @@ class Drawing:
         return unused(wanted, used)
 
 
-def unused(wanted: str, used: Iterable[str]) -> str:
-    """Return a name that is not used: the wanted one, or that with a number.
-
-    >>> unused("B", {"B", "B_2"})
-    'B_3'
-    """
-    used, name, k = set(used), wanted, 1
-    while name in used:
-        k += 1
-        name = f"{wanted}_{k}"
-    return name
+def centers(d: Drawing, a: str, b: str) -> Iterator[tuple[str, str, str]]:
+    """Yield what may be the centres of two gears: a pin of the one, a pin of the other, a body that turns about both."""
+    pins = d.pins()
+    for p, q in product(*(d.bodies.get(gear, Body()).points for gear in (a, b))):
+        if p != q and p in pins and q in pins:
+            first, second = (_turning_at(d, pins, point) for point in (p, q))
+            yield from ((p, q, arm) for arm in first if arm in second and arm not in (a, b))
 
 
-def turning_at(d: Drawing, pins: dict[str, list[str]], point: str) -> list[str]:
+def _turning_at(d: Drawing, pins: dict[str, list[str]], point: str) -> list[str]:
     """Return the bodies that turn about a pin: those of other pins in the same place of one of its bodies too."""
     found = dict.fromkeys(pins[point])
     for body in pins[point]:
@@ -232,18 +286,7 @@ def merge(d: Drawing, keep: str, gone: str) -> None:
     for point, at in b.points.items():
         a.points.setdefault(point, at)
 
-    def new(name: str) -> str:
-        return keep if name == gone else name
-
-    for s in d.slides:
-        s.link, s.on = new(s.link), new(s.on)
-    for m in d.meshes:
-        m.a, m.b, m.arm = new(m.a), new(m.b), new(m.arm)
-    for e in d.drives:
-        e.link, e.on = None if e.link is None else new(e.link), new(e.on)
-    for load in d.loads:
-        load.ends = [(new(name), at) for name, at in load.ends]
-    d.welds = [(new(p), new(q)) for p, q in d.welds]
+    d.rename(lambda name: keep if name == gone else name)
 
 
 def _rename_point(d: Drawing, old: str, new: str) -> None:
@@ -309,43 +352,31 @@ def settle(d: Drawing) -> list[Drawing]:
 def _drop_what_is_rigid(d: Drawing) -> None:
     for s in [s for s in d.slides if s.link == s.on]:
         d.slides.remove(s)
-        d.notes.append(f"slide at {s.point}: left out: both sides are one body")
+        d.leave(f"slide at {s.point}", "both sides are one body")
     for m in [m for m in d.meshes if len({m.a, m.b, m.arm}) < 3]:
         d.meshes.remove(m)
-        d.notes.append(f"gears {m.a}, {m.b}: left out: they are one body, or one is its own arm")
+        d.leave(f"gears {m.a}, {m.b}", "they are one body, or one is its own arm")
     slides = list(map(id, d.slides))
     for e in list(d.drives):
         if (e.slide is not None and id(e.slide) not in slides) or (e.link is not None and e.link == e.on):
             d.drives.remove(e)
-            d.notes.append(
-                f"input {e.link or (e.slide and e.slide.point)}: left out: its two sides are one body"
-            )
+            d.leave(f"input {e.link or (e.slide and e.slide.point)}", "its two sides are one body")
 
 
 def _drop_what_dangles(d: Drawing) -> None:
     """Leave out bodies that no joint holds, or one pin or slot alone that nothing drives."""
     while True:
         holds = dict.fromkeys(d.bodies, 0)
-        for names in d.pins().values():
+        for names, joints in d.ties():
             for name in names:
-                holds[name] += 1
-        for s in d.slides:
-            holds[s.link] += 1
-            holds[s.on] += 1
-        for m in d.meshes:
-            for name in {m.a, m.b, m.arm}:
-                holds[name] += 1
-        for e in d.drives:
-            for name in (e.link, e.on, *((e.slide.link, e.slide.on) if e.slide else ())):
-                if name is not None:
-                    holds[name] += 2
+                holds[name] += joints
         gone = [name for name, n in holds.items() if n < 2 and name != GROUND]
         if not gone:
             return
         for name in gone:
             d.bodies.pop(name)
-            why = "it has no joint" if holds[name] == 0 else "one joint alone holds it, and nothing drives it"
-            d.notes.append(f"{name}: left out: {why}")
+            alone = "one joint alone holds it, and nothing drives it"
+            d.leave(name, alone if holds[name] else "it has no joint")
         d.slides = [s for s in d.slides if {s.link, s.on} <= d.bodies.keys()]
         for load in [a for a in d.loads if not {name for name, _ in a.ends} <= d.bodies.keys()]:
             d.loads.remove(load)
@@ -354,53 +385,22 @@ def _drop_what_dangles(d: Drawing) -> None:
 
 def _parts(d: Drawing) -> list[Drawing]:
     """Split into mechanisms that have nothing but the ground in common; what nothing drives is left out."""
-    root = {name: name for name in d.bodies}
-
-    def top(name: str) -> str:
-        while root[name] != name:
-            name = root[name]
-        return name
-
-    def join(*names: str | None) -> None:
-        moving = [n for n in names if n is not None and n != GROUND]
-        for name in moving[1:]:
-            root[top(name)] = top(moving[0])
-
-    for names in d.pins().values():
-        # shafts that share a place of the ground turn each on its own
-        if GROUND not in names:
-            join(*names)
-    for s in d.slides:
-        join(s.link, s.on)
-    for m in d.meshes:
-        join(m.a, m.b, m.arm)
-    for e in d.drives:
-        join(e.link, e.on)
-    for load in d.loads:
-        join(*(name for name, _ in load.ends))
-    groups: dict[str, list[str]] = {}
-    for name in d.bodies:
-        if name != GROUND:
-            groups.setdefault(top(name), []).append(name)
+    groups = Groups(d.bodies)
+    for names in (*(names for names, _ in d.ties()), *(dict(load.ends) for load in d.loads)):
+        groups.join(*(name for name in names if name != GROUND))
     found = []
-    for names in groups.values():
-        drives = [e for e in d.drives if (e.link or (e.slide and _moving(e.slide))) in names]
+    for group in groups.all():
+        drives = [e for e in d.drives if e.pair[0] in group]
         if drives:
-            found.append(_part(d, set(names), drives))
-        else:
-            d.notes.append(
-                f"{', '.join(names)}: left out: nothing drives {'it' if len(names) == 1 else 'them'}"
-            )
+            found.append(_part(d, set(group), drives))
+        elif group != [GROUND]:
+            d.leave(", ".join(group), f"nothing drives {'it' if len(group) == 1 else 'them'}")
     return found
-
-
-def _moving(s: Slide) -> str:
-    return s.link if s.link != GROUND else s.on
 
 
 def _part(d: Drawing, names: set[str], drives: list[Drive]) -> Drawing:
     bodies = {name: body for name, body in d.bodies.items() if name in names}
-    slides = [s for s in d.slides if _moving(s) in names]
+    slides = [s for s in d.slides if {s.link, s.on} & names]
     used = {p for body in bodies.values() for p in body.points} | {s.point for s in slides}
     ground = Body({p: at for p, at in d.bodies[GROUND].points.items() if p in used})
     return replace(

@@ -12,13 +12,13 @@ from cli.imports.drawn import (
     Place,
     Slide,
     apart,
+    centers,
     direction,
     finite,
     place,
-    turning_at,
 )
 from cli.imports.markup import Element, parse
-from cli.imports.words import damaged, left_out
+from cli.imports.words import damaged
 
 # the file's unit in the unit of the description
 UNITS = {"in": Fraction(1, 96), "mm": Fraction(254, 960)}
@@ -47,9 +47,7 @@ class _Reader:
             self.d.notes.append("the file says no unit: 1/96 inch each, given in inches")
         self.scale = UNITS[self.d.length]
         if self.number(program, "scalefactor", 1.0) != 1.0:
-            self.d.notes.append(
-                left_out("scalefactor", "it scales what the program shows, not what it keeps")
-            )
+            self.d.leave("scalefactor", "it scales what the program shows, not what it keeps")
 
     def number(self, e: Element, key: str, default: float | None = None) -> float:
         """Return a finite number of an attribute."""
@@ -64,14 +62,13 @@ class _Reader:
         self.at: dict[str, Place] = {}
         layers = 0
         for e in self.root.all("connector"):
-            id_ = e.attributes.get("id", "")
-            if not id_:
+            if not e.id:
                 raise damaged(file, f"line {e.line}: <connector>", "no id", "an id")
             if e.attributes.get("layer") in DRAWING_LAYERS:
                 layers += 1
                 continue
             x, y = place(self.number(e, "x"), self.number(e, "y"))
-            self.connectors[id_], self.at[id_] = e, (x * self.scale, y * self.scale)
+            self.connectors[e.id], self.at[e.id] = e, (x * self.scale, y * self.scale)
         self.links: dict[str, Element] = {}
         self.held: dict[str, list[str]] = {}
         for e in self.root.all("link", "element"):
@@ -79,19 +76,18 @@ class _Reader:
             if e.attributes.get("layer") in DRAWING_LAYERS:
                 layers += 1
                 continue
-            ids = [c.attributes.get("id", "") for c in e.all("connector")]
+            ids = [c.id for c in e.all("connector")]
             for c in ids:
                 if c not in self.connectors:
                     raise damaged(file, f"line {e.line}: <{e.tag}> {id_}", c, "the id of a connector")
             self.links[id_], self.held[id_] = e, list(dict.fromkeys(ids))
         if layers:
-            d.notes.append(left_out(f"{layers} elements of layers 1 and 2", "they are drawing only"))
+            d.leave(f"{layers} elements of layers 1 and 2", "they are drawing only")
         if not self.connectors or not self.links:
             raise damaged(file, f"line {self.root.line}", f"<{self.root.tag}>", "connectors and links")
         for id_, e in self.connectors.items():
             if yes(e, "anchor"):
                 d.bodies[GROUND].points[f"C{id_}"] = self.at[id_]
-        self.pistons: dict[str, Slide] = {}
         for id_ in self.links:
             self._link(id_)
         for e in (*self.connectors.values(), *self.links.values()):
@@ -114,7 +110,6 @@ class _Reader:
             a, b = ids
             names = f"L{id_}", f"L{id_} rod"
             slide = d.cylinder(names, (f"C{a}", f"C{b}"), (self.at[a], self.at[b]))
-            self.pistons[id_] = slide
             throw, cpm = (self.number(e, key, 0.0) for key in ("throw", "cpm"))
             speed = None
             if throw * cpm != 0 and not yes(e, "alwaysmanual"):
@@ -131,58 +126,52 @@ class _Reader:
 
     def _body(self, e: Element) -> str | None:
         """Return the body of a link, or of a connector: the ground's, or the first link's that has it."""
-        id_ = e.attributes.get("id", "")
-        if e is self.links.get(id_):
-            return f"L{id_}"
-        if e is self.connectors.get(id_):
-            return next(
-                (f"L{k}" for k, held in self.held.items() if id_ in held),
-                GROUND if yes(e, "anchor") else None,
-            )
+        if e is self.links.get(e.id):
+            return f"L{e.id}"
+        if e is self.connectors.get(e.id):
+            links = (f"L{k}" for k, held in self.held.items() if e.id in held)
+            return next(links, GROUND if yes(e, "anchor") else None)
         return None
 
     def _fasten(self, e: Element) -> None:
         """`fastenlink` and `fastenconnector`, as attributes or as elements inside: rigidly joined."""
         wanted = [(k, v) for k, v in e.attributes.items() if k in ("fastenlink", "fastenconnector")]
-        wanted += [
-            (c.tag.lower(), c.attributes.get("id", "")) for c in e.all("fastenlink", "fastenconnector")
-        ]
+        wanted += [(c.tag.lower(), c.id) for c in e.all("fastenlink", "fastenconnector")]
         for kind, id_ in wanted:
             found = (self.links if kind == "fastenlink" else self.connectors).get(id_)
             if found is None:
-                self.d.notes.append(left_out(f"{kind} {id_} (line {e.line})", "there is none of that id"))
+                self.d.leave(f"{kind} {id_} (line {e.line})", "there is none of that id")
                 continue
             mine, its = self._body(e), self._body(found)
-            here, there = e.attributes.get("id", ""), found.attributes.get("id", "")
             if mine is None and its is not None:
-                self.d.body(its).points[f"C{here}"] = self.at[here]
+                self.d.body(its).points[f"C{e.id}"] = self.at[e.id]
             elif its is None and mine is not None:
-                self.d.body(mine).points[f"C{there}"] = self.at[there]
+                self.d.body(mine).points[f"C{found.id}"] = self.at[found.id]
             elif mine is not None and its is not None and mine != its:
                 self.d.welds.append((its, mine))
 
     def _slide(self, id_: str, e: Element) -> None:
         d, what = self.d, f"slider C{id_}"
-        limits = [c.attributes.get("id", "") for c in e.all("slidelimit")]
+        limits = [c.id for c in e.all("slidelimit")]
         if len(limits) != 2 or not set(limits) <= self.at.keys():
             raise damaged(self.file, f"line {e.line}: {what}", limits, "two slidelimits that are connectors")
         if self.number(e, "slideradius", 0.0) != 0:
-            d.notes.append(left_out(f"slideradius of C{id_}", "a guide that is an arc has no joint here"))
+            d.leave(f"slideradius of C{id_}", "a guide that is an arc has no joint here")
             return
         a, b = (self.at[c] for c in limits)
         if apart(a, b) == 0:
-            d.notes.append(left_out(what, "its two limits are at one place: they give no direction"))
+            d.leave(what, "its two limits are at one place: they give no direction")
             return
         carriers = [k for k, held in self.held.items() if set(limits) <= set(held)]
         both = all(yes(self.connectors[c], "anchor") for c in limits)
         if not carriers and not both:
-            d.notes.append(left_out(what, "its two limits are on no link, nor on the ground"))
+            d.leave(what, "its two limits are on no link, nor on the ground")
             return
         on = f"L{carriers[0]}" if carriers else GROUND
         point = f"C{id_}"
-        held = [n for n, body in d.bodies.items() if point in body.points and n != on]
+        held = [n for n in d.holders(point) if n != on]
         if not held:
-            d.notes.append(left_out(what, "no link is on it"))
+            d.leave(what, "no link is on it")
             return
         z = self.at[id_]
         d.moved((a, b), z, what, "it")
@@ -192,13 +181,13 @@ class _Reader:
         d, what = self.d, f"input C{id_}"
         links = [f"L{k}" for k, held in self.held.items() if id_ in held and f"L{k}" in d.bodies]
         if not yes(e, "anchor"):
-            d.notes.append(left_out(what, "a motor that is at no anchor"))
+            d.leave(what, "a motor that is at no anchor")
             return
         turning = [n for n in links if not self._fixed(n)]
         if not turning:
-            d.notes.append(left_out(what, "no link that could turn is on it"))
+            d.leave(what, "no link that could turn is on it")
             return
-        d.welds += [(turning[0], other) for other in turning[1:]]
+        d.weld(turning)
         rpm = self.number(e, "rpm", 0.0)
         by_hand = (
             rpm == 0 or yes(e, "alwaysmanual") or any(yes(self.links[n[1:]], "alwaysmanual") for n in turning)
@@ -215,35 +204,24 @@ class _Reader:
 
     def _traced(self) -> None:
         for id_, e in self.connectors.items():
-            if not any(f"C{id_}" in body.points for body in self.d.bodies.values()) and yes(e, "draw"):
-                self.d.notes.append(left_out(f"C{id_}", "no link has it"))
+            if yes(e, "draw") and not self.d.holders(f"C{id_}"):
+                self.d.leave(f"C{id_}", "no link has it")
 
     def _ratio(self, ratio: Element) -> None:
         d = self.d
         sides = list(ratio.all("link"))
-        ids = [e.attributes.get("id", "") for e in sides]
+        ids = [e.id for e in sides]
         if len(sides) != 2 or not set(ids) <= self.links.keys():
             raise damaged(self.file, f"line {ratio.line}: <ratio>", ids, "two links of the file")
         sizes = [self.number(e, "size", 0.0) for e in sides]
         what = f"gears L{ids[0]}, L{ids[1]}"
         if sizes[0] * sizes[1] == 0:
-            d.notes.append(left_out(what, "a size is 0"))
+            d.leave(what, "a size is 0")
             return
         first, second = (f"L{i}" for i in ids)
-        pins = d.pins()
-        arm = next(
-            (
-                body
-                for p in d.body(first).points
-                for q in d.body(second).points
-                if p != q and p in pins and q in pins
-                for body in turning_at(d, pins, p)
-                if body not in (first, second) and body in turning_at(d, pins, q)
-            ),
-            None,
-        )
-        if arm is None:
-            d.notes.append(left_out(what, "no link holds the centres of both"))
+        found = next(centers(d, first, second), None)
+        if found is None:
+            d.leave(what, "no link holds the centres of both")
             return
         sense = 1.0 if ratio.attributes.get("type", "").lower() == "chain" else -1.0
-        d.meshes.append(Mesh(first, second, sense * sizes[0] / sizes[1], arm))
+        d.meshes.append(Mesh(first, second, sense * sizes[0] / sizes[1], found[2]))

@@ -18,9 +18,19 @@ from cli.imports.drawn import (
     apart,
     exact,
     place,
-    unused,
 )
-from cli.imports.words import damaged, left_out
+from cli.imports.words import damaged
+from cli.read.names import unused
+
+# type -> the table here, the keys of its bodies and of its points on them, and of its numbers
+LOADS: dict[str, tuple[str, tuple[tuple[str, str | None], ...], tuple[str, ...]]] = {
+    "LinearSpring": ("springs", (("body_a", "point_a"), ("body_b", "point_b")), ("stiffness", "free_length")),
+    "LinearDamper": ("springs", (("body_a", "point_a"), ("body_b", "point_b")), ("damping",)),
+    "TorsionSpring": ("torsion_springs", (("body_i", None), ("body_j", None)), ("stiffness", "free_angle")),
+    "RotaryDamper": ("torsion_springs", (("body_i", None), ("body_j", None)), ("damping",)),
+    "ExternalForce": ("forces", (("body_id", "local_point"),), ()),
+    "ExternalTorque": ("torques", (("body_id", None),), ("torque",)),
+}
 
 
 def read(file: str, data: Any) -> list[Drawing]:
@@ -99,18 +109,18 @@ class _Reader:
             if e.get("type") == "prismatic":
                 self._prism(name, e)
             elif e.get("type") not in ("revolute", "fixed", "revolute_driver"):
-                d.notes.append(left_out(f"joint {name}", f"a joint of type {e.get('type')} has no like here"))
+                d.leave(f"joint {name}", f"a joint of type {e.get('type')} has no like here")
         self._drives(joints)
         self._traced()
         for e in self.listed(data, "forces"):
             self._force(e)
-        if any(body.mass > 0 for name, body in d.bodies.items() if name == GROUND):
+        if d.bodies[GROUND].mass > 0:
             d.bodies[GROUND] = Body(d.bodies[GROUND].points)
         for key in ("load_cases", "sweep_config"):
             if data.get(key):
-                d.notes.append(left_out(key, "the drivers say what drives; ranges are given to the command"))
+                d.leave(key, "the drivers say what drives; ranges are given to the command")
         if data.get("mounting_angle"):
-            d.notes.append(left_out("mounting_angle", "it turns gravity: turn `gravity` in the file instead"))
+            d.leave("mounting_angle", "it turns gravity: turn `gravity` in the file instead")
         return d
 
     def _body(self, name: str, e: Any) -> None:
@@ -130,7 +140,6 @@ class _Reader:
             loose.append((m, self.pair(f"{where}, point_masses", self.get(where, extra, "local_pos")), 0.0))
         body = self.d.body(name)
         body.mass, body.center, body.inertia = together(loose)
-        self.where = where
 
     def _ends(self, name: str, e: dict[str, Any]) -> tuple[str, str, str, str]:
         """Return (body, point, body, point) of a joint; where a body is fixed to another, that one's."""
@@ -159,6 +168,18 @@ class _Reader:
             shift = by + shift * complex(math.cos(more), math.sin(more))
             turn += more
         return body, turn, shift
+
+    def named_body(self, where: str, e: dict[str, Any], key: str) -> tuple[str, float, complex]:
+        """Return the same of the body that an entry names; it must be there."""
+        found = self.whole(str(self.get(where, e, key)))
+        if found[0] not in self.d.bodies:
+            raise damaged(self.file, where, found[0], "one of the bodies")
+        return found
+
+    def held(self, where: str, e: dict[str, Any], key: str, point: str) -> tuple[str, Place]:
+        """Return the body that an entry names, and the place of its point there."""
+        name, turn, shift = self.named_body(where, e, key)
+        return name, self._carried(self.pair(where, self.get(where, e, point)), turn, shift)
 
     @staticmethod
     def _carried(z: Place, turn: float, shift: complex) -> Place:
@@ -224,10 +245,7 @@ class _Reader:
         rows = [(f"driver {k}", e, False) for k, e in self.named(self.data, "drivers").items()]
         rows += [(f"joint {k}", e, True) for k, e in joints.items() if e.get("type") == "revolute_driver"]
         for where, e, marker in rows:
-            i, j = (self.whole(str(self.get(where, e, f"body_{side}"))) for side in "ij")
-            for body, _, _ in (i, j):
-                if body not in d.bodies:
-                    raise damaged(self.file, where, body, "one of the bodies")
+            i, j = (self.named_body(where, e, f"body_{side}") for side in "ij")
             offset = i[1] - j[1]
             link, on, sign = (j[0], i[0], 1.0) if j[0] != GROUND else (i[0], j[0], -1.0)
             if any({x.link, x.on} == {link, on} for x in d.drives):
@@ -242,7 +260,7 @@ class _Reader:
                 )
             else:
                 why = "the file does not store it" if marker else "an expression is not evaluated"
-                d.notes.append(left_out(f"law of motion of {where}", why))
+                d.leave(f"law of motion of {where}", why)
                 d.drives.append(Drive(link, on, at=0.0 if d.posed else sign * offset))
         for e in self.listed(self.data, "linear_drivers"):
             self._linear(e)
@@ -253,10 +271,7 @@ class _Reader:
         where = f"linear driver {e.get('id', '')}".strip()
         ends = []
         for k in "ab":
-            body, turn, shift = self.whole(str(self.get(where, e, f"body_{k}")))
-            z = self._carried(self.pair(where, self.get(where, e, f"point_{k}")), turn, shift)
-            if body not in d.bodies:
-                raise damaged(self.file, where, body, "one of the bodies")
+            body, z = self.held(where, e, f"body_{k}", f"point_{k}")
             ends.append((d.point_at(body, z, f"{where} {k}"), z))
         (p, a), (q, b) = ends
         speed = f"{self.real(where, e.get('velocity', 0.0))!r} m/s"
@@ -285,42 +300,26 @@ class _Reader:
     def _force(self, e: dict[str, Any]) -> None:
         d, kind = self.d, str(e.get("type", ""))
         where = f"force {kind}"
-
-        def at(body: str, point: str | None) -> tuple[str, Place | None]:
-            name, turn, shift = self.whole(str(self.get(where, e, body)))
-            if name not in d.bodies:
-                raise damaged(self.file, where, name, "one of the bodies")
-            if point is None:
-                return name, None
-            return name, self._carried(self.pair(where, self.get(where, e, point)), turn, shift)
-
-        def real(key: str) -> float:
-            return self.real(f"{where}, {key}", e.get(key, 0.0))
-
         constant = self.named(e, "modulation", f"{where}, ").get("modulation_type", "Constant") == "Constant"
         if kind == "Gravity":
             g = self.pair(where, self.get(where, e, "g_vector"))
             d.gravity = float(g[0]), float(g[1])
-        elif kind in ("LinearSpring", "LinearDamper"):
-            keys = ("stiffness", "free_length") if kind == "LinearSpring" else ("damping",)
-            ends = [at("body_a", "point_a"), at("body_b", "point_b")]
-            d.loads.append(Load("springs", ends, {k: real(k) for k in keys}))
-        elif kind in ("TorsionSpring", "RotaryDamper"):
-            keys = ("stiffness", "free_angle") if kind == "TorsionSpring" else ("damping",)
-            values: dict[str, object] = {k: real(k) for k in keys}
-            turns = [self.whole(str(e.get(k)))[1] for k in ("body_i", "body_j")]
-            if "free_angle" in values:
-                values["free_angle"] = real("free_angle") + turns[0] - turns[1]
-            d.loads.append(Load("torsion_springs", [at("body_i", None), at("body_j", None)], values))
-        elif kind == "ExternalForce" and constant:
-            f = self.pair(where, self.get(where, e, "force"))
-            d.loads.append(
-                Load("forces", [at("body_id", "local_point")], {"force": [float(f[0]), float(f[1])]})
-            )
-        elif kind == "ExternalTorque" and constant:
-            d.loads.append(Load("torques", [at("body_id", None)], {"torque": real("torque")}))
-        else:
-            d.notes.append(left_out(f"force of type {kind or '?'}", "it has no like here"))
+            return
+        if kind not in LOADS or (kind.startswith("External") and not constant):
+            d.leave(f"force of type {kind or '?'}", "it has no like here")
+            return
+        table, ends, keys = LOADS[kind]
+        values: dict[str, object] = {k: self.real(f"{where}, {k}", e.get(k, 0.0)) for k in keys}
+        held: list[tuple[str, Place | None]] = [
+            (self.named_body(where, e, key)[0], None) if point is None else self.held(where, e, key, point)
+            for key, point in ends
+        ]
+        if kind == "TorsionSpring":
+            i, j = (self.whole(e[key])[1] for key, _ in ends)
+            values["free_angle"] = self.real(where, e.get("free_angle", 0.0)) + i - j
+        if kind == "ExternalForce":
+            values["force"] = [*map(float, self.pair(where, self.get(where, e, "force")))]
+        d.loads.append(Load(table, held, values))
 
 
 def together(parts: list[tuple[float, Place, float]]) -> tuple[float, Place, float]:

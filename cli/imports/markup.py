@@ -26,6 +26,11 @@ class Element:
     attributes: dict[str, str] = field(default_factory=dict)
     inside: list[Element] = field(default_factory=list)
 
+    @property
+    def id(self) -> str:
+        """What it is called; empty where it is not."""
+        return self.attributes.get("id", "")
+
     def all(self, *tags: str) -> Iterator[Element]:
         """Yield the elements of some tags directly inside, whatever their case."""
         return (e for e in self.inside if e.tag.lower() in tags)

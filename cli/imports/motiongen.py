@@ -6,7 +6,7 @@ from typing import Any
 
 from cli.errors import DataError
 from cli.imports.drawn import GROUND, Drawing, Drive, Place, Slide, direction, place
-from cli.imports.words import damaged, left_out
+from cli.imports.words import damaged
 
 LENGTHS = ("mm", "cm", "m", "in", "ft")
 # what is read of a document, and what only tells about it
@@ -83,8 +83,7 @@ class _Reader:
             for slot in listed(e, "slots", "slotIds"):
                 self.slot_of[str(slot)] = name
         for id_ in sorted(self.welded):
-            held = [n for n, b in d.bodies.items() if id_ in b.points]
-            d.welds += [(held[0], other) for other in held[1:]]
+            d.weld(d.holders(id_))
         self.riders: dict[str, tuple[Slide, str, str]] = {}
         for k, e in enumerate(self.entries("slots"), 1):
             self._slot(k, e)
@@ -97,7 +96,7 @@ class _Reader:
             self._actuator(k, e)
         for key, value in self.data.items():
             if key not in KEYS and isinstance(value, list | dict) and value:
-                d.notes.append(left_out(key, "it has no like here"))
+                d.leave(key, "it has no like here")
         return d
 
     def _slot(self, k: int, e: dict[str, Any]) -> None:
@@ -107,14 +106,14 @@ class _Reader:
             raise damaged(self.file, where, ends, "two ends at different places")
         on = self.slot_of.get(str(e.get("id")))
         if on is None:
-            d.notes.append(left_out(where, "no link carries it"))
+            d.leave(where, "no link carries it")
             return
         a, b = (self.at[id_] for id_ in ends)
         angle = direction(a, b)
         for rider in self.known(where, listed(e, "riders", "riderIds")):
-            held = [n for n, body in d.bodies.items() if rider in body.points and n != on]
+            held = [n for n in d.holders(rider) if n != on]
             if not held:
-                d.notes.append(left_out(f"rider {rider} of {where}", "no other link has it"))
+                d.leave(f"rider {rider} of {where}", "no other link has it")
                 continue
             if rider in d.body(on).points:
                 # the carrier lists its riders among its joints: they are not pinned to it
@@ -133,7 +132,7 @@ class _Reader:
         self.pistons[frozenset(ends)] = slide
         for end, name in zip(ends, names, strict=True):
             if end in self.welded:
-                held = [n for n, body in d.bodies.items() if end in body.points and n not in names]
+                held = [n for n in d.holders(end) if n not in names]
                 d.welds.append((name, held[0] if held and GROUND not in held else GROUND))
         return slide
 
@@ -146,7 +145,7 @@ class _Reader:
             del held["min"], held["max"]
         if held:
             said = ", ".join(f"{key} {value}" for key, value in held.items())
-            self.d.notes.append(left_out(f"{said} of {where}", "an input has no limits of its own here"))
+            self.d.leave(f"{said} of {where}", "an input has no limits of its own here")
 
     def _actuator(self, k: int, e: dict[str, Any]) -> None:
         d, where = self.d, f"actuator {k}"
@@ -169,13 +168,12 @@ class _Reader:
             )
             return
         (to,) = self.known(where, [e["to"]])
-        links = [n for n, b in d.bodies.items() if at in b.points and to in b.points]
-        frames = [
-            n for n, b in d.bodies.items() if at in b.points and start in b.points and n not in links[:1]
-        ]
+        turning = d.holders(at)
+        links = [n for n in turning if to in d.bodies[n].points]
+        frames = [n for n in turning if start in d.bodies[n].points and n not in links[:1]]
         if not links:
             raise damaged(self.file, where, f"{at}, {to}", "two joints of the driven link")
-        on = GROUND if at in d.bodies[GROUND].points or not frames else frames[0]
+        on = GROUND if GROUND in turning or not frames else frames[0]
         rpm = None if speed is None else f"{speed!r} rpm"
         if links[0] == GROUND and frames:
             # the motor's other side is the one that moves

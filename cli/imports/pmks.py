@@ -19,12 +19,12 @@ from cli.imports.drawn import (
     Place,
     Slide,
     apart,
+    centers,
     direction,
     finite,
     place,
-    turning_at,
 )
-from cli.imports.words import damaged, left_out
+from cli.imports.words import damaged
 
 TYPES = ("R", "P", "RP", "G")
 GROUNDS = {"gnd", "grnd", "grond", "gound", "groud", "0"}
@@ -74,12 +74,12 @@ def _one(file: str, text: str, first: int) -> Drawing:
         if word[:1] == "s":
             speed = finite(file, "set", word[1:])
         elif word:
-            d.notes.append(left_out(f"setting {word}", "it is the other program's step or tolerance"))
+            d.leave(f"setting {word}", "it is the other program's step or tolerance")
     if re.search(r"(?:^|[?&])ts=[^&\s]", head, re.MULTILINE):
-        d.notes.append(left_out("ts", "a target shape is no part of the mechanism"))
+        d.leave("ts", "a target shape is no part of the mechanism")
     body, *more = body.split("&")
     for rest in more:
-        d.notes.append(left_out(rest[:40], "it stands behind the joints"))
+        d.leave(rest[:40], "it stands behind the joints")
     line = first + head.count("\n")
     joints = []
     for i, row in enumerate(body.split("\n")):
@@ -124,7 +124,7 @@ def _drawing(file: str, d: Drawing, joints: list[Joint], speed: float) -> Drawin
     for j in joints:
         if j.driven and j not in driven[:1]:
             why = "another joint is the input" if driven else f"a joint of type {j.kind} cannot be driven"
-            d.notes.append(left_out(f"input flag of {j.where}", why))
+            d.leave(f"input flag of {j.where}", why)
     driven = driven or [j for j in joints if len(j.links) > 1 and j.kind in ("R", "P")]
     slides: dict[int, Slide] = {}
     for k, j in enumerate(joints, 1):
@@ -136,7 +136,7 @@ def _drawing(file: str, d: Drawing, joints: list[Joint], speed: float) -> Drawin
             a, b = j.links[:2]
             # the block is the link that moves
             link, on = (a, b) if b == GROUND else (b, a)
-            slides[k] = d.prism(name, link, on, j.at, j.angle)
+            slides[k] = d.guide(name, link, on, j.at, j.angle)
             _more(d, j, k)
         elif j.kind == "RP":
             _slot(d, j, name, joints)
@@ -148,7 +148,7 @@ def _drawing(file: str, d: Drawing, joints: list[Joint], speed: float) -> Drawin
         j = driven[0]
         if j.kind == "P":
             d.drives.append(Drive(slide=slides[joints.index(j) + 1]))
-            d.notes.append(left_out(f"speed {speed:g} rpm", f"the input {j.where} is a slide"))
+            d.leave(f"speed {speed:g} rpm", f"the input {j.where} is a slide")
         else:
             a, b = j.links[:2]
             link, on = (a, b) if b == GROUND else (b, a)
@@ -175,37 +175,25 @@ def _slot(d: Drawing, j: Joint, name: str, joints: list[Joint]) -> None:
             d.notes.append(
                 f"{j.where}: the slot is taken as the ground's, for its line misses {link}'s other joint"
             )
-    held = d.body(link).points
-    point = next((p for p, z in held.items() if z == j.at), name)
-    held[point] = j.at
-    d.body(on)
-    d.slides.append(Slide(point, link, on, j.at, j.angle))
+    d.guide(name, link, on, j.at, j.angle, prism=False)
 
 
 def mesh(d: Drawing, a: str, b: str, at: Place, what: str) -> None:
     """Two gears that touch at a pitch point: their centres are pins that one arm holds (R. Willis, 1841)."""
     best: tuple[float, Mesh] | None = None
-    pins = d.pins()
-    centers = {p: turning_at(d, pins, p) for p, names in pins.items() if a in names or b in names}
-    for p, first in centers.items():
-        for q, second in centers.items():
-            arms = [n for n in first if n in second and n not in (a, b)]
-            if p == q or a not in pins[p] or b not in pins[q] or not arms:
-                continue
-            zp, zq = d.bodies[a].points[p], d.bodies[b].points[q]
-            between = apart(zp, zq)
-            if between == 0:
-                continue
-            ux, uy = (float(zq[i] - zp[i]) / between for i in (0, 1))
-            to_a, to_b = ([float(at[i] - z[i]) for i in (0, 1)] for z in (zp, zq))
-            off = abs(to_a[0] * uy - to_a[1] * ux) / between
-            ra, rb = (v[0] * ux + v[1] * uy for v in (to_a, to_b))
-            if ra * rb != 0 and (best is None or off < best[0]):
-                best = off, Mesh(a, b, ra / rb, arms[0])
+    for p, q, arm in centers(d, a, b):
+        zp, zq = d.bodies[a].points[p], d.bodies[b].points[q]
+        between = apart(zp, zq)
+        if between == 0:
+            continue
+        ux, uy = (float(zq[i] - zp[i]) / between for i in (0, 1))
+        to_a, to_b = ([float(at[i] - z[i]) for i in (0, 1)] for z in (zp, zq))
+        off = abs(to_a[0] * uy - to_a[1] * ux) / between
+        ra, rb = (v[0] * ux + v[1] * uy for v in (to_a, to_b))
+        if ra * rb != 0 and (best is None or off < best[0]):
+            best = off, Mesh(a, b, ra / rb, arm)
     if best is None:
-        d.notes.append(
-            left_out(f"{what} ({a}, {b})", "no link holds a pin of both (a rack has no joint here)")
-        )
+        d.leave(f"{what} ({a}, {b})", "no link holds a pin of both (a rack has no joint here)")
         return
     if best[0] > 1e-6:
         d.notes.append(

@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from itertools import takewhile
 from urllib.parse import unquote
 
 from cli.errors import DataError
 from cli.imports.drawn import GROUND, Drawing, Drive, Load, Place, Slide, direction, exact, place
-from cli.imports.words import damaged, left_out
+from cli.imports.words import damaged
 
 DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
 STRING = re.compile(r"[\w-]*\.[\w,-]*\.[\w,-]+\.\w*\.[^\s?]*")
@@ -27,11 +28,12 @@ class Joint:
     name: str
     at: Place
     angle: float
+    slot: list[str]
+    """The link that carries its slot, and the two joints on whose line that lies."""
     prismatic: bool
     driven: bool
     grounded: bool
     welded: bool
-    slot: tuple[str, str, str] | None
 
 
 def read(file: str, text: str) -> list[Drawing]:
@@ -82,19 +84,13 @@ class _String:
                 "closed by an empty part; is it cut off?"
             )
         self.settings = head
-        self.joint_parts, rest = self._until_empty(rest)
-        self.link_parts, rest = self._until_empty(rest)
+        lists = iter(rest if rest.count("") > 2 else [*rest[:-1], ""])
+        self.joint_parts, self.link_parts, self.force_parts = (list(takewhile(bool, lists)) for _ in range(3))
         self.slides: dict[str, Slide] = {}
-        self.force_parts, _ = self._until_empty(rest) if "" in rest else (rest[:-1], [])
         self.d = Drawing()
         whole = len(text) - 1
         if text[-1] != DIGITS[whole % 62]:
             self.d.notes.append("the checksum does not fit the string's length: look whether it is complete")
-
-    @staticmethod
-    def _until_empty(parts: list[str]) -> tuple[list[str], list[str]]:
-        end = parts.index("")
-        return parts[:end], parts[end + 1 :]
 
     def _decimal(self, what: str, digits: str) -> float:
         try:
@@ -136,13 +132,11 @@ class _String:
         if digits is None:
             raise damaged(self.file, what, part, "a flag digit, then id,name,x,y,angle")
         bits = flags(part[0], 6)
-        tokens = self._tokens(what, part[1:], 5)
-        id_, name, x, y, angle, *more = tokens
+        id_, name, x, y, angle, *more = self._tokens(what, part[1:], 5)
         at = place(self._decimal(what, x), self._decimal(what, y))
-        # newer strings: the link that carries the slot, and the two joints on whose line it lies
-        slot = (more[0], more[1], more[2]) if len(more) > 2 and more[0] else None
-        turn = self._decimal(what, angle)
-        return id_, Joint(name or id_, at, turn, bits[0], bits[1], bits[2], bits[3], slot)
+        # of newer strings
+        slot = more[:3] if len(more) > 2 and more[0] else []
+        return id_, Joint(name or id_, at, self._decimal(what, angle), slot, *bits[:4])
 
     def _links(self, joints: dict[str, Joint]) -> None:
         rows: list[tuple[str, str, list[str], list[str], list[str]]] = []
@@ -155,9 +149,7 @@ class _String:
         real = [tokens for _, kind, tokens, *_ in rows if kind[1:] == "R"]
         unset = bool(real) and all(self._decimal("mass", t[k]) == 1 for t in real for k in (2, 3))
         if unset:
-            self.d.notes.append(
-                left_out("masses and inertias", "every link has 1 and 1, the defaults nobody set")
-            )
+            self.d.leave("masses and inertias", "every link has 1 and 1, the defaults nobody set")
         else:
             self.d.notes.append(
                 f"masses are taken as kg, inertias as kg·{self.d.length}2: the string names no unit"
@@ -179,8 +171,7 @@ class _String:
                 )
             if not unset and mass > 0:
                 body.mass = mass
-                factor = {"in": 0.0254, "cm": 0.01, "m": 1.0}[self.d.length]
-                body.inertia = inertia * factor**2
+                body.inertia = inertia * self.d.metres**2
                 body.center = place(x, y) if kind[1:] == "R" or not ids else joints[ids[0]].at
         self.members = {
             joint: [
@@ -192,20 +183,19 @@ class _String:
     def _joins(self, id_: str, j: Joint, joints: dict[str, Joint]) -> None:
         held = self.members[id_]
         if j.welded:
-            names = [*held, *([GROUND] if j.grounded and not j.prismatic else [])]
-            self.d.welds += [(names[0], other) for other in names[1:]]
+            self.d.weld([*held, GROUND] if j.grounded and not j.prismatic else held)
         if not j.prismatic:
             return
-        if j.slot is not None and j.slot[0] in self.d.bodies and {j.slot[1], j.slot[2]} <= joints.keys():
+        if j.slot and j.slot[0] in self.d.bodies and {*j.slot[1:]} <= joints.keys():
             on, a, b = j.slot
             angle = direction(joints[a].at, joints[b].at)
         elif j.grounded:
             on, angle = GROUND, math.degrees(j.angle)
         else:
-            self.d.notes.append(left_out(f"slider {j.name}", "the string says of no guide"))
+            self.d.leave(f"slider {j.name}", "the string says of no guide")
             return
         for link in [name for name in held if name != on][:1]:
-            self.slides[id_] = self.d.prism(id_, link, on, j.at, angle)
+            self.slides[id_] = self.d.guide(id_, link, on, j.at, angle)
 
     def _drive(self, joints: dict[str, Joint], clockwise: bool) -> None:
         try:
@@ -216,16 +206,16 @@ class _String:
             if not j.driven:
                 continue
             if self.d.drives:
-                self.d.notes.append(left_out(f"input {j.name}", "another joint is the input"))
+                self.d.leave(f"input {j.name}", "another joint is the input")
             elif j.prismatic and id_ in self.slides:
                 self.d.drives.append(Drive(slide=self.slides[id_]))
-                self.d.notes.append(left_out(f"speed {speed} rpm", f"the input {j.name} is a slide"))
+                self.d.leave(f"speed {speed} rpm", f"the input {j.name} is a slide")
             elif self.members[id_] and not j.prismatic:
                 first, *others = self.members[id_]
                 link, on = (first, GROUND) if j.grounded or not others else (others[0], first)
                 self.d.drives.append(Drive(link, on, speed=f"{-abs(speed) if clockwise else speed} rpm"))
             else:
-                self.d.notes.append(left_out(f"input {j.name}", "it drives no link"))
+                self.d.leave(f"input {j.name}", "it drives no link")
 
     def _force(self, k: int, part: str, unit: str) -> None:
         what = f"force {k}"
@@ -233,13 +223,11 @@ class _String:
         tokens = self._tokens(what, part[1:], 8)
         x1, y1, x2, y2, size = (self._decimal(what, t) for t in tokens[3:8])
         if tokens[1] not in self.d.bodies:
-            self.d.notes.append(
-                left_out(f"force {tokens[2]}", f"its link {tokens[1]} is none of the string's")
-            )
+            self.d.leave(f"force {tokens[2]}", f"its link {tokens[1]} is none of the string's")
             return
         span = math.hypot(x2 - x1, y2 - y1)
         if span == 0:
-            self.d.notes.append(left_out(f"force {tokens[2]}", "its two ends coincide: it has no direction"))
+            self.d.leave(f"force {tokens[2]}", "its two ends coincide: it has no direction")
             return
         size = size if outward else -size
         force = [f"{size * (b - a) / span!r} {unit}" for a, b in ((x1, x2), (y1, y2))]

@@ -13,9 +13,9 @@ from fractions import Fraction
 import numpy as np
 
 from cli.errors import DataError
-from cli.imports.drawn import GROUND, Body, Drawing, Drive, Load, Mesh, Place, Slide, unused
+from cli.imports.drawn import GROUND, Body, Drawing, Drive, Load, Mesh, Place, Slide
 from cli.imports.plane import plane_of
-from cli.imports.words import left_out
+from cli.read.names import Groups, unused
 from cli.read.robots.robot import Motor, Robot, RobotJoint, RobotLink, Spring
 
 # what the bodies are called that the export makes of slots
@@ -48,14 +48,17 @@ class _Layer:
 
     def drawing(self) -> Drawing:
         robot, d = self.robot, self.d
-        self.root = {name: name for name in robot.links}
+        self.fixed = Groups(robot.links)
         for j in robot.joints.values():
             if j.kind == "fixed":
-                self._fix(j)
+                pair = j.parent, j.child
+                # what is fixed to the ground is called as that
+                first = self.fixed.of(j.child) == self.fixed.of(robot.ground)
+                self.fixed.join(*(pair[::-1] if first else pair))
         moving = [
             j
             for j in robot.joints.values()
-            if j.kind != "fixed" and self._top(j.parent) != self._top(j.child)
+            if j.kind != "fixed" and self.fixed.of(j.parent) != self.fixed.of(j.child)
         ]
         if not moving:
             raise DataError(f"{robot.file}: nothing in it moves: no joint that turns or slides")
@@ -78,7 +81,6 @@ class _Layer:
         for j in moving:
             if j.kind == "slide":
                 self._slide(j)
-        self.joined = [(s.link, s.on) for s in self.slides.values()]
         self.alike = self._turning_alike()
         self._slots()
         self._named_points()
@@ -87,47 +89,27 @@ class _Layer:
         self._springs(moving)
         for what in dict.fromkeys(what for j in moving for what in j.more):
             names = ", ".join(j.name for j in moving if what in j.more)
-            d.notes.append(
-                left_out(f"{what} of {names}", "it moves as far as its links let it, without friction")
-            )
+            d.leave(f"{what} of {names}", "it moves as far as its links let it, without friction")
         if robot.gravity is not None:
             g = self.plane.direction(robot.gravity)
             d.gravity = (g.real, g.imag) if abs(g) > 1e-12 * float(np.linalg.norm(robot.gravity)) else None
         return d
 
     # --- links ------------------------------------------------------------------------------------------------
-    def _top(self, name: str) -> str:
-        while self.root[name] != name:
-            name = self.root[name]
-        return name
-
-    def _fix(self, j: RobotJoint) -> None:
-        a, b = self._top(j.parent), self._top(j.child)
-        if a == b:
-            return
-        if b == self._top(self.robot.ground):
-            a, b = b, a
-        self.root[b] = a
-
     def _groups(self) -> None:
         robot, d = self.robot, self.d
-        ground = self._top(robot.ground)
-        self.groups: dict[str, _Group] = {}
+        parts = {self.fixed.of(names[0]): names for names in self.fixed.all()}
+        ground = _Group(GROUND, 0j, 0.0)
+        d.bodies[GROUND] = ground.body
+        self.groups = {self.fixed.of(robot.ground): ground}
         for name, link in robot.links.items():
-            if self._top(name) != name:
-                continue
-            if name == ground:
-                self.groups[name] = _Group(GROUND, 0j, 0.0)
+            if name not in parts or name in self.groups:
                 continue
             at, turn = self.plane.place(link.pose[:3, 3]), self.plane.turn(link.pose[:3, :3])
-            label = unused(name, {GROUND})
-            group = self.groups[name] = _Group(label, at, turn)
+            group = self.groups[name] = _Group(unused(name, {GROUND}), at, turn)
             group.body.at = self._place(at)
-            d.bodies[label] = group.body
-        d.bodies[GROUND] = self.groups[ground].body
-        for name, group in self.groups.items():
-            if name != ground:
-                self._masses(group, [k for n, k in robot.links.items() if self._top(n) == name])
+            d.bodies[group.name] = group.body
+            self._masses(group, [robot.links[n] for n in parts[name]])
 
     def _masses(self, group: _Group, links: list[RobotLink]) -> None:
         parts = []
@@ -164,7 +146,7 @@ class _Layer:
 
     def group(self, link: str) -> _Group:
         """Return the body that a link is, or is a part of."""
-        return self.groups[self._top(link)]
+        return self.groups[self.fixed.of(link)]
 
     # --- joints -----------------------------------------------------------------------------------------------
     def _closed(self, j: RobotJoint) -> bool:
@@ -248,7 +230,7 @@ class _Layer:
             if group.name == GROUND or group.name not in d.bodies:
                 continue
             named = {p: link.pose @ np.append(at, 1.0) for p, at in link.points.items()}
-            if self._top(name) != name and link.inertial is None:
+            if self.fixed.of(name) != name and link.inertial is None:
                 named[name] = link.pose[:, 3]
             held = d.bodies[group.name].points
             for point, at in named.items():
@@ -257,13 +239,13 @@ class _Layer:
                     held[d.fresh(point)] = z
 
     # --- what ties and what drives ---------------------------------------------------------------------------
-    def _turning_alike(self) -> dict[str, str]:
-        """Return one body for each: those that slides join turn alike. The ground stands for its own, blocks for none."""
-        found = {name: name for name in [GROUND, *(g.name for g in self.groups.values())]}
-        for s in self.joined:
-            a, b = found[s[0]], found[s[1]]
-            keep = min(a, b, key=lambda name: (name != GROUND, name.startswith(BLOCK)))
-            found = {name: keep if top in (a, b) else top for name, top in found.items()}
+    def _turning_alike(self) -> Groups:
+        """Return the bodies that slides join, which turn alike. The ground stands for its own, blocks for none."""
+        found = Groups([GROUND, *(g.name for g in self.groups.values())])
+        for s in self.slides.values():
+            pair = found.of(s.link), found.of(s.on)
+            keep = min(pair, key=lambda name: (name != GROUND, name.startswith(BLOCK)))
+            found.join(keep, *pair)
         return found
 
     def _shares(
@@ -284,7 +266,7 @@ class _Layer:
             sense = factor * self.plane.sense(j.axis)
             for link, c in ((j.child, sense), (j.parent, -sense)):
                 body = self.group(link).name
-                top = self.alike[body]
+                top = self.alike.of(body)
                 found[top] = found.get(top, 0.0) + c
                 if body == wanted or (top not in names and body in self.d.bodies):
                     names[top] = body
@@ -302,11 +284,11 @@ class _Layer:
         for name, terms in self.robot.couplings:
             shares = self._shares(terms, name)
             if shares is None or len(shares) not in (2, 3) or abs(sum(shares.values())) > 1e-9:
-                d.notes.append(left_out(f"coupling {name}", "it is no gear of two bodies on an arm"))
+                d.leave(f"coupling {name}", "it is no gear of two bodies on an arm")
                 continue
             first = self.robot.joints[terms[0][0]]
-            top = self.alike[self.group(first.parent).name]
-            carriers = [body for body in shares if self.alike[body] == top]
+            top = self.alike.of(self.group(first.parent).name)
+            carriers = [body for body in shares if self.alike.of(body) == top]
             # any of the three may be called the arm
             arm = GROUND if GROUND in shares else (carriers or list(shares))[0]
             if len(shares) == 2:
@@ -342,7 +324,7 @@ class _Layer:
             shares = self._shares(s.terms, s.name)
             pair = sorted(shares.items(), key=lambda e: e[1]) if shares else []
             if len(pair) != 2:
-                d.notes.append(left_out(s.name, "it acts neither between two places nor between two links"))
+                d.leave(s.name, "it acts neither between two places nor between two links")
                 continue
             (on, _), (link, c) = pair
             if s.stiffness:
@@ -381,7 +363,7 @@ class _Layer:
             return
         shares = self._shares(m.terms, where, m.name)
         if shares is None or len(shares) != 2:
-            d.notes.append(left_out(where, "it drives neither one slide nor the angle between two links"))
+            d.leave(where, "it drives neither one slide nor the angle between two links")
             return
         (link, c), (on, _) = sorted(shares.items(), key=lambda e: -e[1])
         sense = 1.0

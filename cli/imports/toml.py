@@ -4,45 +4,52 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from fractions import Fraction
 
-from cli.imports.drawn import GROUND, Body, Drawing, Drive, Place, unused
+from cli.imports.drawn import GROUND, Body, Drawing, Drive, Load, Place
+from cli.read.names import unused
 
 ORIGIN: Place = (Fraction(0), Fraction(0))
+Table = dict[str, object]
 
 
 def text(d: Drawing, source: str) -> str:
     """Return the TOML text; `source` says where the mechanism is from."""
-    d = _named(d)
-    lines = [f"name = {_value(d.name)}", f"source = {_value(source)}"]
-    if d.gravity is not None:
-        lines.append(f"gravity = {_value(list(d.gravity))}")
-    lines += ["", "[units]", f"length = {_value(d.length)}", f"angle = {_value(d.angle)}", "", "[ground]"]
-    lines += [f"{_key(p)} = {_place(z)}" for p, z in d.bodies[GROUND].points.items()]
-    origins = {name: _origin(d, name, body) for name, body in d.bodies.items()}
-    for name, body in d.bodies.items():
-        if name != GROUND:
-            lines += _link(name, body, origins[name])
-    for s in d.slides:
-        lines += ["", "[[sliders]]" if s.turned is not None else "[[slots]]"]
-        rows: dict[str, object] = {"point": s.point, "link": s.link, "on": s.on}
-        lines += [f"{k} = {_value(v)}" for k, v in rows.items()]
-        lines += [f"through = {_place(s.through, origins[s.on])}", f"angle = {_value(s.angle)}"]
-        lines += [] if s.turned is None else [f"turned = {_value(s.turned)}"]
-    for m in d.meshes:
-        lines += ["", "[[gears]]", f"links = {_value([m.a, m.b])}", f"ratio = {_value(m.ratio)}"]
-        lines += [] if m.arm == GROUND else [f"arm = {_value(m.arm)}"]
-    for e in d.drives:
-        lines += ["", "[input]" if len(d.drives) == 1 else "[[input]]", *_input(e)]
-    ats = [_value(e.at) for e in d.drives]
-    lines += ["", "[guess]", f"at = {ats[0] if len(ats) == 1 else '[' + ', '.join(ats) + ']'}"]
-    lines += [f"{_key(n)} = {_value(b.turn)}" for n, b in d.bodies.items() if n != GROUND]
-    for load in d.loads:
-        lines += ["", f"[[{load.table}]]"]
-        lines += _ends(d, load.table, [(n, at, origins[n]) for n, at in load.ends])
-        lines += [f"{k} = {_value(v)}" for k, v in load.values.items()]
+    lines: list[str] = []
+    for head, table in _tables(_named(d), source):
+        lines += ["", head] if head else []
+        lines += [f"{_key(k)} = {_value(v)}" for k, v in table.items()]
     return "\n".join(lines) + "\n"
+
+
+def _tables(d: Drawing, source: str) -> Iterable[tuple[str, Table]]:
+    """Yield the tables of the file with their heads."""
+    gravity: Table = {} if d.gravity is None else {"gravity": d.gravity}
+    yield "", {"name": d.name, "source": source} | gravity
+    yield "[units]", {"length": d.length, "angle": d.angle}
+    yield "[ground]", _places(d.bodies[GROUND].points)
+    origins = {name: _origin(d, name, body) for name, body in d.bodies.items()}
+    links = {name: body for name, body in d.bodies.items() if name != GROUND}
+    for name, b in links.items():
+        table: Table = {"points": _places(b.points, origins[name])}
+        if b.mass > 0:
+            table |= {"mass": b.mass, "center": _place(b.center, origins[name]), "inertia": b.inertia}
+        yield f"[links.{_key(name)}]", table
+    for s in d.slides:
+        table = {"point": s.point, "link": s.link, "on": s.on}
+        table |= {"through": _place(s.through, origins[s.on]), "angle": s.angle}
+        yield ("[[slots]]", table) if s.turned is None else ("[[sliders]]", table | {"turned": s.turned})
+    for m in d.meshes:
+        arm: Table = {} if m.arm == GROUND else {"arm": m.arm}
+        yield "[[gears]]", {"links": [m.a, m.b], "ratio": m.ratio} | arm
+    for e in d.drives:
+        yield "[input]" if len(d.drives) == 1 else "[[input]]", _input(e)
+    ats = [e.at for e in d.drives]
+    at: Table = {"at": ats[0] if len(ats) == 1 else ats}
+    yield "[guess]", at | {n: b.turn for n, b in links.items()}
+    for load in d.loads:
+        yield f"[[{load.table}]]", _ends(d, load, origins) | load.values
 
 
 def _origin(d: Drawing, name: str, body: Body) -> Place:
@@ -54,42 +61,25 @@ def _origin(d: Drawing, name: str, body: Body) -> Place:
     return first or next(iter(body.points.values()), ORIGIN)
 
 
-def _link(name: str, body: Body, origin: Place) -> Iterable[str]:
-    points = ", ".join(f"{_key(p)} = {_place(z, origin)}" for p, z in body.points.items())
-    yield from ("", f"[links.{_key(name)}]", f"points = {{ {points} }}")
-    if body.mass > 0:
-        yield f"mass = {_value(body.mass)}"
-        yield f"center = {_place(body.center, origin)}"
-        yield f"inertia = {_value(body.inertia)}"
-
-
-def _input(e: Drive) -> Iterable[str]:
+def _input(e: Drive) -> Table:
     if e.slide is not None:
-        yield from (f"slider = {_value(e.slide.point)}", f"position = {_value(e.at)}")
+        table: Table = {"slider": e.slide.point, "position": e.at}
     else:
-        yield f"link = {_value(e.link)}"
-        if e.on != GROUND:
-            yield f"on = {_value(e.on)}"
-        yield f"angle = {_value(e.at)}"
-    if e.speed is not None:
-        yield f"speed = {_value(e.speed)}"
+        table = {"link": e.link} | ({} if e.on == GROUND else {"on": e.on}) | {"angle": e.at}
+    return table if e.speed is None else table | {"speed": e.speed}
 
 
-def _ends(d: Drawing, table: str, ends: list[tuple[str, Place | None, Place]]) -> Iterable[str]:
+def _ends(d: Drawing, load: Load, origins: dict[str, Place]) -> Table:
     """Name the bodies that a load holds on to; a spring's ends are points that `_named` has made."""
-    if table == "torsion_springs":
-        yield f"links = {_value([name for name, _, _ in ends])}"
-    elif table == "springs":
-        yield f"between = {_value([f'{name}.{_point_at(d, name, at)}' for name, at, _ in ends])}"
-    else:
-        (name, at, origin) = ends[0]
-        yield f"link = {_value(name)}"
-        if at is not None:
-            yield f"point = {_place(at, origin)}"
-
-
-def _point_at(d: Drawing, name: str, at: Place | None) -> str:
-    return next(p for p, z in d.bodies[name].points.items() if z == at)
+    if load.table == "torsion_springs":
+        return {"links": [name for name, _ in load.ends]}
+    if load.table == "springs":
+        ends = [
+            (name, next(p for p, z in d.bodies[name].points.items() if z == at)) for name, at in load.ends
+        ]
+        return {"between": [".".join(end) for end in ends]}
+    ((name, at),) = load.ends
+    return {"link": name} | ({} if at is None else {"point": _place(at, origins[name])})
 
 
 def _named(d: Drawing) -> Drawing:
@@ -109,25 +99,20 @@ def _named(d: Drawing) -> Drawing:
         for p in body.points:
             if p not in points:
                 points[p] = unused(p.replace(".", "_").strip() or "P", {*points.values(), *links.values()})
-    d.bodies = {links[n]: _with_points(b, points) for n, b in d.bodies.items()}
+        body.points = {points[p]: z for p, z in body.points.items()}
+    d.bodies = {links[n]: b for n, b in d.bodies.items()}
+    d.rename(links.__getitem__)
     for s in d.slides:
-        s.link, s.on, s.point = links[s.link], links[s.on], points[s.point]
-    for m in d.meshes:
-        m.a, m.b, m.arm = links[m.a], links[m.b], links[m.arm]
-    for e in d.drives:
-        e.link, e.on = None if e.link is None else links[e.link], links[e.on]
-    for load in d.loads:
-        load.ends = [(links[name], at) for name, at in load.ends]
+        s.point = points[s.point]
     return d
 
 
-def _with_points(body: Body, names: Mapping[str, str]) -> Body:
-    body.points = {names[p]: z for p, z in body.points.items()}
-    return body
+def _place(z: Place, origin: Place = ORIGIN) -> object:
+    return [float(z[0] - origin[0]), float(z[1] - origin[1])]
 
 
-def _place(z: Place, origin: Place = ORIGIN) -> str:
-    return f"[{_value(float(z[0] - origin[0]))}, {_value(float(z[1] - origin[1]))}]"
+def _places(points: dict[str, Place], origin: Place = ORIGIN) -> Table:
+    return {p: _place(z, origin) for p, z in points.items()}
 
 
 def _key(name: str) -> str:
@@ -137,12 +122,14 @@ def _key(name: str) -> str:
 def _value(value: object) -> str:
     """Return a value as TOML has it.
 
-    >>> _value(-0.0), _value(1e22), _value(["a", 0.1]), _value('x"')
-    ('0.0', '1e+22', '["a", 0.1]', '"x\\\\""')
+    >>> _value(-0.0), _value(1e22), _value(["a", 0.1]), _value('x"'), _value({"A": [1.0]})
+    ('0.0', '1e+22', '["a", 0.1]', '"x\\\\""', '{ A = [1.0] }')
     """
     if isinstance(value, float):
         return repr(value + 0.0)
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{_key(k)} = {_value(v)}' for k, v in value.items())} }}"
     # a JSON string is a basic string of TOML, but for the one control character that JSON leaves as it is
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

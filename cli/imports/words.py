@@ -25,12 +25,3 @@ def unknown(file: str) -> DataError:
 def damaged(file: str, where: str, found: object, expected: str) -> DataError:
     """Refuse a file at the place where it is no longer what it should be."""
     return DataError(f"{file}: {where}: found {quote(str(found))}, expected {expected}")
-
-
-def left_out(what: str, why: str) -> str:
-    """Name what has no meaning here.
-
-    >>> left_out("slide radius of C7", "arcs have no joint here")
-    'slide radius of C7: left out: arcs have no joint here'
-    """
-    return f"{what}: left out: {why}"

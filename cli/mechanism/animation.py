@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from cli.mechanism import columns
-from cli.mechanism.forces import rows_of
+from cli.mechanism.quantities import pairs
 from cli.mechanism.solve import Analysis
 from cli.show.page import shown
 from virtualwork import MechanismError
@@ -55,7 +55,7 @@ def _in_time(variant: str, found: InTime, units: str | None) -> Series:
     every.assemblies = home.assemblies
     whole = replace(found, analysis=every)
     whole.run = found.run
-    arrows = rows_of(every, found.run.first_motion) if found.forces else ()
+    arrows = pairs(every) if found.forces else ()
     columns = shown(whole.table(), units)
     name = f"variant {variant}" if variant else ""
     return found.run.series(
@@ -66,19 +66,19 @@ def _in_time(variant: str, found: InTime, units: str | None) -> Series:
 def _series(variant: str, analysis: Analysis, forces: bool, units: str | None) -> Iterator[Series]:
     """Every assembly asked for; none of a variant that cannot be put together, which the poses' own remarks name."""
     try:
-        pairs = list(zip(analysis.assemblies, analysis.motions, strict=True))
+        found = list(zip(analysis.assemblies, analysis.motions, strict=True))
     except MechanismError:
         if not variant:
             raise
         return
-    for assembly, motion in pairs:
+    for assembly, motion in found:
         # every point and link, whatever --only names: all of it is drawn
         one = replace(analysis, only=None)
         one.assemblies, one.motions = (assembly,), (motion,)
-        listed = shown(columns.poses(one), units)
+        listed = shown(columns.table(one, forces=False), units)
         if forces:
-            listed |= shown(columns.forces(one), units)
-        arrows = [JointForce.of(*row) for row in (rows_of(one, motion) if forces else ())]
+            listed |= shown(columns.table(one, forces=True), units)
+        arrows = [JointForce.of(*row) for row in (pairs(one) if forces else ())]
         names = [
             f"variant {variant}" if variant else "",
             f"branch {assembly.number}" if analysis.several else "",

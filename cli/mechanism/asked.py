@@ -1,108 +1,28 @@
-"""What is asked of many variants, so that another process knows it too, and what there is to say of them."""
+"""What is asked of many variants, so that another process knows it too; what there is to say of them; their tables."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
-from uuid import uuid4
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
 from numpy.typing import NDArray
 
-from cli.mechanism.families import Families
-from cli.mechanism.read import Inputs, wanted
-from cli.mechanism.result import result_of
-from cli.mechanism.solve import Analysis
-from cli.mechanism.studies import Request
-from cli.mechanism.variants import in_si, with_numbers
-from cli.show.columns import Result
+from cli.mechanism.options import Options
+from cli.mechanism.variants import Variants, in_si, with_numbers
+from cli.show.columns import Column, Table
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import Dimension
-from virtualwork.family.family import Family
-from virtualwork.family.part import Part, Solver
 
 if TYPE_CHECKING:
-    from cli.show.columns import Document
+    import numpy as np
+
+    from cli.show.columns import Cell, Document, Values
+
+    Rows = NDArray[np.float64]
 
 # of these kinds of remark each is printed, and of each the first so many variants are named
 REMARKS, NAMED = 10, 5
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What is asked of every variant: all that another process needs to know.
-
-    Attributes
-    ----------
-    mechanism : Mechanism
-        What they are variants of.
-    dimensions : tuple of Dimension
-        What is varied.
-    inputs : Inputs or None
-        None: each variant's own pose.
-    order, only, branch
-        As in `Analysis`.
-    digits : bool
-        Whether bounds of the rounding errors are asked for.
-    name : str
-        Of the question, by which a process knows what it has prepared for it.
-    """
-
-    file: str
-    mechanism: Mechanism
-    dimensions: tuple[Dimension, ...]
-    inputs: Inputs | None
-    bare: dict[str, str]
-    order: int | None
-    only: list[str] | None
-    branch: str | None
-    request: Request
-    about: dict[str, str]
-    digits: bool
-    name: str = field(default_factory=lambda: uuid4().hex)
-
-    def analysis(self, mechanism: Mechanism) -> Analysis:
-        """The question, asked of one mechanism."""
-        q = self.inputs or wanted(mechanism, None, None, None, self.bare)
-        return Analysis.of(self.file, mechanism, q, self.order, self.only, self.branch)
-
-    def result(self, analysis: Analysis) -> Result:
-        """Its answer."""
-        return result_of(analysis, self.request, None, False, None, self.about)
-
-    def variant(self, row: NDArray[np.float64]) -> Analysis:
-        """The question, asked of a variant.
-
-        Raises
-        ------
-        MechanismError
-        """
-        return self.analysis(with_numbers(self.mechanism, self.dimensions, row.tolist()))
-
-    def set(self, row: NDArray[np.float64]) -> Document:
-        """A variant's numbers as they are shown, by the names that they have in JSON and tables."""
-        return {d.header: value for d, value in zip(self.dimensions, row.tolist(), strict=True)}
-
-    def part(self, shown: NDArray[np.float64]) -> Part:
-        """Variants as a part of a family."""
-        numbers = {
-            d.path: [in_si(d, x) for x in c] for d, c in zip(self.dimensions, shown.T.tolist(), strict=True)
-        }
-        q = self.inputs
-        family = Family(self.mechanism, numbers)
-        if q is None:
-            return family.motion().part
-        return family.motion(q.values, q.speed, q.acceleration).part
-
-    def families(self, shown: NDArray[np.float64], json: bool) -> Families | None:
-        """How variants are solved together, for documents or for a table; None where they are not."""
-        plain = self.branch is None and self.request.tables in ([], ["--forces"])
-        # a cycle of work, which stands in the document only, is of each variant
-        cycle = json and self.request.forces and self.request.swept and len(self.mechanism.inputs) == 1
-        if not plain or self.digits or cycle:
-            return None
-        found = Families(self.analysis(self.mechanism), self.request.forces, Solver(self.part(shown)), json)
-        return found if found.pays else None
 
 
 @dataclass
@@ -115,6 +35,8 @@ class Said:
         Remark -> the first variants, and how many there are.
     further : int
         Variants with a remark of their own that is not kept.
+    any_assembled : bool
+        Whether of any variant there is a number.
     """
 
     remarks: dict[str, tuple[list[str], int]] = field(default_factory=dict)
@@ -145,3 +67,157 @@ class Said:
         if self.further:
             lines.append(f"{self.further} further variants have remarks of their own")
         return lines
+
+
+class Home(NamedTuple):
+    """What all parts of the work have in common.
+
+    Attributes
+    ----------
+    each : int
+        How many variants a part has.
+    pattern : Table, optional
+        With the columns that all tables have.
+    row : array (d,), optional
+        The numbers of a variant that can be put together.
+    together : bool
+        Whether variants are solved at once.
+    lanes : int
+        How large the whole is, which the choice of an engine hangs on; 0 where each variant is work of its own.
+    """
+
+    each: int
+    pattern: Table = Table([])
+    row: Rows | None = None
+    together: bool = False
+    lanes: int = 0
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of every variant: all that another process needs to know.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        What they are variants of.
+    dimensions : tuple of Dimension
+        What is varied.
+    bare : mapping
+        The file's units of bare numbers.
+    digits : bool
+        Whether bounds of the errors are asked for.
+    """
+
+    asked: Options
+    mechanism: Mechanism
+    dimensions: tuple[Dimension, ...]
+    bare: Mapping[str, str]
+    digits: bool
+
+    method = ""
+
+    def home(self, variants: Variants, json: bool) -> Home:
+        """What all parts have in common, of documents or of a table."""
+        raise NotImplementedError
+
+    def table(self, home: Home, first: int, shown: Rows, said: Said) -> Table:
+        """The rows of some variants, which are called from `first` on."""
+        raise NotImplementedError
+
+    def documents(self, home: Home, first: int, shown: Rows, said: Said) -> list[Document]:
+        """What JSON says of some variants."""
+        raise NotImplementedError
+
+    def drawn(self, row: Rows) -> Any:
+        """A variant alone, for a page.
+
+        Raises
+        ------
+        MechanismError
+        """
+        raise NotImplementedError
+
+    def variant(self, row: Rows) -> Mechanism:
+        """The mechanism with a variant's numbers.
+
+        Raises
+        ------
+        MechanismError
+        """
+        return with_numbers(self.mechanism, self.dimensions, row.tolist())
+
+    def numbers(self, shown: Rows) -> dict[str, list[float]]:
+        """The numbers of variants by path, SI."""
+        return {
+            d.path: [in_si(d, x) for x in column]
+            for d, column in zip(self.dimensions, shown.T.tolist(), strict=True)
+        }
+
+    def named(self, first: int, shown: Rows, documents: Sequence[Document]) -> list[Document]:
+        """Documents with the variants' names and numbers."""
+        headers = [d.header for d in self.dimensions]
+        return [
+            {"variant": str(first + i), "set": dict(zip(headers, row, strict=True)), **document}
+            for i, (row, document) in enumerate(zip(shown.tolist(), documents, strict=True))
+        ]
+
+    def given(self, names: list[str], numbers: Sequence[Values]) -> list[Column]:
+        """The first columns of a table: the variant and its numbers."""
+        varied = zip(self.dimensions, numbers, strict=True)
+        return [Column("variant", "", names), *(Column(d.path, d.unit, values) for d, values in varied)]
+
+    def below(self, first: int, shown: Rows, tables: Sequence[Table]) -> Table:
+        """The tables of variants one below the other, each row with its variant's name and numbers."""
+        named = []
+        for i, (row, table) in enumerate(zip(shown.tolist(), tables, strict=True)):
+            n = length(table)
+            given = self.given([str(first + i)] * n, [[value] * n for value in row])
+            named.append(Table([*given, *table.columns]))
+        return joined(named)
+
+
+# --- tables of the same columns ---------------------------------------------------------------------------------------
+def length(table: Table) -> int:
+    """How many rows a table has."""
+    return len(table.columns[0].values) if table.columns else 1
+
+
+def like(pattern: Table, table: Table) -> Table:
+    """A table with the columns of the first."""
+    columns = {c.header: c for c in table.columns}
+    empty: list[Cell] = [None] * length(table)
+    return Table(
+        [columns.get(c.header) or Column(c.name, c.unit, empty) for c in pattern.columns], pattern.keys
+    )
+
+
+def emptied(pattern: Table) -> Table:
+    """The rows of a variant that cannot be put together: what names them stays."""
+    return Table(
+        [
+            c if c.header in pattern.keys else Column(c.name, c.unit, [None] * len(c.values))
+            for c in pattern.columns
+        ],
+        pattern.keys,
+    )
+
+
+def without_bounds(table: Table) -> Table:
+    """A table without the bounds of its errors."""
+    return replace(table, columns=[replace(c, error=None) for c in table.columns])
+
+
+def joined(tables: Sequence[Table]) -> Table:
+    """Tables of the same columns, one below the other."""
+
+    def bounds(parts: Sequence[Column]) -> Iterator[float]:
+        for part in parts:
+            # a variant that is not assembled has no numbers, and no bounds of them
+            yield from [0.0] * len(part.values) if part.error is None else part.error()
+
+    def column(*parts: Column) -> Column:
+        error = None if all(part.error is None for part in parts) else lambda: list(bounds(parts))
+        return replace(parts[0], values=[value for part in parts for value in part.values], error=error)
+
+    return replace(tables[0], columns=list(map(column, *(table.columns for table in tables))))

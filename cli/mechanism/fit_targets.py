@@ -10,7 +10,6 @@ import numpy as np
 
 from cli.errors import DataError
 from cli.read import options
-from cli.read.units import to_si
 from virtualwork.describe import hint
 
 if TYPE_CHECKING:
@@ -139,9 +138,7 @@ def _target(
     if table.rows < 2:
         raise DataError(f"{table.file}: a target of one point: expected two or more rows")
     said += table.warnings
-    si: dict[str, Any] = {
-        name: np.asarray(to_si(c.values, kinds[name], c.unit)) for name, c in table.numbers.items()
-    }
+    si: dict[str, Any] = {name: c.si for name, c in table.numbers.items()}
     row_weight = si.get("weight")
     if row_weight is not None:
         table.reject(row_weight < 0, "weight", "a weight of 0 or more")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ from cli.errors import DataError
 from cli.mechanism.fit_targets import targets, wanted, weights
 from cli.mechanism.solve import load
 from cli.mechanism.tables import beside
-from cli.mechanism.variants import assigned, assignment, in_si, quantity
+from cli.mechanism.variants import assigned, in_si, one_number, quantity
 from cli.read import options
 from cli.read.files import read_bytes
 from cli.read.units import read_degrees
@@ -28,6 +27,7 @@ from virtualwork.describe.units import Units
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from cli.mechanism.options import Options
     from cli.show.columns import Document, Json
     from virtualwork import Mechanism
     from virtualwork.family.fitting import Fit
@@ -38,61 +38,38 @@ STARTS = 256
 WRITTEN = 1e-12
 
 
-@dataclass(frozen=True)
-class FitOptions:
-    """The options of a fit, as they are given."""
-
-    tables: Sequence[str] | None
-    points: Sequence[str] | None
-    links: Sequence[str] | None
-    slides: Sequence[str] | None
-    free: Sequence[str] | None
-    weight: Sequence[str] | None
-    starts: int | None
-    best: int | None
-
-    def check(self, others: Sequence[str]) -> None:
-        """Refuse what is missing, and `others`: options that do not go with a fit."""
-        names = self.points or self.links or self.slides
-        needs = {"--fit TARGET.csv": self.tables, "--point NAME": names, "--free PATH=LOW:HIGH": self.free}
-        for needed, given in needs.items():
-            if not given:
-                own = (
-                    "--fit" if self.tables else "--point" if names else "--free" if self.free else "--starts"
-                )
-                raise options.bad(needed.split()[0], f"missing beside {own}: expected {needed}")
-        if others:
-            raise options.bad("--fit", f"expected without {others[0]}: it finds dimensions, not poses")
+def _check(asked: Options) -> None:
+    """Refuse what is missing."""
+    names = asked.point or asked.link or asked.slide
+    needs = {"--fit TARGET.csv": asked.fit, "--point NAME": names, "--free PATH=LOW:HIGH": asked.free}
+    own = next((each.split()[0] for each, given in needs.items() if given), "--starts")
+    for needed, given in needs.items():
+        if not given:
+            raise options.bad(needed.split()[0], f"missing beside {own}: expected {needed}")
 
 
-def fitted(
-    file: str, asked: FitOptions, change: Sequence[str] | None, seed: int, workers: int, others: Sequence[str]
-) -> Result:
-    """Find the dimensions, and show them; `others` are options that do not go with it."""
-    asked.check(others)
-    m, bare, said, about = load(file)
+def fitted(asked: Options) -> Result:
+    """Find the dimensions, and show them."""
+    _check(asked)
+    m, bare, said, about = load(asked.file)
     if len(m.inputs) != 1:
         raise options.bad("--fit", f"{len(m.inputs)} inputs: expected a mechanism with one")
-    m = assigned(m, bare, change) if change else m
-    names = wanted(m, asked.points, asked.links, asked.slides)
+    m = assigned(m, bare, asked.change) if asked.change else m
+    names = wanted(m, asked.point, asked.link, asked.slide)
     weight = weights(asked.weight, names)
     bounds = _bounds(m, asked.free or (), bare)
-    aims = targets(m, asked.tables or (), names, weight, said)
+    aims = targets(m, asked.fit or (), names, weight, said)
+    best = asked.best or 1
     try:
-        with options.processes(workers) as pool:
+        with options.processes(asked.workers or 1) as pool:
             found = m.fit(
-                aims,
-                free=bounds,
-                starts=asked.starts or STARTS,
-                seed=seed,
-                best=asked.best or 1,
-                executor=pool,
+                aims, free=bounds, starts=asked.starts or STARTS, seed=asked.seed, best=best, executor=pool
             )
     except DescriptionError as error:
         raise options.bad("--free", error) from None
     solutions = [found, *found.others]
-    if len(solutions) < (asked.best or 1):
-        said.append(f"fit: found {len(solutions)} distinct of {asked.best} solutions asked for")
+    if len(solutions) < best:
+        said.append(f"fit: found {len(solutions)} distinct of {best} solutions asked for")
     said += found.remarks
     for i, other in enumerate(found.others, 2):
         said += [f"solution {i}: {remark}" for remark in other.remarks]
@@ -103,7 +80,7 @@ def fitted(
         notes=lambda: m.name,
         afterword=lambda: _sentence(found),
         figure=lambda: _drawn(found),
-        toml=lambda: _text(file, found, bare).encode(),
+        toml=lambda: _text(asked.file, found, bare).encode(),
         warnings=said,
         method="Nonlinear least squares within bounds, from many starts, with exact derivatives.",
         about={"title": m.name or "Mechanism"} | about,
@@ -144,11 +121,7 @@ def _bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[
     """Every `--free PATH=LOW:HIGH` in SI."""
     found: dict[str, tuple[float, float]] = {}
     for text in free:
-        (dimension, *both), span = assignment(m, text, "--free", "LOW:HIGH")
-        if both:
-            raise options.bad("--free", f"'{text}': two numbers: expected {dimension.path} or {both[0].path}")
-        if dimension.path in found:
-            raise options.bad("--free", f"'{text}': {dimension.path} is given twice")
+        dimension, span = one_number(m, text, "--free", "LOW:HIGH", found)
         ends = span.split(":")
         if len(ends) != 2:
             raise options.bad("--free", f"'{text}': expected PATH=LOW:HIGH, such as {dimension.path}=...:...")

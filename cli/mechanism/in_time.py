@@ -5,14 +5,25 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cli.errors import DataError
-from cli.mechanism.columns import bounds_of, column
-from cli.mechanism.forces import rows_of
-from cli.mechanism.poses import LINK, POINT, SLIDE, cells
+from cli.mechanism.quantities import (
+    SLIDE,
+    Quantity,
+    bounds_of,
+    cells,
+    column,
+    in_rows,
+    keys_of,
+    links,
+    nested,
+    points,
+    reactions,
+    slides,
+)
 from cli.mechanism.read import until_inputs
 from cli.mechanism.solve import Analysis
 from cli.read import options
@@ -32,9 +43,11 @@ if TYPE_CHECKING:
     from virtualwork.intime.travel import Travel
 
     Reals = NDArray[np.float64]
-    # kind -> name -> quantity -> values; a reaction's name is (joint, on, from)
-    Parts = dict[str, dict[Any, dict[str, Reals]]]
+    Values = dict[Quantity, Reals]
 
+# an input's angle and its rates
+INPUT = ("angle_deg", "speed_rad_s", "acceleration_rad_s2")
+ENERGY = Quantity(("energy_J",), "energy_J")
 METHOD = (
     "Motion under forces: the effort at the inputs by virtual work with d'Alembert's forces is M·q̈ + h; let go, it is "
     "zero, and q̈ is integrated in the inputs. Loops are closed at every evaluation. The error is estimated from a "
@@ -83,93 +96,59 @@ class InTime:
         except ValueError as error:
             raise DataError(f"{a.file}: {error}") from None
 
-    def parts(self, way: Travel) -> Parts:
-        """All that is asked for, of one of the two solutions."""
-        a, run = self.analysis, self.run
-        found: Parts = {"inputs": self._inputs(way), "energy": {"": {"energy_J": way.energy(run.t)}}}
-        motion = way.motion(run.t)
+    @cached_property
+    def _asked(self) -> list[Quantity]:
+        """What is asked for beside the inputs and the energy."""
+        a, m, found = self.analysis, self.analysis.mechanism, []
         if a.only is not None:
-            given = {e.link: e.name for e in a.mechanism.inputs if not e.is_slide and e.on == GROUND}
-            found["links"] = {
-                name: dict(
-                    zip(
-                        LINK,
-                        (
-                            found["inputs"][given[name]]["angle_deg"]
-                            if name in given
-                            else np.degrees(way.link_angle(name, run.t)),
-                            link.omega,
-                            link.alpha,
-                        ),
-                        strict=False,
-                    )
-                )
-                for name, link in ((name, motion.link(name)) for name in a.links)
-            }
-            found["points"] = {
-                name: {
-                    key: values
-                    for order, keys in enumerate(POINT[:3])
-                    for key, values in zip(keys, _xy(motion.point(name).complex(order)), strict=True)
-                }
-                for name in a.points
-            }
-            found["slides"] = {
-                name: dict(zip(SLIDE, (slide.position, slide.speed, slide.acceleration), strict=False))
-                for name, slide in ((name, motion.slide(name)) for name in a.slides)
-            }
-        if self.forces:
-            found |= self._forces(motion)
+            found = [*links(a.links, 2), *points(m, a.points, 2), *slides(m, a.slides, 2)]
+        return found + (reactions(a) if self.forces else [])
+
+    def values(self, way: Travel) -> Values:
+        """All that is asked for, of one of the two solutions."""
+        m, t = self.analysis.mechanism, self.run.t
+        q, v, acceleration, _ = way.at(t)
+        found = inputs_of(m, q, v, acceleration, self.run.error_estimate)
+        turned = {each.path[1]: values for each, values in found.items() if each.path[2] == "angle_deg"}
+        given = {e.link: turned[e.name] for e in m.inputs if not e.is_slide and e.on == GROUND}
+        found[ENERGY] = way.energy(t)
+        keys = keys_of(self._asked)
+        known = dict(zip(keys, way.motion(t).values(keys), strict=True)) if keys else {}
+        for each in self._asked:
+            if each.turns:
+                # whole turns and all
+                name = each.key[1]
+                found[each] = given[name] if name in given else np.degrees(way.link_angle(name, t))
+            else:
+                found[each] = each.of(known[each.key]) if each.key else np.zeros(len(t))
         return found
 
-    def _inputs(self, way: Travel) -> dict[Any, dict[str, Reals]]:
-        q, v, acceleration, _ = way.at(self.run.t)
-        return inputs_of(self.analysis.mechanism, q, v, acceleration, self.run.error_estimate)
-
-    def _forces(self, motion: Any) -> Parts:
-        found: dict[Any, dict[str, Reals]] = {}
-        dynamics = motion.dynamics
-        for joint, on, of in rows_of(self.analysis, self.run.first_motion):
-            force = dynamics.joint_force(joint, on)
-            values = force.real, force.imag, dynamics.joint_moment(joint, on)
-            found[joint.name, on, of] = dict(zip(("fx_N", "fy_N", "moment_N_m"), values, strict=True))
-        force, moment = dynamics.shaking
-        shaking = {"fx_N": force[:, 0], "fy_N": force[:, 1], "moment_N_m": moment}
-        return {"reactions": found, "shaking": {"": shaking}}
-
     @cached_property
-    def fine(self) -> Parts:
+    def fine(self) -> Values:
         """The answer."""
-        return self.parts(self.run.fine)
+        return self.values(self.run.fine)
 
     @cached_property
-    def coarse(self) -> Parts:
+    def coarse(self) -> Values:
         """The coarser solution, for the errors."""
-        return self.parts(self.run.coarse)
+        return self.values(self.run.coarse)
 
     def table(self) -> Table:
         """A row for each time."""
-        several = len(self.analysis.mechanism.inputs) > 1
-        return Table(columns_of(self.run.t, self.shown, several, self._error), keys=("t_s",))
+        return Table(columns_of(self.run.t, self.shown, self._error), keys=("t_s",))
 
     @cached_property
-    def shown(self) -> Parts:
+    def shown(self) -> Values:
         """The answer as far as any digit of it is known."""
         return known(self.fine, self.run.unknown)
 
-    def _error(self, kind: str, name: Any, key: str) -> list[float]:
-        return bounds_of(self.run.spread(self.fine[kind][name][key], self.coarse[kind][name][key]))
+    def _error(self, each: Quantity) -> list[float]:
+        return bounds_of(self.run.spread(self.fine[each], self.coarse[each]))
 
     @property
-    def errors(self) -> dict[tuple[str, Any, str], list[float]]:
+    def errors(self) -> dict[Quantity, list[float]]:
         """The bounds of the errors of all that has one, worked out."""
-        return {
-            (kind, name, key): self._error(kind, name, key)
-            for kind, entries in self.fine.items()
-            for name, of in entries.items()
-            for key in of
-            if not key.startswith("error")
-        }
+        return {each: self._error(each) for each in self.fine if not _is_error(each)}
 
     def document(self) -> Document:
         """The JSON document."""
@@ -220,24 +199,19 @@ class InTime:
         )
 
 
-def inputs_of(m: Mechanism, q: Reals, v: Reals, a: Reals, error: Reals) -> dict[Any, dict[str, Reals]]:
-    """The inputs, their rates and errors (n, k) by name, as they are shown."""
-    found: dict[Any, dict[str, Reals]] = {}
+def inputs_of(m: Mechanism, q: Reals, v: Reals, a: Reals, error: Reals) -> Values:
+    """The inputs, their rates and errors (n, k), as they are shown."""
+    found: Values = {}
     for j, entry in enumerate(m.inputs):
-        if entry.is_slide:
-            found[entry.name] = {
-                "position_m": q[:, j],
-                "speed_m_s": v[:, j],
-                "acceleration_m_s2": a[:, j],
-                "error_estimate_m": error[:, j],
-            }
-        else:
-            found[entry.name] = {
-                "angle_deg": _degrees(q[:, j]),
-                "speed_rad_s": v[:, j],
-                "acceleration_rad_s2": a[:, j],
-                "error_estimate_deg": np.degrees(error[:, j]),
-            }
+        lead = f"{entry.name}_input_" if len(m.inputs) > 1 else "input_"
+        values = (q[:, j], v[:, j], a[:, j], error[:, j])
+        if not entry.is_slide:
+            values = (_degrees(q[:, j]), *values[1:3], np.degrees(error[:, j]))
+        unit = "m" if entry.is_slide else "deg"
+        names = *(SLIDE if entry.is_slide else INPUT)[:3], f"error_estimate_{unit}"
+        for name, its in zip(names, values, strict=True):
+            header = f"{lead}{unit if name in (SLIDE[0], INPUT[0]) else name}"
+            found[Quantity(("inputs", entry.name, name), header)] = its
     return found
 
 
@@ -249,83 +223,38 @@ def _degrees(q: Reals) -> Reals:
     return np.asarray(angle)
 
 
-def known(parts: Parts, unknown: NDArray[np.bool_]) -> Parts:
-    """Parts without what no digit is known of: what stays are the errors, and the energy, which has one of its own."""
+def _is_error(each: Quantity) -> bool:
+    return str(each.path[-1]).startswith("error")
+
+
+def known(values: Values, unknown: NDArray[np.bool_]) -> Values:
+    """Values without what no digit is known of: what stays are the errors, and the energy, which has one of its own."""
     if not unknown.any():
-        return parts
+        return values
     return {
-        kind: {
-            name: {
-                key: values
-                if kind == "energy" or key.startswith("error")
-                else np.where(unknown, np.nan, values)
-                for key, values in of.items()
-            }
-            for name, of in entries.items()
-        }
-        for kind, entries in parts.items()
+        each: of if each == ENERGY or _is_error(each) else np.where(unknown, np.nan, of)
+        for each, of in values.items()
     }
 
 
 def columns_of(
-    t: Reals, parts: Parts, several: bool, error: Callable[[str, Any, str], list[float]] | None = None
+    t: Reals, values: Values, error: Callable[[Quantity], list[float]] | None = None
 ) -> list[Column]:
-    """What is found at each time as columns; `several`: whether there are several inputs."""
+    """What is found at each time as columns."""
     columns = [column("t_s", t.tolist())]
-    for kind, entries in parts.items():
-        for name, values in entries.items():
-            for key, numbers in values.items():
-                told = None if error is None or key.startswith("error") else partial(error, kind, name, key)
-                columns.append(column(_header(kind, name, key, several=several), cells(numbers), told))
+    for each, of in values.items():
+        told = None if error is None or _is_error(each) else partial(error, each)
+        columns.append(column(each.header, cells(of), told))
     return columns
 
 
-def rows_of_time(t: Reals, parts: Parts) -> list[Document]:
+def rows_of_time(t: Reals, values: Values) -> list[Document]:
     """What is found at each time as JSON."""
-    lists = {
-        kind: {name: {key: cells(values) for key, values in of.items()} for name, of in entries.items()}
-        for kind, entries in parts.items()
-    }
-    rows: list[Document] = []
-    for i, time in enumerate(t.tolist()):
-        row: dict[str, Any] = {"t_s": time}
-        for kind, entries in lists.items():
-            here = {name: {key: values[i] for key, values in of.items()} for name, of in entries.items()}
-            if kind == "energy":
-                row |= here[""]
-            elif kind == "shaking":
-                row[kind] = here[""]
-            elif kind == "reactions":
-                row[kind] = [
-                    {"joint": joint, "on": on, "from": of, **values}
-                    for (joint, on, of), values in here.items()
-                ]
-            elif here:
-                row[kind] = here
-        rows.append(row)
-    return rows
+    numbers = {each: cells(of) for each, of in values.items()}
+    return list(in_rows({"t_s": t.tolist(), **nested(numbers, len(t))}, len(t)))
 
 
 def largest(drift: Reals) -> float | None:
     """The largest of numbers by size, sign and all; None where there is none."""
     there = drift[np.isfinite(drift)]
     return float(there[np.argmax(np.abs(there))]) if len(there) else None
-
-
-def _xy(z: NDArray[np.complex128]) -> tuple[Reals, Reals]:
-    return z.real, z.imag
-
-
-def _header(kind: str, name: Any, key: str, *, several: bool) -> str:
-    """How a quantity is called in a table."""
-    if kind == "inputs":
-        rest = {"angle_deg": "deg", "position_m": "m"}.get(key, key)
-        return f"{name}_input_{rest}" if several else f"input_{rest}"
-    if kind == "energy":
-        return key
-    if kind == "shaking":
-        return f"shaking_{key}"
-    if kind == "reactions":
-        joint, on, of = name
-        return f"{joint}_{of}_on_{on}_{key}"
-    return f"{name}_{key}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cli.mechanism.forces import rows_of
+from cli.mechanism.quantities import pairs
 from cli.mechanism.solve import Analysis
 from cli.read import options
 from cli.show.picture import blank
@@ -34,7 +34,7 @@ def draw_curves(analysis: Analysis, text: str) -> Figure:
 def draw_forces(analysis: Analysis) -> Figure:
     """Draw the effort and the joint forces asked for against the input, and what shakes the ground."""
     figure, motion = blank(), analysis.motions[0]
-    forces(motion.dynamics, rows_of(analysis, motion), figure)
+    forces(motion.dynamics, pairs(analysis), figure)
     return figure
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.mechanism.poses import of_links, of_points
+from cli.mechanism.quantities import cells_of, keys_of, links, points, solved
 from cli.read.units import UNITS, from_si, read_degrees, written
 from cli.show.columns import Column, Section, Sheet, Table
 
@@ -32,32 +32,32 @@ def posed(
     def lengths(values: list[float | None]) -> list[float | None]:
         return [None if v is None else from_si(v, "length", length) for v in clean(values, m.size)]
 
-    places = of_points(motion, list(m.points), 0)
-    table = Table(
-        [
-            Column("point", "", list(places)),
-            Column(
-                "of", "", [", ".join(name for name, body in m.bodies.items() if p in body) for p in places]
-            ),
-            Column("x", length, lengths([places[p]["x_m"][0] for p in places])),
-            Column("y", length, lengths([places[p]["y_m"][0] for p in places])),
-        ],
-        ("point",),
-    )
     driven = {
         str(e.link): np.array([read_degrees(v)])
         for e, v in zip(m.inputs, inputs, strict=True)
         if e.on == "ground" and not e.is_slide
     }
-    angles = of_links(motion, list(m.links), 0, driven)
-    links = Table(
+    wanted = [*points(m, list(m.points), 0), *links(list(m.links), 0)]
+    shown = cells_of(wanted, solved(motion, keys_of(wanted)), 1, driven)
+    x, y, angles = (
+        [values[0] for each, values in shown.items() if each.path[-1] == name]
+        for name in ("x_m", "y_m", "angle_deg")
+    )
+    table = Table(
+        [
+            Column("point", "", list(m.points)),
+            Column(
+                "of", "", [", ".join(name for name, body in m.bodies.items() if p in body) for p in m.points]
+            ),
+            Column("x", length, lengths(x)),
+            Column("y", length, lengths(y)),
+        ],
+        ("point",),
+    )
+    bodies = Table(
         [
             Column("link", "", list(m.links)),
-            Column(
-                "angle",
-                "deg",
-                clean([turned["angle_deg"][0] for turned in angles.values()], 360.0),
-            ),
+            Column("angle", "deg", clean(angles, 360.0)),
             Column("mass", "kg", [m.rigid[name].mass for name in m.links]),
             Column("inertia", "kg_m2", [m.rigid[name].inertia for name in m.links]),
         ],
@@ -73,7 +73,7 @@ def posed(
 
     there = bool(motion.assembled.all())
     stands = at_inputs(m, inputs, length)
-    pose = Section("Pose", [stands, table, links] if there else [f"{stands}: it cannot be assembled there"])
+    pose = Section("Pose", [stands, table, bodies] if there else [f"{stands}: it cannot be assembled there"])
     return Sheet(title, [first, Section("Mechanism", [counted(m)]), pose], figure if there else None)
 
 

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from virtualwork import Mechanism
 
+    Reals = NDArray[np.float64]
+
 # poses in one sweep: beyond it a double cannot count them; `Analysis.check_size` knows what one takes in memory
 MOST = 10**15
 
@@ -28,10 +30,10 @@ MOST = 10**15
 class Inputs:
     """The inputs of every pose, in SI and as they are shown (degrees or metres), and their rates where a table gives them."""
 
-    values: NDArray[np.float64]  # (n, k)
-    shown: NDArray[np.float64]  # (n, k), deg or m
-    speed: NDArray[np.float64] | None = None
-    acceleration: NDArray[np.float64] | None = None
+    values: Reals  # (n, k)
+    shown: Reals  # (n, k), deg or m
+    speed: Reals | None = None
+    acceleration: Reals | None = None
     steps: list[str] = field(default_factory=list)
 
     # whether the values are given one by one
@@ -60,7 +62,7 @@ class Sweep:
     mechanism: Mechanism
     swept: int
     rest: list[float]
-    at: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    at: Callable[[Reals], Reals]
     n: int
     last: float
     speed: None = None
@@ -87,12 +89,12 @@ class Sweep:
         return self.part(0, self.n)
 
     @property
-    def values(self) -> NDArray[np.float64]:
+    def values(self) -> Reals:
         """The inputs in SI, (n, k)."""
         return self._whole.values
 
     @property
-    def shown(self) -> NDArray[np.float64]:
+    def shown(self) -> Reals:
         """The inputs as they are shown, degrees or metres, (n, k)."""
         return self._whole.shown
 
@@ -122,9 +124,7 @@ def wanted(
         return _inputs(m, np.array(rows, dtype=float))
     if any(e.history for e in m.inputs):
         return _from_history(m)
-    home = [[_shown(m, j, value) for j, value in enumerate(_home(m))]]
-    found = _inputs(m, np.array(home, dtype=float))
-    return Inputs(np.array([_home(m)]), found.shown, steps=found.steps)
+    return _as_shown(m, np.array([_home(m)]))
 
 
 def _home(m: Mechanism) -> list[float]:
@@ -136,12 +136,20 @@ def _shown(m: Mechanism, j: int, value: float) -> float:
     return value if m.inputs[j].is_slide else read_degrees(value)
 
 
-def _inputs(m: Mechanism, shown: NDArray[np.float64]) -> Inputs:
+def _inputs(m: Mechanism, shown: Reals) -> Inputs:
     values = shown.copy()
     for j, e in enumerate(m.inputs):
         if not e.is_slide:
             values[:, j] = np.radians(shown[:, j])
     return Inputs(values, shown, steps=[str(i) for i in range(1, len(shown) + 1)])
+
+
+def _as_shown(
+    m: Mechanism, q: Reals, speed: Reals | None = None, acceleration: Reals | None = None
+) -> Inputs:
+    """Inputs that are given in SI."""
+    shown = np.array([[_shown(m, j, v) for j, v in enumerate(row)] for row in q])
+    return Inputs(q, shown, speed, acceleration, [str(i) for i in range(1, len(q) + 1)])
 
 
 def _quantity(m: Mechanism, j: int, text: str, flag: str, bare: Mapping[str, str]) -> float:
@@ -235,7 +243,7 @@ def _sweep(m: Mechanism, text: str, at: list[str] | None, bare: Mapping[str, str
             )
         last = stop
 
-        def values(i: NDArray[np.float64]) -> NDArray[np.float64]:
+        def values(i: Reals) -> Reals:
             return np.asarray(start + (stop - start) * (i / n))
 
     else:
@@ -251,7 +259,7 @@ def _sweep(m: Mechanism, text: str, at: list[str] | None, bare: Mapping[str, str
         if abs(n - ratio) <= 1e-9 * max(1.0, ratio):
             last = stop
 
-        def values(i: NDArray[np.float64]) -> NDArray[np.float64]:
+        def values(i: Reals) -> Reals:
             return np.asarray(start + step * i)
 
     rest = _at(m, at[0], bare) if at else [_shown(m, i, value) for i, value in enumerate(_home(m))]
@@ -271,41 +279,30 @@ def _from_table(m: Mechanism, path: str) -> Inputs:
         numbers[f"{e.name.lower()}_speed"] = "velocity" if e.is_slide else "speed"
         numbers[f"{e.name.lower()}_acceleration"] = "acceleration" if e.is_slide else "angular acceleration"
     table = read(path, numbers=numbers, texts=("step",))
-    columns: dict[str, tuple[NDArray[np.float64], str, NDArray[np.float64]]] = {}
-    for key, dimension in numbers.items():
-        if key in table.numbers:
-            column = table.numbers[key]
-            columns[key] = (
-                column.values,
-                column.unit,
-                np.asarray(to_si(column.values, dimension, column.unit)),
-            )
+    si = {key: c.si for key, c in table.numbers.items()}
     shown, values = [], []
     for name, e in names.items():
-        if name.lower() not in columns:
-            units = " or ".join(f"{name}_{u}" for u in list(UNITS["length" if e.is_slide else "angle"])[:2])
+        key = name.lower()
+        if key not in si:
+            units = " or ".join(f"{name}_{u}" for u in list(UNITS[numbers[key]])[:2])
             raise DataError(f"{path}: no column {units} for the input '{name}' {table.told}")
-        raw, its, si = columns[name.lower()]
-        values.append(si)
-        shown.append(si if e.is_slide else (raw if its == "deg" else np.degrees(si)))
+        given = table.numbers[key]
+        values.append(si[key])
+        in_degrees = given.values if given.unit == "deg" else np.degrees(si[key])
+        shown.append(si[key] if e.is_slide else in_degrees)
     q = np.array(values).T
-    rates = []
+    rates: list[Reals | None] = []
     for kind in ("speed", "acceleration"):
-        given = [columns.get(f"{name.lower()}_{kind}") for name in names]
-        rates.append(
-            np.array([np.zeros(len(q)) if g is None else g[2] for g in given]).T
-            if any(g is not None for g in given)
-            else None
-        )
-    if "time" in columns and rates[0] is None:
-        rates = list(_rates_of(path, columns["time"][2], q))
+        of = [si.get(f"{name.lower()}_{kind}") for name in names]
+        none = all(rate is None for rate in of)
+        rates.append(None if none else np.stack([np.zeros(len(q)) if r is None else r for r in of], axis=1))
+    if "time" in si and rates[0] is None:
+        rates = list(_rates_of(path, si["time"], q))
     steps = table.texts.get("step") or [str(i) for i in range(1, len(q) + 1)]
     return Inputs(q, np.array(shown).T, rates[0], rates[1], steps)
 
 
-def _rates_of(
-    path: str, time: NDArray[np.float64], q: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rates_of(path: str, time: Reals, q: Reals) -> tuple[Reals, Reals]:
     """Speed and acceleration of a law given as a table over time: those of the cubic spline through it."""
     if len(time) < 4 or not (np.diff(time) > 0).all():
         raise DataError(
@@ -339,5 +336,4 @@ def _from_history(m: Mechanism) -> Inputs:
         else:
             raise DataError("[[input]] law: the tables of several inputs must have the same times")
     speed, acceleration = _rates_of("[input] law", time, q)
-    shown = np.array([[_shown(m, j, v) for j, v in enumerate(row)] for row in q])
-    return Inputs(q, shown, speed, acceleration, [str(i) for i in range(1, len(q) + 1)])
+    return _as_shown(m, q, speed, acceleration)

@@ -23,7 +23,7 @@ def warnings(studies: Studies) -> list[str]:
     """All of them, once the studies are done."""
     analysis = studies.analysis
     said = [*analysis.warnings, *limits(analysis), *studies.said]
-    return [*said, *of_forces(analysis)] if studies.request.forces else said
+    return [*said, *of_forces(analysis)] if studies.asked.forces else said
 
 
 def _on_branch(analysis: Analysis, assembly: Assembly, found: list[float], digits: int) -> list[float]:
@@ -52,12 +52,12 @@ def limits(analysis: Analysis, counted: list[tuple[int, int]] | None = None) -> 
         if missing:
             text = f"{missing} of {analysis.inputs.n} poses cannot be assembled"
             if track.active:
-                slide = analysis.mechanism.inputs[0].is_slide
                 shown = _on_branch(analysis, assembly, [v.input for v in assembly.reach.limits()], 12)
-                unit = "m" if slide else "deg"
                 if shown:
                     values = ", ".join(f"{v:.13g}" for v in shown)
-                    text += f": the input {name} has the limit{'s' * (len(shown) > 1)} {values} {unit}"
+                    text += (
+                        f": the input {name} has the limit{'s' * (len(shown) > 1)} {values} {analysis.unit}"
+                    )
             lines.append(text + _shortfall(analysis, assembly, first))
         lines += _branch_lines(analysis, assembly)
         lines += track.warnings()
@@ -77,9 +77,8 @@ def _shortfall(analysis: Analysis, assembly: Assembly, i: int) -> str:
     )
     text = f"; at {shown}: {found.text(lambda v: f'{v * factor:.6g} {unit}')}"
     if found.nearest is not None:
-        slide = analysis.mechanism.inputs[0].is_slide
-        there = found.nearest if slide else math.degrees(found.nearest)
-        text += f"; it would close at {there:.10g} {'m' if slide else 'deg'}"
+        there = found.nearest if analysis.unit == "m" else math.degrees(found.nearest)
+        text += f"; it would close at {there:.10g} {analysis.unit}"
     return text
 
 
@@ -91,7 +90,6 @@ def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
     least, largest = analysis.inputs.span
     low, high = min(least, track.start), max(largest, track.start)
     lines = []
-    slide = analysis.mechanism.inputs[0].is_slide
     for changes in track.changes.values():
         inside = [c for c in changes if low - 1e-12 <= c.input <= high + 1e-12]
         if not inside:
@@ -106,7 +104,7 @@ def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
                 f"d{n}/dq = {round(float(v), 12) + 0.0:.6g}" for n, v in zip(names, values, strict=True)
             )
 
-        text = f"change point at {', '.join(f'{v:.10g}' for v in at)} {'m' if slide else 'deg'}: the branches of {c.group} cross; "
+        text = f"change point at {', '.join(f'{v:.10g}' for v in at)} {analysis.unit}: the branches of {c.group} cross; "
         text += f"the motion goes on along its tangent ({rates(c.rates[0])})"
         if c.other is not None:
             text += f", the other branch would go with {rates(c.other)}"
@@ -190,7 +188,6 @@ def _pinned(analysis: Analysis, body: str, center: complex) -> bool:
 
 def listed(analysis: Analysis, what: str, places: list[float], count: int) -> str:
     """One line for what happens at some inputs: the first five of them, and how many more there are."""
-    unit = "m" if analysis.mechanism.inputs[0].is_slide else "deg"
-    named = ", ".join(f"{place:g} {unit}" for place in places[:5])
+    named = ", ".join(f"{place:g} {analysis.unit}" for place in places[:5])
     more = f" and {count - 5} further poses" if count > 5 else ""
     return f"at input {named}{more}: {what}"

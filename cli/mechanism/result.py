@@ -5,57 +5,49 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.errors import DataError
-from cli.mechanism import columns, poses, remarks, words
-from cli.mechanism import forces as of_forces
+from cli.mechanism import columns, remarks, words
 from cli.mechanism.solve import Analysis
 from cli.mechanism.states import table as link_states
-from cli.mechanism.studies import Request, Studies
+from cli.mechanism.studies import Studies
+from cli.mechanism.studies import tables as study_tables
 from cli.show.columns import Result, Sheet
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from cli.mechanism.options import Options
     from cli.show.columns import Document, Table
 
 
 def result_of(
-    analysis: Analysis,
-    request: Request,
-    states: Path | None,
-    explain: bool,
-    graph: str | None,
-    about: dict[str, str],
-    digits: bool = False,
+    analysis: Analysis, asked: Options, about: dict[str, str] | None = None, digits: bool = False
 ) -> Result:
     """What is asked of a mechanism, in every form it can be shown in."""
-    studies = Studies(analysis, request)
+    studies = Studies(analysis, asked)
     found = studies.document
-    if graph:
+    if asked.graph:
         from cli.mechanism import picture
 
         # a bad name is an error before anything is written
-        picture.check_names(analysis, graph)
+        picture.check_names(analysis, asked.graph)
 
     def of_poses() -> Table:
-        return columns.forces(analysis) if request.forces else columns.poses(analysis)
+        return columns.table(analysis, asked.forces)
 
     def document() -> Document:
-        listed = poses.document(analysis)
-        if request.forces:
-            listed = of_forces.with_forces(listed, analysis)
-        return {"name": analysis.mechanism.name, "poses": listed, **found}
+        poses = columns.document(analysis, asked.forces)
+        return {"name": analysis.mechanism.name, "poses": poses, **found}
 
     def figure() -> Figure:
         from cli.mechanism import picture
 
         several = len(analysis.inputs.shown) > 2 and analysis.motions[0].assembled.any()
-        if graph:
-            return picture.draw_curves(analysis, graph)
-        return picture.draw_forces(analysis) if request.forces and several else picture.draw(analysis)
+        if asked.graph:
+            return picture.draw_curves(analysis, asked.graph)
+        return picture.draw_forces(analysis) if asked.forces and several else picture.draw(analysis)
 
     def beside() -> Iterable[bytes]:
         # every link, whatever --only names
@@ -63,22 +55,22 @@ def result_of(
         every.motions = analysis.motions
         return csv_parts([link_states(every)], digits)
 
-    own = columns.studies(studies)
+    own = study_tables(studies)
     # the table of a study asked for alone stands in place of the poses
-    alone = bool(own) and len(request.tables) == 1
+    alone = bool(own) and len(asked.tables) == 1
     tables = {**own, "poses": of_poses} if alone else {"poses": of_poses, **own}
     return Result(
         document=document,
         tables=tables,
         screen=of_poses if alone else None,
-        expected=(lambda: columns.poses(analysis), lambda: link_states(analysis)),
+        expected=(lambda: columns.table(analysis, forces=False), lambda: link_states(analysis)),
         notes=lambda: analysis.mechanism.name,
-        afterword=lambda: words.afterword(studies, explain=explain),
+        afterword=lambda: words.afterword(studies),
         figure=figure,
         method=words.METHOD,
-        sheets=lambda: [Sheet("", words.sections(studies, tables, explain=explain), figure)],
-        about={"title": analysis.mechanism.name or "Mechanism"} | about,
-        beside={} if states is None else {states: beside},
+        sheets=lambda: [Sheet("", words.sections(studies, tables), figure)],
+        about={"title": analysis.mechanism.name or "Mechanism"} | (about or {}),
+        beside={} if asked.states is None else {asked.states: beside},
         warnings=remarks.warnings(studies),
         failed=lambda: not any(analysis.assembled(motion).any() for motion in analysis.motions),
         within=lambda: told(analysis.file),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -18,8 +18,10 @@ from cli.read.files import read_bytes, remember
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cli.mechanism.options import Options
     from virtualwork import Mechanism
     from virtualwork.branch.assembly import Assembly
+    from virtualwork.formulas.asked import Key
     from virtualwork.motion import Motion
 
 ORDERS = ("position", "velocity", "acceleration", "jerk")
@@ -77,21 +79,21 @@ class Analysis:
     @classmethod
     def of(
         cls,
-        file: str,
+        asked: Options,
         mechanism: Mechanism,
         inputs: Inputs | Sweep,
-        order: int | None,
-        only: Sequence[str] | None,
-        branch: str | None,
+        order: int | None = None,
     ) -> Analysis:
-        """Return the analysis to this order, or to the highest that the inputs' rates give."""
+        """Return the analysis to this order, or as --order has it, or to the highest that the inputs' rates give."""
         given = 0
         for k, name in enumerate(("speed", "acceleration", "jerk"), 1):
             if any(getattr(e, name) is not None for e in mechanism.inputs) or (
                 getattr(inputs, name, None) is not None
             ):
                 given = k
-        return cls(file, mechanism, inputs, given if order is None else order, only, branch)
+        if order is None:
+            order = given if asked.order is None else ORDERS.index(asked.order)
+        return cls(asked.file, mechanism, inputs, order, asked.names, asked.branch)
 
     @property
     def is_long(self) -> bool:
@@ -138,22 +140,30 @@ class Analysis:
     @cached_property
     def links(self) -> tuple[str, ...]:
         """The links asked for."""
-        return tuple(n for n in self.mechanism.links if self.only is None or n in self.only)
+        return self._asked(self.mechanism.links)
 
     @cached_property
     def points(self) -> tuple[str, ...]:
         """The points asked for, in the order of the file."""
-        return tuple(n for n in self.mechanism.points if self.only is None or n in self.only)
+        return self._asked(self.mechanism.points)
 
     @cached_property
     def slides(self) -> tuple[str, ...]:
         """The guides asked for, by their point; the points themselves tell where they are."""
-        return tuple(g.point for g in self.mechanism.guides if self.only is None or g.point in self.only)
+        return self._asked(g.point for g in self.mechanism.guides)
+
+    def _asked(self, names: Iterable[str]) -> tuple[str, ...]:
+        return tuple(name for name in names if self.only is None or name in self.only)
 
     @cached_property
     def input_names(self) -> dict[str, str]:
         """Each input and the name of its value: `input_deg`, or `input_m` of a slide."""
         return {e.name: "input_m" if e.is_slide else "input_deg" for e in self.mechanism.inputs}
+
+    @property
+    def unit(self) -> str:
+        """The unit that the first input is shown in."""
+        return "m" if any(e.is_slide for e in self.mechanism.inputs[:1]) else "deg"
 
     @cached_property
     def input_columns(self) -> tuple[str, ...]:
@@ -199,8 +209,13 @@ class Analysis:
         if self.only is None:
             return motion.assembled
         whole = np.ones(motion.n, dtype=bool)
-        homes = motion.mechanism.points
-        places = [("point", homes[name][0], 0j, name, 0) for name in self.points]
-        for found in motion.values([*places, *(("angle", name, 0) for name in self.links)]):
+        for found in motion.values(self.named):
             whole &= np.isfinite(found)
         return whole
+
+    @property
+    def named(self) -> list[Key]:
+        """Places of the points and links asked for, as a motion is asked for them."""
+        homes = self.mechanism.points
+        places = [("point", homes[name][0], 0j, name, 0) for name in self.points]
+        return [*places, *(("angle", name, 0) for name in self.links)]

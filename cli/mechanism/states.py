@@ -14,15 +14,30 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cli.mechanism.columns import bounds_of, column, link_error, pose_keys
-from cli.mechanism.poses import LINK, POINT, cells, of_links, pair
+from cli.mechanism.columns import pose_keys
+from cli.mechanism.quantities import (
+    FORCE,
+    LINK,
+    POINT,
+    bound,
+    bounds_of,
+    cells,
+    cells_of,
+    column,
+    keys_of,
+    links,
+    solved,
+    vector,
+)
 from cli.mechanism.solve import Analysis
 from cli.show.columns import Table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cli.mechanism.quantities import Numbers
     from cli.show.columns import Cell
+    from virtualwork.formulas.asked import Key
     from virtualwork.motion import Motion
 
     Part = dict[str, Sequence[Cell]]
@@ -68,14 +83,13 @@ def table(analysis: Analysis) -> Table:
         if key in ("fvx_m_s", "fvy_m_s"):
             assert guide is not None
             return bounds_of(_guided(along, guide, link))
-        if key in ("fx_N", "fy_N", "torque_N_m"):
-            force, moment = motion.dynamics.error_estimate().applied(link)
-            return bounds_of(moment if key == "torque_N_m" else force)
+        asked: Key = ("applied" if key in FORCE else "applied moment", link)
+        if key in LINK:
+            asked = ("angle", link, LINK.index(key))
         for k, names in enumerate(POINT):
             if key in names:
-                return bounds_of((along if k == 1 else motion).at(link, center).error_estimate(k))
-        k = LINK.index(key)
-        return bounds_of(link_error(analysis, along if k == 1 else motion, link, k))
+                asked = ("point", link, center, None, k)
+        return bounds_of(bound(analysis, along if asked[-1] == 1 else motion, asked))
 
     def error(key: str) -> list[float]:
         found = []
@@ -106,23 +120,23 @@ def rows(analysis: Analysis) -> list[tuple[Place, Row]]:
         if order == 1 and massive:
             order = 2  # a speed alone already makes accelerations, and masses feel them
         parts = {name: _part(analysis, motion, name, order) for name in analysis.links}
-        fields: list[tuple[str, dict[str, Part], list[Mark]]] = [("", {}, [])]
-        if order >= 1:
-            k = len(analysis.mechanism.inputs)
-            fields = [("", {}, _marks(motion, None))]
-            if k > 1:
-                fields = [
-                    (e.name, {name: _virtual(motion, name, j) for name in analysis.links}, _marks(motion, j))
-                    for j, e in enumerate(analysis.mechanism.inputs)
-                ]
-        several_fields = bool(fields[0][0])
+        inputs = analysis.mechanism.inputs
+        # with several inputs a virtual velocity field for each of them, else the motion's own velocities
+        ways: list[int | None] = [*range(len(inputs))] if order >= 1 and len(inputs) > 1 else [None]
+        fields = [
+            (
+                of,
+                {} if of is None else {name: _virtual(motion, name, of) for name in analysis.links},
+                _marks(motion, of) if order >= 1 else [],
+            )
+            for of in ways
+        ]
         for i, (step, assembled) in enumerate(zip(analysis.inputs.steps, motion.assembled, strict=True)):
             head: Row = {"step": step}
             if several:
                 head["branch"] = str(assembly.number)
-            for j, (field, velocities, marks) in enumerate(fields):
-                of = j if several_fields else None
-                lead = {**head, "field": field} if field else head
+            for of, velocities, marks in fields:
+                lead = head if of is None else {**head, "field": inputs[of].name}
                 here = {
                     name: {key: values[i] for key, values in (part | velocities.get(name, {})).items()}
                     for name, part in parts.items()
@@ -147,35 +161,50 @@ def rows(analysis: Analysis) -> list[tuple[Place, Row]]:
 
 
 def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
-    body = motion.mechanism.rigid[name]
+    body, highest = motion.mechanism.rigid[name], min(order, 2)
+    wanted = links([name], highest)
+    for k in range(highest + 1):
+        wanted += vector((name,), "", POINT[k], ("point", name, body.center, None, k))
+    shown = cells_of(wanted, solved(motion, keys_of(wanted)), motion.n, analysis.given)
     part: Part = {"mass_kg": [body.mass] * motion.n, "inertia_kg_m2": [body.inertia] * motion.n}
-    for x, y, k in (("x_m", "y_m", 0), ("vx_m_s", "vy_m_s", 1), ("ax_m_s2", "ay_m_s2", 2))[: order + 1]:
-        z = motion.at(name, body.center).complex(k)
-        part[x], part[y] = pair(z)
-    angle = of_links(motion, [name], min(order, 2), analysis.given)[name]
-    part |= {key: angle[key] for key in ("angle_deg", "omega_rad_s", "alpha_rad_s2") if key in angle}
+    part |= {each.path[-1]: values for each, values in shown.items()}
     if order >= 1:
         force, torque = motion.applied(name)
-        loads = (*pair(force), cells(torque))
         # a pose that cannot be assembled has no loads either
         known = motion.assembled
-        part |= {
-            key: [value if there else None for value, there in zip(column, known, strict=True)]
-            for key, column in zip(("fx_N", "fy_N", "torque_N_m"), loads, strict=True)
-        }
+        part |= _vector(FORCE, force, known)
+        part["torque_N_m"] = cells(torque, np.isfinite(torque) & known)
     return part
+
+
+def _vector(
+    names: Sequence[str], z: NDArray[np.complex128], known: NDArray[np.bool_] | bool = True
+) -> dict[str, Numbers]:
+    """Components of vectors by their names."""
+    there = np.isfinite(z) & known
+    return dict(zip(names, (cells(z.real, there), cells(z.imag, there)), strict=True))
 
 
 def _virtual(motion: Motion, name: str, j: int) -> Part:
     """The virtual velocities of a link for a unit of input j."""
-    x, y = pair(motion.at(name, motion.mechanism.rigid[name].center).coefficient(j))
-    return {"vx_m_s": x, "vy_m_s": y, "omega_rad_s": cells(motion.link(name).coefficient(j))}
+    center = motion.at(name, motion.mechanism.rigid[name].center)
+    turning = cells(motion.link(name).coefficient(j))
+    return {**_vector(POINT[1], center.coefficient(j)), "omega_rad_s": turning}
 
 
 def _marks(motion: Motion, field: int | None) -> list[Mark]:
     """The marks of every input's effort, with the velocities of one field (None: the motion's own)."""
     m, n = motion.mechanism, motion.n
     found: list[Mark] = []
+
+    def turning(link: str) -> NDArray[np.float64]:
+        of = motion.link(link)
+        return of.omega if field is None else of.coefficient(field)
+
+    def velocity(link: str, point: complex | str) -> NDArray[np.complex128]:
+        of = motion.at(link, point)
+        return of.complex(1) if field is None else of.coefficient(field)
+
     for j, entry in enumerate(m.inputs):
         name = f"?{entry.name}"
         if not entry.is_slide:
@@ -183,10 +212,8 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
             plain = len(m.inputs) == 1 and reacts == GROUND
             for link, mark in ((str(entry.link), "?" if plain else name), (reacts, f"{name}*-1")):
                 if link != GROUND:
-                    turning = (
-                        motion.link(link).omega if field is None else motion.link(link).coefficient(field)
-                    )
-                    found.append(Mark(link, {"torque_N_m": [mark] * n, "omega_rad_s": cells(turning)}))
+                    its = {"torque_N_m": [mark] * n, "omega_rad_s": cells(turning(link))}
+                    found.append(Mark(link, its))
             continue
         i = next(i for i, g in enumerate(m.guides) if g.point == entry.slider)
         g = m.guides[i]
@@ -198,18 +225,13 @@ def _marks(motion: Motion, field: int | None) -> list[Mark]:
             if link == GROUND:
                 continue
             if sign > 0:
-                at = motion.at(link, g.point)
-                velocity = at.complex(1) if field is None else at.coefficient(field)
+                at = velocity(link, g.point)
             else:
-                base = motion.at(link, through)
-                turning = motion.link(link).omega if field is None else motion.link(link).coefficient(field)
-                velocity = (
-                    base.complex(1) if field is None else base.coefficient(field)
-                ) + 1j * turning * slide * rail
-            cells_: Part = dict(zip(("fvx_m_s", "fvy_m_s"), pair(velocity), strict=True))
-            cells_["fx_N"] = [_share(name, sign * float(c)) for c in rail.real]
-            cells_["fy_N"] = [_share(name, sign * float(c)) for c in rail.imag]
-            found.append(Mark(link, cells_, i))
+                at = velocity(link, through) + 1j * turning(link) * slide * rail
+            share: Part = {**_vector(("fvx_m_s", "fvy_m_s"), at)}
+            share["fx_N"] = [_share(name, sign * float(c)) for c in rail.real]
+            share["fy_N"] = [_share(name, sign * float(c)) for c in rail.imag]
+            found.append(Mark(link, share, i))
     return found
 
 

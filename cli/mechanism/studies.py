@@ -1,9 +1,9 @@
-"""What is found of a mechanism beside its poses, as the JSON document has it: check, iterates, cycle, equilibria."""
+"""What is found of a mechanism beside its poses, as JSON and tables: check, iterates, cycle, equilibria."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,40 +11,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.errors import DataError
-from cli.mechanism.forces import effort_name
+from cli.mechanism.options import Options, names
+from cli.mechanism.quantities import column, effort_name
 from cli.mechanism.solve import Analysis
+from cli.show.columns import Table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cli.show.columns import Cell
+
+STUDY_KEYS = ("quantity", "of", "k", "link")
+"""The columns that name a row of a study's table."""
 # read again by the words and tables made of it: of its shape INTERFACE speaks
 Document = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Request:
-    """Which studies are asked for."""
-
-    newton: bool = False
-    check: bool = False
-    forces: bool = False
-    equilibrium: bool = False
-    flywheel: float | None = None
-    counterweights: str | None = None
-    swept: bool = False
-
-    @property
-    def tables(self) -> list[str]:
-        """The options that have a table of their own."""
-        asked = {
-            "--forces": self.forces,
-            "--newton": self.newton,
-            "--check": self.check,
-            "--equilibrium": self.equilibrium,
-            "--flywheel": self.flywheel is not None,
-            "--counterweights": self.counterweights is not None,
-        }
-        return [flag for flag, given in asked.items() if given]
 
 
 @dataclass(frozen=True)
@@ -52,7 +32,7 @@ class Studies:
     """The studies of an analysis, each worked out once."""
 
     analysis: Analysis
-    request: Request
+    asked: Options
 
     @cached_property
     def document(self) -> Document:
@@ -66,21 +46,20 @@ class Studies:
 
     @cached_property
     def _found(self) -> tuple[Document, list[str]]:
-        analysis, request = self.analysis, self.request
+        analysis, asked = self.analysis, self.asked
         found: Document = {}
         said: list[str] = []
-        if request.newton:
+        if asked.newton:
             found |= newton_document(analysis)
-        if request.check:
+        if asked.check:
             found["check"] = check_document(analysis)
-        of_one = request.forces and len(analysis.mechanism.inputs) == 1
-        if (of_one or request.flywheel is not None) and request.swept:
-            found["cycle"] = cycle(analysis, request.flywheel)
-        if request.equilibrium:
-            found["equilibria"], said = equilibria(analysis, request.swept)
-        if request.counterweights:
-            links = [name.strip() for name in request.counterweights.split(",") if name.strip()]
-            found["counterweights"] = counterweights(analysis, links)
+        of_one = asked.forces and len(analysis.mechanism.inputs) == 1
+        if (of_one or asked.flywheel is not None) and asked.swept:
+            found["cycle"] = cycle(analysis, asked.flywheel)
+        if asked.equilibrium:
+            found["equilibria"], said = equilibria(analysis, asked.swept)
+        if asked.counterweights:
+            found["counterweights"] = counterweights(analysis, names(asked.counterweights))
         return found, said
 
 
@@ -89,13 +68,12 @@ def check_document(analysis: Analysis) -> Document:
     from virtualwork.study.check import Check
 
     check = Check(analysis.mechanism.assembly)
-    slide = bool(analysis.mechanism.inputs) and analysis.mechanism.inputs[0].is_slide
-    unit = "m" if slide else "deg"
+    unit = analysis.unit
 
     def shown(values: Sequence[float] | None) -> list[float | None] | None:
         if values is None:
             return None
-        return [None if not math.isfinite(v) else (v if slide else math.degrees(v)) for v in values]
+        return [None if not math.isfinite(v) else (v if unit == "m" else math.degrees(v)) for v in values]
 
     return {
         "mobility": check.mobility,
@@ -157,22 +135,15 @@ def cycle(analysis: Analysis, coefficient: float | None) -> Document:
     if len(m.inputs) != 1:
         raise DataError(f"{analysis.file}: a cycle has one input, found {len(m.inputs)}")
     name = effort_name(m.inputs[0].is_slide)
-    empty: Document = {f"{key}_{name}": None for key in ("mean", "peak", "rms")}
-    empty |= {"work_J": None, "energy_closure_J": None, "flywheel_inertia_kg_m2": None}
+    keys = *(f"{key}_{name}" for key in ("mean", "peak", "rms")), "work_J", "energy_closure_J"
+    found: Document = dict.fromkeys((*keys, "flywheel_inertia_kg_m2"))
     if motion.n < 2 or not np.isfinite(motion.effort).all():
         analysis.warnings.append(
             "cycle: the effort is not finite at every pose of the sweep: no mean, work or flywheel"
         )
-        return empty
+        return found
     c = Cycle(motion)
-    found = {
-        f"mean_{name}": c.mean,
-        f"peak_{name}": c.peak,
-        f"rms_{name}": c.rms,
-        "work_J": c.work,
-        "energy_closure_J": c.closure,
-        "flywheel_inertia_kg_m2": None,
-    }
+    found |= zip(keys, (c.mean, c.peak, c.rms, c.work, c.closure), strict=True)
     if coefficient is not None:
         if m.inputs[0].is_slide:
             raise DataError(f"{analysis.file}: --flywheel: the input is a slide: a flywheel turns")
@@ -201,7 +172,7 @@ def equilibria(analysis: Analysis, swept: bool) -> tuple[list[Document], list[st
         values = {}
         for entry, value in zip(m.inputs, e.inputs, strict=True):
             shown = value if entry.is_slide else math.degrees(value) % 360.0
-            values[entry.name] = {"input_m" if entry.is_slide else "input_deg": shown}
+            values[entry.name] = {analysis.input_names[entry.name]: shown}
         place = next(iter(values.values())) if len(m.inputs) == 1 else {"inputs": values}
         rows.append({**place, "stable": e.stable, "potential_J": e.potential})
     said = []
@@ -241,3 +212,74 @@ def counterweights(analysis: Analysis, links: list[str]) -> Document:
         "shaking_rms_before_N": rms(before),
         "shaking_rms_after_N": rms(after),
     }
+
+
+# --- as tables --------------------------------------------------------------------------------------------------------
+def tables(found: Studies) -> dict[str, Callable[[], Table]]:
+    """Return the tables of the studies, by their options' names."""
+    document = found.document
+    known: dict[str, Callable[[], Table]] = {
+        "--newton": lambda: of_iterates(document),
+        "--check": lambda: of_check(document["check"]),
+        "--equilibrium": lambda: of_equilibria(document["equilibria"], found.analysis.input_names),
+        "--flywheel": lambda: of_cycle(document["cycle"]),
+        "--counterweights": lambda: of_counterweights(document["counterweights"]),
+    }
+    return {flag: known[flag] for flag in found.asked.tables if flag != "--forces"}
+
+
+def of_check(document: Document) -> Table:
+    """What the mechanism is: a row for each statement, named as in the JSON."""
+    rows: list[tuple[str, str, Cell]] = [
+        ("mobility", "", document["mobility"]),
+        ("mobility_by_rank", "", document["mobility_by_rank"]),
+        *(("redundant", name, True) for name in document["redundant"]),
+        *(("group", " + ".join(g["links"]), f"{g['kind']}, {g['method']}") for g in document["groups"]),
+    ]
+    for f in document["four_bars"]:
+        links = ", ".join(f["links"])
+        rows.append(("grashof", links, f["grashof"]))
+        for word, value in zip(("least", "largest"), f["transmission_deg"], strict=True):
+            rows.append((f"{word}_transmission_deg", links, value))
+    for key in document:
+        if key.startswith(("input_limits", "dead_points", "change_points")):
+            values = ["none"] if not document[key] else ["open" if v is None else v for v in document[key]]
+            rows += [(key, str(i) if len(values) > 1 else "", v) for i, v in enumerate(values, 1)]
+    return _columns(("quantity", "of", "value"), rows)
+
+
+def of_equilibria(found: list[Document], inputs: dict[str, str]) -> Table:
+    """The positions of rest; `inputs`: the name of each input and of its quantity, `input_deg` or `input_m`."""
+    if len(inputs) == 1:
+        places = [[row[key] for key in inputs.values()] for row in found]
+        names = list(inputs.values())
+    else:
+        places = [[row["inputs"][name][key] for name, key in inputs.items()] for row in found]
+        names = [f"{name}_{key}" for name, key in inputs.items()]
+    rows = [(*place, row["stable"], row["potential_J"]) for place, row in zip(places, found, strict=True)]
+    return _columns((*names, "stable", "potential_J"), rows)
+
+
+def of_cycle(part: Document) -> Table:
+    """Mean, peak and RMS effort, work, flywheel: one row."""
+    return _records([part])
+
+
+def of_counterweights(part: Document) -> Table:
+    """A counterweight a row, with the shaking force before and after all of them."""
+    rms = {key: value for key, value in part.items() if key != "weights"}
+    return _records([w | rms for w in part["weights"]])
+
+
+def of_iterates(part: Document) -> Table:
+    """The iterates of Newton and Raphson."""
+    return _records(part["iterates"])
+
+
+def _records(rows: list[Document]) -> Table:
+    return _columns(list(rows[0]), [list(row.values()) for row in rows])
+
+
+def _columns(names: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Table:
+    columns = [column(name, [row[i] for row in rows]) for i, name in enumerate(names)]
+    return Table(columns, keys=("step", "branch", *STUDY_KEYS))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -104,11 +104,7 @@ def asked(
         return None
     found: dict[Dimension, list[float]] = {}
     for text in vary:
-        (dimension, *both), span = assignment(m, text, "--vary", "FROM:TO:STEP")
-        if both:
-            raise options.bad("--vary", f"'{text}': two numbers: expected {dimension.path} or {both[0].path}")
-        if dimension in found:
-            raise options.bad("--vary", f"'{text}': {dimension.path} is given twice")
+        dimension, span = one_number(m, text, "--vary", "FROM:TO:STEP", [each.path for each in found])
         found[dimension] = options.grid(
             "--vary",
             span,
@@ -132,6 +128,16 @@ def assignment(m: Mechanism, text: str, flag: str, what: str) -> tuple[tuple[Dim
         return named(m, path.strip()), value
     except DescriptionError as error:
         raise options.bad(flag, error) from None
+
+
+def one_number(m: Mechanism, text: str, flag: str, what: str, taken: Container[str]) -> tuple[Dimension, str]:
+    """The same of a path that names one number, which is not among those taken."""
+    (dimension, *both), value = assignment(m, text, flag, what)
+    if both:
+        raise options.bad(flag, f"'{text}': two numbers: expected {dimension.path} or {both[0].path}")
+    if dimension.path in taken:
+        raise options.bad(flag, f"'{text}': {dimension.path} is given twice")
+    return dimension, value
 
 
 def quantity(dimension: Dimension, text: str, flag: str, bare: Mapping[str, str]) -> float:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
+from cli.mechanism.quantities import column
 from cli.mechanism.solve import ORDERS, Analysis
 from cli.mechanism.studies import Document, Studies
+from cli.read.units import written
 from cli.show.columns import Section, Table
 from cli.show.text import heading, table_text
 from virtualwork.formulas.asked import Key
@@ -20,36 +22,30 @@ METHOD = (
 )
 
 
-def sections(studies: Studies, tables: Mapping[str, Callable[[], Table]], *, explain: bool) -> list[Section]:
+def sections(studies: Studies, tables: Mapping[str, Callable[[], Table]]) -> list[Section]:
     """What the report shows: every table, and the order of solution."""
     shown = [Section(heading(name), [table()]) for name, table in tables.items()]
-    if explain:
-        parts = [explain_text(studies.analysis)]
-        if studies.request.forces:
-            parts.append(explain_forces(studies.analysis))
-        shown.append(Section("Order of solution", parts))
-    return shown
+    return [*shown, Section("Order of solution", explained(studies))] if studies.asked.explain else shown
 
 
-def afterword(studies: Studies, *, explain: bool) -> str:
+def afterword(studies: Studies) -> str:
     """All that was asked for, a paragraph each."""
-    analysis, document = studies.analysis, studies.document
-    parts = []
-    if studies.request.newton:
-        parts.append(newton_text(document))
-    if "check" in document:
-        parts.append(check_text(document["check"]))
-    if "cycle" in document:
-        parts.append(cycle_text(document["cycle"]))
-    if "equilibria" in document:
-        parts.append(equilibria_text(document["equilibria"]))
-    if "counterweights" in document:
-        parts.append(counterweights_text(document["counterweights"]))
-    if explain:
-        parts.append(explain_text(analysis))
-        if studies.request.forces:
-            parts.append(explain_forces(analysis))
-    return "\n\n".join(parts)
+    document = studies.document
+    texts: dict[str, Callable[..., str]] = {
+        "check": check_text,
+        "cycle": cycle_text,
+        "equilibria": equilibria_text,
+        "counterweights": counterweights_text,
+    }
+    parts = [newton_text(document)] if studies.asked.newton else []
+    parts += [text(document[key]) for key, text in texts.items() if key in document]
+    return "\n\n".join([*parts, *(explained(studies) if studies.asked.explain else [])])
+
+
+def explained(studies: Studies) -> list[str]:
+    """The order of solution, and of the forces what was done."""
+    analysis = studies.analysis
+    return [explain_text(analysis), *([explain_forces(analysis)] if studies.asked.forces else [])]
 
 
 def check_text(document: Document) -> str:
@@ -133,7 +129,7 @@ def _operations(analysis: Analysis) -> str:
     keys: list[Key] = []
     told = []
     for order, what in enumerate(("", " with velocities", " with accelerations")[: 3 if moves else 1]):
-        keys += [("point", body, z, p, order) for body in m.links for p, z in m.bodies[body].items()]
+        keys += [("point", body, 0j, p, order) for body in m.links for p in m.bodies[body]]
         keys += [("angle", body, order) for body in m.links]
         told.append(f"{motion.lanes.operations(keys)}{what}")
     return f"operations a pose of all points and links: {', '.join(told)}"
@@ -157,21 +153,9 @@ def cycle_text(part: Document) -> str:
     lines = ["cycle:"]
     for key, value in part.items():
         if value is not None:
-            name, unit = _split_unit(key)
-            lines.append(f"  {name:<18} {value:.6g} {unit}")
+            its = column(key, [value])
+            lines.append(f"  {its.name.replace('_', ' '):<18} {value:.6g} {written(its.unit)}")
     return "\n".join(lines)
-
-
-def _split_unit(key: str) -> tuple[str, str]:
-    for suffix in ("_torque_N_m", "_force_N"):
-        if key.endswith(suffix):
-            return key.removesuffix(suffix).replace("_", " ") + suffix.split("_")[1].join([" ", ""]), (
-                "N·m" if "torque" in suffix else "N"
-            )
-    for suffix, unit in (("_kg_m2", "kg·m²"), ("_J", "J")):
-        if key.endswith(suffix):
-            return key.removesuffix(suffix).replace("_", " "), unit
-    return key, ""
 
 
 def equilibria_text(rows: list[Document]) -> str:

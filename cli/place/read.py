@@ -115,7 +115,7 @@ def _of_table(path: str) -> list[Correction]:
         )
     mass, angle = table.require("mass", "mass"), table.require("angle", "angle")
     table.reject(mass.values < 0, "mass", "a mass that is not negative")
-    names = [table.texts.get(name) or ["1"] * table.rows for name in ("rotor", "plane")]
+    names = [table.named(name) for name in ("rotor", "plane")]
     return [
         Correction(rotor, plane, [Vector(m, mass.unit, a, angle.unit)])
         for rotor, plane, m, a in zip(*names, mass.values.tolist(), angle.values.tolist(), strict=True)

@@ -10,7 +10,7 @@ import typer
 
 from cli.errors import DataError
 from cli.read.synonyms import quantity_meant
-from cli.read.units import AMPLITUDES, UNITS, dimensions, find_unit, nearest_unit, unit_name
+from cli.read.units import AMPLITUDES, UNITS, dimensions, find_unit, nearest_unit, parted, unit_name
 
 # compiled where a header is so written
 _BRACKETS = r"(?s)(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\Z"
@@ -115,17 +115,12 @@ def check_renamed() -> None:
 def _merged(given: str, unit: str, written: str) -> tuple[str, str]:
     """Return name and unit of a renamed column: the unit stands in the name given, or in the file, or alike in both."""
     base, own = _parted(given)
-    suffix = own or next((s for s in _suffixes(base) if dimensions(s)), "")
+    suffix = own or parted(base)[1]
     if suffix and unit and suffix.lower() != unit.lower():
         raise DataError(
             f"--column {given}={written}: found the unit '{unit}' in the file, expected '{suffix}'"
         )
     return base, own or ("" if suffix else unit)
-
-
-def _suffixes(name: str) -> list[str]:
-    parts = name.split("_")
-    return ["_".join(parts[k:]) for k in range(1, len(parts))]
 
 
 def spellings(quantity: str, dimension: str) -> str:
@@ -202,10 +197,7 @@ def offers(headings: Iterable[Heading], known: Mapping[str, str], texts: Sequenc
     """Return for columns that are not known but may be meant the option that takes them: `--column mass_g=Masse`."""
     out = []
     for each in headings:
-        base, unit = each.base, each.unit
-        if not unit:
-            unit = next((s for s in _suffixes(base) if dimensions(s)), "")
-            base = base.removesuffix(f"_{unit}") if unit else base
+        base, unit = (each.base, each.unit) if each.unit else parted(each.base)
         quantity = quantity_meant(base, (*known, *texts))
         if quantity:
             from shlex import quote

@@ -42,12 +42,7 @@ def refuse(message: str, **values: object) -> None:
         raise bad(flag, message)
 
 
-def with_unit(
-    flag: str, text: str | None, dimension: str, *, positive: bool = False
-) -> tuple[float, str] | None:
-    """Read a value and the unit it was given in; None stays None."""
-    if text is None:
-        return None
+def _read(flag: str, text: str, dimension: str, positive: bool) -> tuple[float, str]:
     try:
         value, unit = parse_quantity(text, dimension)
     except ValueError as error:
@@ -57,24 +52,27 @@ def with_unit(
     return value, unit
 
 
-def quantity(flag: str, text: str | None, dimension: str, *, positive: bool = False) -> float | None:
-    """Read a value in SI; None stays None."""
-    given = with_unit(flag, text, dimension, positive=positive)
-    return None if given is None else float(to_si(given[0], dimension, given[1]))
+def with_unit(
+    flag: str, text: str | None, dimension: str, *, positive: bool = False
+) -> tuple[float, str] | None:
+    """Read a value and the unit it was given in; None stays None."""
+    return None if text is None else _read(flag, text, dimension, positive)
 
 
 def needed(flag: str, text: str, dimension: str, *, positive: bool = False) -> float:
     """Read a value that is given, in SI."""
-    value = quantity(flag, text, dimension, positive=positive)
-    assert value is not None
-    return value
+    value, unit = _read(flag, text, dimension, positive)
+    return float(to_si(value, dimension, unit))
+
+
+def quantity(flag: str, text: str | None, dimension: str, *, positive: bool = False) -> float | None:
+    """Read a value in SI; None stays None."""
+    return None if text is None else needed(flag, text, dimension, positive=positive)
 
 
 def in_degrees(flag: str, text: str) -> float:
     """Read an angle; one given in degrees is not turned to radians and back."""
-    given = with_unit(flag, text, "angle")
-    assert given is not None
-    value, unit = given
+    value, unit = _read(flag, text, "angle", positive=False)
     return value if unit == "deg" else value * 180 / math.pi
 
 

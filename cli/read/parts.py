@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ PRODUCTS = ("ixy", "ixz", "iyz")
 DENSITIES = {3: "density", 2: "area_density", 1: "linear_density"}
 TENSOR = "tensor"
 MESH = "mesh"
+TURNS = ("rx", "ry", "rz")
 _NUMBERS = {
     "mass": "mass",
     "density": "density",
@@ -40,7 +41,7 @@ _NUMBERS = {
     "linear_density": "linear density",
     **dict.fromkeys(("x", "y", "z", *LENGTHS), "length"),
     **dict.fromkeys(("axis_x", "axis_y", "axis_z"), "number"),
-    **dict.fromkeys(("rx", "ry", "rz", "angle"), "angle"),
+    **dict.fromkeys((*TURNS, "angle"), "angle"),
     **dict.fromkeys((*MOMENTS, *PRODUCTS), "inertia"),
 }
 
@@ -58,56 +59,106 @@ class Parts:
     warnings: list[str]
 
 
+class _Mesh(NamedTuple):
+    """A closed mesh from a file: its triangles are about its centre of mass."""
+
+    mass: float
+    center: Array
+    inertia: Array
+    rough: Callable[[], tuple[float, float]]
+    triangles: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Unturned:
+    """The parts along their own axes; meshes by their number."""
+
+    shapes: list[str]
+    rows: list[dict[str, float]]
+    meshes: dict[int, _Mesh]
+    mass: Array
+    center: Array
+    inertia: Array
+
+    def error(self) -> BodyError:
+        """Bound what is off in them: numbers as read, and their shapes' formulas."""
+        from dalembert.arithmetic.bounds import bounds, read
+        from rigidbody3d.rounding import BodyError
+        from rigidbody3d.shapes import weighed
+
+        masses, centers, tensors = (READ * np.abs(x) for x in (self.mass, self.center, self.inertia))
+        for i, found in self.meshes.items():
+            rough, reach = found.rough()
+            masses[i] += rough * np.abs(self.mass[i])
+            centers[i] += rough * reach
+            tensors[i] += rough * np.abs(self.mass[i]) * reach**2
+        alike: dict[tuple[str, str], list[int]] = {}
+        for i, (shape, row) in enumerate(zip(self.shapes, self.rows, strict=True)):
+            if shape in SHAPES:
+                amount = "mass" if "mass" in row else DENSITIES[SHAPES[shape].thin]
+                alike.setdefault((shape, amount), []).append(i)
+        for (shape, amount), places in alike.items():
+            names = SHAPES[shape].dimensions + SHAPES[shape].optional
+            given = {
+                name: read([self.rows[i].get(key, 0.0) for i in places], 0, READ)
+                for name, key in (("amount", amount), *zip(names, names, strict=True))
+            }
+            masses[places], tensors[places] = bounds(weighed, given, shape, amount != "mass")
+        return BodyError(masses, centers, tensors)
+
+    def solids(self) -> list[Solid]:
+        """Return what they look like."""
+        from rigidbody3d.solids import Solid, of_tensor
+
+        found = []
+        for i, (shape, row) in enumerate(zip(self.shapes, self.rows, strict=True)):
+            if shape == TENSOR:
+                found += of_tensor(self.mass[i : i + 1], self.center[i : i + 1], self.inertia[i : i + 1])
+            else:
+                drawn = (self.meshes[i].triangles,) if i in self.meshes else ()
+                looks = {} if drawn else row
+                found.append(Solid(shape, looks, float(self.mass[i]), self.center[i], np.eye(3), *drawn))
+        return found
+
+
 def read_parts(path: str) -> Parts:
     """Read a table of parts and put them together."""
     table = read(path, numbers=_NUMBERS, texts=["part", "shape", "file", "file_unit"], blank=list(_NUMBERS))
-    if "shape" not in table.texts:
-        raise DataError(f"{table.file}: no column shape {table.told}")
-    values = {
-        name: to_si(column.values, _NUMBERS[name], column.unit) + 0.0
-        for name, column in table.numbers.items()
-        if name not in ("rx", "ry", "rz")
-    }
-    turns = _turns(table)
-    name = table.texts.get("part", [str(index + 1) for index in range(table.rows)])
-    mass, inertia = np.empty(table.rows), np.empty((table.rows, 3, 3))
-    center = np.stack([np.nan_to_num(values.get(axis, np.zeros(table.rows))) for axis in "xyz"], axis=-1)
+    values = {name: column.si + 0.0 for name, column in table.numbers.items()}
+    # row by row Python's numbers are faster; turns are no shape's
+    columns = {key: column.tolist() for key, column in values.items() if key not in TURNS}
+    names = table.texts.get("part", [str(index + 1) for index in range(table.rows)])
+    centers = np.stack([np.nan_to_num(values.get(axis, np.zeros(table.rows))) for axis in "xyz"], axis=-1)
     folder = Path() if path == "-" else Path(path).parent
-    warnings = list(table.warnings)
-    rows: list[dict[str, float]] = []
-    meshes: dict[int, Callable[[], tuple[float, float]]] = {}
-    faces: dict[int, Array] = {}
-    columns = {
-        key: column.tolist() for key, column in values.items()
-    }  # row by row Python's numbers are faster
-    for index, shape in enumerate(table.texts["shape"]):
+    warnings, left_out = list(table.warnings), []
+    kept: list[int] = []
+    shapes, rows, masses, tensors = [], [], [], []
+    meshes: dict[int, _Mesh] = {}
+    for index, shape in enumerate(map(str.lower, table.needed("shape"))):
         row = {key: value for key, column in columns.items() if (value := column[index]) == value}
-        rows.append(row)
-        if shape.lower() == MESH:
-            mass[index], own, inertia[index], meshes[index], faces[index] = _mesh(table, index, row, folder)
-            if not row.keys() & {"x", "y", "z"}:  # it stays where the file has it
-                center[index] = own
+        if shape == MESH:
+            found = _mesh(table, index, row, folder)
+            own, moments = found.mass, found.inertia
+            meshes[len(kept)] = found
+            # it stays where the file has it
+            if not row.keys() & {"x", "y", "z"}:
+                centers[index] = found.center
         else:
-            mass[index], inertia[index] = _part(table, index, shape.lower(), row, warnings, name[index])
-    missed = _check_tensors(table, mass, inertia, name, warnings)
-    for index in np.flatnonzero(mass == 0).tolist():
-        warnings.append(f"{table.file}: part {quote(name[index])}: mass 0: left out")
-    kept = np.flatnonzero(mass)
-    place = {index: at for at, index in enumerate(kept.tolist())}
-    name, rows = [name[i] for i in kept], [rows[i] for i in kept]
-    meshes = {place[i]: rough for i, rough in meshes.items()}
-    faces = {place[i]: triangles for i, triangles in faces.items()}
-    rotation = (turns @ _along(table, values))[kept]
-    shapes = [table.texts["shape"][i].lower() for i in kept]
-    mass, center, inertia = mass[kept], center[kept], inertia[kept]
-    drawn = Body(
-        mass,
-        center,
-        inertia,
-        partial(_reading, shapes, rows, meshes, mass, center, inertia),
-        partial(_solids, shapes, rows, faces, mass, center, inertia),
-    )
-    each = drawn.turned(rotation, error=_turning(rotation, table, kept))
+            own, moments = _part(table, index, shape, row, warnings, names[index])
+        if own == 0:
+            left_out.append(f"{table.file}: part {quote(names[index])}: mass 0: left out")
+            continue
+        kept.append(index)
+        shapes.append(shape)
+        rows.append(row)
+        masses.append(own)
+        tensors.append(moments)
+    mass, inertia = np.array(masses), np.array(tensors).reshape(-1, 3, 3)
+    missed = _check_tensors(table, kept, shapes, mass, inertia, names, warnings)
+    parts = _Unturned(shapes, rows, meshes, mass, centers[kept], inertia)
+    drawn = Body(mass, parts.center, inertia, parts.error, parts.solids)
+    rotation = (_turns(table) @ _along(table, values))[kept]
+    each = drawn.turned(rotation, error=_turning(rotation, values, kept))
     total = mass.sum()
     if not total > 0:
         raise DataError(
@@ -119,7 +170,7 @@ def read_parts(path: str) -> Parts:
         raise DataError(
             f"{table.file}: no body is made of these parts: {verdict.reason}: is a hole outside its part?"
         )
-    return Parts(table.file, name, shapes, each, whole, warnings)
+    return Parts(table.file, [names[i] for i in kept], shapes, each, whole, [*warnings, *left_out])
 
 
 def _part(
@@ -160,25 +211,33 @@ def _part(
     return mass, given
 
 
-def _check_tensors(table: Table, mass: Array, inertia: Array, name: list[str], warnings: list[str]) -> float:
+def _check_tensors(
+    table: Table,
+    kept: list[int],
+    shapes: list[str],
+    mass: Array,
+    inertia: Array,
+    names: list[str],
+    warnings: list[str],
+) -> float:
     """Refuse a given tensor that no body can have; all at once, for one by one takes long.
 
     What its last printed digit explains is said and taken as it is; returned is by how much all of these miss, kg·m².
     """
-    rows = [index for index, shape in enumerate(table.texts["shape"]) if shape.lower() == TENSOR]
+    places = [place for place, shape in enumerate(shapes) if shape == TENSOR]
     missed = 0.0
-    if not rows:
+    if not places:
         return missed
-    verdict = check(inertia[rows] * np.sign(mass[rows])[:, None, None])
+    given = inertia[places] * np.sign(mass[places])[:, None, None]
+    verdict = check(given)
     for at in np.flatnonzero(~verdict.valid):
-        index, by = rows[at], -float(verdict.margin[at])
+        index, by = kept[places[at]], -float(verdict.margin[at])
         digit = _last_digit(table, index)
         # the digit's own rounding is no reason to refuse
         if not by <= digit * (1 + 1e-6):
-            reason = check(inertia[index] * np.sign(mass[index])).reason
-            raise table.wrong(index, "ixx", f"a tensor that a body can have: {reason}")
+            raise table.wrong(index, "ixx", f"a tensor that a body can have: {check(given[at]).reason}")
         warnings.append(
-            f"{table.file}: part {quote(name[index])}: the tensor breaks the triangle inequality by {by:.3g} kg·m², "
+            f"{table.file}: part {quote(names[index])}: the tensor breaks the triangle inequality by {by:.3g} kg·m², "
             f"no more than its last printed digit ({digit:.3g} kg·m²): taken as it is"
         )
         missed += by
@@ -197,12 +256,9 @@ def _last_digit(table: Table, index: int) -> float:
     return max(digits)
 
 
-def _mesh(
-    table: Table, index: int, row: dict[str, float], folder: Path
-) -> tuple[float, Array, Array, Callable[[], tuple[float, float]], Array]:
-    """Return mass, centre and tensor of a closed mesh from a file, what bounds their rounding, its triangles about the centre."""
-    cell = table.texts.get("file", [""] * table.rows)[index]
-    unit = table.texts.get("file_unit", [""] * table.rows)[index]
+def _mesh(table: Table, index: int, row: dict[str, float], folder: Path) -> _Mesh:
+    """Read the mesh of a part."""
+    cell, unit = (table.named(name, "")[index] for name in ("file", "file_unit"))
     if not cell:
         raise table.error(index, "file", "", "the name of an STL or OBJ file")
     if unit not in UNITS["length"]:
@@ -219,9 +275,10 @@ def _mesh(
         raise needs(f"{table.file}: a mesh", "trimesh", "mesh") from None
     except ValueError as error:
         raise table.error(index, "file", cell, f"a closed mesh: {error}") from None
-    density = row["density"] if "density" in row else row["mass"] / float(volume)
-    rough = partial(_rough, vertices, faces, float(volume))
-    return density * float(volume), center, density * inertia, rough, vertices[faces] - center
+    size = float(volume)
+    density = row["density"] if "density" in row else row["mass"] / size
+    rough = partial(_rough, vertices, faces, size)
+    return _Mesh(density * size, center, density * inertia, rough, vertices[faces] - center)
 
 
 def _rough(vertices: Array, faces: NDArray[np.int64], volume: float) -> tuple[float, float]:
@@ -256,78 +313,18 @@ def _mass(table: Table, index: int, shape: str, row: dict[str, float], dimension
     return mass
 
 
-def _reading(
-    shapes: list[str],
-    rows: list[dict[str, float]],
-    meshes: dict[int, Callable[[], tuple[float, float]]],
-    mass: Array,
-    center: Array,
-    inertia: Array,
-) -> BodyError:
-    """Bound what is off in the parts before they are turned: numbers as read, and their shapes' formulas."""
-    from dalembert.arithmetic.bounds import bounds, read
-    from rigidbody3d.rounding import BodyError
-    from rigidbody3d.shapes import weighed
-
-    masses, tensors = READ * np.abs(mass), READ * np.abs(inertia)
-    centers = READ * np.abs(center)
-    alike: dict[tuple[str, str], list[int]] = {}
-    for i, (shape, row) in enumerate(zip(shapes, rows, strict=True)):
-        if i in meshes:
-            rough, reach = meshes[i]()
-            masses[i] += rough * np.abs(mass[i])
-            centers[i] += rough * reach
-            tensors[i] += rough * np.abs(mass[i]) * reach**2
-        if shape in SHAPES:
-            amount = "mass" if "mass" in row else DENSITIES[SHAPES[shape].thin]
-            alike.setdefault((shape, amount), []).append(i)
-    for (shape, amount), places in alike.items():
-        names = SHAPES[shape].dimensions + SHAPES[shape].optional
-        given = {
-            name: read([rows[i].get(key, 0.0) for i in places], 0, READ)
-            for name, key in (("amount", amount), *zip(names, names, strict=True))
-        }
-        masses[places], tensors[places] = bounds(weighed, given, shape, amount != "mass")
-    return BodyError(masses, centers, tensors)
-
-
-def _solids(
-    shapes: list[str],
-    rows: list[dict[str, float]],
-    faces: dict[int, Array],
-    mass: Array,
-    center: Array,
-    inertia: Array,
-) -> list[Solid]:
-    """Return what the parts look like before they are turned."""
-    from rigidbody3d.solids import MESH, Solid, of_tensor
-
-    found = []
-    for i, (shape, row) in enumerate(zip(shapes, rows, strict=True)):
-        if shape == TENSOR:
-            found += of_tensor(mass[i : i + 1], center[i : i + 1], inertia[i : i + 1])
-        elif i in faces:
-            found.append(Solid(MESH, {}, float(mass[i]), center[i], np.eye(3), faces[i]))
-        else:
-            found.append(Solid(shape, row, float(mass[i]), center[i], np.eye(3)))
-    return found
-
-
-def _turning(rotation: Array, table: Table, kept: NDArray[np.intp]) -> Array:
+def _turning(rotation: Array, values: dict[str, Array], kept: list[int]) -> Array:
     """Bound the turns' entries: a matrix of zeros and ones is exact, another has its angles' own rounding."""
-    angle = np.zeros(table.rows)
-    for name in ("rx", "ry", "rz"):
-        if name in table.numbers:
-            column = table.numbers[name]
-            angle += np.abs(np.nan_to_num(to_si(column.values, "angle", column.unit)))
+    angles = [np.abs(np.nan_to_num(values[name][kept])) for name in TURNS if name in values]
     plain = np.isin(rotation, (-1.0, 0.0, 1.0)).all(axis=(-1, -2), keepdims=True)
-    return np.broadcast_to(np.where(plain, 0.0, READ * (4 + angle[kept, None, None])), rotation.shape)
+    rough = READ * (4 + sum(angles, np.zeros(len(kept)))[:, None, None])
+    return np.broadcast_to(np.where(plain, 0.0, rough), rotation.shape)
 
 
 def _turns(table: Table) -> Array:
     """The turn about the fixed x, then y, then z, (k, 3, 3); degrees are exact at quarter turns."""
     out = np.broadcast_to(np.eye(3), (table.rows, 3, 3))
-    for axis, name in enumerate(("rx", "ry", "rz")):
+    for axis, name in enumerate(TURNS):
         if name in table.numbers:
             c, s = cosine_sine(np.nan_to_num(table.numbers[name].values), table.numbers[name].unit)
             turn = np.zeros((table.rows, 3, 3))
@@ -341,11 +338,10 @@ def _turns(table: Table) -> Array:
 
 def _along(table: Table, values: dict[str, Array]) -> Array:
     """The shortest turn that brings z onto each part's axis, (k, 3, 3); about x where the axis is -z."""
-    given = [values.get(f"axis_{axis}") for axis in "xyz"]
-    if all(column is None for column in given):
+    if not any(f"axis_{axis}" in values for axis in "xyz"):
         return np.broadcast_to(np.eye(3), (table.rows, 3, 3))
     blank = np.full(table.rows, np.nan)
-    axis = np.stack([blank if column is None else column for column in given], axis=-1)
+    axis = np.stack([values.get(f"axis_{a}", blank) for a in "xyz"], axis=-1)
     axis = np.where(np.isnan(axis).all(axis=-1, keepdims=True), [0.0, 0.0, 1.0], np.nan_to_num(axis))
     size = np.sqrt(np.square(axis).sum(axis=-1))
     if (size == 0).any():

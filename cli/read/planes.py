@@ -98,11 +98,9 @@ def from_options(specs: Sequence[str], flag: str = "--plane") -> Planes:
 def from_table(path: str) -> Planes:
     """Read a table with the columns plane, radius_* and, but for single planes, z_*; rotor where they differ."""
     table = read(path, numbers={"z": "length", "radius": "length"}, texts=["plane", "rotor"])
-    if "plane" not in table.texts:
-        raise DataError(f"{table.file}: no column plane {table.told}")
+    names, rotor = table.needed("plane"), table.texts.get("rotor")
     radius = table.require("radius", "length")
     table.reject(~(radius.values >= SMALLEST), "radius", "a positive radius")
-    names, rotor = table.texts["plane"], table.texts.get("rotor")
     owners = rotor or [""] * len(names)
     seen: set[tuple[str, str]] = set()
     for index, named in enumerate(zip(owners, names, strict=True)):
@@ -113,11 +111,12 @@ def from_table(path: str) -> Planes:
     if len(set(owners)) < len(owners):
         table.require("z", "length")
     z = table.numbers.get("z")
-    order = sorted(range(len(names)), key=_first_place(owners).__getitem__)
+    # the planes of a rotor stand together, rotors in the order in which they first stand
+    order = np.argsort(table.numbered("rotor")[1], kind="stable").tolist()
     planes = Planes(
         [names[i] for i in order],
-        to_si(z.values, "length", z.unit)[order] if z else None,
-        to_si(radius.values, "length", radius.unit)[order],
+        z.si[order] if z else None,
+        radius.si[order],
         z.unit if z else "",
         radius.unit,
         table.file,
@@ -130,12 +129,6 @@ def from_table(path: str) -> Planes:
                 raise DataError(f"{table.file}: {_same_place(planes, *pair)}")
             start = stop
     return planes
-
-
-def _first_place(owners: Sequence[str]) -> list[int]:
-    """Return for each entry the place where its owner first stands: sorting by it keeps owners together."""
-    first: dict[str, int] = {}
-    return [first.setdefault(owner, index) for index, owner in enumerate(owners)]
 
 
 def _together(planes: Planes, among: range) -> tuple[int, int] | None:

@@ -10,19 +10,20 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import ModuleType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from cli.errors import DataError, quote
 from cli.read.headers import Heading, find_columns, offers, spellings
 from cli.read.sources import Source, open_source
-from cli.read.units import LARGEST, parse_number
+from cli.read.units import LARGEST, parse_number, to_si
 
 if TYPE_CHECKING:
+    import pandas as pd
     from numpy.typing import NDArray
 
 
@@ -34,6 +35,12 @@ class Numbers:
     """As the file writes it."""
     unit: str
     values: NDArray[np.float64]
+    dimension: str
+
+    @property
+    def si(self) -> NDArray[np.float64]:
+        """The numbers in SI."""
+        return to_si(self.values, self.dimension, self.unit)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -129,6 +136,16 @@ class Table:
         if bad.any():
             raise self.wrong(int(np.argmax(bad)), quantity, expected)
 
+    def needed(self, name: str) -> list[str]:
+        """Return a column of texts, or say that the table lacks it."""
+        if name not in self.texts:
+            raise DataError(f"{self.file}: no column {name} {self.told}")
+        return self.texts[name]
+
+    def named(self, name: str, otherwise: str = "1") -> list[str]:
+        """Return a column of texts; without it `otherwise` stands in every row."""
+        return self.texts.get(name) or [otherwise] * self.rows
+
     def require(self, quantity: str, dimension: str) -> Numbers:
         """Return a column of numbers, or say that the table lacks it."""
         if quantity not in self.numbers:
@@ -180,37 +197,57 @@ def read(
         ]
     texts = [each.name for each in source.headings] if texts is None else texts
     found = find_columns(source.file, source.headings, known, texts)
-    used = {index for index, _ in found.values()}
-    extra = [each for index, each in enumerate(source.headings) if index not in used]
-    missed = {name: dimension for name, dimension in known.items() if name not in found}
-    missed_texts = [name for name in texts if name not in found]
-    table = Table(source.file, source.header, 0, warnings=source.warnings, _source=source)
-    table.told = source.told(extra, missed, missed_texts)
-    if extra:
-        names = ", ".join(quote(each.written) if each.written else "without a header" for each in extra)
-        offered = offers(extra, missed, missed_texts)
-        table.warnings.append(
-            f"{source.file}: ignored the column{'s' * (len(extra) > 1)} {names}"
-            + (f"; to read: {' '.join(offered)}" if offered else "")
-        )
-    source.check_cells(used)
-    plan = [
-        (
+    columns = [
+        _Column(
             name,
             index,
+            source.header[index],
             unit,
+            known.get(name, ""),
             "text" if name in texts else "cell" if name in (cells or {}) else "number",
             name in blank,
         )
         for name, (index, unit) in found.items()
     ]
-    if not (source.large and _read_large(source, table, plan, marker)):
-        _read_small(source, table, plan, marker)
+    used = {column.place for column in columns}
+    extra = [each for index, each in enumerate(source.headings) if index not in used]
+    missed = {name: dimension for name, dimension in known.items() if name not in found}
+    missed_texts = [name for name in texts if name not in found]
+    if extra:
+        names = ", ".join(quote(each.written) if each.written else "without a header" for each in extra)
+        offered = offers(extra, missed, missed_texts)
+        source.warnings.append(
+            f"{source.file}: ignored the column{'s' * (len(extra) > 1)} {names}"
+            + (f"; to read: {' '.join(offered)}" if offered else "")
+        )
+    source.check_cells(used)
+    told = source.told(extra, missed, missed_texts)
+
+    def begun() -> Table:
+        return Table(source.file, source.header, 0, warnings=source.warnings, told=told, _source=source)
+
+    table = begun()
+    if not (source.large and _read_large(source, table, columns, marker)):
+        # of what pandas has read nothing is kept
+        table = begun()
+        _read_small(source, table, columns, marker)
     if table.rows == 0:
         raise DataError(
             f"{source.file}: a header and no rows{source.of_sheet}: expected at least one row of data"
         )
     return table
+
+
+class _Column(NamedTuple):
+    """A column that is read, and what becomes of its cells."""
+
+    name: str
+    place: int
+    header: str
+    unit: str
+    dimension: str
+    kind: Literal["text", "cell", "number"]
+    may_be_blank: bool
 
 
 WITH_COMMA = "a number with a decimal comma, as elsewhere in the file"
@@ -223,10 +260,7 @@ def _pointed(text: str) -> str:
     return text.replace(",", ".")
 
 
-_Plan = Sequence[tuple[str, int, str, str, bool]]
-
-
-def _read_small(source: Source, table: Table, plan: _Plan, marker: str) -> None:
+def _read_small(source: Source, table: Table, columns: Sequence[_Column], marker: str) -> None:
     width = len(source.header)
     rows: list[list[str]] = []
     for line, record in source.rows():
@@ -238,92 +272,53 @@ def _read_small(source: Source, table: Table, plan: _Plan, marker: str) -> None:
             record = record[:width]
         rows.append(record)
     table.rows = len(rows)
-    columns = list(zip(*rows, strict=True)) or [()] * width
-    decimal_comma = source.has_commas(columns[index] for _, index, _, kind, _ in plan if kind != "text")
-    for name, index, unit, kind, may_be_blank in plan:
-        column = columns[index]
-        if kind == "text":
-            table.texts[name] = [cell.strip() for cell in column]
-        elif kind == "cell":
-            table.cells[name] = Cells(
-                source.header[index], unit, [cell.strip() for cell in column], decimal_comma
-            )
+    written = list(zip(*rows, strict=True)) or [()] * width
+    decimal_comma = source.has_commas(written[each.place] for each in columns if each.kind != "text")
+    for each in columns:
+        cells = [cell.strip() for cell in written[each.place]]
+        if each.kind == "text":
+            table.texts[each.name] = cells
+        elif each.kind == "cell":
+            table.cells[each.name] = Cells(each.header, each.unit, cells, decimal_comma)
         else:
-            values = np.empty(table.rows)
-            for i, cell in enumerate(column):
-                text = cell.strip()
+            values = np.full(table.rows, np.nan)
+            for i, text in enumerate(cells):
                 if marker and text.startswith(marker):
-                    table.marks[i, name] = text.replace(",", ".") if decimal_comma else text
-                    values[i] = np.nan
-                elif not text and may_be_blank:
-                    values[i] = np.nan
-                else:
+                    table.marks[i, each.name] = text.replace(",", ".") if decimal_comma else text
+                elif text or not each.may_be_blank:
                     try:
                         values[i] = parse_number(_pointed(text) if decimal_comma else text)
                     except ValueError:
                         expected = WITH_COMMA if decimal_comma else "a number"
-                        raise table.error(i, source.header[index], cell, expected) from None
-            table.numbers[name] = Numbers(source.header[index], unit, values)
+                        raise table.error(i, each.header, written[each.place][i], expected) from None
+            table.numbers[each.name] = Numbers(each.header, each.unit, values, each.dimension)
 
 
-def _version(package: ModuleType) -> tuple[int, int]:
-    major, minor = package.__version__.split(".")[:2]
-    return int(major), int(minor)
-
-
-def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
+def _read_large(source: Source, table: Table, columns: Sequence[_Column], marker: str) -> bool:
     """Read with pandas; False where anything is out of order, for the csv module to say what and where."""
-    import pandas as pd
-
-    # from 3.1 numbers are read to the nearest double without being asked to
-    exact: dict[str, Literal["round_trip"]] = (
-        {} if _version(pd) >= (3, 1) else {"float_precision": "round_trip"}
-    )
-
-    def read(decimal: str) -> pd.DataFrame:
-        return pd.read_csv(
-            io.BytesIO(source.text.encode()),
-            sep=source.delimiter,
-            header=0,
-            names=range(len(source.header)),
-            index_col=False,
-            dtype={
-                index: float if kind == "number" and not marker else "category" if kind == "text" else object
-                for _, index, _, kind, _ in plan
-            },
-            usecols=[index for _, index, *_ in plan] if plan else None,
-            keep_default_na=False,
-            na_values={
-                index: [""]
-                for _, index, _, kind, may_be_blank in plan
-                if kind == "number" and may_be_blank and not marker
-            },
-            decimal=decimal,
-            engine="c",
-            **exact,
-        )
-
-    decimal_comma = False
-    try:
-        frame = read(".")
-    except ValueError:
-        if source.delimiter == ",":
-            return False
-        try:
-            frame = read(",")
-        except ValueError:
-            return False
-        decimal_comma = True
-    rows = len(frame)
-    marks: dict[tuple[int, str], str] = {}
-    for name, index, unit, kind, may_be_blank in plan:
-        if kind == "number" and not marker:
-            values = frame[index].to_numpy()
-            empty = np.isnan(values)
-        elif kind == "number":
-            text = frame[index].to_numpy(dtype=object)
-            marked = frame[index].str.startswith(marker).to_numpy(dtype=bool)
-            marks |= {(int(row), name): text[row].strip() for row in np.flatnonzero(marked)}
+    # without a comma between cells it may be the decimal mark
+    for decimal in "." if source.delimiter == "," else ".,":
+        with suppress(ValueError):
+            frame = _frame(source, columns, marker, decimal)
+            break
+    else:
+        return False
+    table.rows = len(frame)
+    for each in columns:
+        column = frame[each.place]
+        if each.kind == "text":
+            table.texts[each.name], table._numbered[each.name] = _texts(column)
+            continue
+        if each.kind == "cell":
+            cells = [cell.strip() for cell in column.tolist()]
+            if source.has_commas([cells]) and decimal == ".":
+                return False
+            table.cells[each.name] = Cells(each.header, each.unit, cells, decimal == ",")
+            continue
+        values = column.to_numpy()
+        if marker:
+            text, marked = values, column.str.startswith(marker).to_numpy(dtype=bool)
+            table.marks |= {(int(row), each.name): text[row].strip() for row in np.flatnonzero(marked)}
             if source.has_commas([text[marked]]):
                 return False
             empty = (text == "") | marked
@@ -331,29 +326,50 @@ def _read_large(source: Source, table: Table, plan: _Plan, marker: str) -> bool:
                 values = np.where(empty, "nan", text).astype(float)
             except ValueError:
                 return False
-        elif kind == "text":
-            column = frame[index].cat
-            # two that differ in blanks are one
-            stripped = [str(category).strip() for category in column.categories]
-            codes = column.codes.to_numpy().astype(np.intp)
-            first = np.zeros(len(stripped), dtype=np.intp)
-            first[codes[::-1]] = np.arange(rows)[::-1]
-            unique: dict[str, int] = {}
-            of_code = np.zeros(len(stripped), dtype=np.intp)
-            for k in np.argsort(first, kind="stable").tolist():
-                of_code[k] = unique.setdefault(stripped[k], len(unique))
-            table.texts[name] = np.array(stripped, dtype=object)[codes].tolist()
-            table._numbered[name] = list(unique), of_code[codes]
-            continue
         else:
-            cells = [cell.strip() for cell in frame[index].tolist()]
-            if source.has_commas([cells]) and not decimal_comma:
-                return False
-            table.cells[name] = Cells(source.header[index], unit, cells, decimal_comma)
-            continue
-        if not ((np.abs(values) <= LARGEST) | (empty & may_be_blank)).all():
+            empty = np.isnan(values)
+        if not ((np.abs(values) <= LARGEST) | (empty & each.may_be_blank)).all():
             return False
-        table.numbers[name] = Numbers(source.header[index], unit, values)
-    table.rows = rows
-    table.marks.update(marks)
+        table.numbers[each.name] = Numbers(each.header, each.unit, values, each.dimension)
     return True
+
+
+def _frame(source: Source, columns: Sequence[_Column], marker: str, decimal: str) -> pd.DataFrame:
+    import pandas as pd
+
+    def kind(each: _Column) -> type | str:
+        if each.kind == "text":
+            return "category"
+        return float if each.kind == "number" and not marker else object
+
+    blanks = [each.place for each in columns if kind(each) is float and each.may_be_blank]
+    version = tuple(map(int, pd.__version__.split(".")[:2]))
+    # from 3.1 numbers are read to the nearest double without being asked to
+    exact: dict[str, Literal["round_trip"]] = {} if version >= (3, 1) else {"float_precision": "round_trip"}
+    return pd.read_csv(
+        io.BytesIO(source.text.encode()),
+        sep=source.delimiter,
+        header=0,
+        names=range(len(source.header)),
+        index_col=False,
+        dtype={each.place: kind(each) for each in columns},
+        usecols=[each.place for each in columns] or None,
+        keep_default_na=False,
+        na_values={place: [""] for place in blanks},
+        decimal=decimal,
+        engine="c",
+        **exact,
+    )
+
+
+def _texts(column: pd.Series) -> tuple[list[str], tuple[list[str], NDArray[np.intp]]]:
+    """Return a column's texts, and as `Table.numbered` has them; two that differ in blanks are one."""
+    stripped = [str(category).strip() for category in column.cat.categories]
+    codes = column.cat.codes.to_numpy().astype(np.intp)
+    first = np.zeros(len(stripped), dtype=np.intp)
+    first[codes[::-1]] = np.arange(len(codes))[::-1]
+    unique: dict[str, int] = {}
+    of_code = np.zeros(len(stripped), dtype=np.intp)
+    for k in np.argsort(first, kind="stable").tolist():
+        of_code[k] = unique.setdefault(stripped[k], len(unique))
+    return np.array(stripped, dtype=object)[codes].tolist(), (list(unique), of_code[codes])

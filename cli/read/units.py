@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Container
 from typing import TYPE_CHECKING, TypeVar, overload
 
 from cli.errors import nearest
@@ -157,10 +158,23 @@ def dimensions(unit: str) -> set[str]:
     return found | {amplitude_kind(amplitude)[0]} if amplitude else found
 
 
-def column_dimensions(name: str) -> set[str]:
-    """Return the dimensions of the unit at the end of a column's name, the longest that is one; none for a name."""
+def parted(name: str, further: Container[str] = ()) -> tuple[str, str]:
+    """Part a column's name from the unit at its end, the longest that is one; `further` are units of no input.
+
+    >>> parted("trial_mass_g"), parted("x_N_m"), parted("plane")
+    (('trial_mass', 'g'), ('x', 'N_m'), ('plane', ''))
+    """
     parts = name.split("_")
-    return next(filter(None, (dimensions("_".join(parts[k:])) for k in range(1, len(parts)))), set())
+    for k in range(1, len(parts)):
+        unit = "_".join(parts[k:])
+        if unit in further or dimensions(unit):
+            return "_".join(parts[:k]), unit
+    return name, ""
+
+
+def column_dimensions(name: str) -> set[str]:
+    """Return the dimensions of the unit at the end of a column's name; none for a name."""
+    return dimensions(parted(name)[1])
 
 
 def nearest_unit(suffix: str, dimension: str) -> str:
@@ -243,12 +257,6 @@ def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
     if not abs(value) <= LARGEST:
         raise ValueError(f"'{text}' is too large a number")
     return value, unit
-
-
-def quantity(text: str, dimension: str) -> float:
-    """Read an option's value with its unit, as SI."""
-    value, unit = parse_quantity(text, dimension)
-    return float(to_si(value, dimension, unit))
 
 
 def cosine_sine(angle: NDArray[np.float64], unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

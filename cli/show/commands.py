@@ -162,12 +162,14 @@ def with_options(
     options: str,
     chosen: Sequence[str] | None,
     hand_on: Callable[[Result, ShowOptions, Mapping[str, str]], None],
+    asked: Callable[..., object] | None = None,
 ) -> Callable[..., None]:
     """Make a command that takes these of the shared options too, None for all, and hands on what it has found.
 
-    `options` is what its help says of its own, as `told` reads it.
+    `options` is what its help says of its own, as `told` reads it. `asked` is a class of them: then the function takes
+    one of these and the shared ones.
     """
-    own, shared = _parameters(find, options), _parameters(ShowOptions, SHARED)
+    own, shared = _parameters(asked or find, options), _parameters(ShowOptions, SHARED)
     shared = {name: p for name, p in shared.items() if chosen is None or name in chosen}
 
     @wraps(find)
@@ -178,16 +180,16 @@ def with_options(
         if options.report is None and (unused := next(iter(options.head), None)) is not None:
             raise typer.BadParameter("expected --report FILE too", param_hint=f"--{unused}")
         rename(options.column)
-        asked = {
+        said = {
             name.replace("_", " "): _said(value)
             for name, value in given.items()
             if value != own[name].default and value is not None
         }
         if "show" in own:
             given["show"] = options
-        result = find(**given)
+        result = find(**given) if asked is None else find(asked(**given), options)
         with result.within():
-            hand_on(result, options, asked)
+            hand_on(result, options, said)
 
     parameters = [*(p for name, p in own.items() if name != "show"), *shared.values()]
     run.__signature__ = signature(find).replace(parameters=parameters, return_annotation=None)  # type: ignore[attr-defined]
@@ -208,7 +210,7 @@ def _said(value: object) -> str:
 
 def _parameters(of: Callable[..., object], options: str) -> dict[str, Parameter]:
     """Return the parameters with their types and help; what is returned is not looked at, nor loaded for it."""
-    names, said = getattr(of, "__globals__", globals()), told(options)
+    names, said = vars(sys.modules[of.__module__]), told(options)
     return {
         name: p.replace(
             kind=Parameter.KEYWORD_ONLY,

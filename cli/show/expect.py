@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     Columns = Mapping[str, Values]
 
 
+COMPARED = ("row", "column", "value", "expected", "error", "verdict")
+
+
 @dataclass(frozen=True)
 class Comparison:
     """A row for each expected cell, and whether all hold."""
@@ -61,9 +64,7 @@ def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], 
     matched = [name for name in header if name in keys and not (is_input(name) and "step" in header)]
     rows = list(_match(columns, file, expected.texts, matched, expected.rows, rtol))
     named = [key for key in keys if key in columns and (key in matched or not is_input(key))]
-    lines: dict[str, list[Cell]] = {
-        name: [] for name in ("row", "column", "value", "expected", "error", "verdict")
-    }
+    lines: list[tuple[Cell, ...]] = []
     for index, row in enumerate(rows):
         for name in header:
             wanted = expected.texts[name][index]
@@ -71,17 +72,13 @@ def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], 
                 continue
             value = columns[name][row]
             number, error = _error(name, value, wanted, columns[name])
-            holds = error <= rtol
             label = "/".join(str(columns[key][row]) for key in named) or str(row + 1)
-            for key, item in zip(
-                lines, (label, name, value, number, error, "ok" if holds else "WRONG"), strict=True
-            ):
-                lines[key].append(item)
-    wrong = lines["verdict"].count("WRONG")
-    total = len(lines["verdict"])
-    if not total:
+            lines.append((label, name, value, number, error, "ok" if error <= rtol else "WRONG"))
+    if not lines:
         raise DataError(f"{file}: no expected value in it: nothing would be checked")
-    return Comparison(lines, f"{total - wrong} of {total} values within {rtol:g}", wrong == 0)
+    compared = dict(zip(COMPARED, zip(*lines, strict=True), strict=True))
+    right = compared["verdict"].count("ok")
+    return Comparison(compared, f"{right} of {len(lines)} values within {rtol:g}", right == len(lines))
 
 
 def _alike(name: str, columns: Iterable[str]) -> list[str]:

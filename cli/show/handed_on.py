@@ -7,21 +7,18 @@ import re
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from cli.show.text import plain, printed
+from cli.show.text import Grid, has_names, printed
 
 if TYPE_CHECKING:
     from cli.show.columns import Table
 
-Cells = tuple[list[str], list[list[str]], list[bool]]
-"""Header, rows, and which columns are numbers."""
-
 
 def handed_on(suffix: str, tables: Mapping[str, Table], warnings: list[str]) -> bytes:
     """Return the file of this suffix: all tables, each with its name where there are several."""
-    form: Callable[[Cells], str] = {".md": markdown, ".tex": _latex, ".html": _html}[suffix]
+    form: Callable[[Grid], str] = {".md": markdown, ".tex": _latex, ".html": _html}[suffix]
     title = {".md": "## {}\n\n", ".tex": "% {}\n", ".html": "<h2>{}</h2>\n"}[suffix]
     several = len(tables) > 1
-    parts = [title.format(name) * several + form(_cells(table)) for name, table in tables.items()]
+    parts = [title.format(name) * several + form(_grid(table)) for name, table in tables.items()]
     remarks = {
         ".md": [f"- {text}\n" for text in warnings],
         ".tex": [f"% {text}\n" for text in warnings],
@@ -31,16 +28,15 @@ def handed_on(suffix: str, tables: Mapping[str, Table], warnings: list[str]) -> 
     return (_PAGE.format(text) if suffix == ".html" else text).encode()
 
 
-def _cells(table: Table) -> Cells:
-    columns = table.cells
-    texts = [printed(name, values) for name, values in columns.items()]
-    numbers = [not any(isinstance(plain(v), str) and plain(v) for v in values) for values in columns.values()]
-    return list(columns), [list(row) for row in zip(*texts, strict=True)], numbers
+def _grid(table: Table) -> Grid:
+    texts = (printed(name, values) for name, values in table.cells.items())
+    rows = [list(row) for row in zip(*texts, strict=True)]
+    return Grid(list(table.cells), rows, [not has_names(values) for values in table.cells.values()])
 
 
-def markdown(cells: Cells) -> str:
+def markdown(grid: Grid) -> str:
     """A table in Markdown."""
-    header, rows, numbers = cells
+    header, rows, numbers = grid
 
     def line(row: list[str]) -> str:
         return "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |\n"
@@ -52,9 +48,9 @@ def markdown(cells: Cells) -> str:
 _LATEX = {**{c: f"\\{c}" for c in "&%$#_{}"}, "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
 
 
-def _latex(cells: Cells) -> str:
+def _latex(grid: Grid) -> str:
     """A tabular, to be put into a document by `\\input`."""
-    header, rows, numbers = cells
+    header, rows, numbers = grid
 
     def escaped(cell: str) -> str:
         return re.sub(r"[&%$#_{}~^]", lambda found: _LATEX[found.group()], cell.replace("\\", "/"))
@@ -81,8 +77,8 @@ th, td {{ padding: .2em .8em; border-bottom: 1px solid #ccc; text-align: left }}
 """
 
 
-def _html(cells: Cells) -> str:
-    header, rows, numbers = cells
+def _html(grid: Grid) -> str:
+    header, rows, numbers = grid
 
     def line(row: list[str], tag: str) -> str:
         each = zip(row, numbers, strict=True)

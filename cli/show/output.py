@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from cli.errors import one_line
-from cli.read.files import named, refuse_inputs
+from cli.read.about import HEAD
+from cli.read.files import refuse_inputs
 from cli.show.colour import coloured
 from cli.show.commands import FORMS, ShowOptions, with_options
 
@@ -21,21 +22,23 @@ if TYPE_CHECKING:
     from cli.show.columns import Result, Table
     from cli.show.expect import Comparison
 
+    Made = Callable[[], bytes | Iterable[bytes]]
 
-def command(options: str) -> Callable[[Callable[..., Result]], Callable[..., None]]:
+
+def command(
+    options: str, asked: Callable[..., object] | None = None
+) -> Callable[[Callable[..., Result]], Callable[..., None]]:
     """Make a command of a function that returns its result: it takes the shared options too, and shows the result.
 
     `options` is what the help says of its own (`told`). Where the function has a parameter `show`, it is given the
-    shared ones.
+    shared ones; `asked` as in `with_options`.
     """
-    return lambda find: with_options(find, options, None, show)
+    return lambda find: with_options(find, options, None, show, asked)
 
 
 def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
     """Write the files asked for, print the result; status 1 if an expectation is not met, or nothing was found."""
     from cli.read.headers import check_renamed
-    from cli.show.files import write, write_all
-    from cli.show.text import csv_text, paragraphs, table_text
 
     if options.form == ".toml" and result.toml is None:
         raise typer.BadParameter(
@@ -46,93 +49,114 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         _stream(result, options)
         return
     result = _in_chosen_units(result, options.units)
-    first, output = cache(next(iter(result.tables.values()))), options.output
+    whole = cache(_first(result))
+    result = _with_first(result, whole)
     checked = None
     if options.expect is not None:
         from cli.show.expect import compare
 
         further = [*([] if result.screen is None else [result.screen]), *result.expected]
-        checked = compare(first(), str(options.expect), options.rtol, further)
-        verdict = f"{table_text(checked.columns)}\n{checked.summary}"
+        checked = compare(whole(), str(options.expect), options.rtol, further)
     check_renamed()
     if options.digits:
-        result, cut = _with_digits_that_hold(result, first)
-        first = cache(lambda: cut)
-    pages = reported(result, options, asked, checked)
-    tables = _tables_beside(result, options)
-    refuse_inputs(
-        [path for path in (output, options.plot, *result.beside, *pages, *tables) if path is not None]
-    )
-    of_tables = {path: partial(_one_table, options.form, table_of) for path, table_of in tables.items()}
-    write_all({**of_tables, **result.beside, **pages})
-    if options.plot is not None and result.figure is not None:
-        from cli.show.picture import drawn
-
-        write(options.plot, drawn(result.figure, options.plot.suffix.lower()[1:]))
-    if output is not None and options.form == ".json":
-        write(output, (part.encode() for part in _json_parts(result)))
-    elif output is not None and options.form == ".toml" and result.toml is not None:
-        write(output, result.toml())
-    elif output is not None and options.holds_one:
-        write(output, _one_table(options.form, first))
-    elif output is not None:
-        (name, _), *others = result.tables.items()
-        formed = {name.strip("-"): first()} | {name.strip("-"): table() for name, table in others}
-        if options.form == ".xlsx":
-            from cli.show.parts import workbook
-
-            write(output, workbook({name: [table] for name, table in formed.items()}))
-        else:
-            from cli.show.handed_on import handed_on
-
-            write(output, handed_on(options.form, formed, result.warnings))
+        result = _with_digits_that_hold(result)
+    # a report cuts the digits of each of its tables
+    pages = _report(_with_first(result, whole), options, asked, checked)
+    _write(result, options, pages)
     # a long table would carry the warnings out of sight
-    at_the_end = output is None and not options.json and sys.stdout.isatty()
+    at_the_end = options.output is None and not options.json and sys.stdout.isatty()
     if not at_the_end:
         _warn(result.warnings, options)
-    if options.json:
-        sys.stdout.writelines(_json_parts(result))
-        if checked is not None:
-            print(verdict, file=sys.stderr)
-    elif checked is not None:
-        print(coloured(verdict, sys.stdout, not options.no_color))
-    elif options.text or (sys.stdout.isatty() and output is None):
-        table = (result.screen or first)()
-        width = get_terminal_size().columns if sys.stdout.isatty() else None
-        text = table_text(table.cells, table.keys, width)
-        said = paragraphs(result.notes(), text, result.afterword())
-        sys.stdout.write(coloured(said, sys.stdout, not options.no_color))
-    elif output is None:
-        sys.stdout.write(csv_text(first().cells))
-    sys.stdout.flush()
+    _print(result, options, checked)
     if at_the_end:
         _warn(result.warnings, options)
     if result.failed() or (checked is not None and not checked.passed):
         raise typer.Exit(1)
 
 
-def reported(
+def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> None:
+    """Write the files; where one of them is an input, none."""
+    from cli.show.files import write_all
+
+    output = options.output
+    files: dict[Path, Made] = {}
+    if output is not None and options.holds_one:
+        for name in result.companions:
+            beside = output.with_name(f"{output.stem}-{name}{output.suffix}")
+            files[beside] = partial(_one_table, options.form, result.tables[name])
+    names = (output, options.plot, *result.beside, *pages, *files)
+    refuse_inputs([path for path in names if path is not None])
+    files |= {**result.beside, **pages}
+    if options.plot is not None and result.figure is not None:
+        from cli.show.picture import drawn
+
+        files[options.plot] = partial(drawn, result.figure, options.plot.suffix.lower()[1:])
+    if output is not None:
+        files[output] = partial(_formed, result, options.form)
+    write_all(files)
+
+
+def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> None:
+    """Print what was asked for, in the form that standard output asks for."""
+    from cli.show.text import csv_text, paragraphs, table_text
+
+    verdict = "" if checked is None else f"{table_text(checked.columns)}\n{checked.summary}"
+    if options.json:
+        sys.stdout.writelines(_json_parts(result))
+        if checked is not None:
+            print(verdict, file=sys.stderr)
+    elif checked is not None:
+        print(coloured(verdict, sys.stdout, not options.no_color))
+    elif options.text or (sys.stdout.isatty() and options.output is None):
+        table = (result.screen or _first(result))()
+        width = get_terminal_size().columns if sys.stdout.isatty() else None
+        text = table_text(table.cells, table.keys, width)
+        said = paragraphs(result.notes(), text, result.afterword())
+        sys.stdout.write(coloured(said, sys.stdout, not options.no_color))
+    elif options.output is None:
+        sys.stdout.write(csv_text(_first(result)().cells))
+    sys.stdout.flush()
+
+
+def _first(result: Result) -> Callable[[], Table]:
+    return next(iter(result.tables.values()))
+
+
+def _with_first(result: Result, table: Callable[[], Table]) -> Result:
+    """Return the result with another first table."""
+    return replace(result, tables={**result.tables, next(iter(result.tables)): table})
+
+
+def reported(options: str) -> Callable[[Callable[..., Result]], Callable[..., None]]:
+    """Make a command of a function that returns the files to be written and what a report says of them.
+
+    `options` is what the help says of its own. The files are `beside` of its result, `notes` is what goes to standard
+    output, `warnings` are the remarks.
+    """
+    return lambda find: with_options(find, options, ("report", *HEAD), _hand_on)
+
+
+def _hand_on(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
+    from cli.show.files import write_all
+
+    files = [*result.beside.items(), *_report(result, options, asked).items()]
+    refuse_inputs(path for path, _ in files)
+    for note in result.warnings:
+        print(f"note: {one_line(note)}", file=sys.stderr)
+    write_all(dict(files))
+    sys.stdout.write(result.notes())
+
+
+def _report(
     result: Result, options: ShowOptions, asked: Mapping[str, str], checked: Comparison | None = None
-) -> dict[Path, Callable[[], bytes]]:
+) -> dict[Path, Made]:
     """Return the files of --report."""
     if options.report is None:
         return {}
     from cli.show.report_forms import pages
 
-    head, units, digits = options.head, options.units, options.digits
-    files = pages(options.report, result, head, asked, named(), units, digits, checked)
+    files = pages(result, options, asked, checked)
     return {path: partial(bytes, page) for path, page in files.items()}
-
-
-def _tables_beside(result: Result, options: ShowOptions) -> dict[Path, Callable[[], Table]]:
-    """Return the tables that go beside a file of one table, each in a file of its own."""
-    output = options.output
-    if output is None or not options.holds_one:
-        return {}
-    return {
-        output.with_name(f"{output.stem}-{name}{output.suffix}"): result.tables[name]
-        for name in result.companions
-    }
 
 
 def _in_chosen_units(result: Result, units: str | None) -> Result:
@@ -172,14 +196,33 @@ def _stream(result: Result, options: ShowOptions) -> None:
         raise typer.Exit(1)
 
 
-def _one_table(form: str, table: Callable[[], Table]) -> bytes | Iterator[bytes]:
-    """Return a file of a single table."""
-    from cli.show.text import csv_text
+def _formed(result: Result, form: str) -> bytes | Iterable[bytes]:
+    """Return the file of -o."""
+    if form == ".json":
+        return (part.encode() for part in _json_parts(result))
+    if form == ".toml":
+        assert result.toml is not None
+        return result.toml()
+    if form in (".csv", ".parquet"):
+        return _one_table(form, _first(result))
+    formed = {name.strip("-"): table() for name, table in result.tables.items()}
+    if form == ".xlsx":
+        from cli.show.parts import workbook
 
+        return workbook({name: [table] for name, table in formed.items()})
+    from cli.show.handed_on import handed_on
+
+    return handed_on(form, formed, result.warnings)
+
+
+def _one_table(form: str, table: Callable[[], Table]) -> bytes | Iterable[bytes]:
+    """Return a file of a single table."""
     if form == ".parquet":
         from cli.show.parts import parquet
 
         return parquet([table()])
+    from cli.show.text import csv_text
+
     return csv_text(table().cells).encode()
 
 
@@ -201,16 +244,16 @@ def _json_parts(result: Result) -> Iterator[str]:
     return json_parts({**result.document(), "warnings": result.warnings})
 
 
-def _with_digits_that_hold(result: Result, first: Callable[[], Table]) -> tuple[Result, Table]:
+def _with_digits_that_hold(result: Result) -> Result:
     """Cut the first table and that of the terminal."""
     from cli.show.digits import digits_that_hold
 
-    table, unknown = digits_that_hold(first())
+    table, unknown = digits_that_hold(_first(result)())
     screen = result.screen if result.screen is None else cache(result.screen)
     if screen is not None and not any(column.error for column in table.columns):
         unknown = digits_that_hold(screen())[1]
     return replace(
-        result,
+        _with_first(result, lambda: table),
         warnings=[*result.warnings, *_unknown(unknown)],
         screen=None if screen is None else lambda: digits_that_hold(screen())[0],
-    ), table
+    )

@@ -10,16 +10,19 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 from cli.read.about import HEAD
-from cli.read.files import load
+from cli.read.files import load, named
 from cli.read.sources import open_source
-from cli.read.units import UNITS, dimensions, is_number, parse_quantity, written
+from cli.read.units import UNITS, is_number, parse_quantity, parted, written
 from cli.show.columns import Column, Section, Sheet, Table
-from cli.show.text import has_names, heading, in_blocks, printed
+from cli.show.digits import finished
+from cli.show.text import Grid, has_names, heading, in_blocks, printed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.show.columns import Cell, Result
+    from cli.show.commands import ShowOptions
+    from cli.show.expect import Comparison
 
 ROWS = 36  # so many rows of a result are shown
 READ = 24  # so many rows of an input
@@ -27,15 +30,6 @@ LINES = 100  # so many lines of a file
 WIDE = 88  # characters beside each other that fit A4 and Letter
 TINY = 1e-9  # a number smaller than this may be the rounding of zero
 _THINNED = ("step", "t_s")  # of tables that begin so every k-th row is shown: they are sweeps
-
-
-@dataclass(frozen=True)
-class Grid:
-    """A table as it is printed: a header and rows of text, and which columns are numbers, to the right."""
-
-    header: list[str]
-    rows: list[list[str]]
-    numbers: list[bool]
 
 
 Part = str | Grid
@@ -63,38 +57,30 @@ class Report:
 
 
 def report(
-    result: Result,
-    head: Mapping[str, str],
-    asked: Mapping[str, str],
-    files: Sequence[str],
-    finish: Callable[[Table], Table],
-    check: Section | None = None,
+    result: Result, options: ShowOptions, asked: Mapping[str, str], checked: Comparison | None
 ) -> Report:
     """Put a report together.
 
-    Parameters
-    ----------
-    head
-        What stands at the head, as options have it: before what the file itself says.
-    asked
-        The command's own options that were given, and their values.
-    files
-        What was read, as the user named it.
-    finish
-        Puts a table into the units and digits asked for.
-    check
-        How the result compares with what was expected.
+    `asked` are the command's own options that were given, and their values; `checked` is how the result compares with
+    what was expected. What the options say for its head goes before what the file itself says.
     """
     from datetime import date
     from importlib.metadata import version
 
-    about = {"date": date.today().isoformat(), **result.about, **head}
+    def finish(table: Table) -> Table:
+        return finished(table, options.units, options.digits)[0]
+
+    about = {"date": date.today().isoformat(), **result.about, **options.head}
     sheets = list(result.sheets() if result.sheets is not None else [_plain_sheet(result)])
-    given = list(_given(asked, () if result.shows_input else files))
-    if sheets and (given or check):
-        first, *others = sheets
-        sections = [*([Section("Given", given)] if given else []), *first.sections]
-        sheets = [replace(first, sections=[*sections, *([check] if check else [])]), *others]
+    given = list(_given(asked, () if result.shows_input else named()))
+    if sheets:
+        sections = list(sheets[0].sections)
+        if given:
+            sections.insert(0, Section("Given", given))
+        if checked is not None:
+            compared = Table([Column(name, "", values) for name, values in checked.columns.items()])
+            sections.append(Section("Compared with what was expected", [compared, checked.summary]))
+        sheets[0] = replace(sheets[0], sections=sections)
     pages = [
         Page(
             sheet.title,
@@ -213,7 +199,10 @@ def _grids(table: Table) -> Iterator[Part]:
         headers.append(
             f"{_words(column.name)} [{written(column.unit)}]" if column.unit else _words(column.name)
         )
-    numbers = [not has_names(column.values) or all(is_number(c.replace(",", ".")) or not c for c in cells) for column, cells in zip(table.columns, texts, strict=True)]  # fmt: skip
+    numbers = [
+        not has_names(column.values) or all(not cell or is_number(cell.replace(",", ".")) for cell in cells)
+        for column, cells in zip(table.columns, texts, strict=True)
+    ]
     widths = {
         str(k): max(map(len, [*cells, *header.split()]))
         for k, (cells, header) in enumerate(zip(texts, headers, strict=True))
@@ -251,6 +240,10 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
+# units of results that no input has
+_RESULTS = ("kg_m2_s", "J", "W", "rad_s3", "m_s3")
+
+
 def said(header: str) -> str:
     """Return a header that stands in a cell as people write it: `inertia_x_kg_m2` is inertia x [kg·m²]."""
     of, colon, rest = header.rpartition(": ")
@@ -258,9 +251,5 @@ def said(header: str) -> str:
         return f"{of}: {said(rest)}"
     if " " in header or "_" not in header:
         return header
-    parts = header.split("_")
-    for k in range(1, len(parts)):
-        unit = "_".join(parts[k:])
-        if dimensions(unit) or unit in ("kg_m2_s", "J", "W", "rad_s3", "m_s3"):
-            return f"{' '.join(parts[:k])} [{written(unit)}]"
-    return _words(header)
+    name, unit = parted(header, further=_RESULTS)
+    return f"{_words(name)} [{written(unit)}]" if unit else _words(name)

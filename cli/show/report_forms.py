@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.errors import DataError
-from cli.show.columns import Column, Section, Table
-from cli.show.digits import finished
 from cli.show.handed_on import markdown
 from cli.show.picture import drawn
-from cli.show.report import CODE, Grid, Page, Part, Report, report
-from cli.show.text import BAD, GOOD
+from cli.show.report import CODE, Page, Part, Report, report
+from cli.show.text import BAD, GOOD, Grid
 
 if TYPE_CHECKING:
     from cli.show.columns import Result
+    from cli.show.commands import ShowOptions
     from cli.show.expect import Comparison
 
 _STYLE = """
@@ -45,32 +44,15 @@ _NO_PICTURE = "(No picture: matplotlib is not installed.)"
 
 
 def pages(
-    path: Path,
-    result: Result,
-    head: Mapping[str, str],
-    asked: Mapping[str, str],
-    files: Sequence[str],
-    units: str | None = None,
-    digits: bool = False,
-    checked: Comparison | None = None,
+    result: Result, options: ShowOptions, asked: Mapping[str, str], checked: Comparison | None = None
 ) -> dict[Path, bytes]:
-    """Return the files of a result's report; `files` were read, `units` and `digits` are those of the tables."""
-
-    def finish(table: Table) -> Table:
-        return finished(table, units, digits)[0]
-
-    check = None
-    if checked is not None:
-        compared = Table([Column(name, "", values) for name, values in checked.columns.items()])
-        check = Section("Compared with what was expected", [compared, checked.summary])
-    return formed(path, report(result, head, asked, files, finish, check))
-
-
-def formed(path: Path, report: Report) -> dict[Path, bytes]:
-    """Return the files of a report: the page itself, and beside Markdown its pictures."""
+    """Return the files of a result's report: the page itself, and beside Markdown its pictures."""
+    path = options.report
+    assert path is not None
+    made = report(result, options, asked, checked)
     if path.suffix.lower() == ".md":
-        return _markdown(path, report)
-    return {path: "".join(_html(report)).encode()}
+        return _markdown(path, made)
+    return {path: "".join(_html(made)).encode()}
 
 
 def _picture(page: Page) -> str | None:
@@ -158,7 +140,7 @@ def _markdown(path: Path, report: Report) -> dict[Path, bytes]:
 
 def _markdown_part(part: Part) -> str:
     if isinstance(part, Grid):
-        return markdown((part.header, part.rows, part.numbers)).rstrip("\n")
+        return markdown(part).rstrip("\n")
     if part.startswith(CODE):
         return f"~~~\n{part.removeprefix(CODE)}\n~~~"
     return "  \n".join(_escaped(line.strip()) for line in part.strip("\n").splitlines())

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from cli.show.columns import Cell, Values
 
 GOOD, BAD = ("ok", "within", "stable"), ("WRONG", "beyond", "unstable")
 """Verdicts, as they stand in cells and sentences."""
+
+
+class Grid(NamedTuple):
+    """A table as it is printed: a header and rows of text, and which columns are numbers, to the right."""
+
+    header: list[str]
+    rows: list[list[str]]
+    numbers: list[bool]
 
 
 def csv_text(columns: Mapping[str, Values], header: bool = True) -> str:

@@ -20,23 +20,19 @@ def states(found: Rotation) -> Table:
     def bound(of: str, i: int | None = None) -> Array:
         return found.bounds[of] if i is None else found.bounds[of][:, i]
 
+    # a turn by an angle moves a quaternion by half of it
     def half(of: str) -> Array:
         return found.bounds[of] / 2
 
     columns = [Column("t", "s", found.time + 0.0)]
-    columns += [
-        Column(f"omega_{a}", "rad_s", s.omega[:, i] + 0.0, partial(bound, "omega", i))
-        for i, a in enumerate("xyz")
-    ]
-    # a turn by an angle moves a quaternion by half of it
-    columns += [
-        Column(f"attitude_{a}", "", s.attitude[:, i] + 0.0, partial(half, "attitude"))
-        for i, a in enumerate("wxyz")
-    ]
-    columns += [
-        Column(f"momentum_{a}", "kg_m2_s", s.momentum[:, i] + 0.0, partial(bound, "momentum", i))
-        for i, a in enumerate("xyz")
-    ]
+    for of, unit, axes in (
+        ("omega", "rad_s", "xyz"),
+        ("attitude", "", "wxyz"),
+        ("momentum", "kg_m2_s", "xyz"),
+    ):
+        for i, axis in enumerate(axes):
+            error = partial(half, of) if of == "attitude" else partial(bound, of, i)
+            columns.append(Column(f"{of}_{axis}", unit, getattr(s, of)[:, i] + 0.0, error))
     columns.append(Column("energy", "J", s.energy + 0.0, partial(bound, "energy")))
     return Table(columns)
 

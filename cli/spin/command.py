@@ -74,7 +74,10 @@ def run(
 
     if time is not None and at:
         raise options.bad("--at", "expected --time or --at, not both")
-    times = options.time_range("--time", time) if time is not None else [_time(text) for text in at or ["0"]]
+    if time is not None:
+        times = options.time_range("--time", time)
+    else:
+        times = [options.number_or_quantity("--at", text, "time") for text in at or ["0"]]
     if html is not None:
         from cli.show.page import refuse_long
 
@@ -89,9 +92,12 @@ def run(
         return draw(found)
 
     def page() -> bytes:
-        from cli.spin.animation import page
+        from cli.show.page import shown
+        from rigidbody3d.animation import turning_page
 
-        return page(found, show.units).html.encode()
+        table = shown(columns.states(found), show.units)
+        made = turning_page(given.name, given.inertia, given.omega, table, given.mgl is not None)
+        return made.html.encode()
 
     return Result(
         document=lambda: columns.document(found),
@@ -104,7 +110,3 @@ def run(
         about={"title": given.name or "Rotation in time"} | given.about,
         warnings=[*given.warnings, *words.warnings(found), *(words.coarse(found) if html else ())],
     )
-
-
-def _time(text: str) -> float:
-    return options.number_or_quantity("--at", text, "time")

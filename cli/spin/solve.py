@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cli.errors import DataError
+from cli.show.columns import finite
 from cli.spin.read import Array, TurningBody
 from rigidbody3d import FreeBody, FreeState, Top, TopState, Trajectory, integrate, principal
 from rigidbody3d import cones as cones_of
@@ -117,7 +117,7 @@ class Rotation:
         g = self.given
         if g.torque is not None or g.mgl is not None:
             return None
-        return _finite(FreeBody(g.inertia, g.omega).period)
+        return finite(float(FreeBody(g.inertia, g.omega).period))
 
     def cones(self) -> dict[str, float | None] | None:
         """Return the cones of a free symmetric body."""
@@ -149,15 +149,15 @@ class Rotation:
         tilt = 2 * np.arctan2(np.hypot(x, y), np.hypot(w, z))
         rates = steady_of(across, along, g.mgl, tilt, g.omega[2])
         return {
-            "slow_rad_s": _finite(rates.slow),
-            "fast_rad_s": _finite(rates.fast),
-            "sleeping_threshold_rad_s": _finite(threshold_of(across, along, g.mgl)) if along else None,
+            "slow_rad_s": finite(float(rates.slow)),
+            "fast_rad_s": finite(float(rates.fast)),
+            "sleeping_threshold_rad_s": finite(float(threshold_of(across, along, g.mgl))) if along else None,
         }
 
     @property
     def nutation_period(self) -> float | None:
         """The period of nutation of a top; None of any other body."""
-        return _finite(self.states.top.nutation_period) if isinstance(self.states, TopState) else None
+        return finite(float(self.states.top.nutation_period)) if isinstance(self.states, TopState) else None
 
     @cached_property
     def bounds(self) -> dict[str, Array]:
@@ -173,8 +173,3 @@ class Rotation:
 
 def _tensor(inertia: Array) -> Array:
     return np.diag(inertia) if inertia.ndim == 1 else inertia
-
-
-def _finite(x: ArrayLike) -> float | None:
-    value = float(np.asarray(x))
-    return value if np.isfinite(value) else None

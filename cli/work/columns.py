@@ -19,22 +19,22 @@ KEYS = ("step", "field", "link", "kind", "unknown")
 def unknowns(found: WorkBalance) -> Table:
     """One row per step and unknown, in the units of the marked columns."""
     table = found.states.table
-    steps = [step.name for step in found.states.steps]
-    cells = [(i, *cell) for i in range(len(steps)) for cell in found.unknowns(i)]
+    steps = found.states.steps
+    cells = [(step.name, *cell) for i, step in enumerate(steps) for cell in found.unknowns(i)]
     columns = [
-        Column("step", "", [steps[i] for i, *_ in cells]),
+        Column("step", "", [step for step, *_ in cells]),
         Column("link", "", [cell.link for _, _, cell, _ in cells]),
     ]
     if any(unknown.name for _, unknown, *_ in cells):
         columns.append(Column("unknown", "", [unknown.name for _, unknown, *_ in cells]))
 
     def errors(name: str, unit: str) -> list[float]:
-        bounds = []
-        for index, step in enumerate(found.states.steps):
-            group, place = found.where[index]
-            for unknown, bound in zip(step.unknowns, found.bounds[group][place].tolist(), strict=True):
-                bounds += [abs(bound * c.factor) if c.quantity == name else 0.0 for c in unknown.cells]
-        return [from_si(bound, COLUMNS[name], unit) for bound in bounds]
+        return [
+            from_si(abs(bound * cell.factor) if cell.quantity == name else 0.0, COLUMNS[name], unit)
+            for i, step in enumerate(steps)
+            for unknown, bound in zip(step.unknowns, found.unknown_bounds(i), strict=True)
+            for cell in unknown.cells
+        ]
 
     for name in LOADS:
         if any(quantity == name for _, quantity in table.marks):
@@ -55,15 +55,14 @@ def ledger(found: WorkBalance) -> Table:
     def errors() -> list[float]:
         return [term.error for i in range(len(steps)) for term in found.terms(i, bounds=True)]
 
+    several = any(len(step.fields) > 1 for step in steps)
     columns = [
         Column("step", "", [step for step, _ in terms]),
-        Column("field", "", [term.field for _, term in terms]),
+        *([Column("field", "", [term.field for _, term in terms])] if several else []),
         Column("link", "", [term.link for _, term in terms]),
         Column("kind", "", [term.kind for _, term in terms]),
         Column("power", "W", [term.power or 0.0 for _, term in terms], errors),
     ]
-    if all(len(step.fields) == 1 for step in steps):
-        del columns[1]
     return Table(columns, [column.name for column in columns if column.name in KEYS])
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cli.errors import DataError, quote
 from cli.read.headers import spellings
 from cli.read.tables import Table, read
-from cli.read.units import parse_number, to_si
+from cli.read.units import parse_number
 
 Real = NDArray[np.float64]
 
@@ -85,8 +85,7 @@ class StateTable:
 def read_states(path: str) -> StateTable:
     """Read the states of links, one row per link, step and velocity field, and find the unknowns."""
     table = read(path, numbers=COLUMNS, texts=["step", "field", "link"], blank=list(COLUMNS), marker="?")
-    if "link" not in table.texts:
-        raise DataError(f"{table.file}: no column link {table.told}")
+    table.needed("link")
     if not table.numbers:
         raise DataError(
             f"{table.file}: no column of states or loads: expected some of vx_m_s, omega_rad_s, fx_N …"
@@ -100,10 +99,7 @@ def read_states(path: str) -> StateTable:
         if quantity in table.numbers:
             table.reject(table.numbers[quantity].values < 0, quantity, f"a {quantity} that is not negative")
     warnings: list[str] = []
-    values = {
-        name: np.asarray(to_si(column.values, COLUMNS[name], column.unit))
-        for name, column in table.numbers.items()
-    }
+    values = {name: column.si for name, column in table.numbers.items()}
     for name, value in values.items():
         overflown = ~np.isfinite(value) & np.isfinite(table.numbers[name].values)
         table.reject(overflown, name, "a number of a size that can be computed with")
@@ -140,13 +136,10 @@ def _sets(table: Table, values: dict[str, Real]) -> tuple[list[Step], list[int]]
     steps: dict[str, Step] = {}
     seen: dict[tuple[str, str, str], int] = {}
     occurrence = []
-    named = table.texts.get("step") or ["1"] * table.rows
-    fields = table.texts.get("field") or [""] * table.rows
-    massive = (
-        sum((values.get(name, np.zeros(table.rows)) for name in ("mass", "inertia")), np.zeros(table.rows))
-        > 0
-    )
-    for row, (step, of, link) in enumerate(zip(named, fields, table.texts["link"], strict=True)):
+    zero = np.zeros(table.rows)
+    massive = values.get("mass", zero) + values.get("inertia", zero) > 0
+    sets = zip(table.named("step"), table.named("field", ""), table.texts["link"], strict=True)
+    for row, (step, of, link) in enumerate(sets):
         steps.setdefault(step, Step(step)).fields.setdefault(of, []).append(row)
         count = seen.get((step, of, link), 0)
         seen[step, of, link] = count + 1
@@ -179,12 +172,12 @@ def _unknowns(table: Table, steps: list[Step], occurrence: list[int]) -> None:
         at = f"{table.file}: step {quote(step.name)}"
         bare = cells.get("", {})
         if len(bare) > 1:
-            second = list(bare.items())[1]
+            first, second, *_ = bare
             raise table.error(
-                second[1],
-                table.numbers[second[0].quantity].header,
+                bare[second],
+                table.numbers[second.quantity].header,
                 "?",
-                f"one ? in step {step.name} (the first is {LOADS[next(iter(bare)).quantity]} of link {next(iter(bare)).link}); "
+                f"one ? in step {step.name} (the first is {LOADS[first.quantity]} of link {first.link}); "
                 "several unknowns are marked ?NAME and need as many velocity fields, a column field",
             )
         if not cells:

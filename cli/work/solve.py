@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError
+from cli.show.columns import finite
 from cli.work.read import Cell, Real, StateTable, Unknown
 from virtualwork.textbook.link_states import KINDS, Balance, LinkStates, UnitLoad, balance
 
@@ -36,7 +37,7 @@ class WorkBalance:
 
     def __post_init__(self) -> None:
         self.where: dict[int, tuple[int, int]] = {}
-        self.groups: list[tuple[LinkStates, Balance, NDArray[np.intp]]] = []
+        self.groups: list[tuple[LinkStates, Balance]] = []
         sizes: dict[int, list[int]] = {}
         for index, step in enumerate(self.states.steps):
             sizes.setdefault(len(step.fields), []).append(index)
@@ -45,7 +46,6 @@ class WorkBalance:
             arrays = {
                 name: np.where(rows >= 0, value[rows], 0.0) for name, value in self.states.values.items()
             }
-
             states = self._link_states(arrays, np.zeros(rows.shape))
             with np.errstate(over="ignore", invalid="ignore"):
                 solved = balance(states, self._patterns(members, rows))
@@ -53,7 +53,7 @@ class WorkBalance:
                 raise DataError(f"{self.states.table.file}: the powers are too large to be computed with")
             for place, index in enumerate(members):
                 self.where[index] = (len(self.groups), place)
-            self.groups.append((states, solved, rows))
+            self.groups.append((states, solved))
         self._say_undetermined()
 
     def _link_states(self, arrays: dict[str, Real], zero: Real) -> LinkStates:
@@ -112,8 +112,7 @@ class WorkBalance:
         found = 0
         table = self.states.table
         for index, step in enumerate(self.states.steps):
-            group, place = self.where[index]
-            solved = self.groups[group][1]
+            solved, place = self._solved(index)
             for j, unknown in enumerate(step.unknowns):
                 if solved.determined[place, j]:
                     found += 1
@@ -139,11 +138,16 @@ class WorkBalance:
         if len(complaints) > 5:
             self.warnings.append(f"… and so in {len(complaints) - 5} further cells")
 
+    def _solved(self, index: int) -> tuple[Balance, int]:
+        """Return the balance that a step is in, and its place there."""
+        group, place = self.where[index]
+        return self.groups[group][1], place
+
     def terms(self, index: int, *, bounds: bool = False) -> Iterator[Term]:
         """Yield the terms of a step, with the bounds of their errors where these are asked for."""
         step = self.states.steps[index]
         group, place = self.where[index]
-        states, solved, _ = self.groups[group]
+        states, solved = self.groups[group]
         single = len(step.fields) == 1
         wrong = self.term_bounds[group] if bounds else {}
 
@@ -171,11 +175,13 @@ class WorkBalance:
     def term_bounds(self) -> list[dict[str, Real]]:
         """Bounds of the rounding errors of each group's powers by kind, and of its unknowns' powers."""
         found = []
-        for (states, solved, _), value in zip(self.groups, self.bounds, strict=True):
+        for (states, solved), value in zip(self.groups, self.bounds, strict=True):
             assert solved.given is not None
             unit = np.stack([states.unit_power_error_estimate(of) for of in solved.given[1]], axis=-1)
             unit = unit[..., None, :] if solved.value.shape[-1] == 1 else unit
-            unknown = np.abs(solved.coefficient) * value[..., None, :]
+            # of an unknown that does no work there is no bound: infinity times nothing
+            with np.errstate(invalid="ignore"):
+                unknown = np.abs(solved.coefficient) * value[..., None, :]
             wrong = {kind: states.term_error_estimate(kind) for kind in states.terms}
             found.append(wrong | {"unknown": unknown + unit * np.abs(solved.value)[..., None, :]})
         return found
@@ -183,27 +189,30 @@ class WorkBalance:
     @cached_property
     def bounds(self) -> list[Real]:
         """Bounds of the rounding errors of each group's unknowns."""
-        return [solved.error_estimate() for _, solved, _ in self.groups]
+        return [solved.error_estimate() for _, solved in self.groups]
 
-    def values(self, index: int) -> list[float | None]:
-        """The unknowns of a step in SI; None where they are not determined."""
+    def unknown_bounds(self, index: int) -> list[float]:
+        """Bounds of the rounding errors of a step's unknowns."""
         group, place = self.where[index]
-        return [None if value != value else value for value in self.groups[group][1].value[place].tolist()]
+        errors: list[float] = self.bounds[group][place].tolist()
+        return errors
 
     def sums(self, index: int) -> list[float]:
         """What is left of the power of each velocity field of a step, W."""
-        group, place = self.where[index]
-        left: list[float] = self.groups[group][1].sum[place].tolist()
+        solved, place = self._solved(index)
+        left: list[float] = solved.sum[place].tolist()
         return left
 
     def condition(self, index: int) -> float | None:
         """The condition number of a step's equations; None where they do not determine the unknowns."""
-        group, place = self.where[index]
-        number = float(self.groups[group][1].condition[place])
-        return number if np.isfinite(number) else None
+        solved, place = self._solved(index)
+        return finite(solved.condition[place])
 
     def unknowns(self, index: int) -> Iterator[tuple[Unknown, Cell, float | None]]:
         """Yield each cell of a step's unknowns: its load in SI, None where it is not determined."""
-        for unknown, value in zip(self.states.steps[index].unknowns, self.values(index), strict=True):
+        solved, place = self._solved(index)
+        for unknown, value in zip(
+            self.states.steps[index].unknowns, solved.value[place].tolist(), strict=True
+        ):
             for cell in unknown.cells:
-                yield unknown, cell, None if value is None else value * cell.factor
+                yield unknown, cell, None if value != value else value * cell.factor

@@ -6,8 +6,7 @@ SIAM 2008, §3.2) is written down as a tape again and runs on every engine.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
 from dalembert.arithmetic.tape import Kind, Tape
@@ -37,44 +36,34 @@ PARTIALS: Mapping[str, Sequence[Partial]] = {
 """∂v/∂argument of each kind of operation, from its arguments and its own value v; a select hands its own on."""
 
 
-class _Sweep:
-    """A tape worked out on any kind of number, with the values of its operations at hand."""
-
-    def __init__(self, tape: Tape, inputs: Mapping[str, Any], kind: Kind) -> None:
-        self.tape, self.kind = tape, kind
-        self.values = tape.values(inputs, kind)
-
-    def adjoints(self, output: int) -> Iterator[tuple[int, Number]]:
-        """v̄ of every operation and input that the output hangs on, from the last to the first."""
-        operations = self.tape.operations
-        bar: dict[int, Number] = {output: 1.0}
-        for number in range(output, -1, -1):
-            if number not in bar:
-                continue
-            own = bar.pop(number)
-            yield number, own
-            kind, *arguments = operations[number]
-            if kind in ("const", "input"):
-                continue
-            given = [self.values[a] for a in arguments]
-            for i, a in enumerate(arguments):
-                if operations[a][0] == "const" or (kind == "select" and i == 0):
-                    continue
-                if kind == "select":
-                    share = (own, 0.0) if i == 1 else (0.0, own)
-                    moved = self.kind.select(given[0], *share)
-                else:
-                    moved = times(own, PARTIALS[kind][i](self.kind, given, self.values[number]))
-                bar[a] = moved if a not in bar else bar[a] + moved
-
-
-def times(own: Number, partial: Number) -> Number:
-    """An adjoint times a derivative, which is often 1 or −1."""
+def handed_on(kind: Kind, name: str, i: int, own: Number, given: list[Number], value: Number) -> Number:
+    """What an operation hands on of its adjoint to its i-th argument; its derivative is often 1 or −1."""
+    if name == "select":
+        return kind.select(given[0], *((own, 0.0) if i == 1 else (0.0, own)))
+    partial = PARTIALS[name][i](kind, given, value)
     if isinstance(partial, float) and abs(partial) == 1.0:
         return own if partial > 0 else -own
-    if isinstance(own, float) and own == 1.0:
-        return partial
-    return own * partial
+    return partial if isinstance(own, float) and own == 1.0 else own * partial
+
+
+def _adjoints(tape: Tape, values: list[Number], output: int) -> dict[str, Number]:
+    """v̄ of every input that the output hangs on, by its name."""
+    bar: dict[int, Number] = {output: 1.0}
+    found: dict[str, Number] = {}
+    for number in range(output, -1, -1):
+        kind, *arguments = tape.operations[number]
+        if number not in bar or kind == "const":
+            continue
+        own = bar.pop(number)
+        if kind == "input":
+            found[arguments[0]] = own
+            continue
+        given = [values[a] for a in arguments]
+        for i, a in enumerate(arguments):
+            if tape.operations[a][0] != "const" and not (kind == "select" and i == 0):
+                moved = handed_on(RECORDED, kind, i, own, given, values[number])
+                bar[a] = moved if a not in bar else bar[a] + moved
+    return found
 
 
 def derivatives(tape: Tape, to: Iterable[str], of: Iterable[str] | None = None) -> Tape:
@@ -111,17 +100,13 @@ def derivatives(tape: Tape, to: Iterable[str], of: Iterable[str] | None = None) 
     d(x)/d(r): v2
     d(x)/d(q): v5
     """
-    recorder, wanted = Recorder(), list(to)
-    sweep = _Sweep(tape, {name: recorder.input(name) for name in tape.inputs}, RECORDED)
-    known = dict(tape.outputs)
-    place = {name: number for number, (kind, name, *_) in enumerate(tape.operations) if kind == "input"}
+    recorder, wanted, known = Recorder(), list(to), dict(tape.outputs)
+    values = tape.values({name: recorder.input(name) for name in tape.inputs}, RECORDED)
+    for variable in wanted:
+        if variable not in tape.inputs:
+            raise KeyError(variable)
     found: dict[str, Number] = {}
     for name in tape.names if of is None else of:
-        bar = {
-            number: own
-            for number, own in sweep.adjoints(known[name])
-            if tape.operations[number][0] == "input"
-        }
-        for variable in wanted:
-            found[f"d({name})/d({variable})"] = bar.get(place[variable], 0.0)
+        bar = _adjoints(tape, values, known[name])
+        found |= {f"d({name})/d({variable})": bar.get(variable, 0.0) for variable in wanted}
     return recorder.tape(found)

@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 
+# of a double's bits, those of its exponent
+EXPONENT = 0x7FF << 52
+
 
 class Numpy:
     """The functions of numpy's numbers, for `Tape.on`."""
@@ -15,6 +18,11 @@ class Numpy:
     sin = staticmethod(np.sin)
     cos = staticmethod(np.cos)
     atan2 = staticmethod(np.arctan2)
+
+    @staticmethod
+    def binade(x: Any) -> Any:
+        """The bits of the exponent alone."""
+        return np.bitwise_and(np.asarray(x, dtype=float).view(np.int64), EXPONENT).view(float)
 
     @staticmethod
     def select(test: Any, positive: Any, otherwise: Any) -> Any:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import cmath
 import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -141,7 +142,7 @@ class Real:
 
     def __abs__(self) -> Real:
         kind, *of = self.recorder.operations[self.number]
-        if kind in ("abs", "sqrt", "const") or (kind == "mul" and of[0] == of[1]):
+        if kind in ("abs", "binade", "sqrt", "const") or (kind == "mul" and of[0] == of[1]):
             return Real(self.recorder, self.number)
         return Real(self.recorder, self.recorder.node("abs", self.number))
 
@@ -306,6 +307,15 @@ class Complex:
         return RECORDED.sqrt(squared(self))
 
 
+def binade(x: float) -> float:
+    """The largest power of two that is no larger than |x|; 0 below the least normal number.
+
+    >>> binade(-3.0), binade(0.5), binade(0.0)
+    (2.0, 0.5, 0.0)
+    """
+    return 0.0 if abs(x) < sys.float_info.min else math.ulp(x) * 2.0**52
+
+
 def squared(z: Number) -> Number:
     """|z|²."""
     return product(z.real, z.real) + product(z.imag, z.imag)
@@ -328,6 +338,10 @@ class Recorded:
     @staticmethod
     def const(value: float) -> float:
         return value
+
+    @staticmethod
+    def binade(x: Number) -> Number:
+        return Real(x.recorder, x.recorder.node("binade", x.number)) if isinstance(x, Real) else binade(x)
 
     @staticmethod
     def sqrt(x: Number) -> Number:

@@ -1,14 +1,14 @@
 """Bounds of a tape's own rounding errors, from one sweep backwards over it.
 
 With the adjoint v̄ = ∂y/∂v of every operation v of an output y (`adjoint`), the rounding error of y is to first order
-Σ v̄·δ_v with |δ_v| ≤ r·u·|v|, u = 2⁻⁵³ (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed.,
-SIAM 2002, §3.1). Ways of one rounding to the result over several paths cancel here as they do in truth, which a
-running bound cannot see. The bounds are a tape again and run on every engine; for a few lanes the sweep is done on
-numbers.
+Σ v̄·δ_v with |δ_v| ≤ r·u·2^e, 2^e ≤ |v| < 2^(e+1), u = 2⁻⁵³: half a unit in the last place, r times (N. J. Higham,
+Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM 2002, §2.1 and §3.1). Ways of one rounding to the result
+over several paths cancel here as they do in truth, which a running bound cannot see. The bounds are a tape again and run
+on every engine; for a few lanes the sweep is done on numbers.
 
-What a factor adds to the error is what its product adds, ā·a = v̄·v for v = a·b, if it is used nowhere else; and the
-terms of a sum share its adjoint. So the sum over v is one over far fewer adjoints, Σ |v̄|·S, and the sums S of sizes
-are the same for many outputs (`_Pattern`).
+What a factor adds to the error, u·|a|, is what its product adds, ā·a = v̄·v for v = a·b, if it is used nowhere else;
+and the terms of a sum share its adjoint. So the sum over v is one over far fewer adjoints, Σ |v̄|·S, and the sums S of
+sizes are the same for many outputs (`_Pattern`).
 
 A root of what may cancel is not smooth where its argument a is no more than the argument's own error κ. There the
 first order is not enough. The true argument is within κ of a, and that of the engine whose answer is judged within κ of
@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dalembert.arithmetic.adjoint import PARTIALS, times
+from dalembert.arithmetic.adjoint import handed_on
 from dalembert.arithmetic.arrays import NUMPY
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
 from dalembert.arithmetic.tape import Kind, Operation, Tape, reached
@@ -46,7 +46,7 @@ ROUNDINGS: Mapping[str, float] = {
     "cos": 4.0,
     "atan2": 4.0,
 }
-"""How many roundings u·|value| an operation errs by, at most; what is not named here is exact."""
+"""How many roundings, half a unit in the last place each, an operation errs by, at most; what is not named is exact."""
 
 
 def rounding_bounds(
@@ -136,7 +136,7 @@ class _Bounds:
         # the slopes of roots that are no derivatives, and their τ
         self.slopes: dict[int, Number] = {}
         self.shares: dict[int, Number] = {}
-        self._sums: dict[tuple[tuple[int, float], ...], Number] = {}
+        self._sums: dict[tuple[Term, ...], Number] = {}
         self._own: dict[int, Number] = {}
         self._errors: dict[int, Number] = {}
 
@@ -193,12 +193,10 @@ class _Bounds:
             for i, a in enumerate(arguments):
                 if a not in pattern.needed or (kind == "select" and i == 0):
                     continue
-                if kind == "select":
-                    moved = self.kind.select(given[0], *((own, 0.0) if i == 1 else (0.0, own)))
-                elif number in self.slopes:
+                if number in self.slopes:
                     moved = own * self.slopes[number]
                 else:
-                    moved = times(own, PARTIALS[kind][i](self.kind, given, values[number]))
+                    moved = handed_on(self.kind, kind, i, own, given, values[number])
                 bars[a] = moved if a not in bars else bars[a] + moved
         total: Number = 0.0
         for number, terms in pattern.sums:
@@ -208,15 +206,16 @@ class _Bounds:
         # the bound's own roundings, and the products of two of them that the first order leaves out
         return total * (UNIT_ROUNDOFF * (1 + 2.0**-20))
 
-    def _sum(self, terms: tuple[tuple[int, float], ...]) -> Number:
+    def _sum(self, terms: tuple[Term, ...]) -> Number:
         """What operations with one adjoint err by together, in units u: so many times their sizes, or by themselves."""
         if terms not in self._sums:
             total: Number = 0.0
-            for number, times_size in terms:
+            for number, times_size, own in terms:
                 if not times_size:
                     part = self._alone(number)
                 else:
-                    part = abs(self.values[number])
+                    # what is rounded to nearest errs by half a unit in its last place, by its size less than that
+                    part = self.kind.binade(self.values[number]) if own else abs(self.values[number])
                     part = part if times_size == 1 else part * times_size
                 total = total + part
             self._sums[terms] = total
@@ -230,9 +229,7 @@ class _Bounds:
             if name == "input":
                 found: Number = abs(self.errors[arguments[0]] * (1 / UNIT_ROUNDOFF))
             elif name in ("sin", "cos"):
-                # next to 1 they have no more than half as many
-                found = abs(self.values[number]) * ROUNDINGS[name]
-                found = self.kind.select(found - 2.0, 2.0, found)
+                found = self.kind.binade(self.values[number]) * ROUNDINGS[name]
                 if self.turned and operations[arguments[0]][0] == "input":
                     found = found + self.turned
             else:
@@ -252,6 +249,9 @@ class _Bounds:
         self.shares[number] = 1.5 * error / a
 
 
+Term = tuple[int, float, bool]
+
+
 class _Pattern(NamedTuple):
     """What a sweep from one output forms.
 
@@ -263,12 +263,13 @@ class _Pattern(NamedTuple):
         Those that have an adjoint.
     sums : tuple of (number, terms)
         The operations that err with the adjoint of `number`, by its size: each with how many roundings of its size it
-        stands for, its own and those of its factors; 0 where it errs by what its size does not tell.
+        stands for, its own and those of its factors, and whether they are its own alone; 0 where it errs by what its
+        size does not tell.
     """
 
     swept: tuple[int, ...]
     needed: frozenset[int]
-    sums: tuple[tuple[int, tuple[tuple[int, float], ...]], ...]
+    sums: tuple[tuple[int, tuple[Term, ...]], ...]
 
 
 @lru_cache(maxsize=1024)
@@ -283,6 +284,8 @@ def _pattern(
     adjoint: dict[int, int] = {}
     roundings: dict[int, float] = {}
     alone: set[int] = set()
+    # those that stand for others besides
+    further: set[int] = set()
     for number in range(output, -1, -1):
         if number not in uses:
             continue
@@ -307,6 +310,8 @@ def _pattern(
         elif own:
             at, times_own = share[number]
             roundings[at] = roundings.get(at, 0.0) + own * times_own
+            if at != number or own > ROUNDINGS[kind]:
+                further.add(at)
         for i, a in enumerate(arguments):
             if operations[a][0] != "const" and not (kind == "select" and i == 0):
                 uses.setdefault(a, []).append(number)
@@ -320,12 +325,12 @@ def _pattern(
         ):
             needed.add(number)
     needed.add(output)
-    sums: dict[int, list[tuple[int, float]]] = {}
+    sums: dict[int, list[Term]] = {}
     for number in sorted(needed):
         if number in roundings:
-            sums.setdefault(adjoint[number], []).append((number, roundings[number]))
+            sums.setdefault(adjoint[number], []).append((number, roundings[number], number not in further))
         if number in alone:
-            sums.setdefault(adjoint[number], []).append((number, 0.0))
+            sums.setdefault(adjoint[number], []).append((number, 0.0, False))
     swept = tuple(n for n in sorted(needed, reverse=True) if operations[n][0] not in ("const", "input"))
     return _Pattern(swept, frozenset(needed), tuple((n, tuple(terms)) for n, terms in sums.items()))
 

@@ -25,6 +25,8 @@ SIGNS = {
     "div": "{} / {}",
     "neg": "-{}",
     "abs": "abs({})",
+    # the largest power of two that is no larger than the size of the number
+    "binade": "binade({})",
     "sqrt": "sqrt({})",
     "sin": "sin({})",
     "cos": "cos({})",
@@ -40,6 +42,7 @@ class Kind(Protocol):
     """The functions of one kind of number; sums, products, quotients and absolute values are the numbers' own."""
 
     def const(self, value: float) -> Any: ...
+    def binade(self, x: Any) -> Any: ...
     def sqrt(self, x: Any) -> Any: ...
     def sin(self, x: Any) -> Any: ...
     def cos(self, x: Any) -> Any: ...

@@ -44,6 +44,15 @@ def prefixed(largest: float, unit: str, at_most: float = 1e4) -> tuple[float, st
     return float(f"1e{-steps}"), f"10{raised} {unit}"
 
 
+def dimensioned(size: float, least: float = 2e-3) -> tuple[float, str]:
+    """Return by what to multiply metres in a drawing of this size, and the unit: millimetres up to two metres.
+
+    >>> dimensioned(0.3), dimensioned(5.0), dimensioned(1e-4)
+    ((1000.0, 'mm'), (1, 'm'), (1000000.0, 'µm'))
+    """
+    return (1e3, "mm") if least <= size < 2 else prefixed(size, "m")
+
+
 def quiet(values: ArrayLike, scale: float) -> NDArray[np.float64]:
     """Return numbers without what rounding leaves of zero, or of a constant, beside the scale of their kind.
 

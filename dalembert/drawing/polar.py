@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -81,14 +81,14 @@ def arrow(axes: PolarAxes, value: complex, scale: float, look: Look) -> None:
     # the shaft ends within the head, so that a dash never blurs the tip
     neck = max(size - 0.03 * scale, 0.5 * size)
     axes.plot([angle, angle], [0, neck], color=look.color, lw=look.width, ls=look.dash, solid_capstyle="butt")
-    head = {
-        "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
-        "color": look.color,
-        "lw": look.width if look.dash == "-" else 1.2,
-        "shrinkA": 0,
-        "shrinkB": 0,
-    }
-    axes.annotate("", xy=(angle, size), xytext=(angle, neck), arrowprops=head).set_in_layout(False)
+    tip = head(look.color, look.width if look.dash == "-" else 1.2)
+    axes.annotate("", (angle, size), (angle, neck), arrowprops=tip).set_in_layout(False)
+
+
+def head(color: str, width: float = 1.2) -> dict[str, Any]:
+    """Return how matplotlib draws the head of an arrow."""
+    style = "-|>,head_width=0.25,head_length=0.5"
+    return {"arrowstyle": style, "color": color, "lw": width, "shrinkA": 0, "shrinkB": 0}
 
 
 def handle(look: Look, label: str) -> Line2D:

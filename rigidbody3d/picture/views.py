@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.drawing.amounts import prefixed, quiet
+from dalembert.drawing.amounts import dimensioned, prefixed, quiet
 from dalembert.drawing.labels import Label, place
-from dalembert.drawing.polar import Look
+from dalembert.drawing.polar import Look, head
 from dalembert.drawing.sheet import plain, sheet
 from rigidbody3d.solids import Piece, Solid, Whole, outline
 
@@ -150,10 +150,9 @@ def _hull(points: Array) -> Array:
 
 
 def _length(whole: Whole, pieces: Sequence[Sequence[Piece]]) -> tuple[float, str]:
-    """Return by what metres are multiplied, and the unit: millimetres up to two metres."""
+    """Return by what metres are multiplied, and the unit."""
     every = np.concatenate([piece.points for of in pieces for piece in of])
-    size = float(max(np.ptp(every, axis=0).max(), 2 * whole.gyration.max()))
-    return (1e3, "mm") if 2e-3 <= size < 2 else prefixed(size, "m")
+    return dimensioned(float(max(np.ptp(every, axis=0).max(), 2 * whole.gyration.max())))
 
 
 def _view(
@@ -250,16 +249,8 @@ def _vector(axes: Axes, start: Array, span: Array, look: Look, reach: float) -> 
         ls=look.dash,
         zorder=67,
     )
-    head = {
-        "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
-        "color": look.color,
-        "lw": 1.2,
-        "shrinkA": 0,
-        "shrinkB": 0,
-    }
-    axes.annotate(
-        "", xy=tuple(start + span), xytext=tuple(start + 0.97 * span), arrowprops=head, zorder=67
-    ).set_in_layout(False)
+    neck = tuple(start + 0.97 * span)
+    axes.annotate("", tuple(start + span), neck, arrowprops=head(look.color), zorder=67).set_in_layout(False)
 
 
 def _legend(

@@ -41,7 +41,8 @@ def test_what_numbers_are_off_by_is_carried_on() -> None:
     (own,) = bounds(lambda x: [x * x], {"x": (x, 0, 0.0)})
     (carried,) = bounds(lambda x: [x * x], {"x": (x, 0, [0.0, 1e-8])})
     (relative,) = bounds(lambda x: [x * x], {"x": read(x, 0, 1e-8)})
-    np.testing.assert_allclose(own, 2.0**-53 * x * x, rtol=1e-5)
+    # half a unit in the last place
+    np.testing.assert_allclose(own, 0.5 * np.spacing(x * x), rtol=1e-5)
     np.testing.assert_allclose(carried - own, [0, 6e-8], rtol=1e-5, atol=1e-20)
     np.testing.assert_allclose(relative, 2e-8 * x * x, rtol=1e-5)
 

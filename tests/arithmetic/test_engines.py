@@ -144,6 +144,15 @@ def test_axes_signed_zeros_and_infinities_are_those_of_the_system() -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+def test_the_binade_of_a_number_is_exact(engine: str) -> None:
+    recorder = Recorder()
+    tape = recorder.tape({"b": RECORDED.binade(recorder.input("x"))})
+    xs = np.array([3.0, -0.75, 1.0, np.nextafter(1.0, 0.0), 2.0**1000 * 1.9, math.inf, 0.0, -5e-324])
+    exact = [2.0, 0.5, 1.0, 0.5, 2.0**1000, math.inf, 0.0, 0.0]
+    np.testing.assert_array_equal(run(tape, {"x": xs}, engine)["b"], exact)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
 def test_a_singular_lane_is_infinite_or_nan_and_the_others_are_not_touched(engine: str) -> None:
     recorder = Recorder()
     x = recorder.input("x")

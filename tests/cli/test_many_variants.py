@@ -13,11 +13,11 @@ import pyarrow.parquet
 import pytest
 
 from cli.errors import DataError
-from cli.mechanism.asked import Asked
 from cli.mechanism.many import Many, as_it_is
+from cli.mechanism.options import Options
 from cli.mechanism.read import wanted
-from cli.mechanism.studies import Request
 from cli.mechanism.variants import Variants
+from cli.mechanism.variants_of_poses import AskedOfPoses
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import dimensions
 
@@ -228,7 +228,8 @@ def question(v):
     m = Mechanism.from_toml_text(FOUR_BAR)
     varied = Variants((dimensions(m)["ground.D.x"],), [np.linspace(0.1, 0.11, v)], grid=True)
     q = wanted(m, ["40deg"], None, None).part(0, 1)
-    return Many(Asked("m.toml", m, varied.dimensions, q, {}, 0, None, "1", Request(), {}, False), varied, 2)
+    asked = Options("m.toml", branch="1", order="position")
+    return Many(AskedOfPoses(asked, m, varied.dimensions, {}, False, q), varied, 2)
 
 
 def test_a_part_whose_worker_died_is_done_again(tmp_path):

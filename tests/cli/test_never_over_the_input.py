@@ -122,3 +122,12 @@ def test_a_spring_between_plain_names(dalembert: Dalembert, tmp_path: Path) -> N
     assert doubled.returncode == 1
     assert '"ground.O" or "crank.O"' in doubled.stderr
     assert unknown.returncode == 1
+
+
+@pytest.mark.parametrize("end", ["[0, 0]", "{ link = 'crank' }", "5"])
+def test_a_spring_at_no_name(dalembert: Dalembert, end: str) -> None:
+    text = f"{CRANK}[[springs]]\nbetween = [{end}, 'crank.P']\n"
+    done = dalembert("mechanism", "-", "--forces", stdin=text)
+    assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
+    assert "[[springs]] 1 between: found" in done.stderr
+    assert "expected a link and its point such as" in done.stderr

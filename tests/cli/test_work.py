@@ -48,6 +48,15 @@ def test_a_second_force_on_a_link_has_its_own_row(dalembert: Dalembert) -> None:
     assert step["unknowns"][0]["value"] == -14.0
 
 
+def test_digits_of_a_step_without_an_answer_are_silent(dalembert: Dalembert) -> None:
+    table = "step,link,vx_m_s,fx_N\na,1,2,?\na,2,2,4\nc,1,0,?\n"
+    done = dalembert("work", "-", "--ledger", "--digits", stdin=table)
+    assert done.returncode == 0
+    (said,) = done.stderr.splitlines()
+    assert said.startswith("warning: standard input: row 3 (line 4), column fx_N: found '?'")
+    assert done.stdout.splitlines()[1:] == ["a,2,applied force,8.0", "a,1,unknown,-8.0"]
+
+
 def test_steps_keep_their_names_and_order(dalembert: Dalembert) -> None:
     table = "step,link,omega_rad_s,torque_N_m\n07,b,2,3\n7,b,1,3\n07,a,1,?\n7,a,1,?\n"
     steps = solve(dalembert, table)["steps"]

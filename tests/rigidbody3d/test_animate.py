@@ -12,6 +12,7 @@ import pytest
 
 from dalembert.page import Page
 from rigidbody3d.freebody import FreeBody
+from rigidbody3d.integration import integrate
 from rigidbody3d.top import Top
 
 
@@ -46,6 +47,15 @@ def test_a_top_stands_on_its_tip() -> None:
     assert held["solid"]["corners"][-1] == [0, 0, 0]
     np.testing.assert_allclose(shown["attitude_x"], 0, atol=1e-15)
     np.testing.assert_allclose(shown["omega_z_rad_s"], 30, rtol=1e-14)
+
+
+def test_what_was_integrated_moves_as_the_closed_form() -> None:
+    t = np.linspace(0, 5, 21)
+    free, _ = columns(FreeBody([1, 2, 3], [1.0, 0.1, 0.5]).at(t).animate())
+    shown, _ = columns(integrate([1, 2, 3], [1.0, 0.1, 0.5], t=t).animate())
+    assert shown.keys() == free.keys()
+    for name, values in free.items():
+        np.testing.assert_allclose(shown[name], values, rtol=0, atol=1e-10)
 
 
 def test_several_bodies_are_refused() -> None:

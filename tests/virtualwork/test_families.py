@@ -264,7 +264,7 @@ def test_a_variant_that_no_description_would_be_is_masked_and_says_why():
 
 
 def test_an_executor_gives_the_same_numbers_whatever_it_is(monkeypatch):
-    monkeypatch.setattr("virtualwork.family.motion.LANES", 64)
+    monkeypatch.setattr("virtualwork.family.family.LANES", 64)
     m, rng = four_bar(), np.random.default_rng(5)
     family = m.vary(drawn(m, rng, 50, 0.03))
     angle = np.linspace(0.0, 6.0, 10)

@@ -176,7 +176,7 @@ def test_points_out_of_order_are_an_order_defect():
 
 @pytest.mark.parametrize("exact", [True, False])
 def test_a_mechanism_off_the_tape_is_fitted_alone_and_with_differences(monkeypatch, exact):
-    from virtualwork.family.alone import Alone
+    from virtualwork.family.design import Alone
     from virtualwork.family.part import Solver
 
     monkeypatch.setattr(Solver, "written", None)
@@ -196,6 +196,15 @@ def test_a_mechanism_off_the_tape_is_fitted_alone_and_with_differences(monkeypat
 def stephenson():
     """Stephenson III, driven in its five-bar loop: a triad, which has no closed form."""
     return Mechanism.from_toml(str(files("cli") / "examples" / "stephenson-six-bar" / "stephenson.toml"))
+
+
+def test_a_design_that_cannot_be_put_together_has_no_number_in_any_row():
+    m = stephenson()
+    design = m.design(["links.left.B.x"], "points.E", "links.coupler")
+    x = [100 * m.size], [m.at[0], m.at[0] + 0.1]
+    assert np.isnan(design(*x)).all()
+    assert design(*x).shape == (3, 2)
+    assert np.isnan(design.slopes(*x)).all()
 
 
 @pytest.mark.parametrize("timed", [True, pytest.param(False, marks=pytest.mark.slow)])

@@ -48,7 +48,7 @@ def family(v=60):
 @pytest.mark.filterwarnings("default")
 def test_a_dask_cluster_gives_the_same_numbers(monkeypatch):
     distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr("virtualwork.family.motion.LANES", 128)
+    monkeypatch.setattr("virtualwork.family.family.LANES", 128)
     angle = np.linspace(0, 6, 12)
     here = family().motion(angle, speed=2.0)
     with distributed.Client(

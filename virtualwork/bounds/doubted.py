@@ -9,6 +9,7 @@ Further inputs of the tape
 --------------------------
 `z 0 x`, `z 0 y`                      a vector of the plan
 `constant BODY`, `whole BODY`         the constant of an angle in the steps, and in the plan's angles
+`factor 1.5`                          by what an angle is multiplied, worked out of the ratios of gears
 `inverse GROUP 0 0`                   J⁻¹ of a group's loops
 `step`                                1: how much of Newton's steps is made
 `f 0`                                 the first unknown of redundant statics
@@ -19,8 +20,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dalembert.arithmetic.exact import two_sum
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
 from dalembert.arithmetic.rounding import UNIT_ROUNDOFF
 from dalembert.arithmetic.varied import made
@@ -33,6 +38,8 @@ from virtualwork.formulas.positions import State
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.statics import equations
 from virtualwork.plan.steps import Angle, Group, Place, Plan, Step, Term, Turn
+
+K = TypeVar("K")
 
 
 class Constants:
@@ -48,13 +55,19 @@ class Constants:
     plan : Plan
     given : iterable of the places of each body
         Its points, and through where its guides run, as the user gave them.
+    ratios : iterable of float
+        Of its gears.
     """
 
-    def __init__(self, plan: Plan, given: Iterable[Collection[complex]]) -> None:
+    def __init__(
+        self, plan: Plan, given: Iterable[Collection[complex]], ratios: Iterable[float] = ()
+    ) -> None:
         self.recorder = Recorder()
-        bodies = [*given]
-        self._given = {sign * z for places in bodies for z in places for sign in (1, -1)}
-        self._apart = {a - b for places in bodies for a in places for b in places}
+        self._ratios = {1.0, *map(abs, ratios)}
+        # of the vectors of bodies, by what their parts err
+        self._known: dict[complex, tuple[float, float]] = {}
+        for places in given:
+            self._known |= _differences(np.array(places, dtype=complex), self._known)
         self.numbers: dict[str, tuple[float, float]] = {}
         self._vectors: dict[tuple[complex, str], complex] = {}
         self.plan = replace(
@@ -73,12 +86,12 @@ class Constants:
         return self.recorder.input(name)
 
     def _vector(self, z: complex, of: str) -> complex:
-        """A vector of a body, wrong by a rounding where it is not as it was given: of its parts if it joins two places."""
+        """A vector of a body: a place as it was given, or what is known of two places; any other is wrong by a rounding."""
         if (z, of) not in self._vectors:
-            name, rounding = f"z {len(self._vectors)}", 0.0 if z in self._given else UNIT_ROUNDOFF
+            name, errors = f"z {len(self._vectors)}", self._known.get(z, (UNIT_ROUNDOFF * abs(z),) * 2)
             x, y = (
-                self._number(f"{name} {axis}", v, rounding * abs(v if z in self._apart else z))
-                for axis, v in (("x", z.real), ("y", z.imag))
+                self._number(f"{name} {axis}", v, error)
+                for axis, v, error in zip("xy", (z.real, z.imag), errors, strict=True)
             )
             self._vectors[z, of] = made(z, RECORDED.join(x, y))
         return self._vectors[z, of]
@@ -87,10 +100,21 @@ class Constants:
         return tuple(replace(t, z=self._vector(t.z, t.body)) for t in terms)
 
     def _angle(self, name: str, of: Angle) -> Angle:
-        if not of.const:
-            return of
-        error = 2 * UNIT_ROUNDOFF * max(abs(of.const), of.size)
-        return replace(of, const=made(of.const, self._number(name, of.const, error)))
+        const = of.const
+        if const:
+            error = 2 * UNIT_ROUNDOFF * max(abs(const), of.size)
+            const = made(const, self._number(name, const, error))
+        return replace(of, const=const, inputs=self._factors(of.inputs), bases=self._factors(of.bases))
+
+    def _factors(self, given: tuple[tuple[K, float], ...]) -> tuple[tuple[K, float], ...]:
+        """What angles are multiplied by: where it is no ratio as given, it is worked out of ratios, and rounds as they do."""
+        return tuple(
+            (of, f if f.is_integer() or abs(f) in self._ratios else made(f, self._factor(f)))
+            for of, f in given
+        )
+
+    def _factor(self, f: float) -> Any:
+        return self._number(f"factor {f!r}", f, 2 * UNIT_ROUNDOFF * max(abs(f), *self._ratios))
 
     def _turn(self, turn: Turn) -> Turn:
         return replace(turn, angle=self._angle(f"constant {turn.body}", turn.angle))
@@ -104,6 +128,23 @@ class Constants:
             closures = tuple(replace(c, terms=self._terms(c.terms)) for c in step.closures)
             return replace(step, ties=tuple(self._turn(tie) for tie in step.ties), closures=closures)
         return step
+
+
+def _differences(
+    places: NDArray[np.complex128], known: dict[complex, tuple[float, float]]
+) -> dict[complex, tuple[float, float]]:
+    """Places of a body and the vectors between them, with what the subtraction of each part errs by, exactly.
+
+    Of vectors that two pairs have alike, or that are known already, the largest counts.
+    """
+    from_here = np.append(places, 0)
+    x, dx = two_sum(from_here.real[:, None], -from_here.real)
+    y, dy = two_sum(from_here.imag[:, None], -from_here.imag)
+    found: dict[complex, tuple[float, float]] = {}
+    for z, *errors in zip(*(part.ravel().tolist() for part in (x + 1j * y, abs(dx), abs(dy))), strict=True):
+        before = found.get(z) or known.get(z, (0.0, 0.0))
+        found[z] = max(before[0], errors[0]), max(before[1], errors[1])
+    return found
 
 
 class Doubted(Recording):
@@ -130,7 +171,8 @@ class Doubted(Recording):
     def __init__(self, plain: Recording, branch: Turning, entered: frozenset[str]) -> None:
         m = branch.mechanism
         through = {body: [m.through(g) for g in m.guides if g.on == body] for body in m.bodies}
-        constants = Constants(branch.plan, [[*of.values(), *through[body]] for body, of in m.bodies.items()])
+        places = [[*of.values(), *through[body]] for body, of in m.bodies.items()]
+        constants = Constants(branch.plan, places, [gear.ratio for gear in m.gears])
         self.constants, self.entered = constants.numbers, entered
         self._left: dict[str, list[Number]] = {}
         self._groups: dict[Key, tuple[str, ...]] = {}

@@ -10,6 +10,7 @@ Joint friction exchanges loads and forces until neither changes; its poses have 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
 
 import numpy as np
@@ -32,8 +33,12 @@ class ForceErrors:
         self.mechanism = dynamics.poses.mechanism
         self.bounds = Bounds(dynamics.poses)
 
-    def together(self) -> None:
-        """Form the bounds of all forces that `bounds` has, which have most of the sweep in common."""
+    def together(self, reactions: Iterable[Key] | None = None) -> None:
+        """Form the bounds of some joints' forces, or of all that `bounds` has: they have most of the sweep in common."""
+        if reactions is not None:
+            if self._redundant is None:
+                self.bounds.together(reactions)
+            return
         inputs, joints = range(len(self.mechanism.inputs)), self.dynamics.reactions.joints
         keys: list[Key] = [("shaking",), ("shaking moment",), *(("effort", j) for j in inputs)]
         if self._redundant is None:

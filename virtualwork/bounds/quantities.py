@@ -25,7 +25,7 @@ from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.rounding import FEW, bounds_of_few, rounding_bounds
 from dalembert.arithmetic.tape import Tape
 from virtualwork.bounds.doubted import Doubted
-from virtualwork.bounds.second_order import Solution, grown, solution
+from virtualwork.bounds.second_order import FAR, Solution, grown, solution
 from virtualwork.formulas.asked import FORCES, Key, names, over_blocks
 from virtualwork.formulas.lanes import Lanes, Turning, taped
 from virtualwork.formulas.loads import Tabled
@@ -119,9 +119,13 @@ class Bounds:
             closed = {key: ("closed", *self.recording.hangs_on(key)) for key in keys}
         found = self.run(keys, dict.fromkeys(closed.values()), values=self.careful)
         nowhere = ~np.isfinite(self.poses.inputs).all(axis=1)
+        # roots are the same for many quantities: whether one is near its limit is looked at once
+        roots = {id(x): x for name, x in found.items() if name.startswith("tau(")}
+        entered = any(map(self.recording.enters, self.branch.plan.groups))
+        near = entered or not all(np.all(tau < FAR) for tau in roots.values())
         for key in keys:
             # what is no number is infinite
-            bound = np.fmin(np.broadcast_to(self._bound(key, found), self.n), np.inf)
+            bound = np.fmin(np.broadcast_to(self._bound(key, found, near), self.n), np.inf)
             if nowhere.any():
                 bound[nowhere] = np.nan
             if key in closed:
@@ -129,12 +133,12 @@ class Bounds:
             bounds[key] = bound
         return bounds
 
-    def _bound(self, key: Key, found: Mapping[str, Any]) -> Any:
-        """The bound of a quantity from what a sweep gives."""
+    def _bound(self, key: Key, found: Mapping[str, Any], near: bool) -> Any:
+        """The bound of a quantity from what a sweep gives; `near`: some pose may be near a limit."""
         parts, order = names(key), self._order(key)
         with np.errstate(all="ignore"):
             bound = _length([found[f"error({name})"] for name in parts])
-            if order:
+            if order and near:
                 bound = bound * grown(self._tau(key, found), order)
             if self.careful:
                 bound = bound + self._apart(key, [found[name] for name in parts])
@@ -183,7 +187,8 @@ class Bounds:
             given = {name: float(np.ravel(value)[0]) for name, value in given.items()}
         written, called = self.branch.recordings[key]
         found = run(written, given)
-        return {name: found[first] for name, first in called.items()}
+        once = {first: found[first] for first in called.values()}
+        return {name: once[first] for name, first in called.items()}
 
     def _tau(self, key: Key, found: Mapping[str, Any]) -> Any:
         """τ of roots that a quantity hangs on, on the tape, and of groups whose unknowns enter."""

@@ -24,6 +24,8 @@ from virtualwork.plan.steps import Group
 
 # a singular value is not taken for smaller: the second order decides there, and does not see it
 FLOOR = 1e-13
+# a share of the second order in the first that adds nothing
+FAR = 8e-13
 
 
 @dataclass(frozen=True)
@@ -32,14 +34,12 @@ class Solution:
 
     Attributes
     ----------
-    residual : array (n, 2·loops)
     inverse : array (n, unknowns, 2·loops)
         Close to a limit larger or smaller than J⁻¹, as the second order has it.
     tau : array (n,)
         The second-order step as a share of the first.
     """
 
-    residual: Reals
     inverse: Reals
     tau: Reals
 
@@ -58,7 +58,7 @@ def solution(group: Group, poses: Poses, residual: Reals) -> Solution:
             high, low = _second(group, st, back, first, scale)
             moved[rows] = back * (scale * kept(high, low))[..., None]
             tau[rows] = high.max(axis=1, initial=0.0)
-    return Solution(residual, moved, tau)
+    return Solution(moved, tau)
 
 
 def _second(group: Group, st: State, back: Reals, first: Reals, scale: Reals) -> tuple[Reals, Reals]:
@@ -106,12 +106,11 @@ def grown(tau: Reals, k: float) -> Reals:
 
     τ is taken a quarter larger, for the third order. One number where no pose is near a limit.
     """
-    tau = 1.25 * np.asarray(tau)
-    # far from a limit there is nothing to add
-    near = ~(tau < 1e-12)
+    tau = np.asarray(tau)
+    near = ~(tau < FAR)
     if not near.any():
         return np.ones(())
-    found, tau = np.ones(tau.shape), tau[near]
+    found, tau = np.ones(tau.shape), 1.25 * tau[near]
     more = np.expm1((0.5 - k) * np.log1p(-2 * tau)) / ((2 * k - 1) * tau)
     found[near] = np.where(tau < 0.5, more, np.inf)
     return found

@@ -257,11 +257,13 @@ def mend_rates(changes: Iterable[ChangePoint], q: Number, k: int, x: list[Number
 
 def _close_by(changes: Iterable[ChangePoint], q: Number) -> Iterator[tuple[ChangePoint, Any, Number]]:
     """The change points close to inputs q: each with which of the inputs (None: the one), and how far they are."""
+    one = np.ndim(q) == 0
     for change in changes:
-        near = np.abs(q - change.input) < change.reach
-        if np.any(near):
-            some = None if np.ndim(q) == 0 else near
-            yield change, some, q - change.input if some is None else q[some] - change.input
+        near = abs(q - change.input) < change.reach
+        if one and near:
+            yield change, None, q - change.input
+        elif not one and near.any():
+            yield change, near, q[near] - change.input
 
 
 def put(store: Any, key: Any, near: Any, value: Any) -> None:

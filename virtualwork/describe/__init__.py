@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Hashable, Iterable
 from difflib import get_close_matches
 
 
@@ -34,3 +34,14 @@ def hint(word: str, names: Iterable[str]) -> str:
     """
     close = get_close_matches(word, list(names), n=1, cutoff=0.4)
     return f"; did you mean '{close[0]}'?" if close else ""
+
+
+def known(name: object, names: Collection[object], where: str, what: str) -> None:
+    """Refuse a name that is none of those known.
+
+    >>> known("crnak", ["crank"], "[[forces]] 1 link", "link")
+    Traceback (most recent call last):
+    virtualwork.describe.DescriptionError: [[forces]] 1 link: unknown link 'crnak'; did you mean 'crank'?
+    """
+    if not isinstance(name, Hashable) or name not in names:
+        raise DescriptionError(f"{where}: unknown {what} '{name}'{hint(str(name), map(str, names))}")

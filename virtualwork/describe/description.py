@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from dalembert.arithmetic.records import Record, record
 from dalembert.arithmetic.varied import heading, rotation
-from virtualwork.describe import DescriptionError, hint
+from virtualwork.describe import DescriptionError, known
 from virtualwork.describe.parts import (
     GROUND,
     Force,
@@ -100,17 +100,7 @@ class Description(Record):
         }
         for key, value in values.items():
             object.__setattr__(self, key, value)
-        refuse(
-            self.links,
-            self.bodies,
-            self.pins,
-            self.guides,
-            self.gears,
-            self.inputs,
-            self.guess,
-            {"forces": self.forces, "torques": self.torques},
-            self.springs,
-        )
+        refuse(self)
 
     def __repr__(self) -> str:
         counts = ((len(self.links), "link"), (len(self.pins) + len(self.guides) + len(self.gears), "joint"))
@@ -218,6 +208,11 @@ class Description(Record):
         entry = self.inputs[j]
         return next((motor.carrier for motor in self.motors if motor.drives == entry.link), entry.on)
 
+    @cached_property
+    def carried(self) -> list[int]:
+        """The turning inputs whose motor sits on another body than `on`."""
+        return [j for j, e in enumerate(self.inputs) if not e.is_slide and self.carrier(j) != e.on]
+
 
 def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]]:
     """Rough link angles and point positions from the guess, the ground and the inputs, as far as they reach."""
@@ -252,63 +247,48 @@ def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]
     return angles, points
 
 
-def known(name: str, names: Collection[str], where: str, what: str) -> None:
-    """Refuse a name that is none of those known."""
-    if name not in names:
-        raise DescriptionError(f"{where}: unknown {what} '{name}'{hint(name, names)}")
-
-
-def refuse(
-    links: Mapping[str, Link],
-    bodies: Bodies,
-    pins: Mapping[str, tuple[str, ...]],
-    guides: Sequence[Guide],
-    gears: Sequence[Gear],
-    inputs: Sequence[Input],
-    guess: Guess,
-    loads: Mapping[str, Sequence[Force | Torque]],
-    springs: Sequence[Spring],
-) -> None:
+def refuse(m: Description) -> None:
     """Refuse unknown names and impossible sizes, each with its place.
 
     Raises
     ------
     DescriptionError
     """
-    if GROUND in links:
+    if GROUND in m.links:
         raise DescriptionError("[links.ground]: 'ground' is the fixed body; give this link another name")
-    if not links:
+    if not m.links:
         raise DescriptionError("[links]: the mechanism has no links")
-    for name, link in links.items():
-        _link(name, link, pins, {g.point for g in guides if g.link == name})
-    for i, guide in enumerate(guides, 1):
-        _guide(f"[[{'sliders' if guide.is_slider else 'slots'}]] {i} ({guide.point})", guide, bodies)
-    for i, gear in enumerate(gears, 1):
+    for name, link in m.links.items():
+        _link(name, link, m.pins, {g.point for g in m.guides if g.link == name})
+    for i, guide in enumerate(m.guides, 1):
+        _guide(f"[[{'sliders' if guide.is_slider else 'slots'}]] {i} ({guide.point})", guide, m.bodies)
+    for i, gear in enumerate(m.gears, 1):
         for body in (*gear.links, gear.arm):
-            known(body, bodies, f"[[gears]] {i}", "link")
+            known(body, m.bodies, f"[[gears]] {i}", "link")
         if gear.ratio == 0 or len({*gear.links, gear.arm}) < 3:
             raise DescriptionError(
                 f"[[gears]] {i}: expected two links, an arm that is neither, and a ratio other than 0"
             )
-    for i, entry in enumerate(inputs, 1):
-        _input("[input]" if len(inputs) == 1 else f"[[input]] {i}", entry, links, bodies, guides)
-    if guess.at is not None and len(guess.at) != len(inputs):
+    for i, entry in enumerate(m.inputs, 1):
+        _input("[input]" if len(m.inputs) == 1 else f"[[input]] {i}", entry, m)
+    if m.guess.at is not None and len(m.guess.at) != len(m.inputs):
         raise DescriptionError(
-            f"[guess] at: found {len(guess.at)} values, expected one for each of {len(inputs)} inputs"
+            f"[guess] at: found {len(m.guess.at)} values, expected one for each of {len(m.inputs)} inputs"
         )
-    for name in guess.angles:
-        known(name, links, f"[guess] {name}", "link or point")
+    for name in m.guess.angles:
+        known(name, m.links, f"[guess] {name}", "link or point")
+    loads: Mapping[str, Sequence[Force | Torque]] = {"forces": m.forces, "torques": m.torques}
     for table, entries in loads.items():
         for i, load in enumerate(entries, 1):
-            known(load.link, links, f"[[{table}]] {i} link", "link")
+            known(load.link, m.links, f"[[{table}]] {i} link", "link")
             if isinstance(load, Force) and isinstance(load.point, str):
                 what = f"point of link {load.link}"
-                known(load.point, bodies[load.link], f"[[{table}]] {i} point", what)
-    for i, spring in enumerate(springs, 1):
+                known(load.point, m.bodies[load.link], f"[[{table}]] {i} point", what)
+    for i, spring in enumerate(m.springs, 1):
         for body, point in spring.between:
-            known(body, bodies, f"[[springs]] {i} between", "link")
+            known(body, m.bodies, f"[[springs]] {i} between", "link")
             if isinstance(point, str):
-                known(point, bodies[body], f"[[springs]] {i} between", f"point of {body}")
+                known(point, m.bodies[body], f"[[springs]] {i} between", f"point of {body}")
 
 
 def _link(name: str, link: Link, pins: Collection[str], guided: Collection[str]) -> None:
@@ -339,13 +319,13 @@ def _guide(where: str, guide: Guide, bodies: Bodies) -> None:
         raise DescriptionError(f"{where}: link '{guide.link}' cannot be guided by itself")
 
 
-def _input(where: str, entry: Input, links: Collection[str], bodies: Bodies, guides: Sequence[Guide]) -> None:
-    names = [guide.point for guide in guides]
+def _input(where: str, entry: Input, m: Description) -> None:
+    names = [guide.point for guide in m.guides]
     if (entry.link is None) == (entry.slider is None):
         raise DescriptionError(f"{where}: expected either a link or a slider")
     if entry.slider is None:
-        known(str(entry.link), links, where + " link", "link")
-        known(entry.on, bodies, where + " on", "link")
+        known(entry.link, m.links, where + " link", "link")
+        known(entry.on, m.bodies, where + " on", "link")
         return
     known(entry.slider, names, where + " slider", "slot or slider")
     if names.count(entry.slider) > 1:

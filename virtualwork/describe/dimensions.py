@@ -6,12 +6,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 from virtualwork.describe import DescriptionError, hint
 from virtualwork.describe.description import Description
+from virtualwork.describe.entries import ENTRIES, LOADS, numbers
 from virtualwork.describe.parts import joined
 from virtualwork.describe.units import HEADERS
 
@@ -20,18 +21,9 @@ Where = tuple[str | int, ...]
 """The way into a description: names of fields, keys, places in a list; x or y of a point comes last."""
 
 # the numbers of an entry in a list, with their kinds of quantity
-_LISTS: Mapping[str, Mapping[str, str]] = {
-    "gears": {"ratio": "number"},
+_LISTS: Mapping[str, Mapping[str, str]] = {name: numbers(ENTRIES[name]) for name in ("gears", *LOADS)} | {
     "forces": {"force": "pair of force", "point": "pair of length"},
     "torques": {"torque": "torque"},
-    "springs": {"stiffness": "stiffness", "free_length": "length", "damping": "damping"},
-    "torsion_springs": {
-        "stiffness": "torsion stiffness",
-        "free_angle": "angle",
-        "damping": "torsion damping",
-    },
-    "motors": {"mass": "mass", "center": "pair of length"},
-    "friction": {"coefficient": "number", "radius": "length"},
 }
 _GUIDE = {"angle": "angle", "turned": "angle", "through": "pair of length"}
 _LINK = {"mass": "mass", "inertia": "inertia", "center": "pair of length"}
@@ -178,6 +170,11 @@ def _value(m: Description, dimension: Dimension) -> float:
         return m.at[int(j)] if key == "value" else 0.0
     number: float = found
     return number
+
+
+def by_path(dimensions: Iterable[Dimension], numbers: Iterable[float]) -> dict[str, float]:
+    """The numbers of dimensions, as `changed` takes them."""
+    return dict(zip((d.path for d in dimensions), numbers, strict=True))
 
 
 def changed(m: D, numbers: Mapping[str, Any]) -> D:

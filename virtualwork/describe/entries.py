@@ -7,17 +7,22 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from virtualwork.describe import DescriptionError, hint
-from virtualwork.describe.parts import GROUND, Link
-from virtualwork.describe.units import Units, wrong
+from virtualwork.describe import DescriptionError, hint, known
+from virtualwork.describe.units import EXPECTED, LARGEST, Units, wrong
+
+if TYPE_CHECKING:
+    # numpy comes with it, and the schema needs none
+    from virtualwork.describe.parts import Link
 
 Load = Callable[[Path], bytes]
+N = TypeVar("N", float, complex)
 P = TypeVar("P")
 
 
@@ -168,6 +173,11 @@ FILE: Keys = {
 GUESS: Keys = {"at": Key("inputs", "the input, or every input, for which the guess holds")}
 
 
+def numbers(keys: Keys) -> dict[str, str]:
+    """The keys that hold a quantity or a pair of them, with its kind."""
+    return {name: key.kind for name, key in keys.items() if key.kind.removeprefix("pair of ") in EXPECTED}
+
+
 class Entries:
     """What is read of every table: entries, quantities, names of links and points."""
 
@@ -178,11 +188,24 @@ class Entries:
         self.units = Units(units)
         self.number, self.pair = self.units.number, self.units.pair
         self.links: dict[str, Link] = {}
-        self.bodies: dict[str, Mapping[str, complex]] = {GROUND: {}}
+        self.bodies: dict[str, Mapping[str, complex]] = {}
 
-    def optional(self, entry: Mapping[str, Any], keys: Keys, key: str, where: str) -> float:
-        """A quantity that is 0 where it is not given."""
-        return self.number(entry[key], keys[key].kind, f"{where} {key}") if key in entry else 0.0
+    def quantities(self, entry: Mapping[str, Any], keys: Keys, where: str) -> dict[str, Any]:
+        """The numbers and pairs of an entry that are given, by their keys."""
+        found: dict[str, Any] = {}
+        for name, kind in numbers(keys).items():
+            if name in entry:
+                one = kind.removeprefix("pair of ")
+                read = self.number if one == kind else self.pair
+                found[name] = read(entry[name], one, f"{where} {name}")
+        return found
+
+    def two(self, entry: Mapping[str, Any], key: str, where: str, what: str) -> tuple[Any, Any]:
+        """A list of two."""
+        found = entry[key]
+        if not isinstance(found, list) or len(found) != 2:
+            raise wrong(f"{where} {key}", found, what)
+        return found[0], found[1]
 
     def table(self, name: str) -> dict[str, Any]:
         """A table of the file; empty where it is not there."""
@@ -191,54 +214,83 @@ class Entries:
             raise wrong(f"[{name}]", value, "a table")
         return value
 
-    def rows(self, name: str) -> Iterable[tuple[int, dict[str, Any]]]:
-        """An array of tables, counted from 1."""
+    def rows(self, name: str) -> list[dict[str, Any]]:
+        """An array of tables."""
         value = self.data.get(name, [])
         if isinstance(value, dict):
             value = [value]
         if not isinstance(value, list) or not all(isinstance(e, dict) for e in value):
             raise wrong(f"[[{name}]]", value, "an array of tables")
-        return enumerate(value, 1)
+        return value
 
-    def every(self, name: str, read: Callable[[dict[str, Any], int], P]) -> list[P]:
-        """Every entry of an array of tables, read."""
-        return [read(entry, i) for i, entry in self.rows(name)] if name in self.data else []
+    def every(self, name: str, read: Callable[[dict[str, Any], str], P]) -> list[P]:
+        """Every entry of an array of tables, read; `[[springs]] 2` is the second."""
+        found = []
+        for i, entry in enumerate(self.rows(name), 1):
+            where = f"[[{name}]] {i}"
+            proper(entry, ENTRIES[name], where)
+            found.append(read(entry, where))
+        return found
 
-    def csv(self, name: Any, where: str) -> list[dict[str, str]]:
-        """The rows of a CSV file beside this one."""
+    def curve(
+        self,
+        name: Any,
+        where: str,
+        over: Collection[str],
+        values: Collection[str],
+        told: str,
+        pair: Callable[[dict[str, str], str], tuple[float, N]],
+    ) -> tuple[list[tuple[float, N]], str]:
+        """The rows of a CSV file beside this one, each as `pair` reads it, and the column that they are over.
+
+        Parameters
+        ----------
+        over, values : collection of str
+            Columns of which one must be there.
+        told : str
+            How a complaint calls them.
+        pair : function of a row and the column that it is over
+        """
         try:
-            return table_rows(self.load(self.folder / str(name)))
+            rows = table_rows(self.load(self.folder / str(name)))
         except (OSError, ValueError, csv.Error):
             raise wrong(where, name, "a CSV file that can be read") from None
+        column = next((c for c in over if rows and c in rows[0]), None)
+        if column is None or rows[0].keys().isdisjoint(values):
+            raise wrong(where, name, f"columns {told}")
+        try:
+            found = [pair(row, column) for row in rows]
+        except (TypeError, ValueError):
+            raise wrong(where, name, "numbers in every row") from None
+        if not all(math.hypot(at, abs(value)) <= LARGEST for at, value in found):
+            raise wrong(where, name, "finite numbers in every row")
+        return found, column
 
     def body(self, name: Any, where: str, ground: bool = True) -> str:
         """The name of a link, or of the ground."""
-        names = self.bodies if ground else self.links
-        if not isinstance(name, str) or name not in names:
-            raise DescriptionError(f"{where}: unknown link '{name}'{hint(str(name), names)}")
-        return name
+        known(name, self.bodies if ground else self.links, where, "link")
+        return str(name)
 
     def place(self, link: str, value: Any, where: str) -> complex | str:
         """A point of a link: its name, or [x, y] in the link's axes."""
-        if isinstance(value, str):
-            if value not in self.bodies[link]:
-                raise DescriptionError(
-                    f"{where}: unknown point '{value}' of {link}{hint(str(value), self.bodies[link])}"
-                )
-            return value
-        return self.pair(value, "length", where)
+        if not isinstance(value, str):
+            return self.pair(value, "length", where)
+        points = self.bodies[link]
+        if value not in points:
+            raise DescriptionError(f"{where}: unknown point '{value}' of {link}{hint(value, points)}")
+        return value
 
-    def point_of(self, name: Any, where: str) -> tuple[str, str]:
+    def point_of(self, name: Any, where: str) -> tuple[str, complex | str]:
         """`crank.B`, or the plain name of a point that one body alone has: the body and the point."""
         link, dot, point = str(name).rpartition(".")
         if dot:
-            return self.body(link, where), point
-        owners = [body for body, points in self.bodies.items() if name in points]
+            return self.body(link, where), self.place(link, point, where)
+        owners = [body for body, points in self.bodies.items() if str(name) in points]
         if len(owners) != 1:
-            known = {p for points in self.bodies.values() for p in points}
+            names = {p for points in self.bodies.values() for p in points}
             expected = " or ".join(f'"{body}.{name}"' for body in owners)
             raise wrong(
-                where, name, expected or f'a link and its point such as "crank.B"{hint(str(name), known)}'
+                where, name, expected or f'a link and its point such as "crank.B"{hint(str(name), names)}'
             )
         return owners[0], str(name)
 
@@ -249,20 +301,15 @@ def known_keys(entry: Mapping[str, Any], names: Collection[str], where: str, wha
         raise wrong(where, entry, "a table")
     for key in entry:
         if key not in names:
-            raise DescriptionError(f"{where}: unknown {what} '{key}'{hint(str(key), names)}")
-
-
-def need(entry: Mapping[str, Any], keys: tuple[str, ...], where: str) -> None:
-    """Refuse an entry in which a key is missing."""
-    for key in keys:
-        if key not in entry:
-            raise DescriptionError(f"{where}: '{key}' is missing")
+            known(key, names, where, what)
 
 
 def proper(entry: Mapping[str, Any], keys: Keys, where: str) -> None:
     """Refuse unknown keys, and an entry in which one is missing that must be there."""
     known_keys(entry, keys, where, "key")
-    need(entry, tuple(name for name, key in keys.items() if key.needed), where)
+    for name, key in keys.items():
+        if key.needed and name not in entry:
+            raise DescriptionError(f"{where}: '{name}' is missing")
 
 
 def table_rows(data: bytes) -> list[dict[str, str]]:

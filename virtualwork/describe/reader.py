@@ -3,34 +3,66 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 
-from virtualwork.describe import DescriptionError, MechanismError, hint
+from virtualwork.describe import DescriptionError, MechanismError, known
 from virtualwork.describe.description import Description
 from virtualwork.describe.entries import (
     ENTRIES,
     FILE,
+    FORCE,
+    FRICTION,
     GEAR,
     GUESS,
     INPUT,
     LINK,
-    LOADS,
+    MOTOR,
     POINT,
     SLIDER,
+    SPRING,
+    TORSION_SPRING,
     Entries,
     Load,
     known_keys,
     proper,
 )
-from virtualwork.describe.parts import GROUND, Gear, Guess, Guide, Input, Link, Polar
-from virtualwork.describe.units import LARGEST, wrong
+from virtualwork.describe.parts import (
+    GROUND,
+    Force,
+    Friction,
+    Gear,
+    Guess,
+    Guide,
+    Input,
+    Link,
+    Motor,
+    Polar,
+    Spring,
+    Torque,
+    TorsionSpring,
+)
+from virtualwork.describe.units import wrong
 
 D = TypeVar("D", bound=Description)
 
 TABLES = {*FILE, *ENTRIES}
+# columns of a table over the input, with what makes them SI
+TURNS = {"angle_rad": 1.0, "angle_deg": math.pi / 180}
+TRAVELS = {"position_m": 1.0, "position_mm": 1e-3}
+# the columns that a table of torque may be over
+AXES = {
+    "t_s": ("time", 1.0),
+    "time_s": ("time", 1.0),
+    "angle_rad": ("angle", 1.0),
+    "angle_deg": ("angle", math.pi / 180),
+    "speed_rad_s": ("speed", 1.0),
+    "speed_rpm": ("speed", math.pi / 30),
+}
 
 
 def read(path: Path, make: Callable[..., D], load: Load = Path.read_bytes) -> D:
@@ -72,7 +104,7 @@ def read_text(
 
 
 class _Reader(Entries):
-    """All tables but those of loads."""
+    """Every table of the file."""
 
     def parts(self) -> dict[str, Any]:
         """Every part of the mechanism, under the name that `Description` gives it."""
@@ -82,8 +114,7 @@ class _Reader(Entries):
         }
         self.links = {name: self.link(name, entry) for name, entry in self.table("links").items()}
         self.bodies = {GROUND: ground} | {n: k.points for n, k in self.links.items()}
-        guides = [self.guide(e, i, "slots") for i, e in self.rows("slots")]
-        guides += [self.guide(e, i, "sliders") for i, e in self.rows("sliders")]
+        guides = [*self.every("slots", self.slot), *self.every("sliders", self.slider)]
         inputs = self.inputs()
         return {
             "ground": ground,
@@ -97,24 +128,24 @@ class _Reader(Entries):
             **self.loads(),
         }
 
+    def loads(self) -> dict[str, Any]:
+        """Every load, under the name that `Description` gives it."""
+        kinds: dict[str, Callable[[dict[str, Any], str], Any]] = {
+            "forces": self.force,
+            "torques": self.torque,
+            "springs": self.spring,
+            "torsion_springs": self.torsion,
+            "motors": self.motor,
+            "friction": self.friction,
+        }
+        return {name: self.every(name, read) for name, read in kinds.items() if name in self.data}
+
     def gravity(self) -> complex:
         """Its two components."""
-        if "gravity" not in self.data:
-            return 0j
-        value = self.data["gravity"]
+        value = self.data.get("gravity", [0, 0])
         if isinstance(value, list) and len(value) == 2:
-            return complex(*(self.number(v, "slide acceleration", "gravity") for v in value))
+            return self.pair(value, "slide acceleration", "gravity")
         raise wrong("gravity", value, "two accelerations [x, y]")
-
-    def loads(self) -> dict[str, Any]:
-        """The loads of a file that has any."""
-        if self.data.keys().isdisjoint(LOADS):
-            return {}
-        from virtualwork.describe.load_entries import LoadEntries
-
-        entries = LoadEntries(self.data, self.folder, self.load)
-        entries.links, entries.bodies = self.links, self.bodies
-        return entries.loads()
 
     def tolerances(self, m: Description) -> dict[str, float]:
         """The limits ± of dimensions, by their paths; quoted, or with the words of the path as tables."""
@@ -150,6 +181,7 @@ class _Reader(Entries):
             raise wrong("name", found, "text")
         return str(found)
 
+    # --- what moves -----------------------------------------------------------------------------------------------
     def link(self, name: str, entry: Any) -> Link:
         where = f"[links.{name}]"
         if not isinstance(entry, dict):
@@ -167,26 +199,18 @@ class _Reader(Entries):
             if not isinstance(v.get("from"), str):
                 raise DescriptionError(f"{at} from: expected the name of another point of this link")
             proper(v, POINT, at)
-            points[p] = Polar(
-                v["from"],
-                self.number(v["length"], "length", f"{at} length"),
-                self.number(v["angle"], "angle", f"{at} angle"),
-            )
-        mass = self.optional(entry, LINK, "mass", where)
-        inertia = self.optional(entry, LINK, "inertia", where)
-        center = self.pair(entry["center"], "length", f"{where} center") if "center" in entry else 0j
-        if mass < 0:
-            raise wrong(f"{where} mass", entry["mass"], "a mass of zero or more")
-        if inertia < 0:
-            raise wrong(f"{where} inertia", entry["inertia"], "a moment of inertia of zero or more")
+            points[p] = Polar(v["from"], **self.quantities(v, POINT, at))
+        found = self.quantities(entry, {key: LINK[key] for key in ("mass", "inertia", "center")}, where)
+        for key, what in (("mass", "a mass"), ("inertia", "a moment of inertia")):
+            if found.get(key, 0.0) < 0:
+                raise wrong(f"{where} {key}", entry[key], f"{what} of zero or more")
         try:
-            return Link(points, mass, center, inertia)
+            return Link(points, **found)
         except DescriptionError as error:
             raise DescriptionError(f"{where} {error}") from None
 
-    def guide(self, entry: dict[str, Any], i: int, table: str) -> Guide:
-        where = f"[[{table}]] {i}"
-        proper(entry, ENTRIES[table], where)
+    def slot(self, entry: dict[str, Any], where: str, turned: float | None = None) -> Guide:
+        """A slot, or with an angle a slider."""
         point = str(entry["point"])
         link = entry.get("link")
         if link is None:
@@ -200,107 +224,67 @@ class _Reader(Entries):
             link = holders[0]
         on = str(entry.get("on", GROUND))
         through = entry.get("through", [0, 0])
-        if not isinstance(through, str):
-            through = self.pair(through, "length", f"{where} through")
-        elif on in self.bodies and through not in self.bodies[on]:
-            raise DescriptionError(
-                f"{where} through: unknown point '{through}' of {on}{hint(through, self.bodies[on])}"
-            )
-        angle = self.optional(entry, SLIDER, "angle", where)
-        turned = None
-        if table == "sliders":
-            turned = self.optional(entry, SLIDER, "turned", where)
-        return Guide(point, str(link), on, through, angle, turned)
+        # an unknown carrier is refused with all other names
+        if on in self.bodies or not isinstance(through, str):
+            through = self.place(on, through, f"{where} through")
+        angles = {"turned": turned} | self.quantities(entry, SLIDER, where)
+        return Guide(point, str(link), on, through, **angles)
 
-    def gear(self, entry: dict[str, Any], i: int) -> Gear:
-        where = f"[[gears]] {i}"
-        proper(entry, GEAR, where)
-        links = entry["links"]
-        if not isinstance(links, list) or len(links) != 2:
-            raise wrong(f"{where} links", links, "two links")
+    def slider(self, entry: dict[str, Any], where: str) -> Guide:
+        return self.slot(entry, where, 0.0)
+
+    def gear(self, entry: dict[str, Any], where: str) -> Gear:
+        a, b = self.two(entry, "links", where, "two links")
         return Gear(
-            (str(links[0]), str(links[1])),
-            self.number(entry["ratio"], "number", f"{where} ratio"),
-            str(entry.get("arm", GROUND)),
+            (str(a), str(b)), arm=str(entry.get("arm", GROUND)), **self.quantities(entry, GEAR, where)
         )
 
     def inputs(self) -> list[Input]:
         found = []
-        rows = list(self.rows("input"))
+        rows = self.rows("input")
         if not rows:
             raise DescriptionError("[input]: missing; nothing drives the mechanism")
-        for i, entry in rows:
+        for i, entry in enumerate(rows, 1):
             where = "[input]" if len(rows) == 1 else f"[[input]] {i}"
             known_keys(entry, INPUT, where, "key")
             slide = "slider" in entry
-            wrong = {"link", "on", "angle"} & set(entry) if slide else {"position"} & set(entry)
-            if wrong or not (slide or "link" in entry):
+            out_of_place = {"link", "on", "angle"} & set(entry) if slide else {"position"} & set(entry)
+            if out_of_place or not (slide or "link" in entry):
                 raise DescriptionError(
                     f"{where}: found {', '.join(sorted(entry)) or 'nothing'}, expected a link with angle, "
                     "or a slider with position"
                 )
-            value = entry.get("position" if slide else "angle")
-            prefix = "slide " if slide else ""
-            rates = {
-                key: None if key not in entry else self.number(entry[key], prefix + key, f"{where} {key}")
+            given: dict[str, Any] = {
+                key: self.number(entry[key], f"slide {key}" if slide else key, f"{where} {key}")
                 for key in ("speed", "acceleration", "jerk")
+                if key in entry
             }
-            found.append(
-                Input(
-                    link=None if slide else str(entry["link"]),
-                    on=str(entry.get("on", GROUND)),
-                    slider=str(entry["slider"]) if slide else None,
-                    value=None
-                    if value is None
-                    else self.number(value, "length" if slide else "angle", where),
-                    history=self.history(entry["law"], where, slide) if "law" in entry else None,
-                    **rates,
-                )
-            )
+            value, kind = ("position", "length") if slide else ("angle", "angle")
+            if value in entry:
+                given["value"] = self.number(entry[value], kind, where)
+            if "law" in entry:
+                given["history"] = self.history(entry["law"], f"{where} law", slide)
+            driven = "slider" if slide else "link"
+            given[driven] = str(entry[driven])
+            found.append(Input(on=str(entry.get("on", GROUND)), **given))
         return found
 
     def history(self, law: Any, where: str, slide: bool) -> tuple[tuple[float, float], ...]:
         """A law of motion: a CSV of time_s and angle_deg (angle_rad, position_m, position_mm)."""
-        kinds = (
-            {"position_m": 1.0, "position_mm": 1e-3}
-            if slide
-            else {"angle_rad": 1.0, "angle_deg": math.pi / 180}
+        over = TRAVELS if slide else TURNS
+        found, _ = self.curve(
+            law,
+            where,
+            over,
+            ("time_s",),
+            f"time_s and {' or '.join(over)}",
+            lambda row, column: (float(row["time_s"]), float(row[column]) * over[column]),
         )
-        rows = self.csv(law, f"{where} law")
-        column = next((c for c in kinds if rows and c in rows[0]), None)
-        if column is None or "time_s" not in rows[0]:
-            raise wrong(f"{where} law", law, f"columns time_s and {' or '.join(kinds)}")
-        try:
-            found = tuple((float(r["time_s"]), float(r[column]) * kinds[column]) for r in rows)
-        except (TypeError, ValueError):
-            raise wrong(f"{where} law", law, "numbers in every row") from None
-        if not all(math.hypot(*pair) <= LARGEST for pair in found):
-            raise wrong(f"{where} law", law, "finite numbers in every row")
-        return found
+        return tuple(found)
 
     def guess(self, inputs: list[Input]) -> Guess:
         table = self.table("guess")
-        kinds = ["length" if e.is_slide else "angle" for e in inputs]
-        at: list[float] | None = None
-        if "at" in table:
-            value = table["at"]
-            if isinstance(value, dict):
-                known_keys(value, {e.name for e in inputs}, "[guess] at", "input")
-                value = [value.get(e.name, e.value) for e in inputs]
-                if None in value:
-                    raise wrong("[guess] at", table["at"], "a value for every input")
-            values = value if isinstance(value, list) else [value]
-            if len(values) != len(inputs):
-                raise wrong("[guess] at", table["at"], f"{len(inputs)} value(s), one for each input")
-            at = [
-                v
-                if isinstance(v, float)
-                and v == e.value
-                and isinstance(table["at"], dict)
-                and e.name not in table["at"]
-                else self.number(v, kind, "[guess] at")
-                for v, kind, e in zip(values, kinds, inputs, strict=True)
-            ]
+        at = self.guessed_inputs(table["at"], inputs) if "at" in table else None
         angles: dict[str, float] = {}
         points: dict[str, complex] = {}
         names = {p for body in self.bodies.values() for p in body}
@@ -309,14 +293,119 @@ class _Reader(Entries):
             where = f"[guess] {key}"
             if key in GUESS:
                 continue
-            if key in slides and not isinstance(value, list):
-                continue
             if isinstance(value, list):
-                if key not in names:
-                    raise DescriptionError(f"{where}: unknown point '{key}'{hint(str(key), names)}")
+                known(key, names, where, "point")
                 points[key] = self.pair(value, "length", where)
-            elif key in self.links:
+            elif key not in slides:
+                known(key, self.links, where, "link")
                 angles[key] = self.number(value, "angle", where)
-            else:
-                raise DescriptionError(f"{where}: unknown link '{key}'{hint(key, self.links)}")
         return Guess(at, angles, points)
+
+    def guessed_inputs(self, given: Any, inputs: list[Input]) -> list[float]:
+        """The input, or every input, for which the guess holds; of those not named the description's own value."""
+        where = "[guess] at"
+        kinds = ["length" if e.is_slide else "angle" for e in inputs]
+        if isinstance(given, dict):
+            known_keys(given, {e.name for e in inputs}, where, "input")
+            own = {e.name: e.value for e in inputs if e.value is not None}
+            if any(e.name not in given and e.name not in own for e in inputs):
+                raise wrong(where, given, "a value for every input")
+            return [
+                self.number(given[e.name], kind, where) if e.name in given else own[e.name]
+                for kind, e in zip(kinds, inputs, strict=True)
+            ]
+        values = given if isinstance(given, list) else [given]
+        if len(values) != len(inputs):
+            raise wrong(where, given, f"{len(inputs)} value(s), one for each input")
+        return [self.number(value, kind, where) for value, kind in zip(values, kinds, strict=True)]
+
+    # --- loads ----------------------------------------------------------------------------------------------------
+    def force(self, entry: dict[str, Any], where: str) -> Force:
+        """A force, constant or over the input by a table."""
+        if "table" not in entry and "force" not in entry:
+            raise DescriptionError(f"{where}: 'force' is missing")
+        link = self.body(entry["link"], f"{where} link", ground=False)
+        point = self.place(link, entry["point"], f"{where} point") if "point" in entry else None
+        frame = entry.get("frame", "ground")
+        if frame not in ("ground", "link"):
+            raise wrong(f"{where} frame", frame, "'ground' or 'link'")
+        if "table" not in entry:
+            return Force(link, point, frame=frame, **self.quantities(entry, FORCE, where))
+        if "force" in entry:
+            raise DescriptionError(f"{where}: found force and table, expected one of them")
+        return Force(link, point, 0j, frame, *self.force_table(entry["table"], f"{where} table"))
+
+    def force_table(self, name: Any, where: str) -> tuple[tuple[tuple[float, complex], ...], bool]:
+        """A force over the input: a CSV of angle_deg (angle_rad, position_m, position_mm), fx_N and fy_N."""
+        inputs = self.rows("input")
+        if len(inputs) != 1:
+            raise wrong(where, name, "a mechanism with one input, for the force is given over it")
+        over = TRAVELS if "slider" in inputs[0] else TURNS
+        found, column = self.curve(
+            name,
+            where,
+            over,
+            ("fx_N", "fy_N"),
+            f"{' or '.join(over)}, fx_N and fy_N",
+            lambda row, column: (
+                float(row[column]) * over[column],
+                complex(float(row.get("fx_N") or 0), float(row.get("fy_N") or 0)),
+            ),
+        )
+        rises([at for at, _ in found], name, where, column)
+        return tuple(found), over is TURNS and is_cycle(found[0][0], found[-1][0])
+
+    def torque(self, entry: dict[str, Any], where: str) -> Torque:
+        """A torque, constant or by a table."""
+        link, value = self.body(entry["link"], f"{where} link", ground=False), entry["torque"]
+        if isinstance(value, str) and re.match(r"\s*[-+]?(\d|\.\d)", value) is None:
+            return Torque(link, 0.0, *self.torque_table(value, f"{where} torque"))
+        return Torque(link, self.number(value, "torque", f"{where} torque"))
+
+    def torque_table(self, name: str, where: str) -> tuple[tuple[tuple[float, float], ...], Any, bool]:
+        """A torque over the time, or over the angle or speed of its link: a CSV with torque_N_m."""
+        found, column = self.curve(
+            name,
+            where,
+            AXES,
+            ("torque_N_m",),
+            f"torque_N_m and one of {', '.join(AXES)}",
+            lambda row, column: (float(row[column]) * AXES[column][1], float(row["torque_N_m"])),
+        )
+        rises([at for at, _ in found], name, where, column)
+        axis = AXES[column][0]
+        return tuple(found), axis, axis == "angle" and is_cycle(found[0][0], found[-1][0])
+
+    def spring(self, entry: dict[str, Any], where: str) -> Spring:
+        ends = self.two(entry, "between", where, 'two points such as ["crank.B", "ground.D"]')
+        a, b = (self.point_of(end, f"{where} between") for end in ends)
+        return Spring((a, b), **self.quantities(entry, SPRING, where))
+
+    def torsion(self, entry: dict[str, Any], where: str) -> TorsionSpring:
+        a, b = self.two(entry, "links", where, "two links")
+        links = self.body(a, f"{where} links"), self.body(b, f"{where} links")
+        return TorsionSpring(links, **self.quantities(entry, TORSION_SPRING, where))
+
+    def motor(self, entry: dict[str, Any], where: str) -> Motor:
+        return Motor(
+            self.body(entry["carrier"], f"{where} carrier"),
+            self.body(entry["drives"], f"{where} drives", ground=False),
+            **self.quantities(entry, MOTOR, where),
+        )
+
+    def friction(self, entry: dict[str, Any], where: str) -> Friction:
+        joint = str(entry["joint"])
+        known(joint, {p for body in self.bodies.values() for p in body}, f"{where} joint", "point")
+        return Friction(joint, **self.quantities(entry, FRICTION, where))
+
+
+def rises(at: Sequence[float], name: Any, where: str, column: str) -> None:
+    """Refuse a table whose first column does not rise."""
+    if len(at) < 2 or any(not b > a for a, b in pairwise(at)):
+        raise wrong(where, name, f"at least two rows with rising {column}")
+
+
+def is_cycle(first: float, last: float) -> bool:
+    """Whether a span of angles is one of whole turns."""
+    turns = (last - first) / (2 * math.pi)
+    return abs(turns - round(turns)) < 1e-9 and round(turns) > 0

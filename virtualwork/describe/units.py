@@ -130,12 +130,8 @@ def parse(text: str, kind: str) -> float | None:
     (0.12, True, None)
     """
     match = _NUMBER.match(text)
-    if match is None:
-        return None
-    if not match[2]:
-        return None
-    found = unit(match[2])
-    if found is None:
+    found = unit(match[2]) if match and match[2] else None
+    if match is None or found is None:
         return None
     factor, dimension = found
     wanted = EXPECTED[kind][1]

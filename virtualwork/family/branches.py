@@ -67,7 +67,7 @@ def chosen(
             found[name][rest] = sign
     if one and not (at_once and clear.all()):
         rest = np.flatnonzero(told & ~clear if at_once else told)
-        known = _of({**given, **{f"sign {name}": sign for name, sign in found.items()}}, rest)
+        known = _of(with_signs(given, found), rest)
         first, last = (end if len(end) == 1 else end[rest] for end in (low, high))
         told[rest] = ~meet_on_the_way(written, m, known, len(rest), first, last)
     return found, told
@@ -100,13 +100,18 @@ def signs(
     chosen = {g.name: np.broadcast_to(found[f"sign {g.name}"], n) + 0.0 for g in written.closed}
     if len(m.inputs) == 1 and any(each.any() for each in opens.values()):
         # one that is assembled next to the guess is chosen by how it stands there
-        known = {**given} | {f"sign {name}": sign for name, sign in chosen.items()}
+        known = with_signs(given, chosen)
         step = BESIDE * (m.size if m.inputs[0].is_slide else 1.0)
         for side in (step, -step):
             for name, open_ in opens.items():
                 depth = _sampled(written, ("margin", name), known, np.array([[m.at[0] + side]]), n)
                 told &= ~(open_ & (depth[0] >= 0))
     return chosen, told
+
+
+def with_signs(given: Mapping[str, Any], signs: Mapping[str, Any]) -> dict[str, Any]:
+    """What is known of variants: their dimensions, and the sign of each closed form by the group's name."""
+    return {**given, **{f"sign {name}": sign for name, sign in signs.items()}}
 
 
 def _inputs(m: Description) -> dict[str, float]:

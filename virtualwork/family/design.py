@@ -8,22 +8,27 @@ branch is not told so simply, more is done; at worst the design is described alo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dalembert.arithmetic.engines import Repeated
-from virtualwork.describe import DescriptionError, hint
+from dalembert.arithmetic.engines import Repeated, run
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe import DescriptionError, MechanismError, hint
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import Dimension
-from virtualwork.family.alone import Alone
-from virtualwork.family.branches import meet_on_the_way, samples, signs
-from virtualwork.family.part import Part, Solver
-from virtualwork.formulas.asked import COMPLEX, Key, names
+from virtualwork.describe.dimensions import Dimension, by_path, changed
+from virtualwork.family.branches import meet_on_the_way, samples, signs, with_signs
+from virtualwork.family.part import Part, Solver, assembled, parts
+from virtualwork.family.written import Written
+from virtualwork.formulas.asked import Key, names, over_blocks
+from virtualwork.formulas.lanes import Lanes
 from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.poses import Poses
 
+REST = (False, False, False)
 AT_REST: list[list[Any]] = [[0.0], [0.0], [0.0]]
 
 
@@ -64,7 +69,7 @@ class Design:
     @property
     def rows(self) -> int:
         """How many rows a table has: two of each point, x and y, one of an angle or a slide."""
-        return sum(2 if key[0] in COMPLEX else 1 for key in self.keys)
+        return sum(len(names(key)) for key in self.keys)
 
     @property
     def exact(self) -> bool:
@@ -80,10 +85,9 @@ class Design:
         written = self._first.written
         self._held, self._chosen = None, (b"", None)
         if numbers is not None and written is not None:
-            given = dict(zip(self._paths, numbers.tolist(), strict=True))
-            chosen, _ = signs(written, self.mechanism, given, 1)
+            chosen, _ = signs(written, self.mechanism, by_path(self.dimensions, numbers.tolist()), 1)
             if len(chosen) == len(written.closed):
-                self._held = {f"sign {name}": float(sign[0]) for name, sign in chosen.items()}
+                self._held = with_signs({}, {name: float(sign[0]) for name, sign in chosen.items()})
         return self._held is not None
 
     # --- one design -----------------------------------------------------------------------------------------------
@@ -132,7 +136,7 @@ class Design:
         """The quantities, or their derivatives, from one run of a tape; and whether the branch is told so simply."""
         known = self._held if self._held is not None else {"at": self.mechanism.at[0]}
         again = self._ready(q, enters)
-        found, fine = again({**known, **dict(zip(self._paths, x.tolist(), strict=True))})
+        found, fine = again(known | by_path(self.dimensions, x.tolist()))
         return found[:, : len(q)], fine
 
     def _ready(self, q: Reals, enters: tuple[str, ...] | None) -> Repeated:
@@ -158,9 +162,9 @@ class Design:
         written, m = self._first.written, self.mechanism
         if written is None:
             return None
-        known: dict[str, Any] = dict(zip(self._paths, x.tolist(), strict=True))
+        known = by_path(self.dimensions, x.tolist())
         found, told = signs(written, m, known, 1)
-        return known | {f"sign {name}": float(sign[0]) for name, sign in found.items()} if told[0] else None
+        return with_signs(known, {name: float(sign[0]) for name, sign in found.items()}) if told[0] else None
 
     def _goes(self, x: Reals, q: Reals) -> bool:
         """Whether a design goes by its signs: the guess tells them, and no other branch is met on the way to the poses."""
@@ -205,15 +209,93 @@ class Design:
     def table(self, numbers: Reals, inputs: Reals) -> Reals:
         """What is asked for of designs (v, d) at their inputs (v or 1, n): (rows, v, n)."""
         self.evaluations += len(numbers)
-        out = []
-        for key, found in zip(self.keys, self.solved(numbers, inputs, self.keys), strict=True):
-            out += [found.real, found.imag] if key[0] in COMPLEX else [found]
-        return np.stack(out)
+        return table(self.solved(numbers, inputs, self.keys))
 
     def solved(self, numbers: Reals, inputs: Reals, keys: Sequence[Key]) -> list[NDArray[Any]]:
         """Any quantities of designs (v, d) at their inputs (v or 1, n), (v, n) each."""
         part = Part(self.mechanism, self.dimensions, numbers, inputs[:, :, None], AT_REST)
         return Solver(part, self._first).values(keys)
+
+
+class Alone:
+    """Positions over the input of designs that are described alone, as their branch is more than signs; the last is kept.
+
+    The formulas are written down once too, with one Newton step of every group that has no closed form. What closes such a
+    group enters as the design's own iteration finds it: there the derivative of the step is that of the solution (the
+    implicit function theorem), and one sweep backwards over the tape has the derivatives to all dimensions.
+
+    Parameters
+    ----------
+    mechanism : Description
+    dimensions : sequence of Dimension
+    keys : sequence of Key
+    """
+
+    def __init__(self, mechanism: Description, dimensions: Sequence[Dimension], keys: Sequence[Key]) -> None:
+        self.mechanism, self.dimensions, self.keys = mechanism, tuple(dimensions), tuple(keys)
+        self._last: tuple[bytes, Assembly | None] | None = None
+
+    @cached_property
+    def written(self) -> Written | None:
+        """The formulas; None where a gear's phase hangs on links that have to be placed first, or every pose is singular.
+
+        And where the mechanism's own dimensions cannot be put together.
+        """
+        try:
+            own = assembled(self.mechanism)
+        except MechanismError:
+            return None
+        if own.folded:
+            return None
+        found = Written(own, self.dimensions, REST, own_signs=True, settled=False)
+        return None if found.open_gears else found
+
+    def values(self, x: Reals, q: Reals) -> Reals:
+        """What is asked for of one design, (rows, n); NaN where it cannot be assembled."""
+        poses = self._poses(x, q)
+        if poses is None:
+            return np.full((sum(len(names(key)) for key in self.keys), len(q)), np.nan)
+        return table(over_blocks(poses, key) for key in self.keys)
+
+    def slopes(self, x: Reals, q: Reals, enters: tuple[str, ...]) -> Reals:
+        """Its derivatives to dimensions by their paths, and to the input `q0`, (rows, n, len(enters))."""
+        of = [name for key in self.keys for name in names(key)]
+        out = np.full((len(of), len(q), len(enters)), np.nan)
+        poses = self._poses(x, q)
+        if poses is None:
+            return out
+        assert self.written is not None
+        tape = self.written.slopes(self.keys, enters)
+        given = by_path(self.dimensions, x.tolist())
+        rest = [name for name in tape.inputs if name not in given]
+        assert self._last is not None
+        assert self._last[1] is not None
+        with np.errstate(all="ignore"):
+            found = run(tape, given | Lanes(self._last[1], poses).entering(rest))
+        for row, name in enumerate(of):
+            for column, to in enumerate(enters):
+                # what does not hang on it has no row
+                out[row, :, column] = found.get(f"d({name})/d({to})", 0.0)
+        out[:, ~poses.assembled] = np.nan
+        return out
+
+    def _poses(self, x: Reals, q: Reals) -> Poses | None:
+        """A design at some inputs; None where it cannot be put together."""
+        name = x.tobytes()
+        if self._last is None or self._last[0] != name:
+            try:
+                self._last = (
+                    name,
+                    Assembly.from_guess(changed(self.mechanism, by_path(self.dimensions, x.tolist()))),
+                )
+            except MechanismError:
+                self._last = name, None
+        return None if self._last[1] is None else Poses(self._last[1], q, 0.0, 0.0, 0.0)
+
+
+def table(quantities: Iterable[NDArray[Any]]) -> Reals:
+    """Quantities as rows of real numbers, (rows, ...): two of what is complex."""
+    return np.stack([row for found in quantities for row in parts(found)])
 
 
 def place_key(m: Description, name: str) -> Key:

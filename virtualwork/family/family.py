@@ -12,18 +12,28 @@ array([1., 2., 3.])
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cached_property
-from typing import TYPE_CHECKING
+import math
+import weakref
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.engines import as_part
+from dalembert.arithmetic.parts import in_parts
+from virtualwork.branch.assembly import Assembly
+from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import Dimension, changed, dimensions, named, value
-from virtualwork.family.motion import FamilyMotion
-from virtualwork.family.part import Part
-from virtualwork.formulas.numbers import Number, Reals
+from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, value
+from virtualwork.describe.parts import Point, as_point
+from virtualwork.family.part import ASSEMBLED, LANES, Part, answer, forget, room
+from virtualwork.formulas.asked import Key
+from virtualwork.formulas.numbers import Number, Reals, xy
+from virtualwork.parts_of_motion import LinkRates, PointRates, SlideRates
+from virtualwork.plan.steps import joints
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -76,8 +86,7 @@ class Family:
 
     def __getitem__(self, i: int) -> Description:
         """The i-th variant, described alone."""
-        numbers = zip(self.dimensions, self.values[i].tolist(), strict=True)
-        return changed(self.mechanism, {d.path: number for d, number in numbers})
+        return changed(self.mechanism, by_path(self.dimensions, self.values[i].tolist()))
 
     def motion(
         self,
@@ -154,3 +163,167 @@ class Family:
             else:
                 rates.append([r.reshape(1, -1)] if k == 1 else [r[..., j].reshape(1, -1) for j in range(k)])
         return rates
+
+
+class PointOfFamily(PointRates):
+    """Motion of one point in every variant: `position`, `velocity`, `acceleration`, `jerk`, each (v, n, 2)."""
+
+    motion: FamilyMotion
+
+    def __repr__(self) -> str:
+        return f"PointOfFamily({self.node or self.place!r} of {self.body}, {len(self.motion)} variants)"
+
+
+class LinkOfFamily(LinkRates):
+    """Motion of one link in every variant: `angle`, `omega`, `alpha`, `jerk`, each (v, n)."""
+
+    motion: FamilyMotion
+
+    def __repr__(self) -> str:
+        return f"LinkOfFamily({self.body}, {len(self.motion)} variants)"
+
+
+class FamilyMotion:
+    """Position, rates and forces of all variants over given inputs, on demand; `Family.motion` makes one.
+
+    Attributes
+    ----------
+    part : Part
+        The variants and the inputs they are asked at.
+    executor : concurrent.futures.Executor or None
+    """
+
+    def __init__(self, part: Part, executor: Executor | None = None) -> None:
+        self.part, self.executor = part, executor
+        self._name = uuid4().hex
+        self._known: dict[Key, Any] = {}
+        self._reasons: dict[int, str] = {}
+        weakref.finalize(self, forget, self._name)
+
+    def __len__(self) -> int:
+        return self.part.shape[0]
+
+    def __repr__(self) -> str:
+        v, n = self.part.shape
+        return f"FamilyMotion({self.part.mechanism.name!r}: {v} variants in {n} poses)"
+
+    @property
+    def inputs(self) -> Reals:
+        """(v or 1, n, k): the inputs, rad or m."""
+        return self.part.inputs
+
+    # --- solving ------------------------------------------------------------------------------------------------
+    def parts(self) -> Iterator[tuple[int, slice]]:
+        """The variants in parts: always the same ones, whoever works them out, and so are the numbers."""
+        v, n = self.part.shape
+        each = max(1, LANES // max(n, 1))
+        for number, i in enumerate(range(0, v, each)):
+            yield number, slice(i, min(i + each, v))
+
+    def values(self, keys: Sequence[Key]) -> list[Any]:
+        """Quantities by their keys (`Recording.value`), each (v, n), real or complex."""
+        new = tuple(key for key in keys if key not in self._known)
+        if new:
+            rows = [rows for _, rows in self.parts()]
+            out = room(new, *self.part.shape)
+            here = self.executor is None
+            work = (
+                (self._name, number, self.part.some(some), new, [x[some] for x in out] if here else None)
+                for number, some in self.parts()
+            )
+            # what others work out hangs on the whole, and not on what each of them did before
+            of = answer if here else partial(as_part, math.prod(self.part.shape), answer)
+            for some, (values, reasons) in zip(rows, in_parts(of, work, self.executor), strict=True):
+                if not here:
+                    for x, value in zip(out, values, strict=True):
+                        x[some] = value
+                self._reasons |= {some.start + place: reason for place, reason in reasons.items()}
+            self._known |= zip(new, out, strict=True)
+        return [self._known[key] for key in keys]
+
+    def value(self, key: Key) -> Any:
+        """A quantity by its key, (v, n)."""
+        return self.values([key])[0].copy()
+
+    @cached_property
+    def assembled(self) -> NDArray[np.bool_]:
+        """(v, n) bool: which poses of which variants can be assembled."""
+        return np.asarray(np.isfinite(self.values([ASSEMBLED])[0]))
+
+    @property
+    def failed(self) -> int:
+        """How many variants cannot be assembled in some pose."""
+        return int((~self.assembled.all(axis=1)).sum())
+
+    def reason(self, i: int) -> str | None:
+        """Why the i-th variant cannot be assembled in some pose; None where it can in all."""
+        bad = np.flatnonzero(~self.assembled[i])
+        if not len(bad):
+            return None
+        if i in self._reasons:
+            return self._reasons[i]
+        q = np.broadcast_to(self.part.inputs, (*self.part.shape, self.part.inputs.shape[2]))[i, bad[0]]
+        try:
+            found = Assembly.from_guess(self.part.described(i)).reach.shortfall(tuple(q.tolist()))
+        except MechanismError as error:
+            return str(error)
+        return None if found is None else found.text()
+
+    # --- what moves -----------------------------------------------------------------------------------------------
+    def point(self, name: str) -> PointOfFamily:
+        """Motion of a named point.
+
+        Raises
+        ------
+        DescriptionError
+            Where no body has a point of that name.
+        """
+        points = self.part.mechanism.points
+        if name not in points:
+            raise DescriptionError(f"no point is named '{name}'")
+        return PointOfFamily(self, *points[name], name)
+
+    def at(self, link: str, point: Point | str) -> PointOfFamily:
+        """Motion of any point of a link: a name, or coordinates in the link's own axes."""
+        if isinstance(point, str):
+            return self.point(point)
+        return PointOfFamily(self, link, as_point(point), None)
+
+    def link(self, name: str) -> LinkOfFamily:
+        """Motion of a link.
+
+        Raises
+        ------
+        DescriptionError
+            Where there is no link of that name.
+        """
+        if name not in self.part.mechanism.links:
+            raise DescriptionError(f"no link is named '{name}'")
+        return LinkOfFamily(self, name)
+
+    def slide(self, name: str) -> SlideRates:
+        """Motion along the guide in which the named point runs."""
+        for i, guide in enumerate(self.part.mechanism.guides):
+            if guide.point == name:
+                return SlideRates(self, i)
+        raise DescriptionError(f"no slot or slider runs at a point named '{name}'")
+
+    # --- forces ---------------------------------------------------------------------------------------------------
+    @property
+    def effort(self) -> Reals:
+        """The effort at the input by virtual work, (v, n) N·m (N at a slide); (v, n, k) for k inputs."""
+        k = len(self.part.mechanism.inputs)
+        found = self.values([("effort", j) for j in range(k)])
+        return found[0] if k == 1 else np.stack(found, axis=-1)
+
+    def reaction(self, joint: str, on: str) -> Reals:
+        """The force of all others on a link at a joint, (v, n, 2) N.
+
+        Raises
+        ------
+        DescriptionError
+            Where the link has no joint of that name.
+        """
+        if not any(j.name == joint and on in j.bodies for j in joints(self.part.mechanism)):
+            raise DescriptionError(f"link '{on}' has no joint at '{joint}'")
+        return xy(self.value(("reaction", joint, on)))

@@ -17,11 +17,10 @@ import numpy as np
 from dalembert.arithmetic.parts import in_parts
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import Dimension, changed, dimensions, named, value
-from virtualwork.family.descent import AWAY, Descent
+from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensions, named, value
 from virtualwork.family.design import Design, place_key
 from virtualwork.family.part import ASSEMBLED
-from virtualwork.family.starts import COARSE, along, in_turn, shares
+from virtualwork.family.search import AWAY, COARSE, Descent, along, in_turn, shares
 from virtualwork.family.target import Aim, Reached, Target
 from virtualwork.formulas.numbers import Complexes, Reals
 
@@ -81,7 +80,7 @@ class Fit(Generic[D]):
     @property
     def parameters(self) -> dict[str, float]:
         """The fitted numbers by path, SI."""
-        return dict(zip((d.path for d in self.dimensions), self.values.tolist(), strict=True))
+        return by_path(self.dimensions, self.values.tolist())
 
     @property
     def inputs(self) -> Reals:
@@ -354,8 +353,7 @@ class _Problem(Generic[D]):
                 return None
             reached += aim.reached(table, q)
             inputs.append(q)
-        numbers = zip((d.path for d in self.dimensions), values.tolist(), strict=True)
-        mechanism = changed(self.m, dict(numbers))
+        mechanism = changed(self.m, by_path(self.dimensions, values.tolist()))
         remarks = tuple(self._remarks(values, inputs))
         return Fit(mechanism, self.m, self.dimensions, values, tuple(reached), starts, evaluations, remarks)
 

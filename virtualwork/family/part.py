@@ -18,8 +18,8 @@ from dalembert.arithmetic.engines import Outputs, run_grid
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
-from virtualwork.describe.dimensions import Dimension, changed
-from virtualwork.family.branches import chosen, stays_within
+from virtualwork.describe.dimensions import Dimension, by_path, changed
+from virtualwork.family.branches import chosen, stays_within, with_signs
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import COMPLEX, FORCES, Key, over_blocks, quantity
 from virtualwork.formulas.dynamics import Dynamics
@@ -75,8 +75,7 @@ class Part:
 
     def described(self, i: int) -> Description:
         """The i-th variant."""
-        numbers = zip(self.dimensions, self.values[i].tolist(), strict=True)
-        return changed(self.mechanism, {d.path: number for d, number in numbers})
+        return changed(self.mechanism, by_path(self.dimensions, self.values[i].tolist()))
 
     def poses(self, i: int) -> Poses:
         """The i-th variant, put together alone.
@@ -148,7 +147,7 @@ class Solver:
         }
 
     @cached_property
-    def _signs(self) -> tuple[dict[str, Reals], Mask]:
+    def _chosen(self) -> tuple[dict[str, Reals], Mask]:
         """The sign of each closed form, and which variants are on the tape."""
         part, written = self.part, self.written
         if written is None:
@@ -172,19 +171,14 @@ class Solver:
         return low, high
 
     @property
-    def _known(self) -> dict[str, Reals]:
-        """The dimensions and the signs of each variant."""
-        return self._given | {f"sign {name}": sign for name, sign in self.signs.items()}
-
-    @property
     def signs(self) -> dict[str, Reals]:
         """The sign of each closed form of each variant, (v,), by the group's name."""
-        return self._signs[0]
+        return self._chosen[0]
 
     @property
     def together(self) -> Mask:
         """Which variants are on the tape, (v,)."""
-        return self._signs[1]
+        return self._chosen[1]
 
     def values(self, keys: Sequence[Key], out: Sequence[NDArray[Any]] | None = None) -> list[Any]:
         """Quantities by their keys (`Recording.value`), each (v, n); NaN where a pose is not assembled.
@@ -240,7 +234,8 @@ class Solver:
             return found
         low, high = self._span
         for number in range(len(m.torsion_springs)):
-            found &= stays_within(self.written, m, self._known, ("twist", number), HALF, v, low, high)
+            known = with_signs(self._given, self.signs)
+            found &= stays_within(self.written, m, known, ("twist", number), HALF, v, low, high)
         return found
 
     def _on_tape(
@@ -255,9 +250,9 @@ class Solver:
         together = isinstance(rows, slice)
         to = [x[rows] for x in out] if together else room(keys, v, n)
         first = dict(zip(reversed(keys), reversed(to), strict=True))
-        parts = [part for key in asked for part in _parts(first[key])]
+        rows_of = [part for key in asked for part in parts(first[key])]
         sound = np.empty(v, dtype=bool)
-        run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n), [*parts, sound])
+        run_grid(tape, {name: self._entering(name, rows) for name in tape.inputs}, (v, n), [*rows_of, sound])
         for key, x in zip(keys, to, strict=True):
             if key == ASSEMBLED:
                 x[:] = 0.0
@@ -282,8 +277,7 @@ class Solver:
         v, n = len(rows), self.part.shape[1]
         written = self.written
         closed = {key: ("closed", *written.recording.hangs_on(key)) for key in keys}
-        forces = any(key[0] in FORCES for key in keys)
-        margins: list[Key] = [("margin", g.name) for g in written.closed] if forces else []
+        margins = written.margins if any(key[0] in FORCES for key in keys) else []
         asked = [key for key in keys if key != ASSEMBLED]
         whole = list(dict.fromkeys(closed.values()))
         tape = written.tape((*asked, *whole, *margins))
@@ -304,7 +298,7 @@ class Solver:
         """An input of the tape for some variants: a number, or what broadcasts to (v, n)."""
         kind, _, group = name.partition(" ")
         if group and kind == "sign":
-            sign = self._signs[0][group][rows]
+            sign = self.signs[group][rows]
             return float(sign[0]) if (sign == sign[0]).all() else sign[:, None]
         if name in self._given:
             return self._given[name][rows, None]
@@ -354,7 +348,8 @@ def room(keys: Sequence[Key], v: int, n: int) -> list[NDArray[Any]]:
     return [np.empty((v, n), complex if key[0] in COMPLEX else float) for key in keys]
 
 
-def _parts(x: NDArray[Any]) -> list[Reals]:
+def parts(x: NDArray[Any]) -> list[Reals]:
+    """The real and the imaginary part of complex numbers, or real numbers as they are."""
     return [x.real, x.imag] if np.iscomplexobj(x) else [x]
 
 

@@ -12,9 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.engines import run
-from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.dimensions import Dimension, named, value
@@ -25,7 +23,7 @@ from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import NAMES
 
 # what an input's own numbers are called on the tape
-ENTERS = {"value": "q", "speed": "v", "acceleration": "a", "jerk": "j"}
+ENTERS = dict(zip(("value", "speed", "acceleration", "jerk"), NAMES, strict=True))
 
 
 class Sensitivities:
@@ -35,7 +33,6 @@ class Sensitivities:
         self.assembly, self.poses = assembly, poses
         self._lanes = Lanes(assembly, poses)
         self._written: dict[tuple[Dimension, ...], Written] = {}
-        self._tapes: dict[tuple[Any, ...], Tape] = {}
 
     def dimension(self, path: str) -> Dimension:
         """The one number that a path names.
@@ -62,13 +59,11 @@ class Sensitivities:
         every = tuple(dimensions)
         written = self._formulas(every)
         self._refuse(keys, written)
-        enters = [self._enters(d) for d in every]
-        asked = tuple(keys), every
-        if asked not in self._tapes:
-            tape = written.tape(keys)
-            there = [name for name in enters if name in tape.inputs]
-            self._tapes[asked] = derivatives(tape, there)
-        tape = self._tapes[asked]
+        # an input's own numbers enter as those of every input do
+        enters = [
+            d.path if d.where[0] != "inputs" else f"{ENTERS[str(d.where[2])]}{d.where[1]}" for d in every
+        ]
+        tape = written.slopes(tuple(keys), tuple(enters))
         given = {
             d.path: float(value(self.assembly.mechanism, d.path).real)
             for d in every
@@ -83,21 +78,12 @@ class Sensitivities:
         """The quantities themselves, (n,)."""
         return self._lanes.values(list(keys))
 
-    @staticmethod
-    def _enters(dimension: Dimension) -> str:
-        """What a dimension is called on the tape."""
-        if dimension.where[0] != "inputs":
-            return dimension.path
-        _, j, name = dimension.where
-        return f"{ENTERS[str(name)]}{j}"
-
     def _formulas(self, dimensions: tuple[Dimension, ...]) -> Written:
         if dimensions not in self._written:
             own = {d.where[-1] for d in dimensions if d.where[0] == "inputs"}
             moves = tuple(
-                any(np.any(rate) for rate in rates)
-                or {"v": "speed", "a": "acceleration", "j": "jerk"}[name] in own
-                for name, rates in zip(NAMES[1:], self.poses.rates, strict=True)
+                any(np.any(rate) for rate in rates) or rate in own
+                for rate, rates in zip(list(ENTERS)[1:], self.poses.rates, strict=True)
             )
             inner = [d for d in dimensions if d.where[0] != "inputs"]
             # which signs change on the way is known once the way was looked over

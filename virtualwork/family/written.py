@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.recorded import RECORDED, Recorder, bare
@@ -71,11 +72,7 @@ class Written:
         self.recording = Recording(
             self.mechanism, self.plan, signs, moves, turning, assembly.geared, settled, recorder
         )
-        self._tapes: dict[tuple[Key, ...], Tape] = {}
-        self._tested: dict[tuple[tuple[Key, ...], tuple[Key, ...]], Tape] = {}
-        self._told: dict[int, Tape] = {}
-        self._evaluations: dict[tuple[tuple[Key, ...], tuple[str, ...] | None, bool], Tape] = {}
-        self._slopes: dict[tuple[tuple[Key, ...], tuple[str, ...]], Tape] = {}
+        self._tapes: dict[tuple[Any, ...], Tape] = {}
 
     @cached_property
     def closed(self) -> list[Group]:
@@ -87,26 +84,30 @@ class Written:
         """The keys of their radicands."""
         return [("margin", group.name) for group in self.closed]
 
+    def _once(self, write: Callable[..., Tape], *asked: Any) -> Tape:
+        """A tape, written when it is first asked for."""
+        key = write.__name__, *asked
+        if key not in self._tapes:
+            self._tapes[key] = write(*asked)
+        return self._tapes[key]
+
     def tape(self, keys: Iterable[Key]) -> Tape:
-        """The tape of quantities, written once."""
-        asked = tuple(keys)
-        if asked not in self._tapes:
-            self._tapes[asked] = self.recording.tape(asked)
-        return self._tapes[asked]
+        """The tape of quantities."""
+        return self._once(self.recording.tape, tuple(keys))
 
     def tested(self, keys: Sequence[Key], also: Sequence[Key] = ()) -> Tape:
         """The tape of quantities, and `sound`: positive where all is assembled that they, and others, hang on.
 
         And where forces among them have digits.
         """
-        asked = tuple(keys), tuple(also)
-        if asked not in self._tested:
-            closed = [("closed", *self.recording.hangs_on(key)) for key in (*keys, *also)]
-            sound = [sys.float_info.max - abs(self.recording.value(key)) for key in dict.fromkeys(closed)]
-            if any(key[0] in FORCES for key in keys):
-                sound += [abs(self.recording.value(key)) - NEAR for key in self.margins]
-            self._tested[asked] = self.recording.tape(keys, {"sound": every(sound)})
-        return self._tested[asked]
+        return self._once(self._tested, tuple(keys), tuple(also))
+
+    def _tested(self, keys: tuple[Key, ...], also: tuple[Key, ...]) -> Tape:
+        closed = [("closed", *self.recording.hangs_on(key)) for key in (*keys, *also)]
+        sound = [sys.float_info.max - abs(self.recording.value(key)) for key in dict.fromkeys(closed)]
+        if any(key[0] in FORCES for key in keys):
+            sound += [abs(self.recording.value(key)) - NEAR for key in self.margins]
+        return self.recording.tape(keys, {"sound": every(sound)})
 
     @cached_property
     def clear(self) -> Tape:
@@ -121,21 +122,21 @@ class Written:
         the radicands are far from zero there and at further inputs `way 0`, `way 1` …, so many. Where it is not told the
         signs mean nothing.
         """
-        if samples not in self._told:
-            recorder = Recorder()
-            found, margins = _again(self.choice, recorder, {}), self.tape(self.margins)
-            signs, clear = {}, []
-            for name in (group.name for group in self.closed):
-                signs[f"sign {name}"] = RECORDED.select(
-                    found[f"plus {name}"] - found[f"minus {name}"], -1.0, 1.0
-                )
-                clear.append(found[f"margin {name}"] - CLEAR)
-            for i in range(samples):
-                depths = _again(margins, recorder, signs | {"q0": recorder.input(f"way {i}")})
-                clear += [depth - CLEAR for depth in depths.values()]
-            outputs = signs | {"told": every(self._plain(found), every(clear, 2.0, 1.0))}
-            self._told[samples] = recorder.tape(outputs)
-        return self._told[samples]
+        return self._once(self._told, samples)
+
+    def _told(self, samples: int) -> Tape:
+        recorder = Recorder()
+        found, margins = _again(self.choice, recorder, {}), self.tape(self.margins)
+        signs, clear = {}, []
+        for name in (group.name for group in self.closed):
+            nearer = found[f"plus {name}"] - found[f"minus {name}"]
+            signs[f"sign {name}"] = RECORDED.select(nearer, -1.0, 1.0)
+            clear.append(found[f"margin {name}"] - CLEAR)
+        for i in range(samples):
+            depths = _again(margins, recorder, signs | {"q0": recorder.input(f"way {i}")})
+            clear += [depth - CLEAR for depth in depths.values()]
+        told = every(self._plain(found), every(clear, 2.0, 1.0))
+        return recorder.tape(signs | {"told": told})
 
     def _plain(self, found: Mapping[str, Number]) -> list[Number]:
         """What is positive where a choice is told plainly."""
@@ -152,39 +153,36 @@ class Written:
         `own_signs`: the signs are those of the guess, at the input `at`, and last comes `fine`: positive where these are
         told plainly, and for the quantities themselves where no radicand is near zero. Else the signs enter.
         """
-        asked = tuple(keys), enters, own_signs
-        if asked not in self._evaluations:
-            recorder = Recorder()
-            signs: dict[str, Number] = {}
-            fine: list[Number] = []
-            if own_signs:
-                found = _again(self.choice, recorder, {"q0": recorder.input("at")})
-                signs, fine = (
-                    {name: found[name] for name in found if name.startswith("sign ")},
-                    self._plain(found),
-                )
-            parts = [part for key in keys for part in names(key)]
-            if enters is None:
-                margins = self.margins if own_signs else []
-                outputs = _again(self.tape((*keys, *margins)), recorder, signs)
-                fine += [outputs.pop(name) - DIP for key in margins for name in names(key)]
-            else:
-                found = _again(self.slopes(keys, enters), recorder, signs)
-                every_one = [f"d({part})/d({name})" for part in parts for name in enters]
-                outputs = {name: found.get(name, 0.0) for name in every_one}
-            if own_signs:
-                outputs["fine"] = every(fine)
-            self._evaluations[asked] = recorder.tape(outputs)
-        return self._evaluations[asked]
+        return self._once(self._evaluation, tuple(keys), enters, own_signs)
 
-    def slopes(self, keys: Sequence[Key], enters: tuple[str, ...]) -> Tape:
-        """The tape of quantities' derivatives to what enters, as far as they hang on that; written once."""
-        asked = tuple(keys), enters
-        if asked not in self._slopes:
-            tape = self.tape(keys)
-            there = [name for name in enters if name in tape.inputs]
-            self._slopes[asked] = derivatives(tape, there)
-        return self._slopes[asked]
+    def _evaluation(self, keys: tuple[Key, ...], enters: tuple[str, ...] | None, own_signs: bool) -> Tape:
+        recorder = Recorder()
+        signs: dict[str, Number] = {}
+        fine: list[Number] = []
+        if own_signs:
+            found = _again(self.choice, recorder, {"q0": recorder.input("at")})
+            signs = {name: found[name] for name in found if name.startswith("sign ")}
+            fine = self._plain(found)
+        if enters is None:
+            margins = self.margins if own_signs else []
+            outputs = _again(self.tape((*keys, *margins)), recorder, signs)
+            fine += [outputs.pop(name) - DIP for key in margins for name in names(key)]
+        else:
+            found = _again(self.slopes(keys, enters), recorder, signs)
+            parts = [part for key in keys for part in names(key)]
+            every_one = [f"d({part})/d({name})" for part in parts for name in enters]
+            outputs = {name: found.get(name, 0.0) for name in every_one}
+        if own_signs:
+            outputs["fine"] = every(fine)
+        return recorder.tape(outputs)
+
+    def slopes(self, keys: tuple[Key, ...], enters: tuple[str, ...]) -> Tape:
+        """The tape of quantities' derivatives to what enters, as far as they hang on that."""
+        return self._once(self._slopes, keys, enters)
+
+    def _slopes(self, keys: tuple[Key, ...], enters: tuple[str, ...]) -> Tape:
+        tape = self.tape(keys)
+        return derivatives(tape, [name for name in enters if name in tape.inputs])
 
     @cached_property
     def choice(self) -> Tape:

@@ -250,17 +250,19 @@ class Case:
         w = st.point[self.closure.start] - st.point[self.closure.end]
         return w + st.sum(self.known) if self.known else w
 
+    def vectors(self, st: State) -> tuple[Number, Number]:
+        """What turns with each unknown angle, V, and what each unknown slide runs along, U."""
+        if self.group.kind == "RRR":
+            return self.arm(0, st), self.arm(1, st)
+        if self.group.kind == "RPR":
+            return self.arm(0, st), self.rail(st)
+        rails = [z * st.turn[body] for z, body in self.rails]
+        return (self.arm(0, st), rails[0]) if self.group.kind == "RRP" else (rails[0], rails[1])
+
     def gap(self, st: State) -> Gap | None:
         """By how much the group does not close at one pose; None where it does."""
-        group = self.group
-        if group.kind == "RRR":
-            v, u = self.arm(0, st), self.arm(1, st)
-        elif group.kind == "PRP":
-            v, u = (z * st.turn[body] for z, body in self.rails)
-        else:
-            z, body = self.rails[0]
-            v, u = self.arm(0, st), z * st.turn[body] if group.kind == "RRP" else self.rail(st)
-        return gap_of(group.kind, group.angles, complex(self.offset(st)), complex(v), complex(u))
+        w, (v, u) = self.offset(st), self.vectors(st)
+        return gap_of(self.group.kind, self.group.angles, complex(w), complex(v), complex(u))
 
     def solve(self, st: State, sign: Number, size: float, folded: bool = False) -> None:
         """Write the group's rotations and slides into the state; `folded`: its two assemblies meet in every pose."""
@@ -270,24 +272,20 @@ class Case:
         if st.many and isinstance(w, complex):
             # between points that stand: as in any array, what is divided by zero is infinite
             w = np.complex128(w)
+        v, u = self.vectors(st)
         if group.kind == "RRR":
-            a, b = group.angles
-            st.turn[a], st.turn[b], margin = two_angles(w, self.arm(0, st), self.arm(1, st), sign, kind)
+            *found, margin = two_angles(w, v, u, sign, kind)
         elif group.kind == "RRP":
-            (a,), (g,) = group.angles, group.slides
-            z, body = self.rails[0]
-            st.turn[a], st.slide[g], margin = angle_and_slide(
-                w, self.arm(0, st), z * st.turn[body], sign, kind
-            )
+            *found, margin = angle_and_slide(w, v, u, sign, kind)
         elif group.kind == "RPR":
-            (a,), (g,) = group.angles, group.slides
-            st.turn[a], st.slide[g], margin = turning_slide(
-                w, self.arm(0, st), self.rail(st), sign, size, kind
-            )
+            *found, margin = turning_slide(w, v, u, sign, size, kind)
         else:
-            g, h = group.slides
-            u, v = (z * st.turn[body] for z, body in self.rails)
-            st.slide[g], st.slide[h], margin = two_slides(w, u, v)
+            *found, margin = two_slides(w, v, u)
+        for i, value in enumerate(found, -len(group.angles)):
+            if i < 0:
+                st.turn[group.angles[i]] = value
+            else:
+                st.slide[group.slides[i]] = value
         st.margin[group.name] = margin
         if folded:
             st.folded.add(group.name)

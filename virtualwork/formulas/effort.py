@@ -96,12 +96,11 @@ def through_carriers(scene: Scene, force: Reals) -> Reals:
     """
     inputs = scene.mechanism.inputs
     k = len(inputs)
-    moved = [j for j, e in enumerate(inputs) if not e.is_slide and scene.mechanism.carrier(j) != e.on]
-    if not moved:
+    if not scene.mechanism.carried:
         return force
     poses = scene.poses
     matrix = np.broadcast_to(np.eye(k), (poses.n, k, k)).copy()
-    for j in moved:
+    for j in scene.mechanism.carried:
         for i in range(k):
             bodies = str(inputs[j].link), scene.mechanism.carrier(j)
             driven, carrier = poses.values([("dangle", body, i, 1) for body in bodies])

@@ -5,6 +5,7 @@ A load that is zero for the whole case (no mass, no speed, no stiffness) is not 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cached_property
 
@@ -18,12 +19,13 @@ from virtualwork.formulas.loads import (
     InertiaForce,
     InertiaTorque,
     Load,
+    SpringEnd,
     Tabled,
+    TorsionEnd,
 )
 from virtualwork.formulas.quantities import Combination, Quantities
-from virtualwork.formulas.springs import SpringEnd, TorsionEnd
 from virtualwork.plan.order import combined
-from virtualwork.plan.steps import Joint, Path, Place, Plan, Term, joints
+from virtualwork.plan.steps import Joint, Path, Place, Plan, Term, joints, path_reads
 
 
 class LoadCase:
@@ -151,6 +153,24 @@ class LoadCase:
         """Loads and friction."""
         return [*self.loads, *self.friction]
 
+    def targets(self, keys: Iterable[str] = ()) -> tuple[tuple[str, ...], int]:
+        """What `keys` and the loads hang on, `angle:BODY`, `slide:GUIDE`, `point:NODE`, and to which derivative."""
+        reads = set(keys).union(*(load.reads() for load in self.everything)) - {f"angle:{GROUND}"}
+        if not reads:
+            # nothing acts: any one thing that moves will do
+            reads = set(self.plan.writes(next(s for s in self.plan.steps if not isinstance(s, Place))))
+        return tuple(sorted(reads)), max((load.order for load in self.loads), default=1)
+
+    @cached_property
+    def places(self) -> tuple[str, ...]:
+        """What the places of all joints hang on."""
+        keys = {f"slide:{i}" for i in range(len(self.mechanism.guides))}
+        for body, r in self.mechanism.rigid.items():
+            keys |= path_reads(self.path(body, r.center)) | {f"angle:{body}"}
+        for group in self.plan.groups:
+            keys |= self.plan.reads(group) | set(self.plan.writes(group))
+        return tuple(sorted(keys))
+
     def acceleration(self, path: Path) -> Combination:
         """The acceleration of a point: Σ z·(s e^{iθ})″, from the point its body hangs on.
 
@@ -192,10 +212,8 @@ class LoadCase:
         motor acts between the driven link and its carrier (Ibrahim §2.3).
         """
         found = []
-        for j, entry in enumerate(self.mechanism.inputs):
-            body = entry.on if entry.is_slide else self.mechanism.carrier(j)
-            if body != entry.on:
-                found += [(body, j, -1.0), (entry.on, j, 1.0)]
+        for j in self.mechanism.carried:
+            found += [(self.mechanism.carrier(j), j, -1.0), (self.mechanism.inputs[j].on, j, 1.0)]
         return [entry for entry in found if entry[0] != GROUND]
 
 

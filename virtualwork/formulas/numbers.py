@@ -75,12 +75,13 @@ def leave_out(values: NDArray[Any], which: NDArray[np.bool_]) -> None:
 
 
 def xy(z: Complexes) -> Reals:
-    """x + iy as rows (x, y), without a copy.
+    """x + iy (..., n) as rows (x, y), (..., n, 2), without a copy.
 
     >>> xy(np.array([1 + 2j]))
     array([[1., 2.]])
     """
-    return np.ascontiguousarray(z).view(float).reshape(-1, 2)
+    z = np.ascontiguousarray(z)
+    return z.view(float).reshape(*z.shape, 2)
 
 
 # --- linear systems of loops: from complex columns to real solutions, over all poses together ------------------------
@@ -99,11 +100,7 @@ def stack(cols: list[list[Number]], n: int) -> Reals:
 
 def stack_rows(rows: list[Number], n: int) -> Reals:
     """The real loop gaps (n, 2·loops) from complex ones."""
-    out = np.empty((n, 2 * len(rows)))
-    for i, w in enumerate(rows):
-        out[:, 2 * i] = np.real(w)
-        out[:, 2 * i + 1] = np.imag(w)
-    return out
+    return stack([[w] for w in rows], n)[:, :, 0]
 
 
 def solve(jacobian: Reals, right: Reals) -> Reals:

@@ -11,7 +11,6 @@ there is no friction: its value at rest is not determined, only bounded.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from virtualwork.formulas.numbers import Number, dot, leave_out, minus, plus, ti
 from virtualwork.formulas.positions import BLOCK
 from virtualwork.formulas.scene import Scene
 from virtualwork.plan.joint_forces import Side
-from virtualwork.plan.steps import Joint, path_reads
+from virtualwork.plan.steps import Joint
 
 # iterations of friction; each gains a factor of some μ r / l
 LIMIT = 200
@@ -125,24 +124,10 @@ class Reactions(JointForces):
         super().__init__(scene.paths, scene.formed)
         self.scene = scene
 
-    @cached_property
-    def keys(self) -> tuple[str, ...]:
-        """What the places of all joints hang on."""
-        keys: set[str] = set()
-        for body in self.mechanism.links:
-            keys |= path_reads(self.scene.case.path(body, self.mechanism.rigid[body].center)) | {
-                f"angle:{body}"
-            }
-        for i in range(len(self.mechanism.guides)):
-            keys.add(f"slide:{i}")
-        for group in self.plan.groups:
-            keys |= self.plan.reads(group) | set(self.plan.writes(group))
-        return tuple(sorted(keys))
-
     def blocks(self) -> list[Block]:
         """The scene's blocks, with what all joints' places hang on."""
         self._drive()
-        return self.scene.blocks(self.keys)
+        return self.scene.blocks(self.scene.case.places)
 
     def _drive(self) -> None:
         """Form the efforts of carried motors over all poses, before the blocks are solved one by one."""
@@ -173,7 +158,7 @@ class Reactions(JointForces):
                 # over a long sweep what the quantities were made of is not kept
                 block.forget(lasting=True)
 
-        self.scene.each(self.keys, work)
+        self.scene.each(self.scene.case.places, work)
         if self.scene.lost is not None:
             for out in found:
                 leave_out(out, self.scene.lost)
@@ -232,5 +217,5 @@ def settle(scene: Scene) -> tuple[int, NDArray[np.bool_]]:
 def _anew(reactions: Reactions) -> None:
     """Forget what was formed with the friction before."""
     reactions.scene.setting.drive = None
-    for block in reactions.scene.blocks(reactions.keys):
+    for block in reactions.scene.blocks(reactions.scene.case.places):
         block.forget()

@@ -168,38 +168,25 @@ class Recording:
         if self._forces is None:
             case = LoadCase(self.mechanism, self.plan, any(self.moves[:2]))
             paths = LoadPaths(case)
-            reads = set().union(*(load.reads() for load in case.everything))
-            # where nothing acts, any one thing that moves will do
-            reads = reads or {key for s in self.plan.steps for key in self.plan.writes(s)}
-            self.solve(reads, max((load.order for load in case.loads), default=1))
+            self.solve(*case.targets())
             self._forces = paths, JointForces(paths, set()), _Block(self)
         return self._forces
 
-    def _places(self, order: int = 1) -> tuple[LoadPaths, JointForces, Block]:
+    def _places(self) -> tuple[LoadPaths, JointForces, Block]:
         """The forces, with everything solved that the places of all joints hang on."""
-        paths, *_ = self.forces
-        keys: set[str] = {f"slide:{i}" for i in range(len(self.mechanism.guides))}
-        for body in self.mechanism.links:
-            keys |= path_reads(paths.case.path(body, self.mechanism.rigid[body].center)) | {f"angle:{body}"}
-        for group in self.plan.groups:
-            keys |= self.plan.reads(group) | set(self.plan.writes(group))
-        self.solve(keys, max((load.order for load in paths.case.loads), default=order))
+        case = self.forces[0].case
+        self.solve(*case.targets(case.places))
         return self.forces
 
     def efforts(self) -> list[Number]:
         """The effort at each input by virtual work, through the carriers of motors."""
         paths, _, block = self.forces
         k = len(self.mechanism.inputs)
-        moved = [
-            j
-            for j, e in enumerate(self.mechanism.inputs)
-            if not e.is_slide and self.mechanism.carrier(j) != e.on
-        ]
         force = [self._negative(generalized_force(paths, block, j)) for j in range(k)]
-        if not moved:
+        if not self.mechanism.carried:
             return force
         matrix: list[list[Number]] = [[float(i == j) for j in range(k)] for i in range(k)]
-        for j in moved:
+        for j in self.mechanism.carried:
             link, carrier = str(self.mechanism.inputs[j].link), self.mechanism.carrier(j)
             self.solve([f"angle:{link}", f"angle:{carrier}"], 1)
             for i in range(k):

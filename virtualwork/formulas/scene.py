@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualwork.describe.parts import GROUND, Rigid
+from virtualwork.describe.parts import Rigid
 from virtualwork.formulas.block import Block, Setting
 from virtualwork.formulas.load_case import LoadCase
 from virtualwork.formulas.load_paths import LoadPaths
@@ -16,7 +16,6 @@ from virtualwork.formulas.loads import FrictionLoad, Load
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.positions import BLOCK
 from virtualwork.formulas.rates import Rates
-from virtualwork.plan.steps import Place
 
 
 class Scene:
@@ -69,16 +68,9 @@ class Scene:
         return self.mechanism.rigid
 
     # --- solving ----------------------------------------------------------------------------------------------
-    def _targets(self, keys: Iterable[str]) -> tuple[tuple[str, ...], int]:
-        reads = set(keys).union(*(load.reads() for load in self.case.everything)) - {f"angle:{GROUND}"}
-        if not reads:
-            # nothing acts: any one thing that moves will do
-            reads = set(self.plan.writes(next(s for s in self.plan.steps if not isinstance(s, Place))))
-        return tuple(sorted(reads)), max((load.order for load in self.loads), default=1)
-
     def blocks(self, keys: Iterable[str] = ()) -> list[Block]:
         """The blocks of poses, with everything solved that the loads and `keys` hang on."""
-        targets, order = self._targets(keys)
+        targets, order = self.case.targets(keys)
         if targets in self._blocks:
             return self._blocks[targets]
         k = len(self.mechanism.inputs)
@@ -102,7 +94,7 @@ class Scene:
 
     def each(self, keys: Iterable[str], form: Callable[[Block], None]) -> None:
         """Form something over every block; of a single input while the block is still in cache from its solution."""
-        targets, order = self._targets(keys)
+        targets, order = self.case.targets(keys)
         if len(self.mechanism.inputs) > 1 or targets in self._blocks or self.poses.n <= BLOCK:
             for block in self.blocks(keys):
                 form(block)

@@ -216,34 +216,29 @@ class Statics:
                 return f"the {kind} {'force ' if kind == 'normal' else ''}of guide {names[key]}"
             return f"the {kind} of {'input' if kind in ('force', 'torque') else 'gear'} {int(key) + 1}"
 
-        found = ["statics does not determine " + ", ".join(label(self.unknowns[i]) for i in free)]
+        by_key = self.reactions.by_key
+
+        def at(axis: str, body: str, joined: bool) -> list[int]:
+            """The open forces of an axis on a body, or of the joints it is `joined` by."""
+            return [
+                i
+                for i in free
+                for kind, key, on in (self.unknowns[i],)
+                if kind == axis and (body in by_key[key].bodies if joined else on == body)
+            ]
+
+        links = list(self.mechanism.links)
         sums = []
         for axis in ("fx", "fy"):
-            for body in self.mechanism.links:
-                here = [i for i in free if self.unknowns[i][0] == axis and self.unknowns[i][2] == body]
-                if len(here) > 1 and np.abs(null[:, :, here].sum(axis=2)).max() <= 1e-7:
-                    places = " and ".join(names[self.unknowns[i][1]] for i in here)
-                    sums.append(f"{axis} on {body} at {places}")
-            ground = [
-                i
-                for i in free
-                if self.unknowns[i][0] == axis and GROUND in self.reactions.by_key[self.unknowns[i][1]].bodies
-            ]
-            if len(ground) > 1 and np.abs(null[:, :, ground].sum(axis=2)).max() <= 1e-7:
-                sums.append(
-                    f"{axis} from the ground at {' and '.join(names[self.unknowns[i][1]] for i in ground)}"
-                )
-        for link in self.mechanism.links:
-            here = [
-                i
-                for i in free
-                if self.unknowns[i][0] == "normal"
-                and link in self.reactions.by_key[self.unknowns[i][1]].bodies
-            ]
-            if len(here) > 1 and np.abs(null[:, :, here].sum(axis=2)).max() <= 1e-7:
-                sums.append(
-                    f"normal force on {link} at {' and '.join(names[self.unknowns[i][1]] for i in here)}"
-                )
-        if sums:
-            found.append("determined are the sums of " + "; ".join(sums))
+            sums += [(f"{axis} on {body}", at(axis, body, False)) for body in links]
+            sums.append((f"{axis} from the ground", at(axis, GROUND, True)))
+        sums += [(f"normal force on {link}", at("normal", link, True)) for link in links]
+        known = [
+            f"{what} at {' and '.join(names[self.unknowns[i][1]] for i in here)}"
+            for what, here in sums
+            if len(here) > 1 and np.abs(null[:, :, here].sum(axis=2)).max() <= 1e-7
+        ]
+        found = ["statics does not determine " + ", ".join(label(self.unknowns[i]) for i in free)]
+        if known:
+            found.append("determined are the sums of " + "; ".join(known))
         return found

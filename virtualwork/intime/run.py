@@ -185,7 +185,7 @@ class Run:
         They have every place and rate, for a page solves nothing of a motion whose coordinates change on the way.
         """
         from virtualwork.animation import Series
-        from virtualwork.picture.shapes import shapes_of
+        from virtualwork.picture.paper import shapes_of
 
         home = self.fine.legs[0].coordinates
         poses = home.motion(self.angle, self.speed, self.acceleration, self.t).poses

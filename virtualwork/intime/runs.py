@@ -8,8 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualwork.family.family import Family
-from virtualwork.family.motion import FamilyMotion
+from virtualwork.family.family import Family, FamilyMotion
 from virtualwork.family.part import Part
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.run import Run

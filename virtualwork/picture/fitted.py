@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.drawing.amounts import prefixed
+from dalembert.drawing.amounts import dimensioned
 from dalembert.drawing.sheet import plain, sheet
 from virtualwork.formulas.numbers import Reals
 
@@ -114,6 +114,4 @@ AFTER: dict[str, Any] = {"color": "#0072b2", "lw": 1.6, "label": "fitted"}
 
 
 def _lengths(sizes: Reals) -> tuple[float, str]:
-    """Drawings are dimensioned in millimetres up to two metres."""
-    size = float(sizes.max(initial=0.0))
-    return (1e3, "mm") if 2e-4 <= size < 2 else prefixed(size, "m")
+    return dimensioned(float(sizes.max(initial=0.0)), 2e-4)

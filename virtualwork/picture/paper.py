@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dalembert.drawing.amounts import prefixed
+from dalembert.drawing.amounts import dimensioned
 from dalembert.drawing.labels import Label, place
 from dalembert.drawing.sheet import plain, sheet
 from virtualwork.describe.parts import GROUND
-from virtualwork.drawing import Circle, Coil, Shape, tracers
+from virtualwork.drawing import Circle, Coil, Drawing, Shape, draw, tracers
 from virtualwork.formulas.numbers import Complexes
 from virtualwork.formulas.poses import Poses
-from virtualwork.picture.shapes import shapes_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,13 +59,23 @@ def on_paper(poses: Poses, points: Sequence[str] | None = None, figure: FigureBa
     return _Paper(poses, figure).draw(points)
 
 
+def shapes_of(*motions: Poses) -> Drawing:
+    """Return what a mechanism is drawn as, its guides as long as they are used in the poses of all of its motions."""
+    m = motions[0].mechanism
+    spans = []
+    for i in range(len(m.guides)):
+        slide = np.concatenate([poses.values([("slide", i, 0)])[0] for poses in motions])
+        used = slide[np.isfinite(slide)]
+        spans.append((float(used.min()), float(used.max())) if len(used) else (-np.inf, np.inf))
+    return draw(m, spans)
+
+
 class _Paper:
     def __init__(self, poses: Poses, figure: FigureBase | None) -> None:
         self.poses, self.m = poses, poses.mechanism
         self.travel = self._travel()
         self.drawing = shapes_of(poses, self.travel)
-        # drawings are dimensioned in millimetres up to two metres
-        self.scale, self.unit = (1e3, "mm") if 2e-3 <= self.m.size < 2 else prefixed(self.m.size, "m")
+        self.scale, self.unit = dimensioned(self.m.size)
         good = np.flatnonzero(poses.assembled)
         steps = np.linspace(0, max(len(good) - 1, 0), min(DRAWN, len(good))).astype(int)
         self.shown: list[int] = list(dict.fromkeys(good[steps].tolist()))
@@ -166,11 +175,9 @@ class _Paper:
         """Draw the paths of points over the whole travel, and return their names."""
         m = self.m
         labels = []
-        body_of = {name: body for body in reversed([*m.bodies]) for name in m.bodies[body]}
-        wanted = tracers(m) if points is None else [p for p in points if body_of.get(p, GROUND) != GROUND]
+        wanted = tracers(m) if points is None else [p for p in points if p in m.points and p not in m.ground]
         for name in dict.fromkeys(wanted) if self.travel.n > 1 else ():
-            own = m.bodies[body_of[name]][name]
-            z = self.travel.point(body_of[name], own, 0, name) * self.scale
+            z = self.travel.point(*m.points[name], 0, name) * self.scale
             self.axes.plot(z.real, z.imag, color="0.15", lw=0.9, zorder=2)
             at = z[np.isfinite(z)]
             if len(at):

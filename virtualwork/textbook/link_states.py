@@ -112,11 +112,15 @@ class LinkStates:
 
         Kinds without a load are never multiplied out.
         """
-        found = {
-            kind: self._linear(load, rate) if linear else self._angular(load)
-            for kind, (linear, load, rate) in self._products().items()
-        }
-        return {kind: term for kind, term in found.items() if term is not None}
+        found = {}
+        for kind, (load, rate) in self._products().items():
+            if load.any():
+                size, power = np.abs(load), _power(load, rate)
+                fastest = self.fastest[0 if np.iscomplexobj(load) else 1]
+                works = (np.abs(power) > ROUNDING * size * fastest) | np.isinf(power)
+                works, there = (np.broadcast_to(mask, self.shape) for mask in (works, size > 0))
+                found[kind] = PowerTerm(np.where(works, power, 0.0), works, there & ~works)
+        return found
 
     @cached_property
     def power(self) -> Real:
@@ -129,9 +133,9 @@ class LinkStates:
     @cached_property
     def fastest(self) -> tuple[Real, Real]:
         """The largest speed of a point (m/s) and the largest angular speed (rad/s) among the links, each (..., 1)."""
-        speed = np.abs(self._vectors(self.velocity))
+        speed = np.abs(np.asarray(self.velocity, dtype=complex))
         if self.point_velocity is not None:
-            speed = np.maximum(speed, np.abs(self._vectors(self.point_velocity)))
+            speed = np.maximum(speed, np.abs(self.applied_velocity))
         turning = np.abs(np.asarray(self.omega, dtype=float))
         full = self.shape
         return (
@@ -139,60 +143,50 @@ class LinkStates:
             np.broadcast_to(turning, full).max(axis=-1, keepdims=True),
         )
 
+    @cached_property
+    def applied_velocity(self) -> Complex:
+        """The velocities of the points of application of the forces, m/s."""
+        at = self.velocity if self.point_velocity is None else self.point_velocity
+        return np.asarray(at, dtype=complex)
+
     def power_error_estimate(self) -> Real:
         """Return a bound (...) of the rounding error of `power`, W."""
         size, cut = np.zeros(self.shape), np.zeros(self.shape)
-        for kind, (linear, load, rate) in self._products().items():
+        for kind, (load, rate) in self._products().items():
             if kind in self.terms:
                 size = size + _sizes(load, rate)
                 # a power that was taken for none because it is below rounding may yet be one
-                power = (load * np.conj(rate)).real if linear else load * rate
-                cut = cut + np.where(self.terms[kind].works, 0.0, np.abs(power))
+                cut = cut + np.where(self.terms[kind].works, 0.0, np.abs(_power(load, rate)))
         return np.asarray(_summed(size) + cut.sum(axis=-1))
 
     def term_error_estimate(self, kind: str) -> Real:
         """Return a bound (..., n) of the rounding error of each power of one kind, W."""
-        _, load, rate = self._products()[kind]
-        return np.broadcast_to(FACTORS * _sizes(load, rate), self.shape)
+        return np.broadcast_to(FACTORS * _sizes(*self._products()[kind]), self.shape)
 
     def unit_power_error_estimate(self, unknown: UnitLoad) -> Real:
         """Return a bound (...) of the rounding error of the power of a unit of an unknown, W."""
-        at = self._vectors(self.velocity if self.point_velocity is None else self.point_velocity)
-        size = _sizes(np.asarray(unknown.force, dtype=complex), at)
+        size = _sizes(np.asarray(unknown.force, dtype=complex), self.applied_velocity)
         size = size + _sizes(np.asarray(unknown.torque, dtype=float), np.asarray(self.omega, dtype=float))
         return _summed(np.broadcast_to(size, self.shape))
 
-    def _products(self) -> dict[str, tuple[bool, Any, Any]]:
-        """What is multiplied for the power of each kind: whether it is a force, the load, the velocity."""
-        v, omega = self._vectors(self.velocity), np.asarray(self.omega, dtype=float)
-        at = v if self.point_velocity is None else self._vectors(self.point_velocity)
-        mass, inertia = np.asarray(self.mass, dtype=float), np.asarray(self.inertia, dtype=float)
+    def _products(self) -> dict[str, tuple[Any, Any]]:
+        """What is multiplied for the power of each kind: force and velocity, complex, or torque and angular velocity."""
+        v, a, force = (np.asarray(x, dtype=complex) for x in (self.velocity, self.acceleration, self.force))
+        mass, inertia, omega, alpha, torque = (
+            np.asarray(x, dtype=float) for x in (self.mass, self.inertia, self.omega, self.alpha, self.torque)
+        )
         return {
-            "applied force": (True, self._vectors(self.force), at),
-            "applied torque": (False, np.asarray(self.torque, dtype=float), omega),
-            "weight": (True, mass * self.gravity, v),
-            "inertia force": (True, -mass * self._vectors(self.acceleration), v),
-            "inertia torque": (False, -inertia * np.asarray(self.alpha, dtype=float), omega),
+            "applied force": (force, self.applied_velocity),
+            "applied torque": (torque, omega),
+            "weight": (mass * np.asarray(self.gravity, dtype=complex), v),
+            "inertia force": (-mass * a, v),
+            "inertia torque": (-inertia * alpha, omega),
         }
 
-    @staticmethod
-    def _vectors(value: ArrayLike) -> Complex:
-        return np.asarray(value, dtype=complex)
 
-    def _linear(self, force: Complex, velocity: Complex) -> PowerTerm | None:
-        if not force.any():
-            return None
-        return self._term(np.abs(force), (force * velocity.conj()).real, self.fastest[0])
-
-    def _angular(self, torque: Real) -> PowerTerm | None:
-        if not torque.any():
-            return None
-        return self._term(np.abs(torque), torque * np.asarray(self.omega, dtype=float), self.fastest[1])
-
-    def _term(self, load: Real, power: Real, fastest: Real) -> PowerTerm:
-        works = np.broadcast_to((np.abs(power) > ROUNDING * load * fastest) | np.isinf(power), self.shape)
-        there = np.broadcast_to(load > 0, self.shape)
-        return PowerTerm(np.where(works, power, 0.0), works, there & ~works)
+def _power(load: Any, rate: Any) -> Any:
+    """F·v, or T ω."""
+    return (load * np.conj(rate)).real
 
 
 def _sizes(load: Any, rate: Any) -> Any:
@@ -314,11 +308,8 @@ class Balance:
         wrong = wrong[..., None, :] if k == 1 else wrong
         size = np.abs(np.where(self.determined, self.value, 0.0))[..., None]
         total = power + ((wrong + EPS * np.abs(self.coefficient)) @ size)[..., 0]
-        rows = np.abs(self.coefficient).max(axis=-1, keepdims=True)
-        rows = np.where(rows > 0, rows, 1.0)
-        columns = np.abs(self.coefficient / rows).max(axis=-2, keepdims=True)
-        columns = np.where(columns > 0, columns, 1.0)
-        inverse = np.abs(np.linalg.pinv(self.coefficient / rows / columns, rcond=k * ROUNDING))
+        scaled, rows, columns = _scaled(self.coefficient)
+        inverse = np.abs(np.linalg.pinv(scaled, rcond=k * ROUNDING))
         error = (inverse @ (total / rows[..., 0])[..., None])[..., 0] / columns[..., 0, :]
         return np.where(self.determined, error + EPS / 2 * size[..., 0], np.inf)
 
@@ -369,12 +360,11 @@ def balance(states: LinkStates, unknowns: Sequence[UnitLoad]) -> Balance:
         raise ValueError(
             f"{k} unknowns need {k} velocity fields, on the last axis but one: the states have shape {states.shape}"
         )
-    at = states.velocity if states.point_velocity is None else states.point_velocity
     fast, turning = (largest[..., 0] for largest in states.fastest)
     columns, scales = [], []
     for unknown in unknowns:
         force, torque = np.asarray(unknown.force, dtype=complex), np.asarray(unknown.torque, dtype=float)
-        power = (force * np.conj(at)).real + torque * np.asarray(states.omega, dtype=float)
+        power = _power(force, states.applied_velocity) + torque * np.asarray(states.omega, dtype=float)
         columns.append(np.broadcast_to(power, states.shape).sum(axis=-1))
         full_force = np.broadcast_to(np.abs(force), states.shape).sum(axis=-1)
         full_torque = np.broadcast_to(np.abs(torque), states.shape).sum(axis=-1)
@@ -399,15 +389,20 @@ def balance(states: LinkStates, unknowns: Sequence[UnitLoad]) -> Balance:
     return replace(_solve(coefficient, states.power), given=(states, tuple(unknowns)))
 
 
+def _scaled(coefficient: Real) -> tuple[Real, Real, Real]:
+    """Return matrices with rows and columns of like size, and by what each row and each column was divided."""
+    rows = np.abs(coefficient).max(axis=-1, keepdims=True)
+    rows = np.where(rows > 0, rows, 1.0)
+    columns = np.abs(coefficient / rows).max(axis=-2, keepdims=True)
+    columns = np.where(columns > 0, columns, 1.0)
+    return np.asarray(coefficient / rows / columns), rows, columns
+
+
 def _solve(coefficient: Real, power: Real) -> Balance:
     """Solve the k × k systems, rows and columns scaled; name what a singular one leaves open."""
     works = (coefficient != 0).any(axis=-2)
-    rows = np.abs(coefficient).max(axis=-1, keepdims=True)
-    scaled = coefficient / np.where(rows > 0, rows, 1.0)
-    columns = np.abs(scaled).max(axis=-2, keepdims=True)
-    columns = np.where(columns > 0, columns, 1.0)
-    scaled = scaled / columns
-    right = -power / np.where(rows > 0, rows, 1.0)[..., 0]
+    scaled, rows, columns = _scaled(coefficient)
+    right = -power / rows[..., 0]
     k = coefficient.shape[-1]
     u, sigma, vh = np.linalg.svd(scaled)
     seen = sigma > k * ROUNDING * sigma[..., :1]

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 from xml.etree.ElementTree import Element, ParseError
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from cli.errors import DataError, quote
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from cli.read.robots.robot import Array, quaternion
 
 LARGEST_FILE = 10_000_000  # bytes
 LARGEST = 1e60
@@ -80,35 +78,55 @@ def stated(limits: Iterable[str | None], friction: str | None) -> tuple[str, ...
     return tuple(what for what, words in found.items() if any((word or "").strip("0. ") for word in words))
 
 
-def words(file: str, where: str, text: str | None) -> list[str]:
-    """Return the numbers of a text as they are written."""
-    found = (text or "").split()
-    for word in found:
-        number(file, where, word)
-    return found
+class At(NamedTuple):
+    """A place in a file, as messages name it; `of` is what stands there."""
 
+    file: str
+    where: str
 
-def number(file: str, where: str, text: str | None) -> float:
-    """Return a finite number."""
-    try:
-        value = float(text or "")
-    except ValueError:
-        value = math.nan
-    if not abs(value) <= LARGEST or "_" in (text or ""):
-        raise DataError(f"{file}: {where}: found {quote(str(text))}, expected a finite number")
-    return value
+    def inside(self, of: str) -> At:
+        """Return a place inside this one."""
+        return At(self.file, f"{self.where}, {of}" if of else self.where)
 
+    def error(self, of: str, found: object, expected: object) -> DataError:
+        """Say what was found there, and what was expected."""
+        return DataError(f"{self.file}: {self.inside(of).where}: found {found}, expected {expected}")
 
-def numbers(
-    file: str, where: str, text: str | None, n: int, default: tuple[float, ...] | None = None
-) -> list[float]:
-    """Return n finite numbers; `default` where there is no text."""
-    if text is None and default is not None:
-        return list(default)
-    found = [float(word) for word in words(file, where, text)]
-    if len(found) != n:
-        raise DataError(f"{file}: {where}: found {quote(text or '')}, expected {n} numbers")
-    return found
+    def number(self, of: str, text: str | None) -> float:
+        """Return a finite number."""
+        try:
+            value = float(text or "")
+        except ValueError:
+            value = math.nan
+        if not abs(value) <= LARGEST or "_" in (text or ""):
+            raise self.error(of, quote(str(text)), "a finite number")
+        return value
+
+    def numbers(
+        self, of: str, text: str | None, n: int | None = None, default: Sequence[float] | None = None
+    ) -> list[float]:
+        """Return n finite numbers, or however many there are; `default` where there is no text."""
+        if text is None and default is not None:
+            return list(default)
+        found = [self.number(of, word) for word in (text or "").split()]
+        if n is not None and len(found) != n:
+            raise self.error(of, quote(text or ""), f"{n} numbers")
+        return found
+
+    def direction(self, of: str, vector: ArrayLike) -> Array:
+        """Return a direction of length 1."""
+        v = np.array(vector, dtype=float)
+        length = float(np.linalg.norm(v))
+        if not length > 0:
+            raise self.error(of, "0 0 0", "a direction")
+        return np.asarray(v / length)
+
+    def rotation(self, wxyz: Sequence[float]) -> Array:
+        """Return the rotation of a quaternion."""
+        try:
+            return quaternion(*wxyz)
+        except ValueError as error:
+            raise DataError(f"{self.file}: {self.where}: {error}") from None
 
 
 def named(file: str, element: Element, attribute: str = "name") -> str:
@@ -117,3 +135,9 @@ def named(file: str, element: Element, attribute: str = "name") -> str:
     if not value:
         raise DataError(f"{file}: a <{plain(element)}> has no '{attribute}'")
     return value
+
+
+def placed(file: str, element: Element) -> tuple[str, At]:
+    """Return an element's name, which must be there, and its place."""
+    name = named(file, element)
+    return name, At(file, f"{plain(element)} '{name}'")

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from cli.errors import DataError
 from cli.read.files import load
-from cli.read.robots.elements import child, children, named, number, numbers, parse, words
+from cli.read.robots.elements import At, child, children, named, parse
 from cli.read.robots.robot import (
+    DIAGONAL_FIRST,
     WORLD,
     Array,
     Inertial,
@@ -22,43 +23,21 @@ from cli.read.robots.robot import (
     RobotLink,
     Spring,
     about,
-    half_unit,
     pose,
+    printed,
     quaternion,
-    symmetric,
-    unit,
 )
 from cli.read.robots.shapes import DENSITY, SIZES, together, unit_mass
 
 KINDS: dict[str, Kind] = {"hinge": "turn", "slide": "slide", "ball": "ball"}
-FULL = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 INCLUDES = 20
-
-
-class _Compiler(NamedTuple):
-    """How angles are written, and whether shapes give masses."""
-
-    degrees: bool
-    sequence: str
-    shapes: str
 
 
 def read(file: str, root: Element, folder: Path | None) -> Robot:
     """Read a `<mujoco>`; files that it includes are followed inside its folder alone."""
     _include(file, root, folder, [0])
     robot = Robot(file, "MJCF", root.get("model", ""))
-    degrees, sequence, shapes = True, "xyz", "auto"
-    for e in children(root, "compiler"):
-        degrees = e.get("angle", "degree" if degrees else "radian") != "radian"
-        sequence = e.get("eulerseq", sequence)
-        shapes = e.get("inertiafromgeom", shapes)
-    if len(sequence) != 3 or not set(sequence.lower()) <= set("xyz"):
-        raise DataError(f"{file}: compiler: found eulerseq '{sequence}', expected three of x, y, z")
-    robot.gravity = np.array([0.0, 0.0, -9.81])
-    for e in children(root, "option"):
-        if e.get("gravity") is not None:
-            robot.gravity = np.array(numbers(file, "option, gravity", e.get("gravity"), 3))
-    _Reader(robot, _Compiler(degrees, sequence, shapes), root).read()
+    _Reader(robot, root).read()
     return robot
 
 
@@ -89,10 +68,21 @@ def _include(file: str, element: Element, folder: Path | None, seen: list[int]) 
 class _Reader:
     """Walks the bodies; `classes` are the defaults, by class and tag."""
 
-    def __init__(self, robot: Robot, compiler: _Compiler, root: Element) -> None:
-        self.robot, self.file, self.compiler, self.root = robot, robot.file, compiler, root
+    def __init__(self, robot: Robot, root: Element) -> None:
+        self.robot, self.file, self.root = robot, robot.file, root
         self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         self.sites: dict[str, tuple[str, Array]] = {}
+        # how angles are written, and whether shapes give masses
+        compiler = {key: text for e in children(root, "compiler") for key, text in e.attrib.items()}
+        self.degrees = compiler.get("angle", "degree") != "radian"
+        self.sequence = compiler.get("eulerseq", "xyz")
+        self.shapes = compiler.get("inertiafromgeom", "auto")
+        if len(self.sequence) != 3 or not set(self.sequence.lower()) <= set("xyz"):
+            raise At(self.file, "compiler").error("", f"eulerseq '{self.sequence}'", "three of x, y, z")
+        robot.gravity = np.array([0.0, 0.0, -9.81])
+        for e in children(root, "option"):
+            if e.get("gravity") is not None:
+                robot.gravity = np.array(At(self.file, "option").numbers("gravity", e.get("gravity"), 3))
         for e in children(root, "default"):
             self._defaults(e, "main", {})
 
@@ -114,7 +104,7 @@ class _Reader:
 
     def angle(self, value: float) -> float:
         """Return an angle of the file in rad."""
-        return float(np.radians(value)) if self.compiler.degrees else value
+        return float(np.radians(value)) if self.degrees else value
 
     def read(self) -> None:
         robot = self.robot
@@ -126,42 +116,35 @@ class _Reader:
         self._tendons()
         self._actuators()
 
-    def frame(self, where: str, e: dict[str, str]) -> Array:
+    def frame(self, where: str, e: Mapping[str, str]) -> Array:
         """Return the pose that pos and one of quat, euler, axisangle, xyaxes, zaxis give."""
-        file = self.file
-        at = numbers(file, f"{where}, pos", e.get("pos"), 3, (0.0, 0.0, 0.0))
+        at = At(self.file, where)
+        place = at.numbers("pos", e.get("pos"), 3, (0.0, 0.0, 0.0))
         turned = np.eye(3)
-        try:
-            if "quat" in e:
-                turned = quaternion(*numbers(file, f"{where}, quat", e["quat"], 4))
-            elif "euler" in e:
-                for axis, angle in zip(
-                    self.compiler.sequence, numbers(file, f"{where}, euler", e["euler"], 3), strict=True
-                ):
-                    one = about("xyz".index(axis.lower()), self.angle(angle))
-                    turned = turned @ one if axis.islower() else one @ turned
-            elif "axisangle" in e:
-                v = numbers(file, f"{where}, axisangle", e["axisangle"], 4)
-                half = self.angle(v[3]) / 2
-                turned = quaternion(np.cos(half), *(np.sin(half) * unit(file, f"{where}, axisangle", v[:3])))
-            elif "xyaxes" in e:
-                v = numbers(file, f"{where}, xyaxes", e["xyaxes"], 6)
-                x = unit(file, f"{where}, xyaxes", v[:3])
-                y = np.array(v[3:]) - x * (x @ v[3:])
-                y = unit(file, f"{where}, xyaxes", list(y))
-                turned = np.column_stack([x, y, np.cross(x, y)])
-            elif "zaxis" in e:
-                z = unit(file, f"{where}, zaxis", numbers(file, f"{where}, zaxis", e["zaxis"], 3))
-                turned = _onto(z)
-        except ValueError as error:
-            raise DataError(f"{file}: {where}: {error}") from None
-        return pose(at, turned)
+        if "quat" in e:
+            turned = at.rotation(at.numbers("quat", e["quat"], 4))
+        elif "euler" in e:
+            for axis, angle in zip(self.sequence, at.numbers("euler", e["euler"], 3), strict=True):
+                one = about("xyz".index(axis.lower()), self.angle(angle))
+                turned = turned @ one if axis.islower() else one @ turned
+        elif "axisangle" in e:
+            *v, angle = at.numbers("axisangle", e["axisangle"], 4)
+            half = self.angle(angle) / 2
+            turned = quaternion(np.cos(half), *(np.sin(half) * at.direction("axisangle", v)))
+        elif "xyaxes" in e:
+            v = at.numbers("xyaxes", e["xyaxes"], 6)
+            x = at.direction("xyaxes", v[:3])
+            y = at.direction("xyaxes", np.array(v[3:]) - x * (x @ v[3:]))
+            turned = np.column_stack([x, y, np.cross(x, y)])
+        elif "zaxis" in e:
+            turned = _onto(at.direction("zaxis", at.numbers("zaxis", e["zaxis"], 3)))
+        return pose(place, turned)
 
     def _inside(self, element: Element, link: str, base: Array, of: str) -> None:
         """Read bodies, sites and frames inside a body; `base` is the pose, in the world, in which they are written."""
         for e in element:
             if e.tag == "frame":
-                frame = self.frame(f"frame '{e.get('name', '')}'", dict(e.attrib))
+                frame = self.frame(f"frame '{e.get('name', '')}'", e.attrib)
                 self._inside(e, link, base @ frame, e.get("childclass", of))
             elif e.tag == "site":
                 values = self.whole(e, of)
@@ -181,14 +164,14 @@ class _Reader:
         robot = self.robot
         name = e.get("name") or f"body {len(robot.links)}"
         where = f"body '{name}'"
-        here = base @ self.frame(where, dict(e.attrib))
+        here = base @ self.frame(where, e.attrib)
         joints = list(children(e, "joint"))
         if child(e, "freejoint") is not None or any(self.whole(j, of).get("type") == "free" for j in joints):
             robot.notes.append(f"{where}: its free joint is left out: it is taken as fixed")
             joints = []
         given = child(e, "inertial")
         held = self._inertial(where, given)
-        if self.compiler.shapes == "true" or (self.compiler.shapes == "auto" and given is None):
+        if self.shapes == "true" or (self.shapes == "auto" and given is None):
             held = self._of_shapes(where, e, of)
         robot.add(RobotLink(name, here, held))
         above = parent
@@ -206,51 +189,47 @@ class _Reader:
         self._inside(e, name, here, of)
 
     def _joint(self, values: dict[str, str], name: str, parent: str, below: str, here: Array) -> None:
-        file = self.file
         name = values.get("name") or name
-        where = f"joint '{name}'"
+        at = At(self.file, f"joint '{name}'")
         type_ = values.get("type", "hinge")
         kind = KINDS.get(type_, "other")
-        at = here @ pose(numbers(file, f"{where}, pos", values.get("pos"), 3, (0.0, 0.0, 0.0)))
-        axis = numbers(file, f"{where}, axis", values.get("axis"), 3, (0.0, 0.0, 1.0))
-        direction = here[:3, :3] @ unit(file, f"{where}, axis", axis)
+        place = here @ pose(at.numbers("pos", values.get("pos"), 3, (0.0, 0.0, 0.0)))
+        axis = at.numbers("axis", values.get("axis"), 3, (0.0, 0.0, 1.0))
+        direction = here[:3, :3] @ at.direction("axis", axis)
         keys = ("range", "frictionloss", "armature")
         more = tuple("limits" if k == "range" else k for k in keys if values.get(k, "0").strip("0. "))
-        value = number(file, f"{where}, ref", values.get("ref", "0"))
-        value = self.angle(value) if kind == "turn" else value
-        made = RobotJoint(name, kind, parent, below, (at[:3, 3], at[:3, 3]), np.asarray(direction), value)
-        made.type, made.more = type_, more
-        made.stiffness, made.damping, rest = (
-            self._leading(where, key, values) for key in ("stiffness", "damping", "springref")
+
+        def coordinate(value: float) -> float:
+            return self.angle(value) if kind == "turn" else value
+
+        value = coordinate(at.number("ref", values.get("ref", "0")))
+        made = RobotJoint(
+            name, kind, parent, below, (place[:3, 3], place[:3, 3]), np.asarray(direction), value
         )
-        made.rest = self.angle(rest) if kind == "turn" else rest
+        made.type, made.more = type_, more
+        made.stiffness, made.damping, rest = _leading(at, values, "stiffness", "damping", "springref")
+        made.rest = coordinate(rest)
         self.robot.join(made)
 
     def _inertial(self, where: str, e: Element | None) -> Inertial | None:
         if e is None:
             return None
-        file = self.file
-        place = self.frame(f"{where}, inertial", dict(e.attrib))
-        mass = number(file, f"{where}, mass", e.get("mass"))
-        texts = dict.fromkeys(FULL, "0")
-        for key, names in (("diaginertia", FULL[:3]), ("fullinertia", FULL)):
+        at = At(self.file, where)
+        place = self.frame(f"{where}, inertial", e.attrib)
+        mass = at.number("mass", e.get("mass"))
+        texts = dict.fromkeys(DIAGONAL_FIRST, "0")
+        for key, names in (("diaginertia", DIAGONAL_FIRST[:3]), ("fullinertia", DIAGONAL_FIRST)):
             if e.get(key) is not None:
-                found = words(file, f"{where}, {key}", e.get(key))
+                found = e.get(key, "").split()
+                at.numbers(key, e.get(key))
                 if len(found) != len(names):
-                    raise DataError(
-                        f"{file}: {where}, {key}: found {len(found)} numbers, expected {len(names)}"
-                    )
+                    raise at.error(key, f"{len(found)} numbers", len(names))
                 texts |= dict(zip(names, found, strict=True))
-        return Inertial(
-            mass,
-            place,
-            symmetric({key: float(text) for key, text in texts.items()}),
-            symmetric({key: half_unit(text) for key, text in texts.items()}),
-        )
+        return Inertial(mass, place, *printed(texts))
 
     def _of_shapes(self, where: str, body: Element, of: str) -> Inertial | None:
         """Return the inertia of a body's shapes."""
-        file, parts = self.file, []
+        at, parts = At(self.file, where), []
         for e in children(body, "geom"):
             values = self.whole(e, of)
             shape = values.get("type", "sphere")
@@ -260,39 +239,38 @@ class _Reader:
                 )
                 continue
             here = self.frame(f"{where}, geom", values)
-            size = [float(w) for w in words(file, f"{where}, geom size", values.get("size", "0"))]
+            size = at.numbers("geom size", values.get("size", "0"))
             if "fromto" in values:
-                ends = np.array(numbers(file, f"{where}, geom fromto", values["fromto"], 6)).reshape(2, 3)
+                ends = np.array(at.numbers("geom fromto", values["fromto"], 6)).reshape(2, 3)
                 way = ends[1] - ends[0]
-                here = pose(ends.mean(axis=0), _onto(unit(file, f"{where}, geom fromto", list(way))))
+                here = pose(ends.mean(axis=0), _onto(at.direction("geom fromto", way)))
                 # across it has one size, whatever its shape
                 size = size[:1] * (SIZES[shape] - 1) + [float(np.linalg.norm(way)) / 2]
             if len(size) < SIZES[shape] or min(size[: SIZES[shape]]) <= 0:
-                raise DataError(
-                    f"{file}: {where}, geom size: found {len(size)}, expected {SIZES[shape]} above zero"
-                )
+                raise at.error("geom size", len(size), f"{SIZES[shape]} above zero")
             volume, moments = unit_mass(shape, size[: SIZES[shape]])
-            density = number(file, f"{where}, geom density", values.get("density", str(DENSITY)))
-            mass = number(file, f"{where}, geom mass", values.get("mass", repr(density * volume)))
+            density = at.number("geom density", values.get("density", str(DENSITY)))
+            mass = at.number("geom mass", values.get("mass", repr(density * volume)))
             parts.append((mass, here, mass * moments))
         return together(parts)
 
     # --- what closes loops ----------------------------------------------------------------------------------
     def _equalities(self, element: Element) -> None:
-        robot, file = self.robot, self.file
+        robot = self.robot
         for k, e in enumerate(element, 1):
             if not isinstance(e.tag, str):
                 continue
             values = self.whole(e, "main")
             name = values.get("name") or f"{e.tag} {k}"
             where = f"equality '{name}'"
+            at = At(self.file, where)
             if values.get("active") == "false":
                 robot.notes.append(f"{where}: left out: it is not active")
             elif e.tag in ("connect", "weld"):
-                self._connect(e.tag, name, where, values)
+                self._connect(e.tag, name, at, values)
             elif e.tag == "joint":
-                terms = [(named(file, e, "joint1"), 1.0)]
-                powers = numbers(file, f"{where}, polycoef", values.get("polycoef", "0 1 0 0 0"), 5)
+                terms = [(named(self.file, e, "joint1"), 1.0)]
+                powers = at.numbers("polycoef", values.get("polycoef", "0 1 0 0 0"), 5)
                 if any(powers[2:]):
                     robot.notes.append(f"{where}: left out: its polynomial is not a straight line")
                     continue
@@ -300,79 +278,74 @@ class _Reader:
                     terms.append((values["joint2"], -powers[1]))
                 robot.couplings.append((name, terms))
             elif e.tag == "tendon" and "tendon2" not in values:
-                robot.couplings.append((name, self._fixed(named(file, e, "tendon1"), where)))
+                robot.couplings.append((name, self._fixed(named(self.file, e, "tendon1"), at)))
             else:
                 robot.notes.append(f"{where}: left out: <{e.tag}> has no like here")
 
-    def _connect(self, tag: str, name: str, where: str, values: dict[str, str]) -> None:
-        robot, file = self.robot, self.file
+    def _connect(self, tag: str, name: str, at: At, values: dict[str, str]) -> None:
+        robot = self.robot
         if "site1" in values or "site2" in values:
             sides = []
             for key in ("site1", "site2"):
                 if values.get(key) not in self.sites:
-                    raise DataError(f"{file}: {where}: no site is called '{values.get(key)}'")
+                    raise DataError(f"{at.file}: {at.where}: no site is called '{values.get(key)}'")
                 link, inside = self.sites.pop(values[key])
                 sides.append((link, (robot.links[link].pose @ pose(inside))[:3, 3]))
-            (a, at), (b, other) = sides
+            (a, one), (b, other) = sides
         else:
             a, b = values.get("body1", ""), values.get("body2") or WORLD
-            anchor = numbers(file, f"{where}, anchor", values.get("anchor"), 3, (0.0, 0.0, 0.0))
-            base = robot.link(a, where).pose
-            robot.link(b, where)
+            anchor = at.numbers("anchor", values.get("anchor"), 3, (0.0, 0.0, 0.0))
+            base = robot.link(a, at.where).pose
+            robot.link(b, at.where)
             # at the file's own configuration the place is the same on both
-            at = other = (base @ pose(anchor))[:3, 3]
+            one = other = (base @ pose(anchor))[:3, 3]
         kind: Kind = "fixed" if tag == "weld" else "ball"
-        robot.join(RobotJoint(name, kind, a, b, (at, other), np.zeros(3)))
+        robot.join(RobotJoint(name, kind, a, b, (one, other), np.zeros(3)))
 
-    def _fixed(self, name: str, where: str) -> list[tuple[str, float]]:
+    def _fixed(self, name: str, at: At) -> list[tuple[str, float]]:
         """Return the terms of a fixed tendon."""
         for element in children(self.root, "tendon"):
             for e in children(element, "fixed"):
                 if e.get("name") == name:
-                    return [
-                        (named(self.file, j, "joint"), number(self.file, f"tendon '{name}'", j.get("coef")))
-                        for j in children(e, "joint")
-                    ]
-        raise DataError(f"{self.file}: {where}: no fixed tendon is called '{name}'")
+                    own = At(self.file, f"tendon '{name}'")
+                    joints = children(e, "joint")
+                    return [(named(self.file, j, "joint"), own.number("", j.get("coef"))) for j in joints]
+        raise DataError(f"{self.file}: {at.where}: no fixed tendon is called '{name}'")
 
     def _tendons(self) -> None:
         for element in children(self.root, "tendon"):
             for k, e in enumerate(children(element, "spatial", "fixed"), 1):
-                self._spring(e, f"tendon '{e.get('name') or k}'")
+                self._spring(e, At(self.file, f"tendon '{e.get('name') or k}'"))
         points: dict[str, dict[str, Array]] = {}
         for name, (link, at) in self.sites.items():
             points.setdefault(link, {})[name] = at
         for link, held in points.items():
             self.robot.links[link].points = held
 
-    def _leading(self, where: str, key: str, values: dict[str, str]) -> float:
-        """Return the first of one number or several, such as a stiffness with its polynomial's."""
-        return float((words(self.file, f"{where}, {key}", values.get(key)) or ["0"])[0])
-
-    def _spring(self, e: Element, where: str) -> None:
+    def _spring(self, e: Element, at: At) -> None:
         """A tendon that pulls: between two sites, or on joints."""
         values = self.classes[e.get("class", "main")].get("tendon", {}) | e.attrib
-        stiffness, damping = (self._leading(where, key, values) for key in ("stiffness", "damping"))
+        stiffness, damping = _leading(at, values, "stiffness", "damping")
         if not (stiffness or damping):
             return
-        rest = [
-            float(w) for w in words(self.file, f"{where}, springlength", values.get("springlength", "-1"))
-        ]
+        rest = at.numbers("springlength", values.get("springlength", "-1"))
         ends, terms = [], []
         if e.tag == "fixed":
-            terms = self._fixed(named(self.file, e), where)
+            terms = self._fixed(named(self.file, e), at)
         else:
             sites = [s.get("site", "") for s in e]
             if len(sites) != 2 or not all(s in self.sites for s in sites):
-                self.robot.notes.append(f"{where}: left out: it does not run straight between two sites")
+                self.robot.notes.append(f"{at.where}: left out: it does not run straight between two sites")
                 return
             ends = [self.sites[s] for s in sites]
         if len(rest) > 1 and rest[0] != rest[-1]:
             self.robot.notes.append(
-                f"{where}: it is slack from {rest[0]:g} to {rest[-1]:g}: the first is taken"
+                f"{at.where}: it is slack from {rest[0]:g} to {rest[-1]:g}: the first is taken"
             )
         open_ = "springlength" not in values or (rest[0] == -1.0 and not terms)
-        self.robot.springs.append(Spring(where, ends, terms, stiffness, damping, None if open_ else rest[0]))
+        self.robot.springs.append(
+            Spring(at.where, ends, terms, stiffness, damping, None if open_ else rest[0])
+        )
 
     def _actuators(self) -> None:
         robot = self.robot
@@ -386,7 +359,7 @@ class _Reader:
                 if "joint" in values:
                     terms = [(values["joint"], 1.0)]
                 elif "tendon" in values:
-                    terms = self._fixed(values["tendon"], f"actuator '{name}'")
+                    terms = self._fixed(values["tendon"], At(self.file, f"actuator '{name}'"))
                 else:
                     robot.notes.append(f"actuator '{name}': left out: it drives no joint")
                     continue
@@ -399,11 +372,16 @@ class _Reader:
         own = [j.name for j in self.robot.joints.values() if j.kind in ("turn", "slide")]
         if not keys or keys[0].get("qvel") is None:
             return {}
-        found = words(self.file, "key, qvel", keys[0].get("qvel"))
+        found = At(self.file, "key").numbers("qvel", keys[0].get("qvel"))
         if len(found) != len(own):
             return {}
         # a key frame at rest says of no speed
-        return {name: float(v) for name, v in zip(own, found, strict=True) if float(v) != 0}
+        return {name: v for name, v in zip(own, found, strict=True) if v != 0}
+
+
+def _leading(at: At, values: Mapping[str, str], *keys: str) -> list[float]:
+    """Return for each key the first of one number or several, such as a stiffness with its polynomial's."""
+    return [(at.numbers(key, values.get(key)) or [0.0])[0] for key in keys]
 
 
 def _onto(z: Array) -> Array:

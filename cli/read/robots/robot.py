@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -13,6 +14,10 @@ from cli.errors import DataError
 Array = NDArray[np.float64]
 Kind = Literal["turn", "slide", "ball", "fixed", "other"]
 WORLD = "world"
+PLACES = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
+# the orders in which formats and tables print a tensor: URDF, SDF; MJCF
+ROWS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+DIAGONAL_FIRST = tuple(PLACES)
 
 
 @dataclass
@@ -170,15 +175,6 @@ def quaternion(w: float, x: float, y: float, z: float) -> Array:
     return np.array(rows) / n
 
 
-def unit(file: str, where: str, vector: list[float]) -> Array:
-    """Return a direction of length 1."""
-    v = np.array(vector)
-    length = float(np.linalg.norm(v))
-    if not length > 0:
-        raise DataError(f"{file}: {where}: found 0 0 0, expected a direction")
-    return np.asarray(v / length)
-
-
 def half_unit(word: str) -> float:
     """Return half a unit of the last printed digit of a number; a whole number, and zero, is exact.
 
@@ -192,16 +188,19 @@ def half_unit(word: str) -> float:
     return float(f"0.5e{int(exponent or 0) - places}")
 
 
-def symmetric(entries: dict[str, float]) -> Array:
+def symmetric(entries: Mapping[str, float]) -> Array:
     """Return the matrix of ixx, iyy, izz, ixy, ixz, iyz as it is written: the products are the matrix's own entries."""
-    e = entries
-    return np.array(
-        [
-            [e["ixx"], e["ixy"], e["ixz"]],
-            [e["ixy"], e["iyy"], e["iyz"]],
-            [e["ixz"], e["iyz"], e["izz"]],
-        ]
-    )
+    made = np.empty((3, 3))
+    for entry, (i, j) in PLACES.items():
+        made[i, j] = made[j, i] = entries[entry]
+    return made
+
+
+def printed(texts: Mapping[str, str]) -> tuple[Array, Array]:
+    """Return the matrix of such entries as printed, and half a unit of the last digit of each."""
+    of = (float, half_unit)
+    tensor, half = (symmetric({entry: read(text) for entry, text in texts.items()}) for read in of)
+    return tensor, half
 
 
 def sphere_around(shape: str, size: list[float]) -> float | None:

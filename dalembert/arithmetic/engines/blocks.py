@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dalembert.arithmetic.arrays import NUMPY
+from dalembert.arithmetic.arrays import EXPONENT, NUMPY
 from dalembert.arithmetic.engines import floats
 from dalembert.arithmetic.tape import Tape, shortened
 
@@ -94,6 +94,8 @@ class Blocks:
                     f"copyto({target}, {given[1]}, where=mask)",
                 ]
                 free += sorted(ends)
+            elif kind == "binade":
+                lines.append(f"bitwise_and({given[0]}.view(int64), {EXPONENT}, {target}.view(int64))")
             else:
                 lines.append(f"{UFUNCS[kind]}({', '.join(given)}, {target})")
         self.slots = slots
@@ -114,7 +116,10 @@ class Blocks:
     def _compiled(self, lines: list[str]) -> list[Callable[..., None]]:
         names = [f"x{k}" for k in range(len(self.varying))] + [f"c{n}" for n in self.read]
         names += [f"o{row}" for row in self.written] + [f"s{k}" for k in range(self.slots)] + ["mask"]
-        room: dict[str, Any] = {name: getattr(np, name) for name in (*UFUNCS.values(), "greater", "copyto")}
+        room: dict[str, Any] = {
+            name: getattr(np, name)
+            for name in (*UFUNCS.values(), "bitwise_and", "int64", "greater", "copyto")
+        }
         parts = []
         for start in range(0, len(lines), LONGEST):
             text = "".join(f"    {line}\n" for line in lines[start : start + LONGEST])

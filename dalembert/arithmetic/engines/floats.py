@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import lru_cache
 
 from dalembert.arithmetic.loop import called
+from dalembert.arithmetic.recorded import binade
 from dalembert.arithmetic.tape import SIGNS, Tape
 
 LONGEST = 2000  # operations of one function: Python's own compiler slows down on longer ones
@@ -74,6 +75,7 @@ def compiled(
         f"def tape({names}):\n" + "".join(f"    {line}\n" for line in lines) + f"    return ({results})\n"
     )
     room: dict[str, object] = {name: getattr(math, name) for name in ("sin", "cos", "atan2", "sqrt")}
+    room["binade"] = binade
     exec(compile(source, "<tape>", "exec"), room)
     return room["tape"]  # type: ignore[return-value]
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 
 import llvmlite.ir as ir
 
+from dalembert.arithmetic.arrays import EXPONENT
 from dalembert.arithmetic.engines.vectors import Vectors
 from dalembert.arithmetic.tape import Tape
 
@@ -154,6 +155,8 @@ def body(
             value = b.fneg(*given)
         elif kind == "abs":
             value = v.intrinsic(b, "fabs", *given)
+        elif kind == "binade":
+            value = b.bitcast(b.and_(b.bitcast(given[0], v.longs), v.integer(EXPONENT)), v.vector)
         elif kind == "sqrt":
             value = v.intrinsic(b, "sqrt", *given)
         elif kind == "select":

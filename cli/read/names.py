@@ -1,0 +1,51 @@
+"""Names that no other thing has, and groups of things by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+def unused(wanted: str, used: Iterable[str], between: str = "_") -> str:
+    """Return a name that is not used: the wanted one, or that with a number.
+
+    >>> unused("B", {"B", "B_2"})
+    'B_3'
+    """
+    used, name, k = set(used), wanted, 1
+    while name in used:
+        k += 1
+        name = f"{wanted}{between}{k}"
+    return name
+
+
+class Groups:
+    """Things that are joined into groups, each of which is called as one of its things.
+
+    >>> groups = Groups("abcd")
+    >>> groups.join("b", "a", "d"), groups.join("d", "a")
+    (True, False)
+    >>> groups.of("a"), groups.all()
+    ('b', [['a', 'b', 'd'], ['c']])
+    """
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._above = {name: name for name in names}
+
+    def of(self, name: str) -> str:
+        """Return what the group of a thing is called."""
+        while self._above[name] != name:
+            name = self._above[name]
+        return name
+
+    def join(self, *names: str) -> bool:
+        """Join the groups of things under the name of the first's; return whether they were several."""
+        groups = [self.of(name) for name in names]
+        self._above |= dict.fromkeys(groups, groups[0]) if groups else {}
+        return len(set(groups)) > 1
+
+    def all(self) -> list[list[str]]:
+        """Return the groups, in the order in which their first things were named."""
+        found: dict[str, list[str]] = {}
+        for name in self._above:
+            found.setdefault(self.of(name), []).append(name)
+        return list(found.values())
