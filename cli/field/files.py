@@ -13,7 +13,7 @@ from cli.errors import DataError, quote
 from cli.field.layouts import Alpha, alpha_of
 from cli.field.runs import Channel, Rows, Runs, apart
 from cli.read.tables import Numbers, Table, read
-from cli.read.units import UNITS, from_si, parse_number, phasor, to_si
+from cli.read.units import UNITS, from_si, parse_number, phasor
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
