@@ -10,8 +10,7 @@ import pytest
 
 from tests.virtualwork.test_in_time import four_bar
 from virtualwork import Friction, Input, Link, Mechanism
-from virtualwork.intime.runs import Runs
-from virtualwork.intime.variants import Variants
+from virtualwork.intime.variants import Runs, Variants
 
 G = 9.81
 

@@ -19,7 +19,7 @@ def test_block_that_slides_to_rest_and_stays() -> None:
     assert (run.speed[-3:, 0] == 0).all()
     assert (run.acceleration[-3:, 0] == 0).all()
     assert np.abs(run.energy_drift).max() < 1e-12
-    assert run.fine.legs[0].path.t[-1] == pytest.approx(3 / (0.2 * G), rel=1e-13)
+    assert run.fine.legs[0].end == pytest.approx(3 / (0.2 * G), rel=1e-13)
 
 
 def test_spring_and_coulomb_friction_lose_the_same_at_every_turn() -> None:
@@ -31,7 +31,7 @@ def test_spring_and_coulomb_friction_lose_the_same_at_every_turn() -> None:
         springs=[Spring((("block", 0j), ("ground", 0j)), 100.0)],
     )
     run = m.simulate(np.linspace(0, 5, 501), angle=0.1)
-    legs = [leg.path.q[-1][0] for leg in run.fine.legs[:-1]]
+    legs = [leg.last[1][0] for leg in run.fine.legs[:-1]]
     swings = [0.1]
     while abs(swings[-1]) > band:
         swings.append(-math.copysign(abs(swings[-1]) - 2 * band, swings[-1]))
@@ -80,7 +80,7 @@ def test_four_bar_with_friction_in_every_pin_against_the_poses_own() -> None:
 def test_double_pendulum_with_friction_comes_to_rest_one_joint_at_a_time() -> None:
     m = double_pendulum(friction=[Friction("O", 0.3, 0.1), Friction("P", 0.3, 0.1)])
     run = m.simulate(np.linspace(0, 60, 61), accuracy=1e-6)
-    modes = [leg.path.equations.mode for leg in run.fine.legs]  # type: ignore[attr-defined]
+    modes = [leg.equations.mode for leg in run.fine.legs]  # type: ignore[attr-defined]
     assert any(0 in mode and any(mode) for mode in modes)
     assert modes[-1] == (0, 0)
     assert (run.speed[-1] == 0).all()

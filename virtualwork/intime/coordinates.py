@@ -11,7 +11,7 @@ import cmath
 import math
 from collections.abc import Callable, Mapping
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
@@ -27,7 +27,7 @@ from virtualwork.describe.parts import GROUND, Guess, Input
 from virtualwork.formulas.numbers import PARTS, Reals
 from virtualwork.formulas.positions import columns
 from virtualwork.intime.equations import Equations
-from virtualwork.intime.watch import Floats
+from virtualwork.intime.watch import Floats, Watch
 from virtualwork.motion import Motion
 
 TURN = 2 * math.pi
@@ -81,17 +81,9 @@ class Coordinates:
         motion = self.motion(q, v, a)
         found = np.empty((3, *q.shape))
         for j, entry in enumerate(self.inputs):
-            if entry.is_slide:
-                slide = motion.slide(entry.name)
-                found[:, :, j] = slide.position, slide.speed, slide.acceleration
-                continue
-            link = motion.link(entry.name)
-            value = np.array([link.angle, link.omega, link.alpha])
-            if entry.on != GROUND:
-                base = motion.link(entry.on)
-                value -= np.array([base.angle, base.omega, base.alpha])
-            value[0] += TURN * np.round((near[:, j] - value[0]) / TURN)
-            found[:, :, j] = value
+            found[:, :, j] = [measured(motion, entry, order) for order in range(3)]
+            if not entry.is_slide:
+                found[0, :, j] = unwound(found[0, :, j], near[:, j])
         return found[0], found[1], found[2]
 
     # --- how far from folding -----------------------------------------------------------------------------------
@@ -161,10 +153,10 @@ class Coordinates:
                 choices.append((*m.inputs[:j], Input(link=name), *m.inputs[j + 1 :]))
         best, most = None, BETTER * max(self.margin(q), 0.0)
         for entries in choices:
-            at = [self._value(motion, entry) for entry in entries]
+            at = [float(measured(motion, entry, 0)[0]) for entry in entries]
             if entries == self.inputs:
                 at = [
-                    x if e.is_slide else x + TURN * round((y - x) / TURN)
+                    x if e.is_slide else float(unwound(x, y))
                     for e, x, y in zip(entries, at, near, strict=True)
                 ]
             try:
@@ -184,7 +176,7 @@ class Coordinates:
             # what lies along the branch is known of it
             if known.equations.mechanism.inputs == entries and known.stands_at(at, angles):
                 return known, at
-        other = Coordinates(self.equations.through(assembly), self.inputs)
+        other = Coordinates(type(self.equations)(assembly).sharing(self.equations.share), self.inputs)
         other.made = self.made
         self.made.append(other)
         return other, at
@@ -195,12 +187,19 @@ class Coordinates:
         apart = [cmath.exp(1j * (motion.link(name).angle[0] - a)) - 1 for name, a in angles.items()]
         return all(abs(x) < SAME for x in apart)
 
-    @staticmethod
-    def _value(motion: Motion, entry: Input) -> float:
-        if entry.is_slide:
-            return float(motion.slide(entry.name).position[0])
-        angle = float(motion.link(entry.name).angle[0])
-        return angle if entry.on == GROUND else angle - float(motion.link(entry.on).angle[0])
+
+def measured(motion: Motion, entry: Input, order: int) -> Reals:
+    """What an input measures in a motion, (n,), or its speed or acceleration; an angle without its whole turns."""
+    if entry.is_slide:
+        return np.asarray(getattr(motion.slide(entry.name), ("position", "speed", "acceleration")[order]))
+    of = ("angle", "omega", "alpha")[order]
+    value = getattr(motion.link(entry.name), of)
+    return np.asarray(value if entry.on == GROUND else value - getattr(motion.link(entry.on), of))
+
+
+def unwound(angle: Reals | float, near: Reals | float) -> Reals:
+    """An angle with the whole turns that bring it nearest to another."""
+    return np.asarray(angle + TURN * np.round((near - angle) / TURN))
 
 
 def opened(assembly: Assembly, at: Floats) -> float:
@@ -213,3 +212,49 @@ def opened(assembly: Assembly, at: Floats) -> float:
         elif g.kind != "PRP":
             found.append(float(np.ravel(st.margin[g.name])[0]))
     return min(x if x == x else 0.0 for x in found)
+
+
+@dataclass
+class Monitor:
+    """What a path is asked at every node: whether its coordinates fold, and what the inputs are there."""
+
+    coordinates: Coordinates
+    near: Floats
+    # a margin below which they fold: where no others were better, a quarter of what it was
+    below: float
+    follows: bool
+    # the coordinate at the last node
+    last: float
+
+    def __call__(self, t: float, q: Floats, v: Floats) -> str:
+        if self.follows:
+            self.near = self.inputs(q, v)
+        if self._strays(q, v):
+            return "undecided"
+        if self.coordinates.folds(q, self.below):
+            return "folding"
+        if self.below < FOLDING and not self.coordinates.folds(q):
+            self.below = FOLDING
+        return ""
+
+    def _strays(self, q: Floats, v: Floats) -> bool:
+        """Whether another coordinate takes for a change point what the inputs do not: by its rounding, that is larger."""
+        last, self.last = self.last, q[0]
+        if self.coordinates.own or self.coordinates.equations.clear(np.array([last, q[0]])):
+            return False
+        return not self.coordinates.made[0].equations.passes(self.inputs(q, v)[0])
+
+    def quiet(self, q: Reals) -> bool:
+        """Whether nothing folds at any of many places, and none has to be followed."""
+        return not self.follows and self.below == FOLDING and self.coordinates.stands(q)
+
+    def inputs(self, q: Floats, v: Floats) -> Floats:
+        """The inputs at a state, with the whole turns of those at the last node."""
+        state = [np.array([x]) for x in (q, v, v, self.near)]
+        return self.coordinates.states(*state)[0][0].tolist()  # type: ignore[no-any-return]
+
+    def until(self, j: int, level: float) -> Watch:
+        """The end where input j has a value."""
+        if self.coordinates.own:
+            return Watch("until", lambda t, q, v: q[j], lambda t, q, v, a: v[j], [level], ends=True)
+        return Watch("until", lambda t, q, v: self.inputs(q, v)[j], None, [level], ends=True)

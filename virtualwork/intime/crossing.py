@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from operator import mul
 
 from virtualwork.intime.watch import Floats
 
@@ -29,7 +30,8 @@ class Crossing:
     --------
     >>> import math
     >>> crossing = Crossing(0.0, 0.3)
-    >>> abs(crossing.interpolated(lambda q: [math.sin(q) / q], 1e-4)[0] - (1 - 1e-8 / 6)) < 1e-15
+    >>> values = [[math.sin(q) / q] for q in crossing.nodes]
+    >>> abs(crossing.interpolated(values, 1e-4)[0] - (1 - 1e-8 / 6)) < 1e-15
     True
     """
 
@@ -48,12 +50,11 @@ class Crossing:
                 weight *= x - y if x != y else 1.0
             self._weights.append(1.0 / weight)
 
-    def interpolated(self, f: Callable[[float], Floats], q: float) -> Floats:
+    def interpolated(self, values: Sequence[Floats], q: float) -> Floats:
         """Quantities at an input within `inner` of the point, from those at the nodes."""
         shares = [w / (q - x) for w, x in zip(self._weights, self.nodes, strict=True)]
         total = sum(shares)
-        values = zip(*(f(x) for x in self.nodes), strict=True)
-        return [sum(s * y for s, y in zip(shares, of, strict=True)) / total for of in values]
+        return [sum(map(mul, shares, of)) / total for of in zip(*values, strict=True)]
 
     def gap(self, f: Callable[[float], Floats]) -> float:
         """How far interpolation lies from quantities at the ends of what it replaces, relative to their size at the nodes.
@@ -61,12 +62,13 @@ class Crossing:
         From poses too far off it misses them, for what is smooth here has an end (a limit, a fast turn) not far away;
         from poses too near they have lost their digits.
         """
-        known = {x: f(x) for x in (*self.nodes, self.at - self.inner, self.at + self.inner)}
-        sizes = [max(map(abs, of)) for of in zip(*known.values(), strict=True)]
+        known, ends = [f(x) for x in self.nodes], (self.at - self.inner, self.at + self.inner)
+        found = {q: f(q) for q in ends}
+        sizes = [max(map(abs, of)) for of in zip(*known, *found.values(), strict=True)]
         gaps = [
             abs(x - y) / size if size else 0.0
-            for q in (self.at - self.inner, self.at + self.inner)
-            for x, y, size in zip(known[q], self.interpolated(known.__getitem__, q), sizes, strict=True)
+            for q in ends
+            for x, y, size in zip(found[q], self.interpolated(known, q), sizes, strict=True)
         ]
         # NaN is the worst
         return max(x if x == x else math.inf for x in gaps)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,52 +14,19 @@ from virtualwork.formulas.block import Setting
 from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.positions import State
-from virtualwork.intime.tables import Value
-from virtualwork.intime.watch import Floats
+from virtualwork.intime.watch import Floats, Value
 
 # Newton's steps from one pose to the next; rad or sizes: a change from which one more step leaves rounding alone, and
 # how far off the last pose may be to begin from
 LIMIT, CLOSE, FAR = 8, 1e-9, 0.3
 
 
-@dataclass(frozen=True)
-class Iteration:
-    """A step of Newton's method on the unknowns of all groups without a closed form, and what else enters it."""
-
-    tape: Tape
-    known: Mapping[str, Value]
-
-    @cached_property
-    def step(self) -> Callable[..., tuple[float, ...]]:
-        """The step as a function of floats."""
-        return floats.compiled(self.tape)
-
-    def settled(
-        self, q: Floats, x: Mapping[str, float], scale: Mapping[str, float]
-    ) -> dict[str, float] | None:
-        """The unknowns at the inputs, from those of a pose close by; None where that does not lead there."""
-        given = {name: of(0.0, q, q) for name, of in self.known.items()}
-        begin = now = dict(x)
-        for _ in range(LIMIT):
-            try:
-                found = self.step(*[given[name] if name in given else now[name] for name in self.tape.inputs])
-            except (ZeroDivisionError, ValueError, OverflowError):
-                return None
-            after = dict(zip(self.tape.names, found, strict=True))
-            if not all(abs(value - begin[name]) <= FAR * scale[name] for name, value in after.items()):
-                return None
-            near = all(abs(value - now[name]) <= CLOSE * scale[name] for name, value in after.items())
-            now = after
-            if near:
-                return now
-        return None
-
-
 class Placed:
     """The poses of an assembly, closed on its branch one after the other.
 
-    With an `iteration` the unknowns are followed from pose to pose; the branch itself is asked where that leads too
-    far, and wherever it `crosses` another.
+    With a `tape`, a step of Newton's method on the unknowns of all groups without a closed form, and what else enters
+    it (`known`), they are followed from pose to pose; the branch itself is asked where that leads too far, and wherever
+    it `crosses` another.
 
     Examples
     --------
@@ -75,10 +40,12 @@ class Placed:
     def __init__(
         self,
         assembly: Assembly,
-        iteration: Iteration | None = None,
+        tape: Tape | None = None,
+        known: Mapping[str, Value] | None = None,
         crosses: Callable[[], bool] = lambda: False,
     ) -> None:
-        self.assembly, self.iteration, self.crosses = assembly, iteration, crosses
+        self.assembly, self.tape, self.known, self.crosses = assembly, tape, known or {}, crosses
+        self._step = None if tape is None else floats.compiled(tape)
         size = assembly.mechanism.size
         self.larger = [g for g in assembly.plan.groups if g.kind == "Newton"]
         self.scale = {
@@ -111,12 +78,31 @@ class Placed:
 
     def _settled(self, q: Floats) -> dict[str, float]:
         """All unknowns at the inputs."""
-        if self.iteration is not None and self._x and not self.crosses():
-            found = self.iteration.settled(q, self._x, self.scale)
-            if found is not None:
-                return found
-        st = self.state(q)
-        return {f"x {g.name} {i}": _one(x) for g in self.larger for i, x in enumerate(unknowns(g, st))}
+        found = self._followed(q) if self._x and not self.crosses() else None
+        if found is None:
+            st = self.state(q)
+            found = {f"x {g.name} {i}": _one(x) for g in self.larger for i, x in enumerate(unknowns(g, st))}
+        return found
+
+    def _followed(self, q: Floats) -> dict[str, float] | None:
+        """The same from those of the last pose; None where that does not lead there."""
+        if self.tape is None or self._step is None:
+            return None
+        now = self._x
+        given = {name: of(0.0, q, q) for name, of in self.known.items()}
+        for _ in range(LIMIT):
+            try:
+                found = self._step(
+                    *(given[name] if name in given else now[name] for name in self.tape.inputs)
+                )
+            except (ZeroDivisionError, ValueError, OverflowError):
+                return None
+            before, now = now, dict(zip(self.tape.names, found, strict=True))
+            if not all(abs(value - self._x[name]) <= FAR * self.scale[name] for name, value in now.items()):
+                return None
+            if all(abs(value - before[name]) <= CLOSE * self.scale[name] for name, value in now.items()):
+                return now
+        return None
 
     def angle(self, body: str) -> Value:
         """A body's angle with its whole turns."""

@@ -18,6 +18,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dalembert.arithmetic.engines import floats, run
 from dalembert.arithmetic.tape import Tape
@@ -32,10 +33,10 @@ from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import Recording
 from virtualwork.formulas.scene import Scene
 from virtualwork.intime.crossing import Crossing, crossings, narrowed, nearest
-from virtualwork.intime.entering import Iteration, Placed
-from virtualwork.intime.powers import motion_of, places_and_speeds
-from virtualwork.intime.tables import Value, ends, kinks, place, reader
-from virtualwork.intime.watch import Floats, Watch
+from virtualwork.intime.entering import Placed
+from virtualwork.intime.powers import motion_of, state_names
+from virtualwork.intime.tables import ends, kinks, place, reader
+from virtualwork.intime.watch import Floats, Value, Watch
 
 # of a turn: how far beyond an input its change points are looked for
 AHEAD = 1.0
@@ -48,7 +49,7 @@ NEAR = 0.1
 # a speed of the input, rad/s or m/s, beside whose forces all others are small
 FAST = 1e4
 TURN = 2 * math.pi
-EVERYWHERE = (-math.inf, math.inf)
+EVERYWHERE, NOWHERE = (-math.inf, math.inf), (math.inf, -math.inf)
 
 
 class Lost(ArithmeticError):
@@ -71,10 +72,10 @@ class Equations:
         self.k = len(self.mechanism.inputs)
         self.scale = [self.mechanism.size if e.is_slide else 1.0 for e in self.mechanism.inputs]
         self.warnings: list[str] = []
-        self._covered = (math.inf, -math.inf)
+        self._covered = NOWHERE
         self._flips: dict[str, list[float]] = {}
         self._crossings: list[Crossing] = []
-        self._share = 1.0
+        self.share = 1.0
         self._known: dict[tuple[float, float], Crossing] = {}
         # starts that were looked at
         self._begun: set[tuple[float, ...]] = set()
@@ -92,7 +93,7 @@ class Equations:
             self._cover(q[0])
         crossing = self._crossing(q[0])
         if crossing is not None:
-            found = crossing.interpolated(lambda x: self._plain(t, [x], v), q[0])
+            found = crossing.interpolated([self._plain(t, [x], v) for x in crossing.nodes], q[0])
         else:
             found = self._plain(t, q, v)
         for value in found:
@@ -104,7 +105,7 @@ class Equations:
     def _plain(self, t: float, q: Floats, v: Floats) -> Floats:
         """The same away from change points."""
         try:
-            return list(self._function(*self._filled(t, q, v)))
+            return list(self._function(*self._filled(self.rates, t, q, v)))
         except (ZeroDivisionError, ValueError, OverflowError):
             raise Lost from None
 
@@ -119,7 +120,7 @@ class Equations:
         if (t, *q, *v) in self._begun:
             return
         names = [e.name for e in self.mechanism.inputs]
-        mass, rest = self.by_poses(t, q, v)
+        mass, rest = self._by_poses(t, q, v)
         if not (np.isfinite(mass).all() and np.isfinite(rest).all()):
             raise MechanismError("it cannot be assembled at the start, or stands at a limit of its input")
         # how much of each input's own inertia is left when the others are free to follow
@@ -135,15 +136,11 @@ class Equations:
     def many(self, t: Reals, q: Reals, v: Reals) -> Reals:
         """The same of many states, (n, k + 1); NaN where there are none."""
         out = np.full((len(q), self.k + 1), np.nan)
-        if not len(q):
-            return out
-        for end in (float(q[:, 0].min()), float(q[:, 0].max())):
-            self._cover(end)
         careful = self._careful(q)
         rows = np.flatnonzero(~careful)
         if len(rows):
-            found = self._run(self._tape, t, q, v, rows)
-            for j, name in enumerate(self._tape.names):
+            found = self._run(self.rates, t[rows], q[rows], v[rows])
+            for j, name in enumerate(self.rates.names):
                 out[rows, j] = found[name]
         for i in np.flatnonzero(careful):
             try:
@@ -152,7 +149,13 @@ class Equations:
                 continue
         return out
 
-    def by_poses(self, t: float, q: Floats, v: Floats) -> tuple[Reals, Reals]:
+    def _careful(self, q: Reals) -> NDArray[np.bool_]:
+        """Which states no tape can do by itself, (n,)."""
+        for end in (q[:, 0].min(), q[:, 0].max()) if len(q) else ():
+            self._cover(float(end))
+        return np.array([self._crossing(x) is not None for x in q[:, 0].tolist()], dtype=bool)
+
+    def _by_poses(self, t: float, q: Floats, v: Floats) -> tuple[Reals, Reals]:
         """M (k, k) and h (k,) at a state, from the effort of k + 1 motions through its pose."""
         k = self.k
         with np.errstate(all="ignore"):
@@ -205,13 +208,12 @@ class Equations:
     @cached_property
     def plain(self) -> bool:
         """Whether the tape of the motion hangs on the state alone: on nothing that has to be looked up."""
-        own = {*places_and_speeds(self.k), "t"}
-        return own.issuperset(self._tape.inputs)
+        return set(state_names(self.k)).issuperset(self.rates.inputs)
 
     @property
     def rates(self) -> Tape:
-        """The tape of accelerations and power; of q and q̇ alone where this is `plain`."""
-        return self._tape
+        """The tape of accelerations and power; of (t, q, q̇) alone where this is `plain`."""
+        return self._recorded[0]
 
     @property
     def called(self) -> tuple[tuple[str, ...], Callable[..., Sequence[float]]]:
@@ -221,63 +223,47 @@ class Equations:
         ------
         Lost
         """
-        if self._bare:
-            return self._tape.inputs, self._function
+        if self.plain and self._covered == EVERYWHERE and not self._crossings:
+            # there is no change point to look for
+            return self.rates.inputs, self._function
         k = self.k
-        return ("t", *places_and_speeds(k)), lambda t, *y: self(t, list(y[:k]), list(y[k:]))
-
-    @property
-    def _bare(self) -> bool:
-        """Whether the tape can be asked without looking for change points."""
-        return self.plain and self._covered == EVERYWHERE and not self._crossings
-
-    @property
-    def _tape(self) -> Tape:
-        return self._recorded[0]
+        return tuple(state_names(k)), lambda t, *y: self(t, list(y[:k]), list(y[k:]))
 
     @cached_property
     def _function(self) -> Callable[..., tuple[float, ...]]:
-        return floats.compiled(self._tape)
+        return floats.compiled(self.rates)
 
     def energies(self, t: Reals, q: Reals, v: Reals) -> Reals:
         """Kinetic energy and that of gravity and springs together, (n,) J."""
-        careful = self._careful(q)
-        out = np.empty(len(q))
-        rows = np.flatnonzero(~careful)
+        near, tape, out = [self._crossing(x) for x in q[:, 0].tolist()], self._recorded[1], np.empty(len(q))
+        rows = np.flatnonzero([crossing is None for crossing in near])
         if len(rows):
-            out[rows] = self._run(self._recorded[1], t, q, v, rows)["energy"]
-        for i in np.flatnonzero(careful):
-            crossing = self._crossing(float(q[i, 0]))
-            places = q[i : i + 1] if crossing is None else np.array(crossing.nodes)[:, None]
-            n = len(places)
-            given = np.full(n, t[i]), places, np.tile(v[i], (n, 1)), np.arange(n)
-            found = self._run(self._recorded[1], *given)["energy"]
+            out[rows] = self._run(tape, t[rows], q[rows], v[rows])["energy"]
+        for i, crossing in enumerate(near):
             if crossing is not None:
-                of = dict(zip(crossing.nodes, found.tolist(), strict=True))
-                (out[i],) = crossing.interpolated(lambda x, of=of: [of[x]], float(q[i, 0]))  # type: ignore[misc]
-            else:
-                (out[i],) = found
+                n = len(crossing.nodes)
+                given = np.full(n, t[i]), np.array(crossing.nodes)[:, None], np.tile(v[i], (n, 1))
+                found = self._run(tape, *given)["energy"]
+                (out[i],) = crossing.interpolated(found[:, None].tolist(), float(q[i, 0]))
         return out
 
-    def _run(self, tape: Tape, t: Reals, q: Reals, v: Reals, rows: Any) -> Mapping[str, Any]:
+    def _run(self, tape: Tape, t: Reals, q: Reals, v: Reals) -> Mapping[str, Any]:
         if self.plain:
-            columns = {f"q{j}": q[rows, j] for j in range(self.k)} | {
-                f"v{j}": v[rows, j] for j in range(self.k)
-            }
-            with np.errstate(all="ignore"):
-                return run(tape, columns | {"t": t[rows]})
-        states = zip(t[rows].tolist(), q[rows].tolist(), v[rows].tolist(), strict=True)
-        given = np.array([self._filled(*state, tape=tape) for state in states])
+            given = dict(zip(state_names(self.k), (t, *q.T, *v.T), strict=True))
+        else:
+            states = zip(t.tolist(), q.tolist(), v.tolist(), strict=True)
+            filled = np.array([self._filled(tape, *state) for state in states])
+            given = dict(zip(tape.inputs, filled.T.copy(), strict=True))
         with np.errstate(all="ignore"):
-            return run(tape, dict(zip(tape.inputs, given.T.copy(), strict=True)))
+            return run(tape, given)
 
     @cached_property
     def _fillers(self) -> dict[str, Value]:
         """What gives each input of the tapes at a state."""
         return {name: self._filler(name) for tape in self._recorded for name in tape.inputs}
 
-    def _filled(self, t: float, q: Floats, v: Floats, tape: Tape | None = None) -> Floats:
-        return [self._fillers[name](t, q, v) for name in (tape or self._tape).inputs]
+    def _filled(self, tape: Tape, t: float, q: Floats, v: Floats) -> Floats:
+        return [self._fillers[name](t, q, v) for name in tape.inputs]
 
     def _filler(self, name: str) -> Value:
         """How an input of the tape hangs on the state."""
@@ -324,7 +310,7 @@ class Equations:
         after = {f"x {g.name} {i}": x for g in larger for i, x in enumerate(unknowns(g, st))}
         tape = recording.recorder.tape(after)
         known = {name: self._filler(name) for name in tape.inputs if not name.startswith("x ")}
-        return Placed(self.assembly, Iteration(tape, known), lambda: self.crosses)
+        return Placed(self.assembly, tape, known, lambda: self.crosses)
 
     def _sign(self, group: str) -> Value:
         base, start = self.assembly.signs[group], self.assembly.track.start
@@ -352,7 +338,7 @@ class Equations:
                 raise Lost from None
             low, high = min(low, q - ahead), max(high, q + ahead)
             self._flips.update({name: at.tolist() for name, at in track.flips.items()})
-            self._crossings = crossings(track.crossings, self.scale[0], self._settled, self._share)
+            self._crossings = crossings(track.crossings, self.scale[0], self._settled, self.share)
         self._covered = (low, high) if track.active and not track.settled else EVERYWHERE
 
     def _settled(self, at: float, widest: float) -> Crossing:
@@ -373,26 +359,16 @@ class Equations:
         found = nearest(self._crossings, q) if self._crossings else None
         return found if found is not None and abs(q - found.at) < found.inner else None
 
-    def _careful(self, q: Reals) -> Any:
-        """Which states no tape can do by itself, (n,)."""
-        return np.array([self._crossing(x) is not None for x in q[:, 0].tolist()], dtype=bool)
-
     def otherwise(self) -> Equations:
         """The same equations, interpolated from other poses near change points."""
+        return self.sharing(OTHER)
+
+    def sharing(self, share: float) -> Equations:
+        """The same equations, interpolated from poses farther from change points or nearer, by what share."""
         other = copy(self)
-        other._takes(OTHER)
+        other.share, other._covered, other._crossings = share, NOWHERE, []
+        other._cover(self.mechanism.at[0])
         return other
-
-    def through(self, assembly: Assembly) -> Equations:
-        """The equations of another assembly, interpolated as these are."""
-        other = type(self)(assembly)
-        if self._share != other._share:
-            other._takes(self._share)
-        return other
-
-    def _takes(self, share: float) -> None:
-        self._share, self._covered, self._crossings = share, (math.inf, -math.inf), []
-        self._cover(self.mechanism.at[0])
 
     @property
     def crosses(self) -> bool:
@@ -408,8 +384,7 @@ class Equations:
         """Whether no change point is near any of the values of the first input."""
         low, high = float(q.min()), float(q.max())
         for end in (low, high):
-            if not self._covered[0] <= end <= self._covered[1]:
-                self._cover(end)
+            self._cover(end)
         return not any(low - c.inner <= c.at <= high + c.inner for c in self._crossings)
 
     def passes(self, q: float) -> bool:

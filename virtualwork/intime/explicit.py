@@ -7,7 +7,7 @@ arrays the same text is the dense output, from the node before each time asked f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from operator import itemgetter
 from typing import Any, NamedTuple
@@ -20,9 +20,9 @@ from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.equations import Equations, Lost
-from virtualwork.intime.step import Step
+from virtualwork.intime.powers import names, state_names
 from virtualwork.intime.tableau import AT, FIFTH, STAGES, THIRD, WEIGHTS
-from virtualwork.intime.watch import Floats
+from virtualwork.intime.watch import Floats, Step
 
 # below it the square of an error is nothing
 TINY = 1e-300
@@ -87,14 +87,6 @@ def step(f: Rates, t: Number, q: Numbers, v: Numbers, rates: Numbers, h: Number)
     return Stepped(dq, dv, work, found, third, fifth, steep, apart)
 
 
-def changes(
-    f: Rates, t: Number, q: Numbers, v: Numbers, rates: Numbers, h: Number
-) -> tuple[Numbers, Numbers, Number]:
-    """The changes of q and q̇ and the work over a step, and nothing else of it."""
-    speeds, others, _ = stages(f, t, q, v, rates, h)
-    return _ends(speeds, others, h)
-
-
 def _ends(speeds: list[Numbers], others: list[Numbers], h: Number) -> tuple[Numbers, Numbers, Number]:
     *dv, work = [h * combined(WEIGHTS, s) for s in others]
     return [h * combined(WEIGHTS, s) for s in speeds], dv, work
@@ -110,35 +102,34 @@ def size(third: Numbers, fifth: Numbers, scale: Numbers) -> Number:
     return high / RECORDED.sqrt(RECORDED.select(whole - TINY, whole, TINY))
 
 
-def names(k: int) -> tuple[list[str], list[str], list[str]]:
-    """What q, q̇ and the rates are called on a tape."""
-    rates = [*(f"a{j}" for j in range(k)), "power"]
-    return [f"q{j}" for j in range(k)], [f"v{j}" for j in range(k)], rates
+class Written:
+    """A step from a state of k inputs, being written down: with calls of the accelerations, which are given what is `passed`."""
 
+    def __init__(self, k: int, passed: Sequence[str]) -> None:
+        self.recorder = Recorder()
+        places, speeds, rates = names(k)
+        self.t, self.q, self.v, self.rates = self.enter("t"), *map(self.several, (places, speeds, rates))
+        self._calls, self._called = Calls(self.recorder, passed, rates), state_names(k)
 
-@lru_cache(maxsize=64)
-def written(k: int, passed: tuple[str, ...]) -> Tape:
-    """A step as a tape, with calls of the accelerations of k inputs, which are given what is `passed`."""
-    recorder = Recorder()
-    places, speeds, rates = names(k)
-    calls = Calls(recorder, passed, rates)
-    q, v, a = ([recorder.input(name) for name in of] for of in (places, speeds, rates))
-    done = step(called_by(calls), recorder.input("t"), q, v, a, recorder.input("h"))
-    parts = zip(("dq", "dv", "rate", "third", "fifth"), (*done[:2], *done[3:6]), strict=True)
-    found = {f"{name}{j}": x for name, values in parts for j, x in enumerate(values)}
-    return recorder.tape(
-        found | {"work": done.work, "steep": done.steep, "apart": done.apart} | calls.outputs
-    )
+    def enter(self, name: str) -> Number:
+        """An input of the tape."""
+        return self.recorder.input(name)
 
+    def several(self, of: Iterable[str]) -> Numbers:
+        """Inputs of the tape."""
+        return [self.enter(name) for name in of]
 
-def called_by(calls: Calls) -> Rates:
-    """The accelerations as calls."""
+    def step(self, h: Number) -> Stepped:
+        """The step of length h."""
 
-    def rates(t: Number, q: Numbers, v: Numbers) -> Numbers:
-        given = {"t": t} | {f"q{j}": x for j, x in enumerate(q)} | {f"v{j}": x for j, x in enumerate(v)}
-        return calls(given)
+        def rates(t: Number, q: Numbers, v: Numbers) -> Numbers:
+            return self._calls(dict(zip(self._called, (t, *q, *v), strict=True)))
 
-    return rates
+        return step(rates, self.t, self.q, self.v, self.rates, h)
+
+    def tape(self, outputs: Mapping[str, Number]) -> Tape:
+        """The tape of what is found."""
+        return self.recorder.tape({**outputs, **self._calls.outputs})
 
 
 class DormandPrince:
@@ -171,7 +162,8 @@ class DormandPrince:
         def many(t: Number, q: Numbers, v: Numbers) -> Numbers:
             return list(f.many(t, np.stack(q, axis=1), np.stack(v, axis=1)).T)
 
-        dq, dv, work = changes(many, t, list(q.T), list(v.T), list(rates.T), h)
+        speeds, others, _ = stages(many, t, list(q.T), list(v.T), list(rates.T), h)
+        dq, dv, work = _ends(speeds, others, h)
         return np.stack(dq, axis=1), np.stack(dv, axis=1), np.asarray(work)
 
     def _one_by_one(
@@ -196,7 +188,12 @@ class DormandPrince:
 @lru_cache(maxsize=64)
 def _function(k: int, passed: tuple[str, ...]) -> tuple[Callable[..., Any], Callable[[Any], Any]]:
     """A step on floats, and what of (t, h, q, q̇, rates) it is given."""
-    tape, (places, speeds, rates) = written(k, passed), names(k)
+    written = Written(k, passed)
+    done = written.step(written.enter("h"))
+    parts = zip(("dq", "dv", "rate", "third", "fifth"), (*done[:2], *done[3:6]), strict=True)
+    found = {f"{name}{j}": x for name, values in parts for j, x in enumerate(values)}
+    tape = written.tape(found | {"work": done.work, "steep": done.steep, "apart": done.apart})
+    places, speeds, rates = names(k)
     every = ["t", "h", *places, *speeds, *rates]
     wanted = [every.index(name) for name in tape.inputs if name in every]
     return floats.compiled(tape, passed, tuple(rates)), itemgetter(*wanted)

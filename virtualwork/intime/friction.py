@@ -17,21 +17,21 @@ import math
 from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
+from itertools import islice
 from operator import mul
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dalembert.arithmetic.adjoint import derivatives
-from dalembert.arithmetic.recorded import RECORDED, Number
-from dalembert.arithmetic.systems import solved
+from dalembert.arithmetic.recorded import Number
 from dalembert.arithmetic.tape import Tape
 from virtualwork.describe import MechanismError
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Reals, dot, minus
 from virtualwork.intime.equations import Equations, Lost
-from virtualwork.intime.powers import potential, wasted
-from virtualwork.intime.watch import Floats, Watch
+from virtualwork.intime.powers import motion_of
+from virtualwork.intime.watch import Floats, Rate, Value, Watch
 
 # iterations of friction and joint forces; each gains a factor of some μ r / l
 LIMIT = 400
@@ -40,6 +40,10 @@ CLOSE = 1e-15
 TOGETHER = 1e-9
 Mode = tuple[int, ...]
 """For each joint that rubs: the sign of its rate, 0 where it sticks."""
+
+
+# what hangs on the friction of each joint that rubs: its force, the acceleration of its slide; and the speed of it
+QUANTITIES = ("x", "y", "slip", "rate")
 
 
 class Values(NamedTuple):
@@ -53,6 +57,26 @@ class Values(NamedTuple):
     slip: Floats
     slips: list[Floats]
     power: float
+
+    @property
+    def signs(self) -> Mode:
+        """Which way each joint slides."""
+        return tuple(_sign(rate) for rate in self.rate)
+
+    def force(self, n: int, phi: Floats) -> float:
+        """A joint's force with friction, in size."""
+        return float(abs(self.p[n] + sum(map(mul, self.q[n], phi))))
+
+    def slid(self, n: int, phi: Floats) -> float:
+        """The acceleration of a joint's slide with friction."""
+        return float(self.slip[n] + sum(map(mul, self.slips[n], phi)))
+
+    def moved(self, phi: Floats) -> Floats:
+        """The accelerations with friction."""
+        found = list(self.a)
+        for x, per in zip(phi, self.per, strict=True):
+            found = [a + x * b for a, b in zip(found, per, strict=True)]
+        return found
 
 
 class Rubbing(Equations):
@@ -93,62 +117,25 @@ class Rubbing(Equations):
 
     @cached_property
     def _recorded(self) -> tuple[Tape, Tape]:
-        k = self.k
         recording = self.recording(True, True, False)
-        again = recording.recorder
         paths, of, block = recording.forces
-        contacts = paths.case.contacts
-        count = len(contacts)
-        rubs = [again.input(f"friction {n}") for n in range(count)]
+        rubs = [f"friction {n}" for n in range(len(self.arms))]
+        for n, (joint, *_) in enumerate(paths.case.contacts):
+            rub = recording.recorder.input(rubs[n])
+            block.friction[n] = rub if joint.guide is None else rub * of.rail(block, joint.guide)
         found: dict[str, Number] = {}
-        for n, (joint, *_rest) in enumerate(contacts):
-            block.friction[n] = rubs[n] if joint.guide is None else rubs[n] * of.rail(block, joint.guide)
-        for n, (joint, body, other, *_rest) in enumerate(contacts):
+        for n, (joint, body, other, *_) in enumerate(paths.case.contacts):
             recording.value(("force", joint.key, body))
             force = of.on_side(block, (joint.key, body))
             if joint.guide is None:
-                rate, slip = (
-                    minus(block.omega(body), block.omega(other)),
-                    minus(block.alpha(body), block.alpha(other)),
-                )
+                rate = minus(block.omega(body), block.omega(other))
+                slip = minus(block.alpha(body), block.alpha(other))
             else:
                 force = dot(force, 1j * of.rail(block, joint.guide))
                 rate, slip = block.slide_rate(joint.guide), _second(block, joint.guide)
-            for name, value in (("x", force.real), ("y", force.imag), ("rate", rate), ("slip", slip)):
+            for name, value in zip(QUANTITIES, (force.real, force.imag, slip, rate), strict=True):
                 found[f"{name} {n}"] = 0.0 if value is None else value
-        found |= {f"effort {j}": recording.value(("effort", j)) for j in range(k)}
-        motion = again.tape(found)
-        inputs = {name: again.input(name) for name in motion.inputs}
-        free = [f"a{j}" for j in range(k)] + [f"friction {n}" for n in range(count)]
-        there = [name for name in free if name in motion.inputs]
-        slopes = derivatives(motion, there).on(inputs, RECORDED)
-        still = motion.on(inputs | dict.fromkeys(there, 0.0), RECORDED)
-
-        def slope(of: str, to: str) -> Number:
-            return slopes.get(f"d({of})/d({to})", 0.0)
-
-        mass = [[slope(f"effort {i}", f"a{j}") for j in range(k)] for i in range(k)]
-        a0 = _solved(mass, [-still[f"effort {i}"] for i in range(k)])
-        per = [
-            _solved(mass, [-slope(f"effort {i}", f"friction {m}") for i in range(k)]) for m in range(count)
-        ]
-        out: dict[str, Number] = {f"a {j}": value for j, value in enumerate(a0)}
-        out |= {f"per {m} {j}": per[m][j] for m in range(count) for j in range(k)}
-        for n in range(count):
-            out[f"rate {n}"] = still[f"rate {n}"]
-            for name in ("x", "y", "slip"):
-                of_a = [slope(f"{name} {n}", f"a{j}") for j in range(k)]
-                out[f"{name} {n}"] = sum((s * x for s, x in zip(of_a, a0, strict=True)), still[f"{name} {n}"])
-                for m in range(count):
-                    own = slope(f"{name} {n}", f"friction {m}")
-                    out[f"{name} {n} {m}"] = sum((s * x for s, x in zip(of_a, per[m], strict=True)), own)
-        speeds = [again.input(f"v{j}") for j in range(k)]
-        out["power"] = wasted(paths.case.loads, block, speeds)
-        kinetic: Number = 0.0
-        for i in range(k):
-            for j in range(k):
-                kinetic = kinetic + 0.5 * (speeds[i] * mass[i][j] * speeds[j])
-        return again.tape(out), again.tape({"energy": kinetic + potential(paths.case.loads, block)})
+        return motion_of(recording, self.k, rubs, found)
 
     def values(self, t: float, q: Floats, v: Floats) -> Values:
         """What the tape says at a state.
@@ -157,29 +144,23 @@ class Rubbing(Equations):
         ------
         Lost
         """
-        if not self._covered[0] <= q[0] <= self._covered[1]:
-            self._cover(q[0])
+        self._cover(q[0])
         try:
-            found = self._function(*self._filled(t, q, v))
+            found = self._function(*self._filled(self.rates, t, q, v))
         except (ZeroDivisionError, ValueError, OverflowError):
             raise Lost from None
         if any(x - x != 0.0 for x in found):
             # NaN and infinity
             raise Lost
-        k, c = self.k, len(self.arms)
-        x = iter(found)
-        a = [next(x) for _ in range(k)]
-        per = [[next(x) for _ in range(k)] for _ in range(c)]
-        rate, slip, p, slips, forces = [], [], [], [], []
-        for _ in range(c):
-            rate.append(next(x))
-            real, real_per = next(x), [next(x) for _ in range(c)]
-            imag, imag_per = next(x), [next(x) for _ in range(c)]
-            p.append(complex(real, imag))
-            forces.append([complex(*pair) for pair in zip(real_per, imag_per, strict=True)])
-            slip.append(next(x))
-            slips.append([next(x) for _ in range(c)])
-        return Values(a, per, p, forces, rate, slip, slips, next(x))
+        k, c, rest = self.k, len(self.arms), iter(found)
+        a, per = list(islice(rest, k)), [list(islice(rest, k)) for _ in range(c)]
+        joints = [[list(islice(rest, 1 + c)) for _ in QUANTITIES] for _ in range(c)]
+        forces = [[complex(*pair) for pair in zip(x, y, strict=True)] for x, y, *_ in joints]
+        rate, slip = [of[3][0] for of in joints], [of[2][0] for of in joints]
+        slips = [of[2][1:] for of in joints]
+        return Values(
+            a, per, [of[0] for of in forces], [of[1:] for of in forces], rate, slip, slips, next(rest)
+        )
 
     @property
     def plain(self) -> bool:
@@ -193,23 +174,13 @@ class Rubbing(Equations):
             return [0.0] * (self.k + 1)
         values = self.values(t, q, v)
         phi = self.friction(values)
-        power = values.power + sum(f * r for f, r in zip(phi, values.rate, strict=True))
-        found = [*_moved(values, phi), power]
+        found = [*values.moved(phi), values.power + sum(map(mul, phi, values.rate))]
         if any(value - value != 0.0 for value in found):
             raise Lost
         return found
 
-    def many(self, t: Reals, q: Reals, v: Reals) -> Reals:
-        """The same of many states, (n, k + 1); NaN where there are none."""
-        if self.locked:
-            return np.zeros((len(q), self.k + 1))
-        out = np.full((len(q), self.k + 1), np.nan)
-        for i, state in enumerate(zip(t.tolist(), q.tolist(), v.tolist(), strict=True)):
-            try:
-                out[i] = self(*state)
-            except Lost:
-                continue
-        return out
+    def _careful(self, q: Reals) -> NDArray[np.bool_]:
+        return np.ones(len(q), dtype=bool)
 
     def friction(self, values: Values) -> Floats:
         """The friction of every joint in this mode.
@@ -225,13 +196,13 @@ class Rubbing(Equations):
         phi = [0.0] * c
         for _ in range(LIMIT):
             after = [
-                -s * arm * abs(r) if s else x
-                for s, arm, r, x in zip(mode, self.arms, _forces(values, phi), phi, strict=True)
+                -s * arm * values.force(n, phi) if s else x
+                for n, (s, arm, x) in enumerate(zip(mode, self.arms, phi, strict=True))
             ]
             if inverse is not None:
                 for n in stuck:
                     after[n] = 0.0
-                rest = [values.slip[n] + sum(map(mul, values.slips[n], after)) for n in stuck]
+                rest = [values.slid(n, after) for n in stuck]
                 for n, x in zip(stuck, (inverse @ rest).tolist(), strict=True):
                     after[n] = -x
             change = max(abs(x - y) for x, y in zip(after, phi, strict=True))
@@ -247,10 +218,10 @@ class Rubbing(Equations):
     # --- modes ----------------------------------------------------------------------------------------------------
     def tendency(self, t: float, q: Floats, direction: float) -> float:
         """The acceleration of the one input, at rest, if it began to move in a direction; 0 where friction locks it."""
-        signs = [_sign(r) for r in self.values(t, q, [direction]).rate]
+        mode = self.values(t, q, [direction]).signs
         try:
             values = self.values(t, q, [0.0])
-            return _moved(values, self.in_mode(tuple(signs)).friction(values))[0]
+            return values.moved(self.in_mode(mode).friction(values))[0]
         except Lost:
             return 0.0
 
@@ -266,7 +237,7 @@ class Rubbing(Equations):
         if self.k == 1:
             if of.startswith("away"):
                 direction = float(of.removeprefix("away"))
-                return self.in_mode(tuple(_sign(r) for r in self.values(t, q, [direction]).rate)), v
+                return self.in_mode(self.values(t, q, [direction]).signs), v
             if ended and of != "rest":
                 return self.in_mode(self._turned_back(t, q, v[0])), v
             if ended:
@@ -312,10 +283,10 @@ class Rubbing(Equations):
     def _decided_alone(self, t: float, q: Floats, v: Floats) -> Mode:
         """The mode of one degree of freedom: it moves, begins to move one way, or sticks."""
         if v[0]:
-            return tuple(_sign(r) for r in self.values(t, q, v).rate)
+            return self.values(t, q, v).signs
         for direction in (1.0, -1.0):
             if self.tendency(t, q, direction) * direction > 0:
-                return tuple(_sign(r) for r in self.values(t, q, [direction]).rate)
+                return self.values(t, q, [direction]).signs
         return (0,) * len(self.arms)
 
     def _decided(self, t: float, q: Floats, v: Floats, resting: Sequence[int]) -> Mode:
@@ -324,22 +295,20 @@ class Rubbing(Equations):
         Friction of a resting joint is what keeps it at rest, at most μ r |R|: found joint by joint, over and over.
         """
         values = self.values(t, q, v)
-        signs = [_sign(r) for r in values.rate]
+        signs = list(values.signs)
         phi = [0.0] * len(self.arms)
         for _ in range(20 * LIMIT if resting else 0):
             before = list(phi)
             for n in range(len(phi)):
-                most = self.arms[n] * abs(_forces(values, phi)[n])
+                most = self.arms[n] * values.force(n, phi)
                 if n not in resting:
                     phi[n] = -signs[n] * most
                 elif values.slips[n][n] > 0:
-                    slip = values.slip[n] + sum(map(mul, values.slips[n], phi))
-                    phi[n] = min(most, max(-most, phi[n] - slip / values.slips[n][n]))
+                    phi[n] = min(most, max(-most, phi[n] - values.slid(n, phi) / values.slips[n][n]))
             if max(abs(x - y) for x, y in zip(phi, before, strict=True)) <= CLOSE * max(map(abs, phi)):
                 break
         for n in resting:
-            most = self.arms[n] * abs(_forces(values, phi)[n])
-            slip = values.slip[n] + sum(map(mul, values.slips[n], phi))
+            most, slip = self.arms[n] * values.force(n, phi), values.slid(n, phi)
             slides = abs(phi[n]) >= most * (1 - 1e-9) and abs(slip) > 1e-9 * abs(values.slip[n])
             signs[n] = _sign(slip) if slides else 0
         return tuple(signs)
@@ -349,65 +318,45 @@ class Rubbing(Equations):
         if self.locked and self.k == 1:
             return [self._breaking_away(1), self._breaking_away(-1)]
         found = super().watches()
-        if self.k == 1:
-            found.append(
-                Watch("friction rest", lambda t, q, v: v[0], lambda t, q, v, a: a[0], [0.0], ends=True)
-            )
-            return found + [self._turning_back(n) for n in range(len(self.mode))]
-        return found + [self._sliding(n) if s else self._sticking(n) for n, s in enumerate(self.mode)]
+        if self.k > 1:
+            return found + [self._sliding(n) if s else self._sticking(n) for n, s in enumerate(self.mode)]
+        rest = _watch("rest", lambda t, q, v: v[0], lambda t, q, v, a: a[0])
+        return [*found, rest, *(self._turning_back(n) for n in range(len(self.mode)))]
 
     def _breaking_away(self, direction: int) -> Watch:
         """A mechanism that stands, and would begin to move one way."""
-
-        def tendency(t: float, q: Floats, v: Floats) -> float:
-            return self.tendency(t, q, float(direction))
-
-        return Watch(f"friction away {direction}", tendency, None, [0.0], ends=True)
+        return _watch(f"away {direction}", lambda t, q, v: self.tendency(t, q, float(direction)))
 
     def _turning_back(self, n: int) -> Watch:
         """A joint whose rate changes its sign while the one input goes on: its coefficient does."""
-        return Watch(
-            f"friction {n}", lambda t, q, v: self.values(t, q, [1.0]).rate[n], None, [0.0], ends=True
-        )
+        return _watch(str(n), lambda t, q, v: self.values(t, q, [1.0]).rate[n])
 
     def _sliding(self, n: int) -> Watch:
         def slip(t: float, q: Floats, v: Floats, rates: Floats) -> float:
             values = self.values(t, q, v)
-            return float(values.slip[n] + sum(map(mul, values.slips[n], self.friction(values))))
+            return values.slid(n, self.friction(values))
 
-        return Watch(f"friction {n}", lambda t, q, v: self.values(t, q, v).rate[n], slip, [0.0], ends=True)
+        return _watch(str(n), lambda t, q, v: self.values(t, q, v).rate[n], slip)
 
     def _sticking(self, n: int) -> Watch:
         def spare(t: float, q: Floats, v: Floats) -> float:
             values = self.values(t, q, v)
             phi = self.friction(values)
-            return self.arms[n] * abs(_forces(values, phi)[n]) - abs(phi[n])
+            return self.arms[n] * values.force(n, phi) - abs(phi[n])
 
-        return Watch(f"friction {n}", spare, None, [0.0], ends=True)
+        return _watch(str(n), spare)
+
+
+def _watch(name: str, value: Value, rate: Rate | None = None) -> Watch:
+    """What ends a path, in a mode, where it is zero."""
+    return Watch(f"friction {name}", value, rate, [0.0], ends=True)
 
 
 def _sign(x: float) -> int:
     return (x > 0) - (x < 0)
 
 
-def _forces(values: Values, phi: Floats) -> list[complex]:
-    """The joint forces with friction."""
-    return [p + sum(map(mul, q, phi)) for p, q in zip(values.p, values.q, strict=True)]
-
-
-def _moved(values: Values, phi: Floats) -> Floats:
-    """The accelerations with friction."""
-    found = list(values.a)
-    for x, per in zip(phi, values.per, strict=True):
-        found = [a + x * b for a, b in zip(found, per, strict=True)]
-    return found
-
-
 def _second(block: Block, guide: int) -> Number:
     """The second derivative of a slide in time."""
     factor, value = block.second(lambda rates, k: rates.slide[guide][k - 1])
     return None if value is None else value * factor
-
-
-def _solved(mass: list[list[Number]], right: list[Number]) -> list[Number]:
-    return [right[0] / mass[0][0]] if len(right) == 1 else solved(mass, right)

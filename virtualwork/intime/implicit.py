@@ -19,8 +19,7 @@ import numpy as np
 
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.equations import Equations, Lost
-from virtualwork.intime.step import Step
-from virtualwork.intime.watch import Floats
+from virtualwork.intime.watch import Floats, Step
 
 STAGES = 5
 # iterations of Newton's method; a change of the speeds, relative, at which it has converged

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dalembert.arithmetic.engines import rounds
-from dalembert.arithmetic.loop import Calls, Loop
-from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
+from dalembert.arithmetic.loop import Loop
+from dalembert.arithmetic.recorded import RECORDED, Number
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.control import (
@@ -33,7 +33,8 @@ from virtualwork.intime.control import (
     stiffer,
     tried,
 )
-from virtualwork.intime.explicit import DormandPrince, called_by, names, size, step
+from virtualwork.intime.explicit import DormandPrince, Written, size
+from virtualwork.intime.powers import names, state_names
 
 # an error that is surely enough, and is no zero
 SMALL = 1e-30
@@ -50,17 +51,17 @@ def body(k: int, passed: tuple[str, ...]) -> Tape:
     rounding left over of q and q̇ (`lq0`, `lv0`); the largest speeds so far (`f0`). Constants: `end`, `span`,
     `tolerance`, and `scale0` and so on.
     """
-    recorder = Recorder()
-    enter = recorder.input
     places, speeds, rates = names(k)
-    calls = Calls(recorder, passed, rates)
-    t, h, grow, stiff, left, work = (enter(x) for x in ("t", "h", "grow", "stiff", "left", "work"))
-    end, span, tolerance = (enter(x) for x in ("end", "span", "tolerance"))
-    q, v, a = ([enter(name) for name in of] for of in (places, speeds, rates))
-    low_q, low_v, fastest, scale = ([enter(f"{x}{j}") for j in range(k)] for x in ("lq", "lv", "f", "scale"))
+    written = Written(k, passed)
+    t, q, v, a = written.t, written.q, written.v, written.rates
+    h, grow, stiff, left, work = written.several(("h", "grow", "stiff", "left", "work"))
+    end, span, tolerance = written.several(("end", "span", "tolerance"))
+    low_q, low_v, fastest, scale = (
+        written.several(f"{x}{j}" for j in range(k)) for x in ("lq", "lv", "f", "scale")
+    )
     whole = end - t
     length = tried(h, whole)
-    done = step(called_by(calls), t, q, v, a, length)
+    done = written.step(length)
     error = size(done.third, done.fifth, allowed(tolerance, scale, q, fastest, v, done.dv))
     # the eighth root, by three; NaN where the error is
     some = most(error, SMALL)
@@ -94,44 +95,91 @@ def body(k: int, passed: tuple[str, ...]) -> Tape:
         least(tried(out["h"], end - out["t"]) - shortest(out["t"], span), STIFF - out["stiff"] - 0.5),
     )
     out["left"] = RECORDED.select(left, further, left)
-    return recorder.tape(out | calls.outputs)
+    return written.tape(out)
 
 
 @lru_cache(maxsize=64)
 def loop(k: int, rates: Tape) -> Loop:
     """The loop of steps with the tape of accelerations and power of k inputs."""
-    own = {"t", *names(k)[0], *names(k)[1]}
-    passed = tuple(name for name in rates.inputs if name in own)
-    kept = ("t", *names(k)[0], *names(k)[1], *names(k)[2], "work")
-    return Loop(body(k, passed), rates, kept)
+    return Loop(body(k, _passed(k, rates)), rates, _kept(k))
 
 
 @lru_cache(maxsize=64)
 def again(k: int, rates: Tape) -> Loop:
     """The loop of steps whose ends are given (`next`): no step is judged."""
-    recorder = Recorder()
-    enter = recorder.input
     places, speeds, slopes = names(k)
-    own = {"t", *places, *speeds}
-    calls = Calls(recorder, [name for name in rates.inputs if name in own], slopes)
-    t, end, work = enter("t"), enter("next"), enter("work")
-    q, v, a = ([enter(name) for name in of] for of in (places, speeds, slopes))
-    done = step(called_by(calls), t, q, v, a, end - t)
-    out: dict[str, Number] = {"t": end, "left": enter("left"), "work": work + done.work}
+    written = Written(k, _passed(k, rates))
+    end = written.enter("next")
+    done = written.step(end - written.t)
+    work, left = written.several(("work", "left"))
+    out: dict[str, Number] = {"t": end, "left": left, "work": work + done.work}
     out |= dict(zip(slopes, done.rates, strict=True))
-    for x, d, name in (*zip(q, done.dq, places, strict=True), *zip(v, done.dv, speeds, strict=True)):
-        out[name], out[f"l{name}"] = added(x, enter(f"l{name}"), d)
-    kept = ("t", *places, *speeds, *slopes, "work")
-    return Loop(recorder.tape(out | calls.outputs), rates, kept, ("next",))
+    for name, x, d in zip((*places, *speeds), (*written.q, *written.v), (*done.dq, *done.dv), strict=True):
+        out[name], out[f"l{name}"] = added(x, written.enter(f"l{name}"), d)
+    return Loop(written.tape(out), rates, _kept(k), ("next",))
+
+
+def _passed(k: int, rates: Tape) -> tuple[str, ...]:
+    """What of a state the accelerations hang on."""
+    return tuple(name for name in rates.inputs if name in state_names(k))
+
+
+def _kept(k: int) -> tuple[str, ...]:
+    return (*state_names(k), *names(k)[2], "work")
+
+
+class Nodes(NamedTuple):
+    """States of lanes side by side, (…, 3k + 3): the times and works (…), q and q̇ (…, k), the rates (…, k + 1)."""
+
+    table: Reals
+    k: int
+
+    @property
+    def t(self) -> Reals:
+        """The times."""
+        return self.table[..., 0]
+
+    @property
+    def q(self) -> Reals:
+        """The coordinates."""
+        return self.table[..., 1 : self.k + 1]
+
+    @property
+    def v(self) -> Reals:
+        """Their speeds."""
+        return self.table[..., self.k + 1 : 2 * self.k + 1]
+
+    @property
+    def rates(self) -> Reals:
+        """The accelerations, and the power."""
+        return self.table[..., 2 * self.k + 1 : -1]
+
+    @property
+    def work(self) -> Reals:
+        """The work so far."""
+        return self.table[..., -1]
+
+    def at(self, where: Any) -> Nodes:
+        """Some of them."""
+        return Nodes(self.table[where], self.k)
+
+    def then(self, *others: Nodes) -> Nodes:
+        """These and others, one round after the other."""
+        return _nodes(self.k, np.concatenate([np.moveaxis(of.table, -1, 1) for of in (self, *others)]))
+
+
+def _nodes(k: int, kept: Reals) -> Nodes:
+    """What is kept of each round, (rounds, 3k + 3, n), as nodes (rounds, n)."""
+    return Nodes(np.moveaxis(kept, 1, -1), k)
 
 
 class March(NamedTuple):
-    """What a march has found: the nodes, (rounds, n) each, by name; and the last state, (n,) each.
+    """What a march has found: the nodes at the ends of rounds, (rounds, n); and the last state, (n,) each.
 
     A round in which a lane took no step repeats its last node.
     """
 
-    nodes: dict[str, Reals]
+    nodes: Nodes
     state: dict[str, Reals]
 
     @property
@@ -140,9 +188,7 @@ class March(NamedTuple):
         return self.state["stiff"] >= STIFF
 
 
-def march(
-    k: int, rates: Tape, given: Lanes, state: Lanes, capacity: int = ROUNDS, engine: str | None = None
-) -> March:
+def march(k: int, rates: Tape, given: Lanes, state: Lanes, capacity: int = ROUNDS) -> March:
     """Do steps in every lane, at most `capacity`.
 
     Parameters
@@ -151,55 +197,41 @@ def march(
     given, state : mapping of name to float or array (n,)
         See `body`; what further enters the rates is given.
     """
-    found, nodes = rounds.run(loop(k, rates), given, state, capacity, engine)
-    return March(nodes, found)
+    found, kept = rounds.run(loop(k, rates), given, state, capacity)
+    return March(_nodes(k, np.stack(list(kept.values()), axis=1)), found)
+
+
+def follow(k: int, rates: Tape, given: Lanes, state: Lanes, times: Reals) -> March:
+    """Steps that end at given times, (rounds, n)."""
+    steps = again(k, rates)
+    begin = {name: state[name] for name in steps.states}
+    found, kept = rounds.run(steps, given, begin, len(times), fed={"next": times})
+    return March(_nodes(k, np.stack(list(kept.values()), axis=1)), {**state, **found})
 
 
 def beginning(
-    t: Number,
-    q: Several,
-    v: Several,
-    rates: Several,
-    h: Number,
-    fastest: Several,
-    work: Number,
+    node: Nodes,
+    h: Number = 0.0,
+    fastest: Several | None = None,
 ) -> dict[str, Any]:
-    """The state at the first node: q and the others (k, n) or (k,)."""
-    places, speeds, slopes = names(len(q))
+    """The state of steps from nodes: the next one's length, and the largest speeds so far, (k, n) or (k,)."""
+    k = node.k
+    places, speeds, rates = names(k)
     low = {f"l{name}": 0.0 for name in (*places, *speeds)}
-    found = {"t": t, "h": h, "grow": GROW, "stiff": 0.0, "left": 1.0, "work": work}
-    for of, values in (
-        (places, q),
-        (speeds, v),
-        (slopes, rates),
-        ([f"f{j}" for j in range(len(q))], fastest),
-    ):
+    found = {"t": node.t, "h": h, "grow": GROW, "stiff": 0.0, "left": 1.0, "work": node.work}
+    several = (places, node.q.T), (speeds, node.v.T), (rates, node.rates.T)
+    for of, values in (*several, ([f"f{j}" for j in range(k)], [1.0] * k if fastest is None else fastest)):
         found |= dict(zip(of, values, strict=True))
     return found | low
 
 
-def follow(k: int, rates: Tape, given: Lanes, state: Lanes, times: Reals, engine: str | None = None) -> March:
-    """Steps that end at given times, (rounds, n)."""
-    loop_of = again(k, rates)
-    begin = {name: state[name] for name in loop_of.states}
-    found, nodes = rounds.run(loop_of, given, begin, len(times), engine, {"next": times})
-    return March(nodes, {**state, **found})
-
-
-def over(
-    k: int, rates: Tape, given: Lanes, t: Reals, q: Reals, v: Reals, slopes: Reals, h: Reals
-) -> tuple[Reals, Reals, Reals]:
+def over(rates: Tape, given: Lanes, node: Nodes, h: Reals) -> tuple[Reals, Reals, Reals]:
     """Changes of q and q̇ (n, k) and the work (n,) over one step of a length of its own from each of n states; NaN where there is none."""
-    state = beginning(t, q.T, v.T, slopes.T, h, np.ones((k, len(q))), 0.0)
+    k, end = node.k, node.t + h
     # any error will do
-    whole = {**given, "end": t + h, "span": 0.0, "tolerance": 1e100} | {f"scale{j}": 1.0 for j in range(k)}
-    found = march(k, rates, whole, state, 1).state
-    there = found["t"] == whole["end"]
-    places, speeds, _ = names(k)
-    dq, dv = (
-        np.stack(
-            [np.where(there, found[name] - x, np.nan) for name, x in zip(of, before.T, strict=True)], axis=1
-        )
-        for of, before in ((places, q), (speeds, v))
-    )
-    return dq, dv, np.where(there, found["work"], np.nan)
+    whole = {**given, "end": end, "span": 0.0, "tolerance": 1e100} | {f"scale{j}": 1.0 for j in range(k)}
+    state = beginning(node, h) | {"work": 0.0}
+    found = march(k, rates, whole, state, 1).nodes.at(0)
+    there = found.t == end
+    dq, dv = (np.where(there[:, None], x, np.nan) for x in (found.q - node.q, found.v - node.v))
+    return dq, dv, np.where(there, found.work, np.nan)

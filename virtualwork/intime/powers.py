@@ -2,62 +2,72 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping, Sequence
 
 from dalembert.arithmetic.adjoint import derivatives
 from dalembert.arithmetic.recorded import RECORDED, Number
 from dalembert.arithmetic.systems import solved
 from dalembert.arithmetic.tape import Tape
-from virtualwork.formulas.block import Block
-from virtualwork.formulas.loads import Load
 from virtualwork.formulas.recording import Recording
 
 
-def motion_of(recording: Recording, k: int) -> tuple[Tape, Tape]:
-    """The tapes of accelerations and power, and of the energies, of k inputs that move."""
-    names = [f"effort {j}" for j in range(k)]
-    motion = recording.tape([("effort", j) for j in range(k)])
-    free = derivatives(motion, [f"a{j}" for j in range(k) if f"a{j}" in motion.inputs])
-    _, _, block = recording.forces
-    again = recording.recorder
+def names(k: int) -> tuple[list[str], list[str], list[str]]:
+    """What q, q̇ and the rates (the accelerations, and the power) are called on a tape."""
+    places, speeds, rates = ([f"{name}{j}" for j in range(k)] for name in "qva")
+    return places, speeds, [*rates, "power"]
+
+
+def state_names(k: int) -> list[str]:
+    """What (t, q, q̇) is called on a tape."""
+    places, speeds, _ = names(k)
+    return ["t", *places, *speeds]
+
+
+def motion_of(
+    recording: Recording, k: int, frictions: Sequence[str] = (), more: Mapping[str, Number] | None = None
+) -> tuple[Tape, Tape]:
+    """The tapes of accelerations and power, and of the energies, of k inputs that move.
+
+    The effort hangs linearly on the accelerations and on what is called `frictions`. Where these are given, the
+    accelerations and quantities (`more`) are those without them, and beside each stands how it changes with each:
+    `NAME FRICTION`.
+    """
+    again, more = recording.recorder, more or {}
+    paths, _, block = recording.forces
+    efforts, accelerations = [f"effort {j}" for j in range(k)], names(k)[2][:-1]
+    motion = recording.tape([("effort", j) for j in range(k)], more)
+    free = [name for name in (*accelerations, *frictions) if name in motion.inputs]
     inputs = {name: again.input(name) for name in motion.inputs}
-    still = motion.on(inputs | {f"a{j}": 0.0 for j in range(k)}, RECORDED)
-    slopes = free.on(inputs, RECORDED)
-    mass = [[slopes.get(f"d({name})/d(a{j})", 0.0) for j in range(k)] for name in names]
-    right = [-still[name] for name in names]
-    found = [right[0] / mass[0][0]] if k == 1 else solved(mass, right)
-    loads = recording.forces[0].case.loads
-    speeds = [again.input(f"v{j}") for j in range(k)]
+    slopes = derivatives(motion, free).on(inputs, RECORDED)
+    still = motion.on(inputs | dict.fromkeys(free, 0.0), RECORDED)
+
+    def slope(of: str, to: str) -> Number:
+        return slopes.get(f"d({of})/d({to})", 0.0)
+
+    mass = [[slope(effort, a) for a in accelerations] for effort in efforts]
+
+    def moved(by: Sequence[Number]) -> list[Number]:
+        right = [-x for x in by]
+        return [right[0] / mass[0][0]] if k == 1 else solved(mass, right)
+
+    found = moved([still[effort] for effort in efforts])
+    per = {name: moved([slope(effort, name) for effort in efforts]) for name in frictions}
+    out = dict(zip(accelerations, found, strict=True))
+    for name, by in per.items():
+        out |= {f"{a} {name}": x for a, x in zip(accelerations, by, strict=True)}
+    for quantity in more:
+        along = [slope(quantity, a) for a in accelerations]
+        out[quantity] = sum((s * x for s, x in zip(along, found, strict=True)), still[quantity])
+        for name, by in per.items():
+            own = slope(quantity, name)
+            out[f"{quantity} {name}"] = sum((s * x for s, x in zip(along, by, strict=True)), own)
+    speeds = [again.input(name) for name in names(k)[1]]
     kinetic: Number = 0.0
-    for i in range(k):
-        for j in range(k):
-            kinetic = kinetic + 0.5 * (speeds[i] * mass[i][j] * speeds[j])
-    outputs = {f"a{j}": value for j, value in enumerate(found)}
-    return (
-        again.tape(outputs | {"power": wasted(loads, block, speeds)}),
-        again.tape({"energy": kinetic + potential(loads, block)}),
-    )
-
-
-def places_and_speeds(k: int) -> list[str]:
-    """What q and q̇ are called on the tape."""
-    return [f"{name}{j}" for name in "qv" for j in range(k)]
-
-
-def wasted(loads: Iterable[Load], block: Block, speeds: list[Number]) -> Number:
-    """The power of what stores nothing: of applied forces and torques, dampers, drives."""
-    total: Number = 0.0
-    for load in loads:
-        for j, speed in enumerate(speeds):
-            work = load.wasted(block, j)
-            total = total if work is None else total + work * speed
-    return total
-
-
-def potential(loads: Iterable[Load], block: Block) -> Number:
-    """What gravity and springs hold, J."""
-    total: Number = 0.0
-    for load in loads:
-        if load.stores and load.carries:
-            total = total + load.potential(block)
-    return total
+    for row, speed in zip(mass, speeds, strict=True):
+        for m, other in zip(row, speeds, strict=True):
+            kinetic = kinetic + 0.5 * (speed * m * other)
+    loads = paths.case.loads
+    wasted = [(load.wasted(block, j), speed) for load in loads for j, speed in enumerate(speeds)]
+    power = sum((work * speed for work, speed in wasted if work is not None), 0.0)
+    potential = sum((load.potential(block) for load in loads if load.stores and load.carries), 0.0)
+    return again.tape(out | {"power": power}), again.tape({"energy": kinetic + potential})

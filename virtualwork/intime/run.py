@@ -20,8 +20,8 @@ from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, UNKNOWN, roun
 from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.implicit import Radau
-from virtualwork.intime.path import MOST
 from virtualwork.intime.travel import UNDECIDED, Travel, travel
+from virtualwork.intime.walk import MOST
 from virtualwork.intime.watch import Floats
 from virtualwork.motion import Motion
 
@@ -44,6 +44,8 @@ class Run:
         The inputs (rad, or m of a slide; not wrapped) and their rates.
     error_estimate : array (n, k)
         How far the inputs may be from the truth.
+    work : array (n,)
+        Of what stores no energy, since the first time, J.
     ended : str
         Why it ends before the last time asked for; empty where it does not.
     warnings : tuple of str
@@ -51,29 +53,15 @@ class Run:
 
     assembly: Assembly
     t: Reals
+    angle: Reals = field(repr=False)
+    speed: Reals = field(repr=False)
+    acceleration: Reals = field(repr=False)
+    work: Reals = field(repr=False)
+    error_estimate: Reals = field(repr=False)
     fine: Travel = field(repr=False)
     coarse: Travel = field(repr=False)
     share: float = field(repr=False)
     warnings: tuple[str, ...] = ()
-
-    @cached_property
-    def _states(self) -> tuple[Reals, Reals, Reals, Reals]:
-        return self.fine.at(self.t)
-
-    @property
-    def angle(self) -> Reals:
-        """(n, k): the inputs, rad or m."""
-        return self._states[0]
-
-    @property
-    def speed(self) -> Reals:
-        """(n, k): their speeds."""
-        return self._states[1]
-
-    @property
-    def acceleration(self) -> Reals:
-        """(n, k): their accelerations."""
-        return self._states[2]
 
     @property
     def ended(self) -> str:
@@ -85,24 +73,15 @@ class Run:
         """(n,): kinetic energy and that of gravity and springs, J."""
         return self.fine.energy(self.t)
 
-    @cached_property
+    @property
     def energy_drift(self) -> Reals:
         """(n,): the change of energy since the first time that the work of the loads does not explain, J."""
-        return np.asarray((self.energy - self.energy[0]) - self._states[3])
-
-    @cached_property
-    def error_estimate(self) -> Reals:
-        """(n, k): how far the inputs may be from the truth, rad or m."""
-        nodes = self.coarse.nodes[self.coarse.nodes <= self.fine.end]
-        q, v, a, _ = self.fine.at(nodes)
-        found = spread(q, self.coarse.at(nodes)[0], self.share) + rounding(nodes, q, v, a)
-        # between two nodes that of the later one
-        return np.asarray(found[np.minimum(np.searchsorted(nodes, self.t), len(nodes) - 1)])
+        return drift(self.energy, self.work)
 
     @property
     def unknown(self) -> NDArray[np.bool_]:
         """(n,): from when on no digit is known."""
-        scale = np.array(self.fine.legs[0].path.equations.scale)
+        scale = np.array(self.fine.legs[0].equations.scale)
         return np.asarray((self.error_estimate / scale).max(axis=1) > UNKNOWN)
 
     def spread(self, fine: Reals, coarse: Reals) -> Reals:
@@ -132,9 +111,9 @@ class Run:
         """
         from virtualwork.intime.picture import Course, draw, fine_times
 
-        fine = replace(self, t=fine_times(self.t))
-        course = Course(fine.t, fine.angle, fine.speed, fine.energy, fine.motion)
-        return draw(course, self.assembly.mechanism, figure)
+        t, way = fine_times(self.t), self.fine
+        angle, speed, *_ = way.at(t)
+        return draw(Course(t, angle, speed, way.energy(t), way.motion(t)), self.assembly.mechanism, figure)
 
     def animate(self, forces: bool = False) -> Page:
         """Return a page that moves: the mechanism by its own clock with play, slider, curves and values.
@@ -215,33 +194,44 @@ def simulate(
     equations.refuse(float(t[0]), q, v)
     scale = np.array(equations.scale)
     levels = levels_of(m.inputs, until)
-    tolerance = max(LEAST, FIRST * accuracy)
+    tolerance, end = max(LEAST, FIRST * accuracy), float(t[-1])
     start = float(t[0]), q, v
-    fine = travel(own, start, float(t[-1]), tolerance, levels, DormandPrince(), accuracy)
+    fine = travel(own, start, end, tolerance, levels, DormandPrince(), accuracy)
     if fine.stiff:
         # what is stiff somewhere is from the beginning
-        fine = travel(own, start, float(t[-1]), tolerance, levels, Radau(), accuracy)
+        fine = travel(own, start, end, tolerance, levels, Radau(), accuracy)
     for tries in range(TRIES):
-        coarse, method = fine, fine.legs[0].path.method
+        coarse, method = fine, fine.legs[0].method
         # near change points every solution is interpolated from other poses
         ways = own if tries % 2 else own.otherwise()
         # no farther than both go
-        last = coarse.end if coarse.ended == UNDECIDED else float(t[-1])
+        last = coarse.end if coarse.ended == UNDECIDED else end
         fine = travel(ways, start, last, tolerance / (GAIN + 1), levels, method, accuracy, coarse)
-        if last < t[-1] and fine.ended == "end":
+        if last < end and fine.ended == "end":
             fine.ended = coarse.ended
         coarse.backwards()
         part = 1.0 if equations.crosses or coarse.folds or fine.folds else share(tolerance)
-        found = Run(assembly, reached(t, fine.end), fine, coarse, part)
-        worst = float((found.error_estimate / scale).max())
+        found = reached(t, fine.end)
+        error = _error(fine, coarse, found, part)
+        worst = float((error / scale).max())
         if worst <= accuracy or tolerance <= LEAST or tries == TRIES - 1 or fine.steps > MOST / 2:
             break
         tolerance /= GAIN + 1
-    _refuse_lost_energy(found, max(accuracy, worst))
-    return replace(found, warnings=(*equations.warnings, *_said(found, accuracy, worst, until, t)))
+    _refuse_lost_energy(fine, max(accuracy, worst))
+    run = Run(assembly, found, *fine.at(found), error, fine, coarse, part)
+    return replace(run, warnings=(*equations.warnings, *_said(run, accuracy, worst, until, t)))
 
 
-def _refuse_lost_energy(run: Run, error: float) -> None:
+def _error(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
+    """How far the inputs may be from the truth at times, (n, k)."""
+    nodes = coarse.nodes[coarse.nodes <= fine.end]
+    q, v, a, _ = fine.at(nodes)
+    found = spread(q, coarse.at(nodes)[0], part) + rounding(nodes, q, v, a)
+    # between two nodes that of the later one
+    return np.asarray(found[np.minimum(np.searchsorted(nodes, t), len(nodes) - 1)])
+
+
+def _refuse_lost_energy(fine: Travel, error: float) -> None:
     """Refuse a motion through change points whose energy is lost by more than its error explains.
 
     Raises
@@ -249,19 +239,16 @@ def _refuse_lost_energy(run: Run, error: float) -> None:
     MechanismError
         From which time on.
     """
-    fine = run.fine
-    path = fine.legs[0].path
-    equations = path.equations
+    nodes, equations = fine.legs[0].nodes, fine.legs[0].equations
     if not equations.crosses:
         return
-    t, q, v = (np.array(x) for x in (path.t, path.q, path.v))
+    t, q, v = nodes.t, nodes.q, nodes.v
     moving = float(np.max(equations.energies(t, q, v) - equations.energies(t, q, 0 * v)))
-    nodes = fine.nodes
-    energy = fine.energy(nodes)
-    lost = np.abs(energy - energy[0] - fine.at(nodes)[3]) > 1e3 * error * moving
+    times = fine.nodes
+    lost = np.abs(drift(fine.energy(times), fine.at(times)[3])) > 1e3 * error * moving
     if lost.any():
         raise MechanismError(
-            f"at {nodes[np.argmax(lost)]:.6g} s it passes a change point too close to which its rates change too fast: "
+            f"at {times[np.argmax(lost)]:.6g} s it passes a change point too close to which its rates change too fast: "
             "energy is lost there beyond the error of the motion"
         )
 
@@ -274,6 +261,11 @@ def _own(assembly: Assembly) -> Coordinates:
         found = Coordinates((Rubbing if m.friction else Equations)(assembly), m.inputs)
         assembly.recordings["in time"] = found
     return found
+
+
+def drift(energy: Reals, work: Reals) -> Reals:
+    """The change of energy (…, n) since the first time that work does not explain."""
+    return np.asarray(energy - energy[..., :1] - work)
 
 
 def rising(times: ArrayLike) -> Reals:

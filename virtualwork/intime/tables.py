@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
 
 from virtualwork.formulas.loads import Tabled
-from virtualwork.intime.watch import Floats, Watch
+from virtualwork.intime.watch import Floats, Rate, Value, Watch
 from virtualwork.plan.steps import Plan
 
-Value = Callable[[float, Floats, Floats], float]
-Rate = Callable[[float, Floats, Floats, Floats], float]
 # of a table's span: how far beyond its ends it is read, for a step may reach there by its rounding
 EDGE = 1e-12
 

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from virtualwork.formulas.numbers import EPS, Reals
-from virtualwork.intime.coordinates import BETTER, FOLDING, TURN, Coordinates
+from virtualwork.intime.coordinates import BETTER, FOLDING, TURN, Coordinates, Monitor, measured
 from virtualwork.intime.equations import Lost
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.joined import Joined
-from virtualwork.intime.path import MOST, Path, walk
-from virtualwork.intime.step import Method
-from virtualwork.intime.watch import Floats, Watch
+from virtualwork.intime.path import Method, Path, followed
+from virtualwork.intime.walk import MOST, Walk
+from virtualwork.intime.watch import Floats
 
 # changes of coordinates in one simulation
 CHANGES = 10_000
@@ -27,70 +26,31 @@ NO_FURTHER = "it can go no further: a limit, or a pose where its motion is not d
 
 
 @dataclass
-class Leg:
-    """A path and its coordinates; `first` are the inputs at its beginning."""
-
-    coordinates: Coordinates
-    path: Path
-    first: Floats
-
-    @cached_property
-    def inputs(self) -> Reals:
-        """The inputs at the nodes (n, k), whole turns and all."""
-        q, v = np.array(self.path.q), np.array(self.path.v)
-        if self.coordinates.own:
-            return q
-        rates = np.array(self.path.rates)[:, : q.shape[1]]
-        found, speed, _ = self.coordinates.states(q, v, rates, np.zeros_like(q))
-        step = np.diff(self.path.t)[:, None]
-        near = 0.5 * (speed[1:] + speed[:-1]) * step
-        change = np.diff(found, axis=0)
-        turning = np.array([not e.is_slide for e in self.coordinates.inputs])
-        change = np.where(turning, change - TURN * np.round((change - near) / TURN), change)
-        return np.asarray(self.first + np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(change, axis=0)]))
-
-    def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
-        """The coordinates, their speeds and accelerations, and the work."""
-        return self.path.at(times)
-
-    def states(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
-        """The inputs, their speeds and accelerations, and the work."""
-        q, v, a, work = self.at(times)
-        if self.coordinates.own:
-            return q, v, a, work
-        t = np.array(self.path.t)
-        i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
-        near = self.inputs[i]
-        speed = self.coordinates.states(q, v, a, near)[1]
-        return *self.coordinates.states(q, v, a, near + 0.5 * speed * (times - t[i])[:, None]), work
-
-
-@dataclass
 class Travel:
     """The legs, one after the other, and why the last one ended."""
 
-    legs: list[Leg] = field(default_factory=list)
+    legs: list[Path] = field(default_factory=list)
     ended: str = ""
 
     @property
     def end(self) -> float:
         """The last time reached."""
-        return self.legs[-1].path.t[-1]
+        return self.legs[-1].end
 
     @property
     def steps(self) -> int:
         """How many steps were taken."""
-        return sum(len(leg.path.t) - 1 for leg in self.legs)
+        return sum(leg.steps for leg in self.legs)
 
     @property
     def stiff(self) -> bool:
         """Whether a leg ended for it was stiff."""
-        return any(leg.path.ended == "stiff" for leg in self.legs)
+        return any(leg.ended == "stiff" for leg in self.legs)
 
     @property
     def folds(self) -> bool:
         """Whether a loop came near folding on the way: there halves of steps gain less than the method's order."""
-        return any(leg.path.ended == "folding" for leg in self.legs)
+        return any(leg.ended == "folding" for leg in self.legs)
 
     @property
     def undecided(self) -> float | None:
@@ -99,17 +59,17 @@ class Travel:
         With a speed the motion is decided there: only one of the branches that meet goes on with it.
         """
         for leg in self.legs:
-            path = leg.path
-            if not path.equations.crosses:
+            if not leg.equations.crosses:
                 continue
-            v = np.array(path.v)[:, 0]
-            rest = 1e-7 * float(np.abs(v).max())
-            for i, t in enumerate(path.t):
-                if path.equations.meets(path.q[i][0]) and abs(v[i]) <= rest:
-                    return t
+            nodes, meets = leg.nodes, leg.equations.meets
+            t, q, v = (of.tolist() for of in (nodes.t, nodes.q[:, 0], nodes.v[:, 0]))
+            rest = 1e-7 * max(map(abs, v))
+            for i in range(len(t)):
+                if meets(q[i]) and abs(v[i]) <= rest:
+                    return float(t[i])
                 if i and v[i] * v[i - 1] < 0:
-                    turn = path.turning(i - 1)
-                    if path.equations.meets(float(path.at(np.array([turn]))[0][0, 0])):
+                    turn = leg.turning(i - 1)
+                    if meets(float(leg.at(np.array([turn]))[0][0, 0])):
                         return turn
         return None
 
@@ -120,12 +80,12 @@ class Travel:
         it is another one.
         """
         for leg in self.legs:
-            leg.path.backwards = True
+            leg.backwards = True
 
     @property
     def nodes(self) -> Reals:
         """The times between steps."""
-        return np.unique(np.concatenate([leg.path.t for leg in self.legs]))
+        return np.unique(np.concatenate([leg.nodes.t for leg in self.legs]))
 
     @property
     def halves(self) -> Floats:
@@ -135,17 +95,17 @@ class Travel:
     @property
     def methods(self) -> list[str]:
         """The methods used."""
-        return list(dict.fromkeys(leg.path.method.name for leg in self.legs))
+        return list(dict.fromkeys(leg.method.name for leg in self.legs))
 
-    def _parts(self, times: Reals) -> list[tuple[Leg, Any]]:
+    def _parts(self, times: Reals) -> list[tuple[Path, Any]]:
         """The legs, each with the rows of the times on it."""
-        begins = np.array([leg.path.t[0] for leg in self.legs])
+        begins = np.array([leg.rows[0][0] for leg in self.legs])
         which = np.clip(np.searchsorted(begins, times, side="right") - 1, 0, None)
         return [(leg, rows) for i, leg in enumerate(self.legs) if len(rows := np.flatnonzero(which == i))]
 
     def at(self, times: Reals) -> tuple[Reals, Reals, Reals, Reals]:
         """The inputs, their speeds and accelerations (n, k), and the work done (n,)."""
-        k = self.legs[0].path.equations.k
+        k = self.legs[0].equations.k
         out = [np.empty((len(times), k)) for _ in range(3)]
         work = np.empty(len(times))
         for leg, rows in self._parts(times):
@@ -158,8 +118,8 @@ class Travel:
         """Kinetic energy and that of gravity and springs, (n,) J."""
         out = np.empty(len(times))
         for leg, rows in self._parts(times):
-            q, v, _, _ = leg.path.at(times[rows])
-            out[rows] = leg.path.equations.energies(times[rows], q, v)
+            q, v, _, _ = leg.at(times[rows])
+            out[rows] = leg.equations.energies(times[rows], q, v)
         return out
 
     def motion(self, times: Reals) -> Any:
@@ -174,62 +134,13 @@ class Travel:
         """A link's angle (n,) rad, followed from the first time on through all whole turns."""
         every = np.union1d(self.nodes[self.nodes <= times[-1]], times)
         link = self.motion(every).link(name)
-        angle, omega = link.angle, link.omega
-        near = 0.5 * (omega[1:] + omega[:-1]) * np.diff(every)
-        change = np.diff(angle)
-        change -= TURN * np.round((change - near) / TURN)
-        whole = angle[0] + np.concatenate([[0.0], np.cumsum(change)])
+        angle, omega = link.angle[:, None], link.omega[:, None]
+        whole = angle[0] + followed(angle, omega, every, True)[:, 0]
         for j, entry in enumerate(self.legs[0].coordinates.inputs):
             if entry.link == name and entry.on == "ground":
                 # as the input itself is counted
                 whole += TURN * np.round((self.legs[0].first[j] - whole[0]) / TURN)
         return np.asarray(whole[np.searchsorted(every, times)])
-
-
-@dataclass
-class Monitor:
-    """What a path is asked at every node: whether its coordinates fold, and what the inputs are there."""
-
-    coordinates: Coordinates
-    near: Floats
-    # a margin below which they fold: where no others were better, a quarter of what it was
-    below: float
-    follows: bool
-    # the coordinate at the last node
-    last: float
-
-    def __call__(self, t: float, q: Floats, v: Floats) -> str:
-        if self.follows:
-            self.near = self.inputs(q, v)
-        if self._strays(q, v):
-            return "undecided"
-        if self.coordinates.folds(q, self.below):
-            return "folding"
-        if self.below < FOLDING and not self.coordinates.folds(q):
-            self.below = FOLDING
-        return ""
-
-    def _strays(self, q: Floats, v: Floats) -> bool:
-        """Whether another coordinate takes for a change point what the inputs do not: by its rounding, that is larger."""
-        last, self.last = self.last, q[0]
-        if self.coordinates.own or self.coordinates.equations.clear(np.array([last, q[0]])):
-            return False
-        return not self.coordinates.made[0].equations.passes(self.inputs(q, v)[0])
-
-    def quiet(self, q: Reals) -> bool:
-        """Whether nothing folds at any of many places, and none has to be followed."""
-        return not self.follows and self.below == FOLDING and self.coordinates.stands(q)
-
-    def inputs(self, q: Floats, v: Floats) -> Floats:
-        """The inputs at a state, with the whole turns of those at the last node."""
-        state = [np.array([x]) for x in (q, v, v, self.near)]
-        return self.coordinates.states(*state)[0][0].tolist()  # type: ignore[no-any-return]
-
-    def until(self, j: int, level: float) -> Watch:
-        """The end where input j has a value."""
-        if self.coordinates.own:
-            return Watch("until", lambda t, q, v: q[j], lambda t, q, v, a: v[j], [level], ends=True)
-        return Watch("until", lambda t, q, v: self.inputs(q, v)[j], None, [level], ends=True)
 
 
 def travel(
@@ -264,7 +175,7 @@ def travel(
     ended = ""
     while True:
         equations = coordinates.equations
-        left = None
+        left: dict[str, float] = {}
         if isinstance(equations, Rubbing):
             before = equations.mode
             try:
@@ -278,19 +189,18 @@ def travel(
         monitor = Monitor(coordinates, inputs, below, bool(until) and not coordinates.own, q[0])
         watches = [*(monitor.until(j, level) for j, level in until.items()), *equations.watches()]
         most = MOST if like is None else MOST + 2 * like.steps
-        stops, budget = equations.stops, most - found.steps
-        begin = t, q, v, work
-        path = walk(equations, method, begin, end, tolerance, watches, stops, monitor, budget, left, plan)
-        leg = Leg(coordinates, path, inputs)
-        found.legs.append(leg)
+        path = Path(coordinates, method, inputs)
+        way = path, end, tolerance, watches, equations.stops, monitor, most - found.steps, left, plan
+        Walk(*way).go(t, q, v, work)
+        found.legs.append(path)
         found.ended = path.ended
         if path.ended in ("end", "until", "budget") or len(found.legs) > CHANGES:
             return found
         if path.ended == "undecided":
             # the last node lies where that has been
             path.drop()
-        t, q, v, work = path.t[-1], path.q[-1], path.v[-1], path.work[-1]
-        inputs, ended = leg.inputs[-1].tolist(), path.ended
+        t, q, v, _, work = path.last
+        inputs, ended = path.inputs[-1].tolist(), path.ended
         if ended.startswith("friction"):
             continue
         if path.ended == "stiff":
@@ -299,7 +209,7 @@ def travel(
         found.ended = equations.outside(t, q, v) if path.ended == "lost" else ""
         if found.ended:
             # a table over time reads a little beyond its end
-            path.back(stops)
+            path.back(equations.stops)
         other = None if found.ended else coordinates.better(q, inputs)
         if (
             other is None
@@ -314,20 +224,8 @@ def travel(
             found.ended = found.ended or NO_FURTHER
             return found
         if other is not None:
-            v = _speeds(coordinates, other[0], q, v)
+            motion = coordinates.motion(np.array([q]), np.array([v]))
             coordinates, q = other
+            v = [float(measured(motion, entry, 1)[0]) for entry in coordinates.equations.mechanism.inputs]
             if isinstance(equations, Rubbing) and isinstance(coordinates.equations, Rubbing):
                 coordinates = coordinates.of(coordinates.equations.in_mode(equations.mode))
-
-
-def _speeds(old: Coordinates, new: Coordinates, q: Floats, v: Floats) -> Floats:
-    """The speeds of what other coordinates measure."""
-    motion = old.motion(np.array([q]), np.array([v]))
-    speeds = []
-    for entry in new.equations.mechanism.inputs:
-        if entry.is_slide:
-            speeds.append(float(motion.slide(entry.name).speed[0]))
-        else:
-            base = 0.0 if entry.on == "ground" else float(motion.link(entry.on).omega[0])
-            speeds.append(float(motion.link(entry.name).omega[0]) - base)
-    return speeds

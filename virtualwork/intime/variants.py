@@ -8,7 +8,8 @@ whose branch is not told by a comparison.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
-from virtualwork.family.family import Family
+from virtualwork.family.family import Family, FamilyMotion
 from virtualwork.family.part import Part, Solver
 from virtualwork.family.written import Written
 from virtualwork.formulas.numbers import Reals
@@ -26,18 +27,85 @@ from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
 from virtualwork.intime.ends import events, passed
 from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, rounding, share, spread
-from virtualwork.intime.explicit import names
-from virtualwork.intime.marching import beginning, follow, march, over
-from virtualwork.intime.powers import motion_of, places_and_speeds
-from virtualwork.intime.run import levels_of, not_met, reached, rising, simulate
-from virtualwork.intime.runs import Runs
+from virtualwork.intime.marching import Nodes, beginning, follow, march, over
+from virtualwork.intime.powers import motion_of, names
+from virtualwork.intime.run import drift, levels_of, not_met, reached, rising, simulate
 from virtualwork.intime.watch import Levels
 
 Mask = NDArray[np.bool_]
+Rows = NDArray[np.intp]
 # steps of one variant; beyond them it is done singly
 MOST = 20_000
 # rounds between two looks, at first and later
 SOON, LATER = 16, 128
+# what is found of each variant over its times
+FOUND = ("angle", "speed", "acceleration", "error_estimate", "energy", "work")
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """What `Variants.simulate` has found: every array has a leading axis of variants.
+
+    Attributes
+    ----------
+    t : array (n,)
+        The times asked for, s.
+    times : array (v, n)
+        Those of each variant: where its motion ends before the last, that of its end comes after those before it, and
+        what follows is NaN. So is all of a variant that cannot be let go.
+    angle, speed, acceleration : array (v, n, k)
+        The inputs (rad, or m of a slide; not wrapped) and their rates.
+    error_estimate : array (v, n, k)
+        How far the inputs may be from the truth.
+    energy, work : array (v, n)
+        Kinetic energy and that of gravity and springs, and the work of what stores none, J.
+    unknown : array (v, n)
+        From when on no digit is known.
+    warnings : dict of a variant's place to what must be said of it
+    """
+
+    family: Family
+    t: Reals
+    times: Reals = field(repr=False)
+    angle: Reals = field(repr=False)
+    speed: Reals = field(repr=False)
+    acceleration: Reals = field(repr=False)
+    error_estimate: Reals = field(repr=False)
+    energy: Reals = field(repr=False)
+    work: Reals = field(repr=False)
+    unknown: Mask = field(repr=False)
+    warnings: dict[int, tuple[str, ...]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, family: Family, t: Reals) -> Runs:
+        """Nothing yet."""
+        v, n, k = len(family), len(t), len(family.mechanism.inputs)
+        times, energy, work = np.full((3, v, n), np.nan)
+        angle, speed, acceleration, error = np.full((4, v, n, k), np.nan)
+        unknown = np.zeros((v, n), dtype=bool)
+        return cls(family, t, times, angle, speed, acceleration, error, energy, work, unknown)
+
+    @property
+    def energy_drift(self) -> Reals:
+        """(v, n): the change of energy since the first time that the work of the loads does not explain, J."""
+        return drift(self.energy, self.work)
+
+    @cached_property
+    def motion(self) -> FamilyMotion:
+        """The motion of every variant through all times: points, links, slides, joint forces."""
+        f = self.family
+        rates = [list(np.moveaxis(of, 2, 0)) for of in (self.speed, self.acceleration)]
+        return FamilyMotion(
+            Part(f.mechanism, f.dimensions, f.values, self.angle, [*rates, [0.0] * len(rates[0])])
+        )
+
+    def put(self, rows: Any, times: Reals, **found: Reals) -> None:
+        """Take over what is found of some variants at their times (…, n), which may be less than those asked for."""
+        n = times.shape[-1]
+        for name, values in {"times": times, **found}.items():
+            of = getattr(self, name)
+            of[rows, n:] = np.nan
+            of[rows, :n] = values
 
 
 class Variants(Family):
@@ -111,7 +179,10 @@ class Variants(Family):
             except MechanismError as error:
                 runs.warnings[int(i)] = (str(error),)
                 continue
-            runs.put(int(i), own)
+            runs.put(int(i), own.t, **{name: getattr(own, name) for name in FOUND})
+            runs.unknown[i, : len(own.t)] = own.unknown
+            if own.warnings:
+                runs.warnings[int(i)] = own.warnings
         return runs
 
 
@@ -168,7 +239,8 @@ class _Lanes:
                 # no mass moves: each says so
                 return None
         rates, energy = family.tapes
-        if not {*places_and_speeds(k), *given}.issuperset(rates.inputs):
+        places, speeds, _ = names(k)
+        if not {*places, *speeds, *given}.issuperset(rates.inputs):
             return None
         scale = np.ones((len(q), k))
         slides = [j for j, e in enumerate(m.inputs) if e.is_slide]
@@ -183,7 +255,7 @@ class _Lanes:
         """Inputs."""
         return int(self.q.shape[1])
 
-    def some(self, rows: Any) -> dict[str, Reals]:
+    def some(self, rows: Rows) -> dict[str, Reals]:
         """What enters the tapes in some variants."""
         return {name: x[rows] for name, x in self.given.items()}
 
@@ -196,155 +268,99 @@ class _Lanes:
         for tries in range(TRIES):
             coarse, nodes = nodes, self.halved(rows, nodes)
             times = self.times(rows, nodes, alone)
-            found = self._at(rows, nodes, times, self._error(coarse, nodes, times, share(tolerance)))
-            past = np.isnan(times)[:, :, None]
-            worst = np.where(past, 0.0, found["error"] / self.scale[rows, None]).max(axis=(1, 2), initial=0.0)
+            past = np.isnan(times)
+            error = self._error(coarse, nodes, times, share(tolerance))
+            error[past] = np.nan
+            worst = np.where(past[..., None], 0.0, error / self.scale[rows, None]).max(
+                axis=(1, 2), initial=0.0
+            )
             holds = worst <= accuracy
-            self._put(runs, rows[holds], {name: x[holds] for name, x in found.items()})
+            self._put(runs, rows, np.flatnonzero(holds), nodes, times[holds], error[holds])
             tolerance /= GAIN + 1
-            last = tolerance <= LEAST or tries == TRIES - 1 or len(nodes["t"]) > MOST
+            last = tolerance <= LEAST or tries == TRIES - 1 or len(nodes.t) > MOST
             # what does not hold is tried again, and at last left to say itself why not
             again = ~holds & ~alone[rows] & np.isfinite(worst) & (not last)
             alone[rows[~holds & ~again]] = True
             if not again.any():
                 break
-            rows, nodes = rows[again], {name: x[:, again] for name, x in nodes.items()}
+            rows, nodes = rows[again], nodes.at(np.s_[:, again])
         return alone
 
-    def _constants(self, rows: NDArray[np.intp]) -> dict[str, Any]:
-        """What enters the loop in some variants."""
-        return self.some(rows) | {f"scale{j}": self.scale[rows, j] for j in range(self.k)}
-
-    def way(self, rows: NDArray[np.intp], tolerance: float, alone: Mask) -> dict[str, Reals]:
+    def way(self, rows: Rows, tolerance: float, alone: Mask) -> Nodes:
         """The nodes of a way through all times, (rounds, lanes); marks in `alone` what has to be done singly.
 
         A round in which a lane took no step repeats its last node.
         """
-        k, t = self.k, self.t
-        span = float(t[-1] - t[0])
-        given = self._constants(rows) | {"tolerance": tolerance, "end": float(t[-1]), "span": span}
-        places, speeds, rates = names(k)
-        q, v = self.q[rows].T, self.v[rows].T
-        with np.errstate(all="ignore"):
-            begin = run(self.rates, given | dict(zip((*places, *speeds), (*q, *v), strict=True)))
-            slopes = np.stack([np.broadcast_to(begin[name], len(rows)) for name in rates])
-        fastest, h = first_steps(span, tolerance, self.scale[rows].T, q, v, slopes)
-        state = beginning(float(t[0]), q, v, slopes, h, fastest, 0.0)
-        state["left"] = np.where(np.isfinite(slopes).all(axis=0) & (span > 0), 1.0, 0.0)
-        kept = ("t", *places, *speeds, *rates, "work")
-        nodes = [{name: np.broadcast_to(state[name], len(rows))[None] for name in kept}]
+        t, n = self.t, len(rows)
+        end, span = float(t[-1]), float(t[-1] - t[0])
+        given = self.some(rows) | {"tolerance": tolerance, "end": end, "span": span}
+        given |= {f"scale{j}": self.scale[rows, j] for j in range(self.k)}
+        q, v, scale = self.q[rows], self.v[rows], self.scale[rows].T
+        slopes = self._run(self.rates, rows, q, v)
+        first = Nodes(np.column_stack([np.full(n, t[0]), q, v, slopes, np.zeros(n)]), self.k)
+        fastest, h = first_steps(span, tolerance, scale, q.T, v.T, slopes.T)
+        state = beginning(first, h, fastest)
+        state["left"] = np.where(np.isfinite(slopes).all(axis=1) & (span > 0), 1.0, 0.0)
+        parts = [first.at(None)]
         taken = 0
         while state["left"].max() > 0 and taken < MOST:
-            found = march(k, self.rates, given, state, SOON if taken < 4 * SOON else LATER)
-            state = found.state
-            nodes.append(found.nodes)
-            taken += len(found.nodes["t"])
-            if self.levels:
-                # one step beyond the event is enough
-                last = {
-                    name: np.concatenate([*(part[name] for part in nodes[-2:-1]), found.nodes[name]])
-                    for name in kept
-                }
-                state["left"] = np.where(passed(last, self.levels, k)[:-1].any(axis=0), 0.0, state["left"])
-        whole = {name: np.concatenate([part[name] for part in nodes]) for name in kept}
-        ended = whole["t"][-1] >= t[-1]
+            found, state = march(self.k, self.rates, given, state, SOON if taken < 4 * SOON else LATER)
+            parts.append(found)
+            taken += len(found.t)
+            # one step beyond the event is enough
+            hits = passed(parts[-2].then(found), self.levels)[:-1].any(axis=0)
+            state["left"] = np.where(hits, 0.0, state["left"])
+        whole = parts[0].then(*parts[1:])
+        hits = passed(whole, self.levels)
+        ended = (whole.t[-1] >= end) | hits.any(axis=0)
         if self.levels:
-            hits = passed(whole, self.levels, k)
-            ended |= hits.any(axis=0)
-            beyond = np.where(hits.any(axis=0), np.argmax(hits, axis=0) + 2, len(whole["t"]))
-            at = np.minimum(np.arange(len(whole["t"]))[:, None], beyond)
-            whole = {name: np.take_along_axis(x, at, axis=0) for name, x in whole.items()}
+            beyond = np.where(hits.any(axis=0), np.argmax(hits, axis=0) + 2, len(whole.t))
+            whole = whole.at((np.minimum(np.arange(len(whole.t))[:, None], beyond), np.arange(n)))
         alone[rows[~ended]] = True
         alone[rows[self._folds(rows, whole)]] = True
         return whole
 
-    def halved(self, rows: NDArray[np.intp], nodes: Mapping[str, Reals]) -> dict[str, Reals]:
+    def halved(self, rows: Rows, nodes: Nodes) -> Nodes:
         """The nodes of the same ways in steps half as long."""
-        k = self.k
-        places, speeds, rates = names(k)
-        first = {name: x[0] for name, x in nodes.items()}
-        none = [np.zeros(len(rows))] * k
-        state = beginning(
-            first["t"],
-            [first[x] for x in places],
-            [first[x] for x in speeds],
-            [first[x] for x in rates],
-            0.0,
-            none,
-            first["work"],
-        )
-        t = nodes["t"]
+        t, first = nodes.t, nodes.at(np.s_[:1])
         times = np.stack([0.5 * (t[1:] + t[:-1]), t[1:]], axis=1).reshape(-1, t.shape[1])
-        found = follow(k, self.rates, self.some(rows), state, times).nodes
-        return {name: np.concatenate([x[None], found[name]]) for name, x in first.items()}
+        found = follow(self.k, self.rates, self.some(rows), beginning(first.at(0)), times)
+        return first.then(found.nodes)
 
-    def times(self, rows: NDArray[np.intp], nodes: Mapping[str, Reals], alone: Mask) -> Reals:
+    def times(self, rows: Rows, nodes: Nodes, alone: Mask) -> Reals:
         """The times up to each lane's event, it the last, (lanes, n); then NaN."""
         found = np.tile(self.t, (len(rows), 1))
         if self.levels:
-            ends = events(self.k, self.rates, self.some(rows), nodes, self.levels)
+            ends = events(self.rates, self.some(rows), nodes, self.levels)
             self.late[rows] = np.isnan(ends)
             # the level that the coarser way passed at its very end
-            alone[rows[np.isnan(ends) & (nodes["t"][-1] < self.t[-1])]] = True
+            alone[rows[np.isnan(ends) & (nodes.t[-1] < self.t[-1])]] = True
             for row, end in zip(found, ends, strict=True):
                 if end < self.t[-1]:
                     its = reached(self.t, end)
                     row[: len(its)], row[len(its) :] = its, np.nan
         return found
 
-    def _error(
-        self, coarse: Mapping[str, Reals], fine: Mapping[str, Reals], times: Reals, of: float
-    ) -> Reals:
+    def _error(self, coarse: Nodes, fine: Nodes, times: Reals, of: float) -> Reals:
         """The error of the inputs at all times, (lanes, n, k): that of the coarser way's next node."""
-        places, speeds, rates = names(self.k)
-        q, v, a = (np.stack([fine[name][::2].T for name in x], axis=-1) for x in (places, speeds, rates[:-1]))
-        other = np.stack([coarse[name].T for name in places], axis=-1)
-        found = spread(q, other, of) + rounding(coarse["t"].T, q, v, a)
-        at = np.stack([(coarse["t"] < x).sum(axis=0) for x in times.T], axis=1)
-        at = np.minimum(at, len(coarse["t"]) - 1)
+        q, v, a = (np.swapaxes(x[::2], 0, 1) for x in (fine.q, fine.v, fine.rates[..., :-1]))
+        found = spread(q, np.swapaxes(coarse.q, 0, 1), of) + rounding(coarse.t.T, q, v, a)
+        at = np.stack([(coarse.t < x).sum(axis=0) for x in times.T], axis=1)
+        at = np.minimum(at, len(coarse.t) - 1)
         return np.asarray(found[np.arange(len(found))[:, None], at])
 
-    def _at(
-        self, rows: NDArray[np.intp], nodes: Mapping[str, Reals], t: Reals, error: Reals
-    ) -> dict[str, Reals]:
-        """The states at all times (lanes, n), from the node before each; NaN where the time is."""
-        k = self.k
-        places, speeds, rates = names(k)
-        before = np.stack([(nodes["t"] <= x).sum(axis=0) - 1 for x in t.T], axis=1)
-        lanes = np.arange(len(rows))[:, None]
-        state = {name: x[np.maximum(before, 0), lanes] for name, x in nodes.items()}
-        q, v, slopes = (np.stack([state[name] for name in of], axis=-1) for of in (places, speeds, rates))
-        work, h = state["work"].copy(), t - state["t"]
-        lane, on = np.nonzero(h > 0)
-        if len(lane):
-            here = (state["t"][lane, on], q[lane, on], v[lane, on], slopes[lane, on], h[lane, on])
-            dq, dv, dw = over(k, self.rates, self.some(rows[lane]), *here)
-            q[lane, on] += dq
-            v[lane, on] += dv
-            work[lane, on] += dw
-        past = np.isnan(t)
-        for x in (q, v, work, error):
-            x[past] = np.nan
-        return {"t": t, "q": q, "v": v, "work": work, "error": error}
-
-    def _folds(self, rows: NDArray[np.intp], nodes: Mapping[str, Reals]) -> Mask:
+    def _folds(self, rows: Rows, nodes: Nodes) -> Mask:
         """In which lanes a loop folds on the way."""
-        closed = [g.name for g in self.written.closed]
-        n = len(nodes["t"])
-        folds = np.zeros(len(rows), dtype=bool)
-        if closed:
-            tape = self.written.tape([("margin", name) for name in closed])
-            given = {name: np.tile(x, n) for name, x in self.some(rows).items()}
-            given |= {f"q{j}": nodes[f"q{j}"].ravel() for j in range(self.k)}
-            with np.errstate(all="ignore"):
-                found = run(tape, given)
-            for name in tape.names:
-                margin = np.broadcast_to(found[name], n * len(rows)).reshape(n, -1)
-                folds |= ~(margin >= FOLDING).all(axis=0)
-        q = nodes["q0"]
+        q = nodes.q[..., 0]
         self.low[rows] = np.fmin(self.low[rows], q.min(axis=0))
         self.high[rows] = np.fmax(self.high[rows], q.max(axis=0))
-        return folds
+        margins = self.written.margins
+        if not margins:
+            return np.zeros(len(rows), dtype=bool)
+        found = self._run(
+            self.written.tape(margins), np.tile(rows, len(nodes.t)), nodes.q.reshape(-1, self.k)
+        )
+        return np.asarray(~(found >= FOLDING).all(axis=1).reshape(-1, len(rows)).all(axis=0))
 
     def meet(self) -> Mask:
         """Which variants may have a change point on their way, (v,)."""
@@ -354,22 +370,31 @@ class _Lanes:
         rates: list[list[Any]] = [[1.0], [1.0], [0.0]]
         return ~Solver(Part(f.mechanism, f.dimensions, f.values, ends, rates), self.solver).together
 
-    def _put(self, runs: Runs, rows: NDArray[np.intp], found: Mapping[str, Reals]) -> None:
-        n = len(self.t)
-        given = {name: np.repeat(x, n) for name, x in self.some(rows).items()}
-        given |= dict(
-            zip(
-                places_and_speeds(self.k),
-                np.concatenate([found["q"], found["v"]], axis=2).reshape(-1, 2 * self.k).T,
-                strict=True,
-            )
+    def _put(self, runs: Runs, rows: Rows, lanes: Rows, nodes: Nodes, t: Reals, error: Reals) -> None:
+        """Take over the states of some lanes at times (lanes, n), each from the node before; NaN where the time is."""
+        rows, begin = rows[lanes], nodes.t[:, lanes]
+        before = np.stack([(begin <= x).sum(axis=0) - 1 for x in t.T], axis=1)
+        node = nodes.at((np.maximum(before, 0), lanes[:, None]))
+        h = t - node.t
+        lane, on = np.nonzero(h > 0)
+        if len(lane):
+            changes = over(self.rates, self.some(rows[lane]), node.at((lane, on)), h[lane, on])
+            for of, change in zip((node.q, node.v, node.work), changes, strict=True):
+                of[lane, on] += change
+        for of in (node.q, node.v, node.work):
+            of[np.isnan(t)] = np.nan
+        every, q, v = np.repeat(rows, t.shape[1]), node.q.reshape(-1, self.k), node.v.reshape(-1, self.k)
+        slopes, energy = (
+            self._run(tape, every, q, v).reshape(*t.shape, len(tape.names))
+            for tape in (self.rates, self.energy)
         )
+        found = node.q, node.v, slopes[..., :-1], error, energy[..., 0], node.work
+        runs.put(rows, t, **dict(zip(FOUND, found, strict=True)))
+
+    def _run(self, tape: Tape, rows: Rows, q: Reals, v: Reals | None = None) -> Reals:
+        """A tape's outputs (n, outputs) in states (n, k) of variants."""
+        given = self.some(rows) | {f"q{j}": x for j, x in enumerate(q.T)}
+        given |= {} if v is None else {f"v{j}": x for j, x in enumerate(v.T)}
         with np.errstate(all="ignore"):
-            slopes, energy = (run(tape, given) for tape in (self.rates, self.energy))
-        for j in range(self.k):
-            runs.inputs[2, rows, :, j] = np.broadcast_to(slopes[f"a{j}"], len(rows) * n).reshape(-1, n)
-        for of, values in zip((0, 1, 3), (found["q"], found["v"], found["error"]), strict=True):
-            runs.inputs[of, rows] = values
-        runs.energies[0, rows] = np.broadcast_to(energy["energy"], len(rows) * n).reshape(-1, n)
-        runs.energies[1, rows] = found["work"]
-        runs.times[rows] = found["t"]
+            found = run(tape, given)
+        return np.stack([np.broadcast_to(found[name], len(rows)) for name in tape.names], axis=-1)

@@ -1,4 +1,4 @@
-"""What a step must not pass: ends of a motion, kinks of what acts."""
+"""A step, and what it must not pass: ends of a motion, kinks of what acts."""
 
 from __future__ import annotations
 
@@ -6,26 +6,32 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple
 
-from virtualwork.formulas.numbers import EPS, Number, Reals
+from virtualwork.formulas.numbers import EPS, Number
 
 Floats = list[float]
 Several = Sequence[Number]
+Value = Callable[[float, Floats, Floats], float]
+Rate = Callable[[float, Floats, Floats, Floats], float]
+"""A quantity at a state (t, q, q̇), and its derivative in time, of (t, q, q̇, rates)."""
 Levels = Mapping[int, float]
 """An input's number → its value that ends the motion."""
 # how far a level must be from where a step begins, relative to what is watched, and that at least
 APART, SMALL = 64 * EPS, 1e-3
+# of a step, at which it is looked whether a level has been passed; halvings of a quarter, and Newton's steps
+QUARTERS, HALVINGS, NEWTONS = (0.25, 0.5, 0.75, 1.0), 24, 12
 
 
-class Check(Protocol):
-    """What is asked at every node of a way through time."""
+class Step(NamedTuple):
+    """Changes of q and q̇, the work, the rates at the end, the errors of (q, q̇) as the method knows them, and h·|λ|."""
 
-    def __call__(self, t: float, q: Floats, v: Floats) -> str:
-        """Why the way ends here; empty where it goes on."""
-
-    def quiet(self, q: Reals) -> bool:
-        """Whether it has nothing to say at any of many places, (n, k), nor has to see them."""
+    dq: Floats
+    dv: Floats
+    work: float
+    rates: Floats
+    errors: tuple[Floats, ...]
+    stiffness: float
 
 
 @dataclass
@@ -37,8 +43,8 @@ class Watch:
     """
 
     name: str
-    value: Callable[[float, Floats, Floats], float]
-    rate: Callable[[float, Floats, Floats, Floats], float] | None
+    value: Value
+    rate: Rate | None
     levels: Sequence[float]
     period: float | None = None
     ends: bool = False
