@@ -7,7 +7,7 @@ component, with limits on masses and residuals where asked for.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -51,6 +51,9 @@ class Balance:
     """The limits of the corrections that were asked for, (p,)."""
     max_residual: Real | None = None
     """The limits of the residual that were asked for, (s,)."""
+
+    singular_values: Real | None = field(default=None, repr=False, compare=False)
+    """Of the scaled coefficients, (..., p), where they are known from the solution."""
 
     def __repr__(self) -> str:
         largest = numbers(self.residual_max)
@@ -120,6 +123,8 @@ class Balance:
     @cached_property
     def condition_number(self) -> Real:
         """σ_max/σ_min of the coefficients after scaling the columns (see `condition_number`), (...)."""
+        if self.singular_values is not None:
+            return np.asarray(self.singular_values[..., 0] / self.singular_values[..., -1])
         return condition_number(self.influence, self.weights)
 
     def error_estimate(
@@ -279,7 +284,8 @@ def least_squares(
         found = limited_least_squares(alpha, v, root, limit, ceiling)
         return Balance(alpha, v, found, w, max_mass=_given(limit), max_residual=_given(ceiling))
     a, b = (alpha, v) if root is None else (alpha * root[..., None], v * root)
-    return Balance(alpha, v, smallest_squares(a, b, ridge), w, ridge=ridge)
+    found, sigma = smallest_squares(a, b, ridge)
+    return Balance(alpha, v, found, w, ridge=ridge, singular_values=None if ridge else sigma)
 
 
 def minimax(

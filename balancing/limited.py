@@ -39,7 +39,7 @@ def limited_least_squares(
     """
     a, b = (alpha, v) if root is None else (alpha * root[:, None], v * root)
     try:
-        free = smallest_squares(a, b)
+        free, _ = smallest_squares(a, b)
         if (np.abs(free) <= limit).all() and (np.abs(v + np.matvec(alpha, free)) <= ceiling).all():
             return free
     except DependentPlanes:
@@ -102,7 +102,7 @@ def smallest_maximum(a: Complex, b: Complex, limit: Real) -> tuple[Complex, floa
             if not np.isfinite(limit).all():
                 raise
     else:
-        free = smallest_squares(a, b)
+        free, _ = smallest_squares(a, b)
         largest = float(np.abs(b + np.matvec(a, free)).max())
         if not largest > 64 * EPS * max(float(np.abs(b).max()), float((np.abs(a) @ np.abs(free)).max())):
             return free, 0.0
@@ -147,7 +147,7 @@ class _Space:
         self.limited = np.flatnonzero(np.isfinite(limit))
         w0 = np.zeros(a.shape[1], dtype=complex)
         try:
-            free = smallest_squares(a, b)
+            free, _ = smallest_squares(a, b)
             if not len(self.limited):
                 w0 = free
         except DependentPlanes:
@@ -183,7 +183,7 @@ class _Space:
         )
         # rounding must not carry a mass over its limit
         if len(self.limited):
-            over = np.abs(w) > self.limit
+            over = np.abs(w) > self.limit * (1 - 4 * EPS)
             w = np.where(over, w * (self.limit / np.where(over, np.abs(w), 1.0)), w)
             tight = over & (np.abs(w) > self.limit)
             w = np.where(tight, w * (1 - EPS), w)

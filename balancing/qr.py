@@ -9,20 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.dependence import (
-    DependentPlanes,
-    columns_scaled,
-    damping_norms,
-    require_independent,
-    threshold,
-)
+from balancing.dependence import DependentPlanes, adjoint, columns_scaled, damping_norms, require_independent
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> Complex:
-    """Return w (..., p) with Σ|b + a w|² + λ² Σ_p ‖a_p‖² |w_p|² least.
+def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> tuple[Complex, Real]:
+    """Return w (..., p) with Σ|b + a w|² + λ² Σ_p ‖a_p‖² |w_p|² least, and the singular values of the scaled columns.
 
     Parameters
     ----------
@@ -36,14 +30,9 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> Complex:
     DependentPlanes
         The readings do not tell the planes apart.
 
-    Notes
-    -----
-    The readings go through the factorisation as a last column, [a b] = Q [R c; 0 ρ]: c is their part in Q's
-    coordinates, without Q (Golub and Van Loan, Matrix Computations, 4th ed., section 5.3.3).
-
     Examples
     --------
-    >>> w = smallest_squares(np.array([[3, -2], [5, -2], [5, -3]], complex), np.array([1, -1, 0], complex))
+    >>> w, _ = smallest_squares(np.array([[3, -2], [5, -2], [5, -3]], complex), np.array([1, -1, 0], complex))
     >>> (w.real * 21).round(12)
     array([17., 31.])
     """
@@ -53,28 +42,23 @@ def smallest_squares(a: Complex, b: Complex, ridge: float = 0.0) -> Complex:
         norms = damping_norms(scaled)
         scaled = np.concatenate([scaled, ridge * norms[..., None] * np.eye(planes)], axis=-2)
         b = np.concatenate([b, np.zeros((*b.shape[:-1], planes))], axis=-1)
+    order = np.argsort(-np.abs(scaled).max(axis=-1), axis=-1, kind="stable")
+    if scaled.ndim == 2 and b.ndim == 1:
+        scaled, b = scaled[order], b[order]
+    else:
+        lead = np.broadcast_shapes(scaled.shape[:-2], b.shape[:-1])
+        scaled = np.broadcast_to(scaled, lead + scaled.shape[-2:])
+        b = np.broadcast_to(b, lead + b.shape[-1:])
+        order = np.broadcast_to(order, lead + order.shape[-1:])
+        scaled = np.take_along_axis(scaled, order[..., None], axis=-2)
+        b = np.take_along_axis(b, order, axis=-1)
     readings = scaled.shape[-2]
     if readings < planes:
         require_independent(scaled, scale, readings, planes, "readings", DependentPlanes)
-    lead = np.broadcast_shapes(scaled.shape[:-2], b.shape[:-1])
-    # a row of zeros where there are no more readings than planes: R is square then too
-    both = np.zeros((*lead, max(readings, planes + 1), planes + 1), dtype=complex)
-    both[..., :readings, :planes], both[..., :readings, planes] = scaled, b
-    order = np.argsort(-np.abs(both[..., :planes]).max(axis=-1), axis=-1, kind="stable")
-    both = both[order] if not lead else np.take_along_axis(both, order[..., None], axis=-2)
-    both = np.asarray(np.linalg.qr(both, mode="r"))
-    # [R c; 0 1]⁻¹ = [R⁻¹ -R⁻¹c; 0 1]: the solution, and what R⁻¹ tells of the planes' dependence
-    both[..., planes, planes] = 1.0
-    try:
-        inverse = np.linalg.inv(both)
-    except np.linalg.LinAlgError:
-        inverse = np.full_like(both, np.nan)
-    r = both[..., :planes, :planes]
-    # σ_max/σ_min ≤ p² max|R| max|R⁻¹|: the singular values are worked out only where that does not decide
-    worst = np.abs(r).max() * np.abs(inverse[..., :planes, :planes]).max()
-    if not worst * planes**2 * threshold(readings, planes) < 1:
-        require_independent(r, scale, readings, planes, "readings", DependentPlanes)
-    return np.asarray(inverse[..., :planes, planes] * scale + 0.0, dtype=complex)
+    q, r = np.linalg.qr(scaled)
+    sigma = require_independent(r, scale, readings, planes, "readings", DependentPlanes)
+    x = np.linalg.solve(r, -(adjoint(q) @ b[..., None]))[..., 0]
+    return np.asarray(x * scale + 0.0, dtype=complex), sigma
 
 
 def factors(a: Complex) -> tuple[Complex, Complex, Real]:

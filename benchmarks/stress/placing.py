@@ -124,9 +124,9 @@ def _wrapped(rng: np.random.Generator) -> Pairs:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "runs.csv"
         path.write_text("\n".join(rows) + "\n")
-        table = runs_table(str(path))
-        runs = read_runs(table, lagging=False, phaseless=False, stored_unit=None)
-        columns = {c.header: c for c in corrections(FieldBalancing(runs, Request()), []).columns}
+        request = Request()
+        runs = read_runs(runs_table(str(path)), request)
+        columns = {c.header: c for c in corrections(FieldBalancing(runs, request), []).columns}
     size, angle = (float(str(columns[name].values[0])) for name in ("mass_g", "angle_deg"))
     bound = {name: column.error() for name, column in columns.items() if column.error is not None}
     with mp.workdps(DIGITS):

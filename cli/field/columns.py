@@ -39,10 +39,7 @@ def corrections(found: FieldBalancing, warnings: list[str]) -> Table:
         Column("angle", "deg", degrees(flat), angle),
     ]
     if found.uncertain:
-        pairs = [
-            found.uncertainty(solved) or (np.full(solved.corrections.shape, np.nan),) * 2
-            for solved in found.solved
-        ]
+        pairs = [solved.uncertainty for solved in found.solved]
         along, across = (found.rows([pair[k] for pair in pairs]) for k in (0, 1))
 
         def share(of: Real) -> Real:
@@ -73,27 +70,26 @@ def channels(found: FieldBalancing, of: Sequence[Channel]) -> list[Column]:
 
 def prediction(found: FieldBalancing) -> Table:
     """The vibration before, and as predicted with the corrections: a row for each rotor and sensor."""
-    kinds: dict[Channel, int] = {}
     parts = [
         (
             np.repeat(solved.group.rotors, len(solved.group.channels)),
-            np.tile([kinds.setdefault(of, len(kinds)) for of in solved.group.channels], len(solved.initial)),
             solved.initial.ravel(),
             solved.residual.ravel(),
         )
         for solved in found.solved
     ]
-    rotor, kind, before, after = (np.concatenate(part) for part in zip(*parts, strict=True))
+    rotor, before, after = (np.concatenate(part) for part in zip(*parts, strict=True))
     order = np.argsort(rotor, kind="stable")
-    before, after, known = before[order], after[order], list(kinds)
+    rotor, before, after = rotor[order], before[order], after[order]
+    read = [channel for solved in found.solved for channel in solved.group.channels * len(solved.initial)]
     unit = found.runs.amplitude_unit
     columns = [
         *(
-            [Column("rotor", "", [found.runs.rotors[r] for r in rotor[order].tolist()])]
+            [Column("rotor", "", [found.runs.rotors[r] for r in rotor.tolist()])]
             if found.runs.several
             else []
         ),
-        *channels(found, [known[k] for k in kind[order].tolist()]),
+        *channels(found, [read[k] for k in order.tolist()]),
         Column("before_amplitude", unit, np.abs(before)),
         Column("predicted_amplitude", unit, np.abs(after)),
     ]

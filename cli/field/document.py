@@ -40,11 +40,11 @@ def document(found: FieldBalancing) -> Document:
 def _rotor(found: FieldBalancing, solved: Solved, i: int) -> Document:
     """What is said of a rotor, however its coefficients were found."""
     group, request, runs = solved.group, found.request, found.runs
-    spreads = found.uncertainty(solved) or np.full((2, *solved.corrections.shape), np.nan)
+    along, across = (spread[i] for spread in solved.uncertainty)
     corrections = _masses(runs, solved.planes, solved.corrections[i])
     for p, (entry, w) in enumerate(zip(corrections, solved.corrections[i], strict=True)):
-        entry[f"{runs.per}_uncertainty_{runs.per_si}"] = finite(spreads[0][i, p])
-        entry["angle_uncertainty_deg"] = finite(spreads[1][i, p])
+        entry[f"{runs.per}_uncertainty_{runs.per_si}"] = finite(along[p])
+        entry["angle_uncertainty_deg"] = finite(across[p])
         if request.places is not None:
             entry["split"] = [
                 {"position": name, "angle_deg": angle, f"{runs.per}_{runs.per_si}": part}

@@ -13,22 +13,10 @@ from cli.errors import DataError, quote
 from cli.field.layouts import Alpha, alpha_of
 from cli.field.runs import Channel, Rows, Runs, apart
 from cli.read.tables import Numbers, Table, read
-from cli.read.units import UNITS, amplitude_kind, from_si, parse_number, phasor, to_si
+from cli.read.units import UNITS, from_si, parse_number, phasor
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-
-def convert_amplitude(value: Real, unit: str, wanted: str, what: str) -> Real:
-    """Convert amplitudes between units of one kind and tag; DataError where they are different quantities."""
-    if amplitude_kind(unit) != amplitude_kind(wanted):
-        raise DataError(
-            f"{what} is in {unit}, the runs in {wanted}: displacement, velocity, acceleration, voltage, counts, peak "
-            "(_pk), peak to peak (_pp) and r.m.s. (_rms) do not mix"
-        )
-    if unit == wanted:
-        return value
-    return np.asarray(from_si(to_si(value, "amplitude", unit), "amplitude", wanted))
 
 
 def read_runout(path: str, runs: Runs, *, lagging: bool) -> dict[str, complex]:
@@ -36,9 +24,7 @@ def read_runout(path: str, runs: Runs, *, lagging: bool) -> dict[str, complex]:
     table = read(path, numbers={"amplitude": "amplitude", "phase": "angle"}, texts=["sensor"])
     amplitude, phase = table.require("amplitude", "amplitude"), table.require("phase", "angle")
     table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
-    size = convert_amplitude(
-        amplitude.values, amplitude.unit, runs.amplitude_unit, f"{table.file}: the run-out"
-    )
+    size = runs.in_unit(amplitude.values, amplitude.unit, f"{table.file}: the run-out")
     vectors = phasor(size, -phase.values if lagging else phase.values, phase.unit).tolist()
     sensors = table.named("sensor")
     known = {channel.sensor for group in runs.groups for channel in group.channels}
@@ -148,10 +134,7 @@ class Stored:
                 at[s, p] = best[0]
         factor = 1.0
         if self.amplitude_unit:
-            one = np.ones(1)
-            factor = float(
-                convert_amplitude(one, self.amplitude_unit, runs.amplitude_unit, f"{self.table.file}")[0]
-            )
+            factor = runs.in_unit(1.0, self.amplitude_unit, self.table.file)
         sd, nu = np.nan, np.inf
         if "reading_sd" in self.table.numbers:
             sd = factor * float(self.table.numbers["reading_sd"].values[at[0, 0]])

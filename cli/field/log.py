@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator
+from datetime import datetime
 
 import numpy as np
 
 from cli.errors import DataError, quote
-from cli.field.dates import YEAR, years
 from cli.field.layouts import Layout, log_table
 from cli.field.log_groups import Logs
 from cli.field.log_rows import LogRows, Masses, numbered
 from cli.field.read import NEAR_SPEED
+from cli.field.request import Request
 from cli.field.runs import Channel, Real, Rows, Runs
 from cli.field.sisters import Sisters
 from cli.read.options import bad
@@ -19,19 +21,18 @@ from cli.read.rounding import vector_error
 from cli.read.tables import Cells, Table
 from cli.read.units import LARGEST, UNITS, phasor, to_si
 
+_ISO = re.compile(
+    r"(\d{4})[-/](\d{1,2})(?:[-/](\d{1,2}))?(?:[T ]+(\d{1,2}):(\d{2})(?::(\d{2})(?:\.\d+)?)?Z?)?"
+)
+_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:,?\s+(\d{1,2}):(\d{2})(?::(\d{2}))?)?")
+DATE = "a date such as 2019-03-14, 2019-03-14 08:30 or 14.03.2019"
+YEAR = 365.25
 
-def read_log(
-    path: str,
-    table: Table | None = None,
-    *,
-    lagging: bool | None,
-    exclude: Sequence[str] = (),
-    sisters: Sisters | None = None,
-    reading_error: tuple[float, float] | None = None,
-) -> Runs:
-    """Read a log whose runs are all to be fitted together; `lagging` None: in the sense of the phase that fits better.
 
-    `table` is the file where it is a table of runs that is read already; `sisters` is what is known of the coefficients; `reading_error` the errors with which its weight is found.
+def read_log(path: str, request: Request, table: Table | None = None, sisters: Sisters | None = None) -> Runs:
+    """Read a log whose runs are all to be fitted together.
+
+    `table` is the file where it is a table of runs that is read already; `sisters` is what is known of the coefficients.
     """
     layout = log_table(path) if table is None else Layout(table)
     table = layout.table
@@ -41,7 +42,7 @@ def read_log(
     unread = np.isnan(amplitude.values) & np.isnan(phase.values)
     for numbers, name in ((amplitude, "amplitude"), (phase, "phase")):
         table.reject(np.isnan(numbers.values) & ~unread, name, "a number, or amplitude and phase both blank")
-    turn = np.where(unread, 0.0, -phase.values if lagging else phase.values)
+    turn = np.where(unread, 0.0, -phase.values if request.lagging else phase.values)
     vibration = np.where(unread, complex(np.nan), phasor(amplitude.values, turn, phase.unit))
     both = [name for name in ("trial_mass", "trial_unbalance") if name in table.cells]
     if len(both) > 1 or not (both or sisters):
@@ -62,17 +63,17 @@ def read_log(
             f"{table.file}: the column use is the keeper's own mark: every row takes part in the fit"
         )
     channels, channel = _channels(table, rotor)
-    when = years(table)
+    when = _years(table)
     if "run" in table.texts:
         run_names, run = table.numbered("run")
     else:
         run_names, run = _run_names(rotor, channel, when, masses)
-    for name in exclude:
+    for name in request.exclude:
         if name not in run_names:
             raise bad("--exclude", f"no run {quote(name)} in {table.file}")
     share = float(vector_error(np.ones(table.rows), turn, phase.unit).max())
     rows = LogRows(runs, rotor, vibration, channel, channels, masses, run, run_names, when, share, mass_share)
-    Logs(rows, lagging, set(exclude), sisters, reading_error).read()
+    Logs(rows, request, sisters).read()
     runs.warnings = [*table.warnings, *runs.warnings]
     return runs
 
@@ -235,3 +236,27 @@ def _run_names(rotor: Rows, channel: Rows, when: Real | None, masses: Masses) ->
         seen.add(of)
         out.append(count[r] - 1)
     return [str(k + 1) for k in range(max(out) + 1)], np.array(out)
+
+
+def _years(table: Table) -> Real | None:
+    """Return the date of each row in years, from any origin; NaN where there is none, None without a column of dates."""
+    written = table.texts.get("date")
+    if written is None or not any(written):
+        return None
+    return np.array([_year(table, i, text) if text else np.nan for i, text in enumerate(written)])
+
+
+def _year(table: Table, row: int, text: str) -> float:
+    iso, points = _ISO.fullmatch(text), _POINTS.fullmatch(text)
+    found = iso or points
+    if found is None:
+        raise table.error(row, "date", text, DATE)
+    first, month, last, *clock = found.groups()
+    year, day = (first, last or "1") if iso else (last, first)
+    try:
+        hour, minute, second = (int(part or 0) for part in clock)
+        at = datetime(int(year), int(month), int(day), hour, minute, second)
+    except ValueError:
+        raise table.error(row, "date", text, DATE) from None
+    # in days first, so that no digit is lost
+    return (at - datetime(2000, 1, 1)).total_seconds() / 86400 / YEAR

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from balancing import JointFit, determined, fit_with_prior, joint_fit, phase_sense
 from cli.errors import DataError
 from cli.field.log_rows import LogRows, Part, Sorted
+from cli.field.request import Request
 from cli.field.runs import SHOWN, Before, Complex, Group, Real, Rows, Runs
 from cli.field.sisters import Sisters
 
@@ -46,21 +47,13 @@ def _sense(
 class Logs:
     """The logs of all rotors; those of like shape and names become a group."""
 
-    def __init__(
-        self,
-        rows: LogRows,
-        lagging: bool | None,
-        exclude: set[str],
-        sisters: Sisters | None,
-        reading_error: tuple[float, float] | None,
-    ) -> None:
-        self.rows, self.runs, self.lagging, self.exclude = rows, rows.of, lagging, exclude
-        self.sisters, self.reading_error = sisters, reading_error
+    def __init__(self, rows: LogRows, request: Request, sisters: Sisters | None) -> None:
+        self.rows, self.runs, self.request, self.sisters = rows, rows.of, request, sisters
         self.lost = 0
 
     def read(self) -> None:
         """Read and fit all rotors."""
-        rows = Sorted(self.rows, self.exclude)
+        rows = Sorted(self.rows, self.request.exclude)
         named = None if self.sisters is None else [self.sisters.key(name) for name in self.runs.rotors]
         for part in rows.parts(named):
             self._fit(part)
@@ -95,7 +88,11 @@ class Logs:
         fit = self._fitted(readings, masses, known)
         if known is None or determined(masses, np.isfinite(readings)).all():
             fit, part.lines.senses = _sense(
-                self.runs, part.rotors, fit, self.lagging, lambda turned: self._fitted(turned, masses, known)
+                self.runs,
+                part.rotors,
+                fit,
+                self.request.lagging,
+                lambda turned: self._fitted(turned, masses, known),
             )
         g, s, p = len(part.rotors), len(channels), len(planes)
         none = np.zeros((g, 0, p), dtype=complex)
@@ -132,9 +129,11 @@ class Logs:
         """Fit runs, with what is known before."""
         if known is None:
             return joint_fit(readings, masses)
-        if self.reading_error is not None:
+        if self.request.reading_error is not None:
             size = np.abs(np.where(np.isfinite(readings), readings, 0.0))
-            return fit_with_prior(readings, masses, known.prior, float(np.hypot(*self.reading_error)) * size)
+            return fit_with_prior(
+                readings, masses, known.prior, float(np.hypot(*self.request.reading_error)) * size
+            )
         fit = fit_with_prior(readings, masses, known.prior)
         if known.reading is not None and (fit.degrees_of_freedom == 0).any():
             sd = np.where(fit.degrees_of_freedom > 0, fit.residual_sd, known.reading[0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, overload
 
@@ -172,7 +172,7 @@ class _Listed:
 class Sorted:
     """The rows of all rotors, sorted by rotor; what was on in each run, and which runs take part."""
 
-    def __init__(self, rows: LogRows, excluded: set[str]) -> None:
+    def __init__(self, rows: LogRows, excluded: Collection[str]) -> None:
         self.rows = rows
         self.order = np.argsort(rows.rotor, kind="stable")
         self.rotor = rows.rotor[self.order]
@@ -230,25 +230,20 @@ class Sorted:
     ) -> None:
         """Refuse rows that put on other masses than the first one of their run that tells them."""
         rows = self.rows
+        in_order = np.lexsort((plane, at))
+        at, plane = at[in_order], plane[in_order]
+        value, counts = value[in_order], counts[in_order]
         entries = np.bincount(at, minlength=len(self.order))
-        wrong = entries[told] != entries[first[self.run[told]]]
-        bad = told[wrong].tolist()
-        # of one mass each the comparison is one of arrays
-        start = np.searchsorted(at, np.arange(len(self.order)))
-        others = at[~counts]
-        single = entries[others] == 1
-        one = start[first[self.run[others[single]]]]
-        own = np.flatnonzero(~counts)[single]
-        if len(one) and not len(bad):
-            bad += others[single][(plane[one] != plane[own]) | (value[one] != value[own])].tolist()
+        start = np.cumsum(entries) - entries
+        # each mass of a row beside that of the row that counts
+        twin = start[first[self.run[at]]] + np.arange(len(at)) - start[at]
+        many = entries[told] != entries[first[self.run[told]]]
+        bad = told[many]
         if not len(bad):
-            for row in np.unique(others[~single]).tolist():
-                both = [slice(start[r], start[r] + entries[r]) for r in (row, first[self.run[row]])]
-                mine, theirs = (dict(zip(plane[s].tolist(), value[s].tolist(), strict=True)) for s in both)
-                if mine != theirs:
-                    bad.append(row)
-        if bad:
-            row = min(bad)
+            own, twin = np.flatnonzero(~counts), twin[~counts]
+            bad = at[own[(plane[twin] != plane[own]) | (value[twin] != value[own])]]
+        if len(bad):
+            row = bad.min()
             size, i = next(iter(rows.of.table.cells.values())), int(self.order[row])
             name = rows.runs[rows.run[i]]
             raise rows.of.table.error(

@@ -28,7 +28,7 @@ def read_measured(
     if fit and not files and (own := alpha_of(path)) is not None and not own.trials:
         files = [stored_alpha(own)]
     if fit:
-        runs, stored = _fitted(path, None, request, files), None
+        runs, stored = _fitted(path, request, files=files), None
     else:
         runs, stored = _of_table(path, request, files)
     for one in files:
@@ -43,29 +43,20 @@ def read_measured(
 
 def _of_table(path: str, request: Request, files: Sequence[Stored]) -> tuple[Runs, Stored | None]:
     """Read a table of runs; where it has runs to spare, or none that is the initial one, all are fitted."""
-    table, stored, phaseless = runs_table(path), next(iter(files), None), request.four_run
-    can_fit = stored is None and not phaseless
+    table, stored = runs_table(path), next(iter(files), None)
+    can_fit = stored is None and not request.four_run
     if not (can_fit and more_than_unknowns(table)):
         try:
             unit = None if stored is None else stored.unit
-            runs = read_runs(table, lagging=request.against, phaseless=phaseless, stored_unit=unit)
-            return runs, stored
+            return read_runs(table, request, unit), stored
         except NotOneInitialRun:
             if not can_fit:
                 raise
-    return _fitted(path, table, request, files), None
+    return _fitted(path, request, table), None
 
 
-def _fitted(path: str, table: Table | None, request: Request, files: Sequence[Stored]) -> Runs:
+def _fitted(path: str, request: Request, table: Table | None = None, files: Sequence[Stored] = ()) -> Runs:
     from cli.field.log import read_log
     from cli.field.sisters import Sisters
 
-    told = request.phase_lag or request.rotation is not None
-    return read_log(
-        path,
-        table,
-        lagging=request.against if told else None,
-        exclude=request.exclude,
-        sisters=Sisters(files) if files else None,
-        reading_error=request.reading_error,
-    )
+    return read_log(path, request, table, Sisters(files) if files else None)

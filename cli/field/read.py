@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cli.errors import DataError, quote
+from cli.field.request import Request
 from cli.field.runs import SHOWN, Channel, Complex, Group, Real, Rows, Runs, Trial, Value, alike, apart
 from cli.read.rounding import EPS, vector_error
 from cli.read.tables import Cells, Table, read
@@ -35,7 +36,7 @@ def runs_table(
     )
 
 
-def read_runs(table: Table, *, lagging: bool, phaseless: bool, stored_unit: str | None) -> Runs:
+def read_runs(table: Table, request: Request, stored_unit: str | None = None) -> Runs:
     """Read a table of runs; `stored_unit` is the unit of stored coefficients that stand for the trials."""
     for name in OF_LOGS:
         if name in table.texts:
@@ -43,12 +44,12 @@ def read_runs(table: Table, *, lagging: bool, phaseless: bool, stored_unit: str 
     amplitude = table.require("amplitude", "amplitude")
     table.reject(np.isnan(amplitude.values), "amplitude", "a number")
     table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
-    if phaseless:
+    if request.four_run:
         vibration = amplitude.values.astype(complex)
     else:
         phase = table.require("phase", "angle")
         table.reject(np.isnan(phase.values), "phase", "a number")
-        vibration = phasor(amplitude.values, -phase.values if lagging else phase.values, phase.unit)
+        vibration = phasor(amplitude.values, -phase.values if request.against else phase.values, phase.unit)
     if "weight" in table.numbers:
         table.reject(table.numbers["weight"].values < 0, "weight", "a weight that is not negative")
     sizes = [table.cells[name] for name in ("trial_mass", "trial_unbalance") if name in table.cells]

@@ -66,11 +66,11 @@ def _amounts(found: FieldBalancing, solved: Solved, i: int | None, masses: Compl
         Column(found.runs.per, found.runs.mass_unit, found.amount(np.abs(masses))),
         Column("angle", "deg", [degrees(w) if w else None for w in masses.tolist()]),
     ]
-    spreads = found.uncertainty(solved)
-    if i is not None and spreads is not None:
+    if i is not None and solved.covariance is not None:
+        along, across = (spread[i] for spread in solved.uncertainty)
         table += [
-            Column("± ", found.runs.mass_unit, found.amount(spreads[0][i])),
-            Column("± angle", "deg", spreads[1][i]),
+            Column("± ", found.runs.mass_unit, found.amount(along)),
+            Column("± angle", "deg", across),
         ]
     return Table(table, keys=("plane",))
 
@@ -155,7 +155,7 @@ def _found(found: FieldBalancing, solved: Solved, i: int) -> list[str | Table]:
     if found.runs.fitted:
         parts += [fit_words.summary(found, solved, i), _history(found, solved, i)]
     for j, trial in enumerate(group.trials):
-        on = _masses(found, solved, group.on[i, j]) if found.stored is None else ""
+        on = _masses(found, solved, group.on[i, j])
         parts += [f"Run {trial.run}{': ' + on if on else ''}{', kept' if trial.kept else ''}", _vibration(found, solved, {"amplitude": group.runs[i, j]})]  # fmt: skip
     influence = words.influence_table(found, solved, i)
     parts += ["Influence coefficients:", Table([Column(name, "", values) for name, values in influence.items()], keys=("sensor",))]  # fmt: skip

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cli.field.files import convert_amplitude
 from cli.field.runs import Runs
 from cli.read import options
 from cli.read.tolerance import Tolerance
@@ -48,6 +47,11 @@ class Request:
     def against(self) -> bool:
         """Whether the instrument counts phases against the sense of the mass angles."""
         return self.phase_lag != (self.rotation == "cw")
+
+    @property
+    def lagging(self) -> bool | None:
+        """The same, None where the options do not say it."""
+        return self.against if self.phase_lag or self.rotation is not None else None
 
 
 def reading_error(text: str | None) -> tuple[float, float] | None:
@@ -102,7 +106,7 @@ def ceiling_in(given: Given | None, runs: Runs) -> float | None:
     value, unit = given
     if not amplitude_kind(unit)[1]:
         unit += amplitude_kind(runs.amplitude_unit)[1]
-    return float(convert_amplitude(np.array([value]), unit, runs.amplitude_unit, "--max-residual")[0])
+    return runs.in_unit(value, unit, "--max-residual")
 
 
 def masses_at(text: str | None, runs: Runs) -> dict[str, complex] | None:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import balancing
+from cli.errors import DataError
 from cli.read.tables import Table
-from cli.read.units import UNITS
+from cli.read.units import UNITS, Scaled, amplitude_kind, from_si, to_si
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -208,6 +209,16 @@ class Runs:
     def fitted(self) -> bool:
         """Whether all runs are fitted together."""
         return any(group.fit is not None for group in self.groups)
+
+    def in_unit(self, value: Scaled, unit: str, what: str) -> Scaled:
+        """Convert amplitudes to the unit of the readings; DataError where they are another quantity, or read another way."""
+        wanted = self.amplitude_unit
+        if amplitude_kind(unit) != amplitude_kind(wanted):
+            raise DataError(
+                f"{what} is in {unit}, the runs in {wanted}: displacement, velocity, acceleration, voltage, counts, peak "
+                "(_pk), peak to peak (_pp) and r.m.s. (_rms) do not mix"
+            )
+        return value if unit == wanted else from_si(to_si(value, "amplitude", unit), "amplitude", wanted)
 
     def of(self, rotor: int) -> str:
         """Return what a sentence about a rotor begins with, where there are several."""

@@ -92,6 +92,16 @@ class Solved(Problem):
         """What is added to the rotor in its initial state, (g, p)."""
         return self.corrections + self.standing
 
+    @cached_property
+    def uncertainty(self) -> tuple[Real, Real]:
+        """The standard deviations of size (SI) and angle (degrees), (g, p) each; NaN where they are not known."""
+        size = np.abs(self.corrections)
+        if self.covariance is None:
+            return np.full(size.shape, np.nan), np.full(size.shape, np.nan)
+        along, across = (np.sqrt(self.covariance[..., k, k]) for k in (0, 1))
+        angle = np.where(size > 0, np.degrees(across / np.where(size > 0, size, 1.0)), np.nan)
+        return along, np.where(angle <= UNKNOWN_ANGLE, angle, np.nan)
+
 
 class FieldBalancing:
     """The corrections of every rotor of a table of runs."""
@@ -411,17 +421,6 @@ class FieldBalancing:
     def uncertain(self) -> bool:
         """Whether reading errors are known, stated or from repeats."""
         return any(solved.covariance is not None for solved in self.solved)
-
-    def uncertainty(self, solved: Solved) -> tuple[Real, Real] | None:
-        """Return the standard deviations of size (SI) and angle (degrees; NaN where it is not known), (g, p) each."""
-        if solved.covariance is None:
-            return None
-        size = np.abs(solved.corrections)
-        along = np.sqrt(solved.covariance[..., 0, 0])
-        across = np.sqrt(solved.covariance[..., 1, 1])
-        safe = np.where(size > 0, size, 1.0)
-        angle = np.where(size > 0, np.degrees(across / safe), np.nan)
-        return along, np.where(angle <= UNKNOWN_ANGLE, angle, np.nan)
 
     @cached_property
     def _order(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -34,8 +34,7 @@ def last_run(found: FieldBalancing, solved: Solved, i: int) -> LastRun | None:
     if request.four_run or not group.trials:
         return None
     on = group.on[i, -1]
-    stands = request.from_here and bool((on == group.kept[i]).all())
-    if not on.any() or not (stands or found.stored is not None):
+    if not (request.from_here and on.any() and (on == group.kept[i]).all()):
         return None
     return LastRun(group.trials[-1].run, on, group.runs[i, -1] - found.runout(group))
 

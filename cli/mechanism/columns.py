@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,6 @@ from cli.mechanism.quantities import (
     bounds_of,
     cells,
     cells_of,
-    column,
     form_bounds,
     in_rows,
     keys_of,
@@ -30,9 +30,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cli.mechanism.quantities import Numbers, Reals
-    from cli.show.columns import Document
+    from cli.show.columns import Cell, Document
     from virtualwork.formulas.asked import Key
     from virtualwork.motion import Motion
+
+_UNIT = re.compile(r"_(m|m_s|m_s2|m_s3|deg|rad_s|rad_s2|rad_s3|N|N_m|kg|kg_m|kg_m2|J)\Z")
+
+
+def column(header: str, values: Sequence[Cell], error: Callable[[], list[float]] | None = None) -> Column:
+    """Return a column by its header, name and unit."""
+    unit = _UNIT.search(header)
+    if unit is None:
+        return Column(header, "", values, error)
+    return Column(header[: unit.start()], unit[1], values, error)
 
 
 def pose_keys(analysis: Analysis) -> tuple[str, ...]:
@@ -56,12 +66,12 @@ def table(analysis: Analysis, forces: bool, found: Sequence[Mapping[Key, Any]] =
         for motion in analysis.motions:
             form_bounds(analysis, motion, wanted)
 
-    def error(keys: Sequence[Key]) -> list[float]:
+    def error(each: Quantity) -> list[float]:
         formed()
         return [
             b
             for motion in analysis.motions
-            for b in bounds_of(sum(bound(analysis, motion, key) for key in keys))  # type: ignore[arg-type]
+            for b in bounds_of(sum(bound(analysis, motion, key) for key in keys_of([each])))  # type: ignore[arg-type]
         ]
 
     columns = [Column("step", "", [*analysis.inputs.steps] * times)]
@@ -79,7 +89,7 @@ def table(analysis: Analysis, forces: bool, found: Sequence[Mapping[Key, Any]] =
             columns.append(inputs[each.key[1]])
         values = parts[0][each] if times == 1 else [v for part in parts for v in part[each]]
         if _has_column(analysis, each, values):
-            bounds = None if found else partial(error, keys_of([each]))
+            bounds = None if found else partial(error, each)
             columns.append(column(each.header, values, bounds))
     return Table(columns, keys=pose_keys(analysis))
 

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.errors import DataError
+from cli.mechanism.columns import column
 from cli.mechanism.quantities import (
     SLIDE,
     Quantity,
     bounds_of,
     cells,
-    column,
     in_rows,
     keys_of,
     links,

@@ -6,21 +6,18 @@ Tables, JSON, bounds of errors, variants, motion in time and tolerances all walk
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cli.mechanism.solve import Analysis
 from cli.read.units import degrees
-from cli.show.columns import Column
 from virtualwork.formulas.asked import FORCES, Key, over_blocks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cli.show.columns import Cell
     from virtualwork import Mechanism
     from virtualwork.motion import Motion
     from virtualwork.plan.steps import Joint
@@ -35,7 +32,6 @@ POINT = (("x_m", "y_m"), ("vx_m_s", "vy_m_s"), ("ax_m_s2", "ay_m_s2"), ("jx_m_s3
 LINK = ("angle_deg", "omega_rad_s", "alpha_rad_s2", "jerk_rad_s3")
 SLIDE = ("position_m", "speed_m_s", "acceleration_m_s2", "jerk_m_s3")
 FORCE = ("fx_N", "fy_N")
-_UNIT = re.compile(r"_(m|m_s|m_s2|m_s3|deg|rad_s|rad_s2|rad_s3|N|N_m|kg|kg_m|kg_m2|J)\Z")
 
 
 class Quantity(NamedTuple):
@@ -262,15 +258,7 @@ def bounds_of(bounds: Reals) -> list[float]:
     return [math.inf if bound != bound else bound for bound in bounds.tolist()]
 
 
-# --- in tables and JSON -----------------------------------------------------------------------------------------------
-def column(header: str, values: Sequence[Cell], error: Callable[[], list[float]] | None = None) -> Column:
-    """Return a column by its header, name and unit."""
-    unit = _UNIT.search(header)
-    if unit is None:
-        return Column(header, "", values, error)
-    return Column(header[: unit.start()], unit[1], values, error)
-
-
+# --- in JSON ----------------------------------------------------------------------------------------------------------
 def nested(numbers: Mapping[Quantity, Numbers], n: int) -> dict[str, Any]:
     """Columns of n poses where they stand in JSON."""
     found: dict[str, Any] = {}

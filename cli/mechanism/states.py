@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cli.mechanism.columns import pose_keys
+from cli.mechanism.columns import column, pose_keys
 from cli.mechanism.quantities import (
     FORCE,
     LINK,
@@ -23,7 +23,6 @@ from cli.mechanism.quantities import (
     bounds_of,
     cells,
     cells_of,
-    column,
     keys_of,
     links,
     solved,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.mechanism.quantities import column
+from cli.mechanism.columns import column
 from cli.show.columns import Table
 from cli.show.progress import progress
 from virtualwork.formulas.positions import BLOCK, EvenSweep

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.errors import DataError
+from cli.mechanism.columns import column
 from cli.mechanism.options import Options, names
-from cli.mechanism.quantities import column, effort_name
+from cli.mechanism.quantities import effort_name
 from cli.mechanism.solve import Analysis
 from cli.show.columns import Table
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from cli.mechanism.quantities import column
+from cli.mechanism.columns import column
 from cli.mechanism.solve import ORDERS, Analysis
 from cli.mechanism.studies import Document, Studies
 from cli.read.units import written

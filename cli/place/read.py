@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from cli.errors import DataError, quote
 from cli.read import options
@@ -145,7 +146,7 @@ def _of_json(path: str) -> list[Correction]:
     return found
 
 
-def _vector(one: dict[str, Any]) -> Vector:
+def _vector(one: Mapping[str, str | float]) -> Vector:
     mass, angle = float(one["mass_kg"]), float(one["angle_deg"])
     if not (0 <= mass <= 1e60 and abs(angle) <= 1e60):
         raise ValueError

@@ -174,6 +174,7 @@ def test_many_machines_with_runs_of_their_own(dalembert: Dalembert) -> None:
 
 def test_machines_with_runs_planes_and_repeats_of_their_own_are_each_least_squares(tmp_path: Any) -> None:
     from cli.field.log import read_log
+    from cli.field.request import Request
 
     rng = np.random.default_rng(11)
     known, lines = {}, []
@@ -209,7 +210,7 @@ def test_machines_with_runs_planes_and_repeats_of_their_own_are_each_least_squar
         "rotor,run,state,amplitude_um,phase_deg,trial_plane,trial_mass_kg,trial_angle_deg\n"
         + "".join(lines[i] for i in mixed)
     )
-    runs = read_log(str(path), lagging=False)
+    runs = read_log(str(path), Request(rotation="ccw"))
     seen = 0
     for group in runs.groups:
         assert group.fit is not None
