@@ -331,6 +331,8 @@ def test_bombs_and_entities_are_refused(text: str, root: str) -> None:
         (MJCF.replace('joint="hip"', 'joint="none"'), "no joint is called 'none'"),
         (MJCF.replace('euler="0 20 0"', 'quat="0 0 0 0"'), "body 'rod': found 0 0 0 0, expected a quaternion"),
         ("<mujoco>" + "<frame>" * 200 + "</frame>" * 200 + "</mujoco>", "nested more than 100 deep"),
+        (MJCF.replace("<actuator>", '<tendon><fixed name="t" stiffness="3" springlength=""/></tendon><actuator>', 1), "tendon 't', springlength: found '', expected 1 or 2 numbers"),
+        ("<robot name='r'><link name='a'><visual><geometry><cylinder radius='1 2' length='1'/></geometry></visual></link></robot>", "link 'a', radius: found '1 2', expected 1 number"),
         ("<html/>", "of no known kind: expected pmks-text"),
     ],
 )  # fmt: skip

@@ -110,7 +110,7 @@ class At(NamedTuple):
             return list(default)
         found = [self.number(of, word) for word in (text or "").split()]
         if n is not None and len(found) != n:
-            raise self.error(of, quote(text or ""), f"{n} numbers")
+            raise self.error(of, quote(text or ""), f"{n} number{'s' * (n != 1)}")
         return found
 
     def direction(self, of: str, vector: ArrayLike) -> Array:

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cli.errors import DataError
+from cli.errors import DataError, quote
 from cli.read.files import load
 from cli.read.robots.elements import At, child, children, named, parse
 from cli.read.robots.robot import (
@@ -328,7 +328,10 @@ class _Reader:
         stiffness, damping = _leading(at, values, "stiffness", "damping")
         if not (stiffness or damping):
             return
-        rest = at.numbers("springlength", values.get("springlength", "-1"))
+        text = values.get("springlength", "-1")
+        rest = at.numbers("springlength", text)
+        if not 1 <= len(rest) <= 2:
+            raise at.error("springlength", quote(text), "1 or 2 numbers")
         ends, terms = [], []
         if e.tag == "fixed":
             terms = self._fixed(named(self.file, e), at)

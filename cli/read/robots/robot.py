@@ -209,9 +209,9 @@ def sphere_around(shape: str, size: list[float]) -> float | None:
     >>> sphere_around("box", [3.0, 4.0, 12.0]), sphere_around("mesh", [])
     (6.5, None)
     """
-    if shape == "box":
+    if shape == "box" and size:
         return float(np.linalg.norm(size)) / 2
-    if shape in ("cylinder", "capsule"):
+    if shape in ("cylinder", "capsule") and len(size) == 2:
         radius, length = size
         return float(np.hypot(radius, length / 2)) if shape == "cylinder" else radius + length / 2
     return max(size) if shape in ("sphere", "ellipsoid") and size else None

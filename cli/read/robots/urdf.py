@@ -98,8 +98,12 @@ def _shapes(at: At, link: Element) -> list[tuple[Array, float]]:
     for e in children(link, "visual", "collision"):
         geometry = child(e, "geometry")
         for shape in () if geometry is None else geometry:
-            keys = [key for key in ("size", "radius", "length") if shape.get(key) is not None]
-            size = [x for key in keys for x in at.numbers(key, shape.get(key))]
+            given = [
+                (key, n)
+                for key, n in (("size", 3), ("radius", 1), ("length", 1))
+                if shape.get(key) is not None
+            ]
+            size = [x for key, n in given for x in at.numbers(key, shape.get(key), n)]
             radius = sphere_around(plain(shape), size)
             if radius is None:
                 return []
