@@ -50,11 +50,11 @@ def bounds(formula: Formula, given: Mapping[str, Given], *options: Hashable) -> 
 
     Examples
     --------
-    What is left of a difference is all error; the quotient's is half a unit of itself:
+    What is left of a difference is all error; the quotient's is half a unit in its last place:
 
     >>> (bound,) = bounds(lambda a, b: [a / 3 - b], {"a": ([1.0, 2.0], 0, 0.0), "b": (1 / 3, 0, 0.0)})
     >>> [float(round(x * 2**53, 3)) for x in bound]
-    [0.333, 1.0]
+    [0.25, 0.75]
     """
     arrays = {name: np.asarray(value, dtype=float) for name, (value, _, _) in given.items()}
     own = {name: array.shape[array.ndim - given[name][1] :] for name, array in arrays.items()}
