@@ -53,6 +53,16 @@ def test_rounds_go_on_where_they_stopped() -> None:
     assert rounds.run(newton(), given, part, 50, "numpy")[0]["x"] == pytest.approx(whole["x"], rel=1e-16)
 
 
+@pytest.mark.parametrize("engine", ["numpy", "llvm"])
+def test_no_round_leaves_the_state_as_it_was(engine: str) -> None:
+    """Compiled code wrote a round beyond what it had been given room for."""
+    state, kept = rounds.run(
+        newton(), {"mean": np.array([1.0, 2.0]), "e": 0.8}, {"x": 1.5, "left": 1.0}, 0, engine
+    )
+    assert state["x"].tolist() == [1.5, 1.5]
+    assert kept["x"].shape == (0, 2)
+
+
 def test_the_body_on_floats_calls_a_function() -> None:
     loop = newton()
     function = floats.compiled(loop.body, loop.passed, loop.inner.names)

@@ -107,7 +107,8 @@ def run(
     food = np.empty((capacity, len(loop.fed), n))
     for i, name in enumerate(loop.fed):
         food[:, i] = (fed or {})[name]
-    code = ready(loop, engine)
+    # compiled code does a round before it looks whether there is one
+    code = ready(loop, engine) if capacity else None
     if code is not None:
         found, kept = code(constants, found, food, capacity)
     else:
