@@ -175,6 +175,8 @@ def grid(
 
     `read` reads one of the three; `what` is counted, `most` of them at most.
     """
+    from fractions import Fraction
+
     steps = None
     body = text
     if "/" in text:
@@ -185,23 +187,21 @@ def grid(
     parts = body.split(":")
     if len(parts) != (2 if steps else 3):
         raise bad(flag, f"'{text}': expected START:STOP:STEP or START:STOP/N, such as {example}")
-    values = [read(part) for part in parts]
-    start, stop = values[:2]
+    # the decimals that the numbers print as, exactly: 50mm and a step of 1mm are 0.051, not 0.051000000000000004
+    start, stop, *by = [Fraction(repr(read(part))) for part in parts]
     if steps is None:
-        step = values[2]
-        if step == 0 or (stop - start) * step < 0:
+        if by[0] == 0 or (stop - start) * by[0] < 0:
             raise bad(flag, f"'{text}': a step of {parts[2]} never gets from {parts[0]} to {parts[1]}")
-        ratio = (stop - start) / step
-        if ratio > most:
-            raise bad(flag, f"'{text}': {ratio:.3g} {what}: expected at most {most}")
+        ratio = (stop - start) / by[0]
         steps = round(ratio)
-        if abs(ratio - steps) > 1e-9 * max(1.0, ratio):
-            return [start + i * step for i in range(int(ratio) + 1)]
-        if steps == 0:
-            return [start]
+        if abs(ratio - steps) * 10**9 > max(Fraction(1), ratio):
+            stop, steps = start + int(ratio) * by[0], int(ratio)
     if steps > most:
-        raise bad(flag, f"'{text}': {steps:.3g} {what}: expected at most {most}")
-    return [start + (stop - start) * i / steps for i in range(steps + 1)]
+        raise bad(flag, f"'{text}': {float(steps):.3g} {what}: expected at most {most}")
+    below = math.lcm(start.denominator, stop.denominator) * max(steps, 1)
+    first, last = int(start * below), int(stop * below)
+    each = (last - first) // max(steps, 1)
+    return [(first + i * each) / below for i in range(steps + 1)]
 
 
 @contextmanager

@@ -70,6 +70,20 @@ def test_a_grid_runs_over_the_last_path_fastest_and_each_row_begins_with_its_var
             assert row == own
 
 
+@pytest.mark.parametrize(
+    ("vary", "expected"),
+    [
+        ("50mm:52mm:0.1mm", [f"{50 + i / 10:.1f}" for i in range(21)]),
+        ("1cm:1.1cm:0.03cm", ["10.0", "10.3", "10.6", "10.9"]),
+        ("30mm:29mm:-0.25mm", ["30.0", "29.75", "29.5", "29.25", "29.0"]),
+    ],
+)
+def test_steps_are_those_of_the_decimals_as_written(dalembert, files, vary, expected):
+    found = dalembert("mechanism", files(), "--vary", f"links.crank.B.x={vary}", "--at", "40", "--only", "H")
+    shown = [row["links.crank.B.x_m"] for row in rows(found.stdout)]
+    assert shown == [repr(float(f"{x}e-3")) for x in expected]
+
+
 def test_json_holds_what_was_set_and_the_poses_of_each_variant(dalembert, files):
     vary = ("--vary", "links.coupler.H.angle=0:30:15", "--set", "ground.D.x=101")
     found = json.loads(dalembert("mechanism", files(), *vary, "--at", "40", "--json").stdout)
