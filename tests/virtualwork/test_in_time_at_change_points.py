@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.truth.bodies_in_time import Bodies
-from virtualwork import Friction, Guess, Input, Link, Mechanism, MechanismError
+from virtualwork import Friction, Guess, Guide, Input, Link, Mechanism, MechanismError
 
 G = 9.81
 
@@ -194,3 +194,27 @@ def test_with_friction_it_ends_close_to_the_flat_pose_with_its_time(lengths: tup
     assert run.warnings[0].startswith(f"ends at {run.t[-1]:.9g} s: it can go no further")
     assert abs(math.sin(run.angle[-1, 0])) < 0.01
     assert np.abs(run.energy_drift).max() < 1e-7
+
+
+@pytest.mark.parametrize("engine", ["numpy", "llvm"])
+def test_too_far_from_the_guess_it_ends_with_its_time(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A block on a rail draws a slotted arm without mass: steadily to 20 000 sizes of the mechanism, and no farther."""
+    if engine == "llvm":
+        pytest.importorskip("llvmlite")
+    monkeypatch.setenv("DALEMBERT_ENGINE", engine)
+    m = Mechanism(
+        {"O": 0j, "D": 1j},
+        {"block": Link({"P": 0j, "Q": 0.1j}, mass=1), "arm": Link({"D": 0j})},
+        guides=[Guide("P", "block", turned=0.0), Guide("Q", "block", "arm")],
+        inputs=Input(slider="P", value=0.5),
+        guess=Guess(0.5, {"arm": -1.0}),
+    )
+    run = m.simulate([0, 1.0], angle=19990.0, speed=-10.0)
+    assert not run.warnings
+    assert run.angle[-1, 0] == pytest.approx(19980.0, rel=1e-15)
+    # an input's surroundings are looked at as far as a size away
+    run = m.simulate([0, 0.5, 2.0], angle=19990.0, speed=10.0)
+    assert "turns away from the guess" in run.ended
+    assert run.warnings == (f"ends at {run.t[-1]:.9g} s: {run.ended}",)
+    assert 19998.5 < run.angle[-1, 0] < 20000.5
+    assert run.angle[:, 0] == pytest.approx(19990.0 + 10.0 * run.t, rel=1e-14)
