@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.truth.bodies_in_time import Bodies
-from virtualwork import Friction, Guess, Input, Link, Mechanism, MechanismError
+from virtualwork import Friction, Guess, Guide, Input, Link, Mechanism, MechanismError
 
 G = 9.81
 
@@ -194,3 +194,101 @@ def test_with_friction_it_ends_close_to_the_flat_pose_with_its_time(lengths: tup
     assert run.warnings[0].startswith(f"ends at {run.t[-1]:.9g} s: it can go no further")
     assert abs(math.sin(run.angle[-1, 0])) < 0.01
     assert np.abs(run.energy_drift).max() < 1e-7
+
+
+@pytest.mark.parametrize("engine", ["numpy", "llvm"])
+def test_too_far_from_the_guess_it_ends_with_its_time(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A block on a rail draws a slotted arm without mass: steadily to 20 000 sizes of the mechanism, and no farther."""
+    if engine == "llvm":
+        pytest.importorskip("llvmlite")
+    monkeypatch.setenv("DALEMBERT_ENGINE", engine)
+    m = Mechanism(
+        {"O": 0j, "D": 1j},
+        {"block": Link({"P": 0j, "Q": 0.1j}, mass=1), "arm": Link({"D": 0j})},
+        guides=[Guide("P", "block", turned=0.0), Guide("Q", "block", "arm")],
+        inputs=Input(slider="P", value=0.5),
+        guess=Guess(0.5, {"arm": -1.0}),
+    )
+    run = m.simulate([0, 1.0], angle=19990.0, speed=-10.0)
+    assert not run.warnings
+    assert run.angle[-1, 0] == pytest.approx(19980.0, rel=1e-15)
+    # an input's surroundings are looked at as far as a size away
+    run = m.simulate([0, 0.5, 2.0], angle=19990.0, speed=10.0)
+    assert "turns away from the guess" in run.ended
+    assert run.warnings == (f"ends at {run.t[-1]:.9g} s: {run.ended}",)
+    assert 19998.5 < run.angle[-1, 0] < 20000.5
+    assert run.angle[:, 0] == pytest.approx(19990.0 + 10.0 * run.t, rel=1e-14)
+
+
+def lift(driver: str, angle: float) -> Mechanism:
+    """A scissors lift of bars without mass, `left` at an angle; its platform goes straight up and down."""
+    shoe = Guide("B", "shoe", "ground", "A", 0.0, 0.0)
+    places = {"B": 1.2 * math.cos(angle), "left": angle, "right": math.pi - angle, "platform": 0.0}
+    entry = Input(slider="B") if driver == "B" else Input(link=driver)
+    others = {name: place for name, place in places.items() if name not in ("B", driver)}
+    return Mechanism(
+        {"A": 0j},
+        {
+            "left": Link({"A": 0j, "M": 0.6, "C": 1.2}),
+            "right": Link({"B": 0j, "M": 0.6, "D": 1.2}),
+            "platform": Link({"D": 0j, "E": 1.2}, mass=400, center=0.6 + 0.1j),
+            "shoe": Link({"B": 0j}),
+        },
+        guides=[shoe, Guide("C", "left", "platform", "D", 0.0)],
+        inputs=entry,
+        guess=Guess(places[driver], others),
+        gravity=-1j * G,
+    )
+
+
+@pytest.mark.parametrize("driver", ["B", "left", "right"])
+def test_a_scissors_lift_falls_freely_through_its_flat_pose(driver: str) -> None:
+    """Only the platform has mass: it falls as a stone does, until the bars stand on end below."""
+    begin = math.radians(24)
+    high = 1.2 * math.sin(begin)
+    run = lift(driver, begin).simulate([0, 0.2, 0.3, 0.4, 0.5, 0.7])
+    heights = run.motion.point("D").position[:, 1]
+    assert heights[3] < 0 < heights[2]
+    assert heights == pytest.approx(high - G / 2 * run.t**2, abs=1e-11)
+    assert run.warnings == (f"ends at {run.t[-1]:.9g} s: {run.ended}",)
+    assert run.ended.startswith("it can go no further")
+    assert -1.2 <= heights[-1] < -1.199
+
+
+def test_a_scissors_lift_let_go_flat() -> None:
+    """Its bars' angles lead on from there; the shoe's place stands at its limit."""
+    run = lift("left", 0.0).simulate([0, 0.2, 0.4])
+    assert run.motion.point("D").position[:, 1] == pytest.approx(-G / 2 * run.t**2, abs=1e-11)
+    with pytest.raises(MechanismError, match="stands at a limit of its input"):
+        lift("B", 0.0).simulate([0, 0.2, 0.4])
+
+
+def pantograph(**loop: Link) -> Mechanism:
+    """Two bars of 1 m, and the two of 0.5 m that make a parallelogram with them; without these a double pendulum."""
+    heavy = 0.0 if loop else 1.0
+    return Mechanism(
+        {"O": 0j},
+        {
+            "upper": Link({"O": 0j, "A": 1, "D": 0.5}, mass=1, center=1, inertia=0.2 * heavy),
+            "lower": Link({"A": 0j, "P": 1, "C": 0.5}, mass=1 + heavy, center=1, inertia=0.1 * heavy),
+            **loop,
+        },
+        inputs=[Input(link="upper", value=0.3), Input(link="lower", value=-0.8)],
+        guess=Guess((0.3, -0.8), {"third": -0.8, "fourth": 0.3 + math.pi} if loop else {}),
+    )
+
+
+def test_a_pantograph_moves_to_where_it_lies_flat_and_no_farther() -> None:
+    """4 kg where its parallelogram closes, halfway to the end, are 1 kg there: without gravity a double pendulum."""
+    third = Link({"D": 0j, "E": 0.5}, mass=4, center=0.5, inertia=0.1)
+    m = pantograph(third=third, fourth=Link({"C": 0j, "E": 0.5}, inertia=0.2))
+    run = m.simulate([0, 0.25, 0.5, 1.5], speed=[0.0, 1.0])
+    assert run.warnings == (f"ends at {run.t[-1]:.9g} s: {run.ended}",)
+    assert "near a change point" in run.ended
+    assert 0.7 < run.t[-1] < 0.8
+    alike = pantograph().simulate(run.t, speed=[0.0, 1.0])
+    assert run.angle == pytest.approx(alike.angle, abs=1e-9)
+    assert abs(alike.angle[-1, 0] - alike.angle[-1, 1]) < 1e-3
+    for moving in (0.0, 1.0):
+        with pytest.raises(MechanismError, match="cannot be assembled at the start, or stands at a limit"):
+            m.simulate([0, 0.2], angle=[0.0, 0.0], speed=[0.0, moving])

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from copy import copy
 from functools import cached_property
 from typing import Any
@@ -46,6 +47,8 @@ FAR = 64.0
 OTHER = 0.85
 # how near a change point a fold is its own
 NEAR = 0.1
+# rad, or of a slide's size: how far beyond where it ended is asked whether it could not be looked farther
+NEXT = 1e-6
 # a speed of the input, rad/s or m/s, beside whose forces all others are small
 FAST = 1e4
 TURN = 2 * math.pi
@@ -152,8 +155,11 @@ class Equations:
     def _careful(self, q: Reals) -> NDArray[np.bool_]:
         """Which states no tape can do by itself, (n,)."""
         for end in (q[:, 0].min(), q[:, 0].max()) if len(q) else ():
-            self._cover(float(end))
-        return np.array([self._crossing(x) is not None for x in q[:, 0].tolist()], dtype=bool)
+            with suppress(Lost):
+                self._cover(float(end))
+        low, high = self._covered
+        careful = (not low <= x <= high or self._crossing(x) is not None for x in q[:, 0].tolist())
+        return np.array(list(careful), dtype=bool)
 
     def _by_poses(self, t: float, q: Floats, v: Floats) -> tuple[Reals, Reals]:
         """M (k, k) and h (k,) at a state, from the effort of k + 1 motions through its pose."""
@@ -177,8 +183,12 @@ class Equations:
         return sorted({x for load in self._tables if load.axis == "time" for x, _ in load.table})
 
     def outside(self, t: float, q: Floats, v: Floats) -> str:
-        """Which table ends at a state; empty where none does."""
+        """Which table ends at a state, or that it lies too far from the guess; empty where neither is so."""
         every = (ends(load, self.assembly.plan, t, q, v) for load in self._tables)
+        try:
+            self._cover(q[0] + math.copysign(NEXT * self.scale[0], v[0]))
+        except Lost as lost:
+            return str(lost)
         return next((said for said in every if said), "")
 
     # --- the tape ---------------------------------------------------------------------------------------------
@@ -334,8 +344,9 @@ class Equations:
                 raise Lost
             try:
                 track.cover(q - ahead, q + ahead)
-            except MechanismError:
-                raise Lost from None
+            except MechanismError as error:
+                # so many turns from the guess
+                raise Lost(str(error)) from None
             low, high = min(low, q - ahead), max(high, q + ahead)
             self._flips.update({name: at.tolist() for name, at in track.flips.items()})
             self._crossings = crossings(track.crossings, self.scale[0], self._settled, self.share)
@@ -381,10 +392,13 @@ class Equations:
         return found is not None and abs(q - found.at) < 1e-7 * self.scale[0]
 
     def clear(self, q: Reals) -> bool:
-        """Whether no change point is near any of the values of the first input."""
+        """Whether no change point is near any of the values of the first input, as far as can be looked."""
         low, high = float(q.min()), float(q.max())
-        for end in (low, high):
-            self._cover(end)
+        try:
+            for end in (low, high):
+                self._cover(end)
+        except Lost:
+            return False
         return not any(low - c.inner <= c.at <= high + c.inner for c in self._crossings)
 
     def passes(self, q: float) -> bool:
