@@ -160,7 +160,11 @@ def _bars(axes: Axes, measurements: list[Measurement]) -> None:
         note = (
             f"{m.operations} operations" if m.operations else f"{m.ratio:.2f} × {m.floor}" if m.ratio else ""
         )
-        axes.annotate(f" {note}", (width, place), (2, 0), textcoords="offset points", va="center", fontsize=7)
+        # the longest bar has more room within than beyond it
+        away, side = (-4, "right") if width > 0.9 * max(widths) else (4, "left")
+        axes.annotate(
+            note, (width, place), (away, 0), textcoords="offset points", ha=side, va="center", fontsize=7
+        )
     axes.set_yticks(places, [m.method for m in measurements], fontsize=7)
     axes.set_xlim(0, 1.45 * max(widths))
     axes.set_xlabel(f"time per item, {unit}", fontsize=8)
