@@ -181,7 +181,7 @@ class _Space:
         w = np.asarray(
             self.start + self.scale * np.linalg.solve(self.r, z[:p] + 1j * z[p : 2 * p]), dtype=complex
         )
-        # rounding must not carry a mass over its limit
+        # a mass at its limit is the limit, and rounding must not carry it over
         if len(self.limited):
             over = np.abs(w) > self.limit * (1 - 4 * EPS)
             w = np.where(over, w * (self.limit / np.where(over, np.abs(w), 1.0)), w)

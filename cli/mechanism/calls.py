@@ -25,18 +25,7 @@ def answer(asked: Options, show: ShowOptions) -> Result:
     """What a call finds; which kind of call it is, is decided here."""
     refuse_clashes(asked, show)
     with told(asked.file):
-        if any(
-            (
-                asked.fit,
-                asked.point,
-                asked.link,
-                asked.slide,
-                asked.free,
-                asked.weight,
-                asked.starts,
-                asked.best,
-            )
-        ):
+        if asked.fits:
             from cli.mechanism.fitted import fitted
 
             result = fitted(asked)

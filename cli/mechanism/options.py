@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # have a table of their own, as --forces has
 STUDIES = "newton check equilibrium flywheel counterweights"
+# of a fit alone
+FITTING = "fit point link slide free weight starts best"
 
 
 def _print_schema(asked: bool) -> None:
@@ -86,7 +88,15 @@ class Options:
     @property
     def tables(self) -> list[str]:
         """The options given that have a table of their own."""
-        return flags_of(**{name: getattr(self, name) for name in ("forces", *STUDIES.split())})
+        return self._given(f"forces {STUDIES}")
+
+    @property
+    def fits(self) -> bool:
+        """Whether a fit is asked for, or something of one."""
+        return bool(self._given(FITTING))
+
+    def _given(self, names: str) -> list[str]:
+        return flags_of(**{name: getattr(self, name) for name in names.split()})
 
 
 def names(text: str) -> list[str]:

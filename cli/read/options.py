@@ -83,13 +83,11 @@ def mass_at(
     mass, mark, angle = vector.partition("@")
     if not mark:
         raise bad(flag, expected)
-    size = with_unit(flag, mass, dimension)
-    assert size is not None
-    if size[0] < 0:
+    size, unit = _read(flag, mass, dimension, positive=False)
+    if size < 0:
         raise bad(flag, f"'{text}': expected a mass that is not negative")
-    turn = with_unit(flag, f"{angle}deg" if is_number(angle) else angle, "angle")
-    assert turn is not None
-    return *size, *turn
+    turn = _read(flag, f"{angle}deg" if is_number(angle) else angle, "angle", positive=False)
+    return size, unit, *turn
 
 
 def two_bearings(flag: str, text: str) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from virtualwork.branch.continuation import FINEST, NODES
 from virtualwork.describe.description import Description
 from virtualwork.formulas.newton import newton, write_unknowns
 from virtualwork.formulas.numbers import Reals, solve, stack, stack_rows
-from virtualwork.formulas.positions import FAR, SHORTEST, State, columns, principal
+from virtualwork.formulas.positions import FAR, SHORTEST, State, columns, principal, unwound
 from virtualwork.formulas.rates import Rates
 from virtualwork.plan.steps import Group, Step
 
@@ -116,7 +116,7 @@ def wind_along_lines(track: Along, group: Group, st: State, bodies: Collection[s
     for body in bodies:
         angle = np.angle(st.turn[body])
         # what no input moves is one number for all poses
-        wound = np.broadcast_to(angle + 2 * np.pi * np.round((total[body] - angle) / (2 * np.pi)), n)
+        wound = np.broadcast_to(unwound(angle, total[body]), n)
         turn, margin = (
             np.where(reached, st.turn[body], np.nan),
             np.where(reached, st.margin[group.name], -1.0),

@@ -343,11 +343,15 @@ def follow(
     return nodes, angles
 
 
+def unwound(angle: Number, near: Number) -> Number:
+    """An angle with the whole turns that bring it nearest to another."""
+    return angle + 2 * np.pi * np.round((near - angle) / (2 * np.pi))
+
+
 def whole(samples: Samples, q: Number, angle: Number) -> Number:
     """An angle at inputs q, known modulo a turn, with its whole turns by what was counted."""
     nodes, counted = samples
     good = np.isfinite(counted)
     if not good.any():
         return angle
-    near = np.interp(np.asarray(q, dtype=float), nodes[good], counted[good])
-    return angle + 2 * np.pi * np.round((near - angle) / (2 * np.pi))
+    return unwound(angle, np.interp(np.asarray(q, dtype=float), nodes[good], counted[good]))

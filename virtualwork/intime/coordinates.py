@@ -8,7 +8,6 @@ follow from the pose.
 from __future__ import annotations
 
 import cmath
-import math
 from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
@@ -25,12 +24,11 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import GROUND, Guess, Input
 from virtualwork.formulas.numbers import PARTS, Reals
-from virtualwork.formulas.positions import columns
+from virtualwork.formulas.positions import columns, unwound
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.watch import Floats, Watch
 from virtualwork.motion import Motion
 
-TURN = 2 * math.pi
 # the relative radicand of a loop's closed form, the squared sine of its transmission angle, below which another
 # coordinate is looked for; by how much it must be better
 FOLDING, BETTER = 0.02, 4.0
@@ -195,11 +193,6 @@ def measured(motion: Motion, entry: Input, order: int) -> Reals:
     of = ("angle", "omega", "alpha")[order]
     value = getattr(motion.link(entry.name), of)
     return np.asarray(value if entry.on == GROUND else value - getattr(motion.link(entry.on), of))
-
-
-def unwound(angle: Reals | float, near: Reals | float) -> Reals:
-    """An angle with the whole turns that bring it nearest to another."""
-    return np.asarray(angle + TURN * np.round((near - angle) / TURN))
 
 
 def opened(assembly: Assembly, at: Floats) -> float:

@@ -13,7 +13,8 @@ import numpy as np
 from dalembert.arithmetic.engines import rounds
 from dalembert.arithmetic.loop import Loop
 from virtualwork.formulas.numbers import Reals
-from virtualwork.intime.coordinates import Coordinates, unwound
+from virtualwork.formulas.positions import unwound
+from virtualwork.intime.coordinates import Coordinates
 from virtualwork.intime.equations import Equations
 from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.implicit import Radau

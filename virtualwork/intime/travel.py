@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from virtualwork.formulas.numbers import EPS, Reals
-from virtualwork.intime.coordinates import BETTER, FOLDING, TURN, Coordinates, Monitor, measured
-from virtualwork.intime.equations import Lost
+from virtualwork.intime.coordinates import BETTER, FOLDING, Coordinates, Monitor, measured
+from virtualwork.intime.equations import TURN, Lost
 from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.joined import Joined

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dalembert.drawing.amounts import dimensioned
 from dalembert.drawing.sheet import plain, sheet
 from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.positions import unwound
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -96,7 +97,7 @@ def _function(axes: Axes, each: Fitted) -> tuple[Reals, Reals, str]:
         # angles go on over the half turn, and a target stands at the curve's own turn
         after, before = (np.unwrap(values, period=2 * np.pi) for values in (each.after, each.before))
         near = np.interp(each.inputs, each.q, np.where(np.isfinite(after), after, 0.0))
-        target = each.target + 2 * np.pi * np.round((near - each.target) / (2 * np.pi))
+        target = unwound(each.target, near)
         start = np.nanmean(after) - np.nanmean(before)
         if np.isfinite(start):
             before = before + 2 * np.pi * np.round(start / (2 * np.pi))
