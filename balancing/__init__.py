@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from balancing.amplitudes import AmplitudeFit, influence_from_amplitudes
-    from balancing.balance import Balance, initial_unbalance, least_squares, minimax
+    from balancing.balance import Balance, least_squares, minimax
     from balancing.confidence import Readings, spread
     from balancing.correction import CoincidentPlanes, Correction, Unbalances, correct
     from balancing.dependence import (
@@ -21,8 +21,11 @@ if TYPE_CHECKING:
         unseen,
     )
     from balancing.doubt import Drift, drift, outlier_probability, phase_sense, repeats, robust_fit
+    from balancing.fixed_weights import place_weights
+    from balancing.flywheel import TorqueCycle, torque_cycle
+    from balancing.indexing import Indexed, index_balancing
     from balancing.influence import influence_coefficients
-    from balancing.limited import Infeasible
+    from balancing.limited import Doubtful, Infeasible, NotConverged
     from balancing.log_balance import LogBalance, region_factor
     from balancing.next_run import NextRun, suggest_run
     from balancing.placement import Placement, drill_depth, place, place_from_stock, transfer
@@ -31,28 +34,38 @@ if TYPE_CHECKING:
     from balancing.rounding import influence_error
     from balancing.run_log import JointFit, Undetermined, determined, joint_fit
     from balancing.synchronous import OncePerTurn, once_per_turn
-    from balancing.tolerance import GRADES, allocate, grade_value, permissible_unbalance
+    from balancing.tolerance import (
+        GRADES,
+        allocate,
+        api_unbalance,
+        grade_value,
+        journal_loads,
+        mil_unbalance,
+        permissible_unbalance,
+    )
     from balancing.trial import (
         ErrorBudget,
-        Indexed,
         TrialEffect,
         error_budget,
-        index_balancing,
         trial_effect,
         trial_unbalance,
     )
+    from balancing.unbalance import initial_unbalance
 
 # A rotor with known masses needs none of what vibration needs: each module is loaded when a name of it is asked for.
 _HOMES = {
     "balancing.amplitudes": "AmplitudeFit influence_from_amplitudes",
-    "balancing.balance": "Balance initial_unbalance least_squares minimax",
+    "balancing.balance": "Balance least_squares minimax",
     "balancing.confidence": "Readings spread",
     "balancing.correction": "CoincidentPlanes Correction Unbalances correct",
     "balancing.dependence": "DependentPlanes DependentTrials condition_number plane_significance unseen",
     "balancing.doubt": "Drift drift outlier_probability phase_sense repeats robust_fit",
+    "balancing.fixed_weights": "place_weights",
+    "balancing.flywheel": "TorqueCycle torque_cycle",
+    "balancing.indexing": "Indexed index_balancing",
     "balancing.influence": "influence_coefficients",
     "balancing.run_log": "JointFit Undetermined determined joint_fit",
-    "balancing.limited": "Infeasible",
+    "balancing.limited": "Doubtful Infeasible NotConverged",
     "balancing.log_balance": "LogBalance region_factor",
     "balancing.next_run": "NextRun suggest_run",
     "balancing.synchronous": "OncePerTurn once_per_turn",
@@ -60,8 +73,9 @@ _HOMES = {
     "balancing.placement": "Placement drill_depth place place_from_stock transfer",
     "balancing.rotor": "by_size",
     "balancing.rounding": "influence_error",
-    "balancing.tolerance": "GRADES allocate grade_value permissible_unbalance",
-    "balancing.trial": "ErrorBudget Indexed TrialEffect error_budget index_balancing trial_effect trial_unbalance",
+    "balancing.tolerance": "GRADES allocate api_unbalance grade_value journal_loads mil_unbalance permissible_unbalance",
+    "balancing.trial": "ErrorBudget TrialEffect error_budget trial_effect trial_unbalance",
+    "balancing.unbalance": "initial_unbalance",
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
 
@@ -85,6 +99,7 @@ __all__ = [
     "Correction",
     "DependentPlanes",
     "DependentTrials",
+    "Doubtful",
     "Drift",
     "ErrorBudget",
     "Indexed",
@@ -92,14 +107,17 @@ __all__ = [
     "JointFit",
     "LogBalance",
     "NextRun",
+    "NotConverged",
     "OncePerTurn",
     "Placement",
     "Prior",
     "Readings",
+    "TorqueCycle",
     "TrialEffect",
     "Unbalances",
     "Undetermined",
     "allocate",
+    "api_unbalance",
     "by_size",
     "condition_number",
     "correct",
@@ -115,7 +133,9 @@ __all__ = [
     "influence_from_amplitudes",
     "initial_unbalance",
     "joint_fit",
+    "journal_loads",
     "least_squares",
+    "mil_unbalance",
     "minimax",
     "once_per_turn",
     "outlier_probability",
@@ -123,6 +143,7 @@ __all__ = [
     "phase_sense",
     "place",
     "place_from_stock",
+    "place_weights",
     "plane_significance",
     "pooled_prior",
     "region_factor",
@@ -131,6 +152,7 @@ __all__ = [
     "spread",
     "stored_prior",
     "suggest_run",
+    "torque_cycle",
     "transfer",
     "trial_effect",
     "trial_unbalance",

@@ -148,11 +148,11 @@ def influence_from_amplitudes(initial: ArrayLike, trials: ArrayLike, trial_masse
         raise ValueError("the trial masses are all alike: expected different angles")
     unit = float(np.abs(t).max())
     scaled: Complex = np.asarray(t / unit, dtype=complex)
-    found = [_fit(read / first, scaled) for first, read in zip(o, reading.T, strict=True)]
+    fits = [_fit(read / first, scaled) for first, read in zip(o, reading.T, strict=True)]
     return AmplitudeFit(
-        np.array([fit[0] for fit in found]) * o / unit,
-        np.array([fit[1] for fit in found]) * o,
-        np.array([fit[2] for fit in found]) * o / unit,
+        np.array([fit[0] for fit in fits]) * o / unit,
+        np.array([fit[1] for fit in fits]) * o,
+        np.array([fit[2] for fit in fits]) * o / unit,
         o,
         reading,
         t,

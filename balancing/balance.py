@@ -6,6 +6,7 @@ component, with limits on masses and residuals where asked for.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,12 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from balancing.dependence import DependentPlanes, adjoint, columns_scaled, condition_number
-from balancing.limited import limited_least_squares, smallest_maximum
+from balancing.dependence import DependentPlanes, condition_number
+from balancing.limited import DOUBTFUL, Doubtful, limited_least_squares, smallest_maximum
 from balancing.phase import angle_of
 from balancing.qr import smallest_squares
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import numbers, record, table
+from dalembert.arithmetic.shapes import as_numbers, common_shape, spread_to
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,7 +47,12 @@ class Balance:
     weights: Real | None = None
     """The weights that were asked for, (..., s)."""
     bound: float | None = None
-    """minimax alone: no corrections whatever leave less than this (from the dual problem)."""
+    """No corrections within the limits leave less than this (from the dual problem): of minimax the largest (weighted)
+    residual, of least squares with limits Σ w|r|²; None for least squares without limits."""
+    gap: float = 0.0
+    """By what share what is left may lie above the least there is, rounding aside: what is left held against `bound`."""
+    of_largest: bool = False
+    """Whether the largest residual is the least there is (minimax), and not the sum of squares."""
     ridge: float = 0.0
     max_mass: Real | None = None
     """The limits of the corrections that were asked for, (p,)."""
@@ -101,6 +108,17 @@ class Balance:
         return before_and_after(
             self.initial, self.residual, self.corrections, amplitude, sensors, planes, figure=figure
         )
+
+    @property
+    def status(self) -> str:
+        """ "optimal", or by how much what is left may lie above the optimum, and why."""
+        if self.gap <= DOUBTFUL:
+            return "optimal"
+        what = "the largest residual" if self.of_largest else "the sum of squares"
+        text = f"{what} is proven to be the least only to a share of {self.gap:.1e}"
+        if self.condition_number > 1e5:
+            return f"{text}: the planes are nearly dependent (condition number {float(self.condition_number):.2g})"
+        return f"{text}: the limits hardly leave a choice"
 
     @cached_property
     def residual(self) -> Complex:
@@ -167,10 +185,13 @@ class Balance:
             return bounds.residual
         if quantity == "residual_max":
             largest = bounds.residual.max(axis=-1)
-            if self.bound is not None and self.weights is None:
-                # the true optimum lies between the dual bound and what was found
-                gap = max(float(self.residual_max) - self.bound, 0.0)
-                largest = np.minimum(largest, gap + solved.evaluation_error.max())
+            if self.of_largest and self.bound is not None and self.weights is None:
+                # the true optimum lies between the dual bound, rounding taken off, and what the corrections truly leave
+                gap, own = (
+                    max(float(self.residual_max) - self.bound, 0.0),
+                    float(solved.evaluation_error.max()),
+                )
+                largest = np.minimum(largest, max(gap, own) if exact else gap + own)
             return np.asarray(largest)
         if quantity == "residual_rms":
             return np.asarray(np.sqrt(np.square(bounds.residual).mean(axis=-1)) + 8 * EPS * self.residual_rms)
@@ -191,8 +212,11 @@ class Balance:
         from balancing.rounding import Solved
 
         of_influence, of_initial = (
-            None if error is None else np.asarray(error, dtype=float)
-            for error in (influence_error, initial_error)
+            None if error is None else spread_to(name, error, like.shape)
+            for name, error, like in (
+                ("influence_error", influence_error, self.influence),
+                ("initial_error", initial_error, self.initial),
+            )
         )
         return Solved(self.influence, self.initial, self.corrections, self.weights, of_influence, of_initial)
 
@@ -203,15 +227,15 @@ class Balance:
             return least_squares_bounds(solved, self.residual, self.ridge), ""
         from balancing.optimality import optimum_bounds
 
-        return optimum_bounds(solved, self.bound is not None, self.max_mass, self.max_residual)
+        return optimum_bounds(solved, self.of_largest, self.max_mass, self.max_residual)
 
     @property
     def _free(self) -> bool:
         """Whether the corrections are those of least squares: without limits, or where none holds them."""
-        if self.bound is not None:
+        if self.of_largest:
             # a rotor that minimax balances to nothing is balanced by least squares
             noise = np.abs(self.influence) @ np.abs(self.corrections) + np.abs(self.initial)
-            if self.bound > 0 or float(self.residual_max) > 64 * EPS * float(noise.max()):
+            if self.bound or float(self.residual_max) > 64 * EPS * float(noise.max()):
                 return False
         return _within(self.corrections, self.max_mass) and _within(self.residual, self.max_residual)
 
@@ -252,7 +276,10 @@ def least_squares(
     DependentPlanes
         The sensors do not tell the planes apart (and `ridge` is 0): the combination they do not see is named.
     Infeasible
-        `max_residual` cannot be met.
+        `max_residual` cannot be met: the smallest that can is named.
+    NotConverged
+        The corrections under limits cannot be proven optimal to a millionth (`Balance.gap`); above 1e-9 a warning
+        `Doubtful` says so.
     ValueError
         Not finite, or shapes that do not fit.
 
@@ -268,9 +295,9 @@ def least_squares(
     >>> (fix.corrections.real * 21).round(12)
     array([17., 31.])
     """
-    alpha, v, root = _checked(influence, initial, weights)
-    if ridge < 0 or not np.isfinite(ridge):
-        raise ValueError("ridge must not be negative")
+    alpha, v, root = checked(influence, initial, weights)
+    if np.ndim(ridge) or ridge < 0 or not np.isfinite(ridge):
+        raise ValueError("ridge must be one number, not negative")
     w = None if weights is None else np.asarray(weights, dtype=float)
     if max_mass is not None or max_residual is not None:
         if ridge:
@@ -281,11 +308,12 @@ def least_squares(
             _limits("max_mass", max_mass, alpha.shape[1]),
             _limits("max_residual", max_residual, len(v)),
         )
-        found = limited_least_squares(alpha, v, root, limit, ceiling)
-        return Balance(alpha, v, found, w, max_mass=_given(limit), max_residual=_given(ceiling))
+        corrections, bound, gap = limited_least_squares(alpha, v, root, limit, ceiling)
+        capped, held = _given(limit), _given(ceiling)
+        return _warned(Balance(alpha, v, corrections, w, bound, gap, max_mass=capped, max_residual=held))
     a, b = (alpha, v) if root is None else (alpha * root[..., None], v * root)
-    found, sigma = smallest_squares(a, b, ridge)
-    return Balance(alpha, v, found, w, ridge=ridge, singular_values=None if ridge else sigma)
+    solution, sigma = smallest_squares(a, b, ridge)
+    return Balance(alpha, v, solution, w, ridge=ridge, singular_values=None if ridge else sigma)
 
 
 def minimax(
@@ -318,6 +346,8 @@ def minimax(
     ------
     DependentPlanes
         The sensors do not tell the planes apart, and no limit keeps their masses finite.
+    NotConverged
+        The corrections cannot be proven optimal to a millionth (`Balance.gap`); above 1e-9 a warning `Doubtful` says so.
     ValueError
         Not finite, or shapes that do not fit.
 
@@ -334,7 +364,7 @@ def minimax(
     >>> fix.corrections.real.round(9), fix.residual_max.round(12), round(fix.bound, 12)
     (array([1. , 1.8]), np.float64(0.4), 0.4)
     """
-    alpha, v, _ = _checked(influence, initial, weights)
+    alpha, v, _ = checked(influence, initial, weights)
     if alpha.ndim != 2 or v.ndim != 1:
         raise ValueError(
             f"one rotor at a time: expected influence (s, p), initial (s,), found {alpha.shape}, {v.shape}"
@@ -349,88 +379,45 @@ def minimax(
         a, b = a[moved], b[moved]
     if not len(b):
         raise DependentPlanes("the readings show no plane at all", np.eye(alpha.shape[1], dtype=complex)[0])
-    corrections, bound = smallest_maximum(a, b, limit)
-    return Balance(alpha, v, corrections, w, max(bound, floor, 0.0), max_mass=_given(limit))
+    corrections, bound, gap = smallest_maximum(a, b, limit)
+    if floor > bound:
+        # what no plane moves may be all that is left
+        reached = float((np.abs(b + a @ corrections)).max())
+        bound, gap = floor, gap if reached > floor else 0.0
+    return _warned(Balance(alpha, v, corrections, w, bound, gap, True, max_mass=_given(limit)))
 
 
-def initial_unbalance(
-    influence: ArrayLike, initial: ArrayLike, weights: ArrayLike | None = None, *, singular: float = 1e12
-) -> Complex:
-    """Find the unbalance in the correction planes that explains the initial vibration best.
-
-    It is the rotor's: no limit, ridge or rounding of the corrections changes it.
-
-    Parameters
-    ----------
-    influence, initial, weights
-        As for `least_squares`.
-    singular
-        The condition number from which on planes count as dependent.
-
-    Returns
-    -------
-    ndarray
-        u of V = α u, complex (..., p), kg; NaN in each plane where the readings do not determine it: planes that no
-        sensor tells apart, or fewer sensors than planes.
-
-    Raises
-    ------
-    ValueError
-        Not finite, or shapes that do not fit.
-
-    Notes
-    -----
-    The minimum of ‖V - α u‖ is unique in plane p where every null vector of α has a zero there (Golub and Van Loan,
-    Matrix Computations, 4th ed., section 5.5: rank-deficient least squares by the SVD).
-
-    Examples
-    --------
-    Two planes that act alike and a third: 6 is seen of the two together, 5 of the third.
-
-    >>> initial_unbalance([[1, 1, 0], [2, 2, 0], [0, 0, 1]], [6, 12, 5]).real
-    array([nan, nan,  5.])
-    """
-    alpha, v, root = _checked(influence, initial, weights)
-    if bool((condition_number(alpha, weights) < singular).all()):
-        return np.asarray(-least_squares(alpha, v, weights).corrections)
-    a, b = (alpha, v) if root is None else (alpha * root[..., None], v * root)
-    scaled, scale = columns_scaled(a)
-    readings, planes = scaled.shape[-2:]
-    left, sigma, right = np.linalg.svd(scaled, full_matrices=readings < planes)
-    k = sigma.shape[-1]
-    seen = sigma * singular > sigma[..., :1]
-    along = np.matvec(adjoint(left), b) / np.where(seen, sigma, 1.0)
-    u = np.matvec(adjoint(right[..., :k, :]), np.where(seen, along, 0.0)) * scale
-    null = np.concatenate([~seen, np.ones((*seen.shape[:-1], planes - k), dtype=bool)], axis=-1)
-    hidden = np.linalg.norm(np.where(null[..., None], right, 0.0), axis=-2)
-    # a null vector is known to the rounding of α, not to that of its own components
-    return np.where(hidden > 1e-6, complex(np.nan, np.nan), u)
-
-
-def _checked(
+def checked(
     influence: ArrayLike, initial: ArrayLike, weights: ArrayLike | None
 ) -> tuple[Complex, Complex, Real | None]:
-    """Return α, V and the square roots of the weights."""
-    alpha = np.asarray(influence, dtype=complex)
-    v = np.asarray(initial, dtype=complex)
+    """Return α, V and the square roots of the weights, or say what is wrong with them."""
+    alpha, v = as_numbers("influence", influence, complex), as_numbers("initial", initial, complex)
     if alpha.ndim < 2 or v.ndim < 1 or alpha.shape[-2] != v.shape[-1] or 0 in alpha.shape[-2:]:
         raise ValueError(f"shapes do not fit: influence {alpha.shape}, initial {v.shape}")
+    common_shape(influence=alpha.shape[:-1], initial=v.shape)
     if not (np.isfinite(alpha).all() and np.isfinite(v).all()):
         raise ValueError("influence and initial must be finite")
     if weights is None:
         return alpha, v, None
-    w = np.asarray(weights, dtype=float)
+    w = as_numbers("weights", weights)
+    common_shape(weights=w.shape, influence=alpha.shape[:-1], initial=v.shape)
     if not ((w >= 0) & (w < np.inf)).all() or not (w > 0).any():
         raise ValueError("weights must not be negative, and not all zero")
     return alpha, v, np.sqrt(w)
+
+
+def _warned(fix: Balance) -> Balance:
+    if fix.gap > DOUBTFUL:
+        warnings.warn(fix.status, Doubtful, stacklevel=3)
+    return fix
 
 
 def _within(z: Complex, limit: Real | None) -> bool:
     return limit is None or bool((np.abs(z) < limit * (1 - 1e-9)).all())
 
 
-def _limits(name: str, given: ArrayLike | None, count: int) -> Real:
-    limit = np.broadcast_to(np.inf if given is None else np.asarray(given, dtype=float), (count,))
+def _limits(name: str, limits: ArrayLike | None, count: int) -> Real:
+    limit = spread_to(name, np.inf if limits is None else limits, (count,))
     if not (limit > 0).all():
         raise ValueError(f"{name} must be positive")
     return limit

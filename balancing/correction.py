@@ -29,6 +29,7 @@ from balancing.rotor import BLOCK
 from dalembert.arithmetic.exact import UNIT, exact_sum, two_product, two_sum
 from dalembert.arithmetic.parts import in_parts
 from dalembert.arithmetic.records import numbers, record, table
+from dalembert.arithmetic.shapes import as_numbers, common_shape, spread_to
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -101,7 +102,7 @@ class Correction:
 
     def couple(self, about: ArrayLike) -> Complex:
         """Return the couple unbalance Σ U (z - about) before correction, (...), kg·m²."""
-        at = np.broadcast_to(np.asarray(about, dtype=float), self.static.shape)
+        at = spread_to("about", about, self.static.shape)
         return _complex(self._about(at[..., None])[0])[..., 0]
 
     @cached_property
@@ -197,8 +198,9 @@ class Correction:
 
     def residual_of(self, unbalance: ArrayLike, about: ArrayLike | None = None) -> Unbalances:
         """Return what corrections as really made (..., p) leave: static, and couple about a plane (default: the first)."""
-        made = np.asarray(unbalance, dtype=complex)
-        lead = np.broadcast_shapes(made.shape[:-1], self.static.shape)
+        made = as_numbers("unbalance", unbalance, complex)
+        common_shape(unbalance=made.shape[-1:], planes=self.planes.shape[-1:])
+        lead = common_shape(unbalance=made.shape[:-1], rotors=self.static.shape)
         made = np.broadcast_to(made, lead + made.shape[-1:])
         at = np.broadcast_to(self.planes[..., 0] if about is None else np.asarray(about, dtype=float), lead)
         parts = _parts(made)
@@ -253,9 +255,9 @@ class Correction:
             radius = np.asarray(at, dtype=float)
             return np.asarray((bound + 4 * UNIT * size) / radius)
         if quantity == "angle":
-            known = bound < size
-            turn = np.arcsin(np.where(known, bound / np.where(known, size, 1.0), 0.0))
-            return np.where(known, turn + 8 * UNIT * np.pi, np.where((size > 0) | (bound > 0), np.pi, 0.0))
+            nonzero = bound < size
+            turn = np.arcsin(np.where(nonzero, bound / np.where(nonzero, size, 1.0), 0.0))
+            return np.where(nonzero, turn + 8 * UNIT * np.pi, np.where((size > 0) | (bound > 0), np.pi, 0.0))
         raise ValueError(
             f"'{quantity}': expected unbalance, static, couple, mass, angle, residual_static or residual_couple"
         )
@@ -284,7 +286,7 @@ class Correction:
 
     def mass(self, radius: ArrayLike) -> Real:
         """Return the masses to add at the radius (m) of each plane, (..., p), kg."""
-        return np.asarray(np.abs(self.unbalance) / radius)
+        return np.asarray(np.abs(self.unbalance) / spread_to("radius", radius, self.unbalance.shape))
 
     @property
     def angle(self) -> Real:
@@ -354,13 +356,13 @@ def correct(
     >>> np.degrees(fix.angle).round(2)
     array([256.82,  19.68])
     """
-    u = np.atleast_1d(np.asarray(moment, dtype=complex))
-    at = np.asarray(z, dtype=float)
-    p = np.atleast_1d(np.asarray(planes, dtype=float))
+    u = np.atleast_1d(as_numbers("moment", moment, complex))
+    at = as_numbers("z", z)
+    p = np.atleast_1d(as_numbers("planes", planes))
     if not (np.isfinite(u).all() and np.isfinite(at).all() and np.isfinite(p).all()):
         raise ValueError("moment, z and planes must be finite")
-    shape = np.broadcast_shapes(u.shape, at.shape)
-    lead = np.broadcast_shapes(shape[:-1], p.shape[:-1])
+    shape = common_shape(moment=u.shape, z=at.shape)
+    lead = common_shape(rotors=shape[:-1], planes=p.shape[:-1])
     fix = Correction(
         np.broadcast_to(u, lead + shape[-1:]),
         np.broadcast_to(at, lead + shape[-1:]),
@@ -374,8 +376,8 @@ def correct(
         rows = (slice(i, i + PART) for i in range(0, len(fix.moment), PART))
         parts = ((fix.moment[i], fix.z[i], fix.planes[i]) for i in rows)
         # what is worked out when it is first asked for
-        found = np.concatenate(list(in_parts(_unbalance, parts, executor)))
-        object.__setattr__(fix, "unbalance", found)
+        unbalance = np.concatenate(list(in_parts(_unbalance, parts, executor)))
+        object.__setattr__(fix, "unbalance", unbalance)
     return fix
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.exact import EPS
+from dalembert.arithmetic.shapes import as_numbers, common_shape
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -107,8 +108,14 @@ def unseen(influence: ArrayLike, weights: ArrayLike | None = None) -> tuple[Comp
 
 
 def _weighted(influence: ArrayLike, weights: ArrayLike | None) -> Complex:
-    alpha = np.asarray(influence, dtype=complex)
-    return alpha if weights is None else alpha * np.sqrt(np.asarray(weights, dtype=float))[..., None]
+    alpha = as_numbers("influence", influence, complex)
+    if alpha.ndim < 2:
+        raise ValueError(f"influence must be (..., s, p), found the shape {alpha.shape}")
+    if weights is None:
+        return alpha
+    w = as_numbers("weights", weights)
+    common_shape(influence=alpha.shape[:-1], weights=w.shape)
+    return np.asarray(alpha * np.sqrt(w)[..., None])
 
 
 def _normed(direction: Complex) -> Complex:

@@ -14,6 +14,7 @@ from balancing.prior import Prior, fit_with_prior, runs_alone
 from balancing.run_log import Errors, JointFit, joint_fit
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
+from dalembert.arithmetic.shapes import as_numbers, common_shape
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -136,7 +137,8 @@ def drift(fit: JointFit, times: ArrayLike) -> Drift:
     from scipy.special import betainc
 
     fit = fit.alone
-    time = np.asarray(times, dtype=float)
+    time = as_numbers("times", times)
+    common_shape(times=time.shape, runs=fit.present.shape[:-1])
     time = time - time.mean(axis=-1, keepdims=True)
     shared = np.where(fit.present, time[..., None], 0.0)
     by_channel = np.swapaxes(shared, -1, -2)
@@ -145,19 +147,19 @@ def drift(fit: JointFit, times: ArrayLike) -> Drift:
     read = np.swapaxes(fit.present, -1, -2)
     free = np.where(read, by_channel - followed, 0.0)
     length = (weights * np.square(np.abs(free))).sum(axis=-1)
-    told = length > 1e-20 * (weights * np.square(by_channel)).sum(axis=-1)
+    detectable = length > 1e-20 * (weights * np.square(by_channel)).sum(axis=-1)
     left = np.swapaxes(np.where(fit.present, fit.residuals, 0.0), -1, -2)
     along = (weights * free.conj() * left).sum(axis=-1)
-    safe = np.where(told, length, 1.0)
-    k, nu = told.sum(axis=-1), np.asarray(fit.degrees_of_freedom)
-    rate = np.where(told, along / safe, np.nan)
-    less = np.where(told, np.square(np.abs(along)) / safe, 0.0).sum(axis=-1)
+    safe = np.where(detectable, length, 1.0)
+    k, nu = detectable.sum(axis=-1), np.asarray(fit.degrees_of_freedom)
+    rate = np.where(detectable, along / safe, np.nan)
+    less = np.where(detectable, np.square(np.abs(along)) / safe, 0.0).sum(axis=-1)
     tested = (k > 0) & (nu > k)
     whole = fit.sum_of_squares
     share = np.clip(less / np.where(whole > 0, whole, 1.0), 0.0, 1.0)
     chance = betainc(np.where(tested, nu - k, 1), np.where(tested, k, 1), 1 - share)
     variance = np.maximum(whole - less, 0.0) / np.where(tested, nu - k, np.nan) / 2
-    deviation = np.where(told, np.sqrt(variance[..., None] / safe), np.nan)
+    deviation = np.where(detectable, np.sqrt(variance[..., None] / safe), np.nan)
     return Drift(rate, deviation, np.asarray(np.where(tested, chance, np.nan)))
 
 
@@ -183,8 +185,8 @@ def phase_sense(fit: JointFit) -> tuple[Real, Real, Real]:
     enough = fdtri(2 * np.maximum(nu, 1), 2 * np.maximum(nu, 1), 1 - LEVEL)
     leads = (lag > enough * lead) & (lag > floor)
     lags = (lead > enough * lag) & (lead > floor)
-    told = np.where(nu > 0, leads.astype(float) - lags.astype(float), 0.0)
-    return told, lead, lag
+    sense = np.where(nu > 0, leads.astype(float) - lags.astype(float), 0.0)
+    return sense, lead, lag
 
 
 def robust_fit(fit: JointFit, prior: Prior | None = None, deviation: ArrayLike | None = None) -> JointFit:
@@ -215,32 +217,36 @@ def robust_fit(fit: JointFit, prior: Prior | None = None, deviation: ArrayLike |
     (array([1.7]), array([0.]))
     """
     if prior is None:
-        given = np.ones(fit.readings.shape) if fit.weights is None else fit.weights
-        return _huber(fit, lambda share: joint_fit(fit.readings, fit.masses, given * share))[0]
+        weights = np.ones(fit.readings.shape) if fit.weights is None else fit.weights
+        return _huber(fit, lambda share: joint_fit(fit.readings, fit.masses, weights * share))[0]
     sd = np.asarray(np.nan if deviation is None else deviation, dtype=float)
     if np.isnan(sd).any():
         _, of_runs = _huber(fit.alone, lambda share: runs_alone(fit.readings, fit.masses, share))
         sd = np.where(np.isnan(sd), np.sqrt(2) * of_runs, sd)
-    known = np.broadcast_to(sd, fit.readings.shape)
+    spread = np.broadcast_to(sd, fit.readings.shape)
     again = partial(fit_with_prior, fit.readings, fit.masses, prior)
-    return _huber(again(known), lambda share: again(known / np.sqrt(share)), known / np.sqrt(2))[0]
+    return _huber(again(spread), lambda share: again(spread / np.sqrt(share)), spread / np.sqrt(2))[0]
 
 
 def _huber(
-    fit: JointFit, again: Callable[[Real], JointFit], known: Real | None = None
+    fit: JointFit, again: Callable[[Real], JointFit], deviation: Real | None = None
 ) -> tuple[JointFit, Real]:
-    """Fit with Huber's shares of the weights until nothing changes; with the standard deviations of a component, or `known`."""
+    """Fit with Huber's shares of the weights until nothing changes; with the standard deviations of a component, or `deviation`."""
     root = 1.0 if fit.weights is None else np.sqrt(fit.weights)
     count = fit.present.sum(axis=(-2, -1))
     grown = np.sqrt(count / np.maximum(fit.degrees_of_freedom, 1))
-    found, sd = fit, np.zeros(())
+    current, sd = fit, np.zeros(())
     for _ in range(200):
-        size = np.where(fit.present, np.abs(found.residuals) * root, np.nan)
-        sd = (grown * np.nanmedian(size, axis=(-2, -1)) / MEDIAN)[..., None, None] if known is None else known
+        size = np.where(fit.present, np.abs(current.residuals) * root, np.nan)
+        sd = (
+            (grown * np.nanmedian(size, axis=(-2, -1)) / MEDIAN)[..., None, None]
+            if deviation is None
+            else deviation
+        )
         beyond = fit.present & (size > HUBER * sd) & (sd > 0)
         share = np.where(beyond, HUBER * sd / np.where(beyond, size, 1.0), 1.0)
-        before, found = found, again(share)
-        change = np.abs(found.unknowns - before.unknowns)
-        if (change <= 1e-12 * np.abs(found.unknowns).max(axis=-1, keepdims=True)).all():
+        before, current = current, again(share)
+        change = np.abs(current.unknowns - before.unknowns)
+        if (change <= 1e-12 * np.abs(current.unknowns).max(axis=-1, keepdims=True)).all():
             break
-    return found, sd
+    return current, sd

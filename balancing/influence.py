@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.dependence import DependentTrials, adjoint, columns_scaled, require_independent
+from dalembert.arithmetic.shapes import as_numbers, common_shape
 
 Complex = NDArray[np.complex128]
 
@@ -60,9 +61,8 @@ def influence_coefficients(initial: ArrayLike, trials: ArrayLike, trial_masses: 
     >>> abs(fix.corrections).round(6), np.degrees(np.angle(fix.corrections)).round(2)
     (array([0.002012]), array([-30.79]))
     """
-    v0 = np.asarray(initial, dtype=complex)
-    v = np.asarray(trials, dtype=complex)
-    t = np.asarray(trial_masses, dtype=complex)
+    v0, v = as_numbers("initial", initial, complex), as_numbers("trials", trials, complex)
+    t = as_numbers("trial_masses", trial_masses, complex)
     for name, array, axes in (("initial", v0, 1), ("trials", v, 2), ("trial_masses", t, 2)):
         if array.ndim < axes:
             raise ValueError(f"{name} must have at least {axes} axes, found shape {array.shape}")
@@ -70,6 +70,7 @@ def influence_coefficients(initial: ArrayLike, trials: ArrayLike, trial_masses: 
             raise ValueError(f"{name} must be finite")
     if v.shape[-1] != v0.shape[-1] or t.shape[-2] != v.shape[-2]:
         raise ValueError(f"shapes do not fit: initial {v0.shape}, trials {v.shape}, trial_masses {t.shape}")
+    common_shape(initial=v0.shape[:-1], trials=v.shape[:-2], trial_masses=t.shape[:-2])
     runs, planes = t.shape[-2:]
     change = v - v0[..., None, :]
     scaled, scale = columns_scaled(t)

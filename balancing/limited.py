@@ -1,14 +1,24 @@
-"""The smallest largest residual, exactly, and limits on masses and residuals.
+"""The smallest largest residual, exactly, and limits on masses and residuals; each answer with its proof.
 
-    min t   with |V_s + α_s w| <= t,  |w_p| <= m_p
+    min t        with |V_s + α_s w| <= t,  |w_p| <= m_p                       (minimax)
+    min Σ|r_s|²  with |V_s + α_s w| <= c_s,  |w_p| <= m_p                     (least squares)
 
-is a second-order cone problem: |·| of a complex number is a cone in three dimensions (`balancing.cone_problem` solves
-it). The dual solution y is the proof: for any y with αᴴy = 0 and Σ|y_s| = 1 no w leaves less than Re(yᴴV), since
+are second-order cone problems: |·| of a complex number is a cone in three dimensions (`balancing.cone_problem` solves
+them). The dual solution is the proof. For any y with Σ|y_s| = 1, and for any x and y, no w within the limits leaves less
+than
 
-    max_s |r_s| >= Re Σ ȳ_s r_s = Re yᴴ(V + α w) = Re yᴴV.
+    max |r_s|   >= Re yᴴV - Σ m_p |(αᴴy)_p|,
+    ½ Σ |r_s|²  >= Re xᴴV - ½|x|² + Re yᴴV - Σ c_s |y_s| - Σ m_p |(αᴴ(x + y))_p|,
+
+where αᴴy, αᴴ(x + y) are zero for planes without a limit (Boyd and Vandenberghe, Convex Optimization, section 5.2). What
+the masses leave is held against that: the gap comes with the answer, and above `REFUSED` there is none.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from decimal import ROUND_CEILING, Context
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,190 +31,283 @@ from dalembert.arithmetic.exact import EPS
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+CLOSED = 1e-12
+"""An answer whose gap is at most this, or rounding, is not solved again."""
+DOUBTFUL = 1e-9
+"""Above this gap an answer comes with a warning."""
+REFUSED = 1e-6
+"""Above this gap there is no answer."""
+
 
 class Infeasible(ValueError):
-    """No corrections meet the residual limit; `smallest` is the smallest limit that can be met."""
+    """No corrections meet the residual limits; `smallest` is the smallest limit that can be met.
 
-    def __init__(self, smallest: float) -> None:
-        self.smallest = smallest
-        super().__init__(f"the residual limit cannot be met: the smallest that can is {smallest:.6g}")
+    Of several limits `smallest` belongs to the lowest one: all of them times `factor` can be met.
+    """
+
+    def __init__(self, factor: float, limits: Real) -> None:
+        self.factor = factor
+        self.smallest = factor * float(limits.min())
+        text = f"the residual limit cannot be met: the smallest that can is {self.rounded_up}"
+        if float(limits.max()) > float(limits.min()):
+            text = f"the residual limits cannot be met: the smallest that can are {factor:.6g} times as large"
+        super().__init__(text)
+
+    @property
+    def rounded_up(self) -> str:
+        """`smallest` less its rounding in six digits, rounded up: a limit of this can be met."""
+        least = self.smallest * (1 - 64 * EPS)
+        return f"{float(Context(prec=6, rounding=ROUND_CEILING).create_decimal_from_float(least)):g}"
+
+
+class Doubtful(UserWarning):
+    """Corrections under limits are proven optimal to fewer than nine digits."""
+
+
+class NotConverged(ArithmeticError):
+    """The best corrections reached are not proven optimal; `gap` is by what share they may leave too much."""
+
+    def __init__(self, gap: float, condition: float) -> None:
+        self.gap, self.condition = gap, condition
+        text = f"no corrections are given out: the best ones that were reached may leave {gap:.2g} of the optimum too much"
+        if condition > 1e5:
+            text += (
+                f": the planes are nearly dependent (condition number {condition:.2g}), and the rounding of the masses alone "
+                "changes the residuals by as much: leave a plane out, or limit the masses further"
+            )
+        super().__init__(text)
+
+
+class Optimum(NamedTuple):
+    """Corrections (p,), a lower bound of the objective, and by what share the objective may lie above its least value."""
+
+    corrections: Complex
+    bound: float
+    gap: float
 
 
 def limited_least_squares(
     alpha: Complex, v: Complex, root: Real | None, limit: Real, ceiling: Real
-) -> Complex:
+) -> Optimum:
     """Return the corrections of least squares within limits: of masses (p,) and of residuals (s,), inf for none.
 
-    `root` are the square roots of weights (s,); None: all are one. Raises Infeasible.
+    `root` are the square roots of weights (s,); None: all are one. Raises Infeasible, NotConverged.
     """
     a, b = (alpha, v) if root is None else (alpha * root[:, None], v * root)
     try:
         free, _ = smallest_squares(a, b)
         if (np.abs(free) <= limit).all() and (np.abs(v + np.matvec(alpha, free)) <= ceiling).all():
-            return free
+            return Optimum(free, float(np.square(np.abs(b + a @ free)).sum()), 0.0)
     except DependentPlanes:
         if not np.isfinite(limit).all():
             raise
     capped = np.isfinite(ceiling)
-    start = None
+    # in units of their limits
+    e, offset = (alpha[capped].T / ceiling[capped]).T, v[capped] / ceiling[capped]
+
+    def kept(w: Complex) -> bool:
+        # as `Balance.residual` is computed: another order of sums may differ by a unit in the last place
+        return bool((np.abs(v + np.matvec(alpha, w)) <= ceiling).all() and (np.abs(w) <= limit).all())
+
+    inside = None
     if capped.any():
-        start, bound = smallest_maximum(
-            alpha[capped] / ceiling[capped, None], v[capped] / ceiling[capped], limit
-        )
-        reached = float(np.abs((v[capped] + alpha[capped] @ start) / ceiling[capped]).max())
-        if bound > 1:
-            raise Infeasible(reached * float(ceiling[capped].min()))
-        # nothing to choose from
-        if reached >= 1 - 1e-9:
-            return start
-    space = _Space(a, b, limit)
-    rows, offset = space.residuals
-    cones = [space.limits()]
-    if capped.any():
-        ratio = alpha[capped] / ceiling[capped, None]
-        here = (v[capped] + alpha[capped] @ space.start) / ceiling[capped]
-        cones.append((space.within(ratio), here, np.ones(int(capped.sum()))))
-    problem = ConeProblem(
-        np.concatenate([c[0] for c in cones]),
-        np.concatenate([c[1] for c in cones]),
-        np.concatenate([c[2] for c in cones]),
-        np.zeros(sum(len(c[2]) for c in cones)),
-        rows,
-        offset,
-    )
-    x, _ = solve(problem)
-    w = space.masses(x)
-    if start is None:
-        return w
-
-    def beyond(share: float) -> bool:
-        mixed = w + share * (start - w)
-        return bool((np.abs(v[capped] + alpha[capped] @ mixed) > ceiling[capped]).any())
-
-    # next to infeasible a constraint may be missed by a little: towards the minimax corrections all hold
-    low, high = 0.0, 1.0
-    if not beyond(0.0):
-        return w
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if beyond(middle) else (low, middle)
-    return np.asarray(w + high * (start - w), dtype=complex)
+        # the corrections farthest within all limits, in units of these
+        caps = _caps(limit)
+        nowhere, none = np.full(len(limit), np.inf), np.zeros(len(caps), dtype=complex)
+        inside = smallest_maximum(
+            np.concatenate([e, caps]), np.concatenate([offset, none]), nowhere
+        ).corrections
+        if not kept(inside):
+            inside = smallest_maximum(e, offset, limit).corrections
+            factor = float((np.abs(v + alpha @ inside)[capped] / ceiling[capped]).max())
+            # the smallest limit itself can be missed by rounding
+            if factor > 1 + min(_rounding(e, offset, inside), DOUBTFUL):
+                raise Infeasible(factor, ceiling[capped])
+    return _Limited(limit, (a, b), (e, offset), inside, kept).solved()
 
 
-def smallest_maximum(a: Complex, b: Complex, limit: Real) -> tuple[Complex, float]:
-    """Return the minimax corrections (p,) within limits (p,) and a lower bound of the largest |b + a w|."""
-    if np.isfinite(limit).any():
-        try:
-            free, bound = smallest_maximum(a, b, np.full(len(limit), np.inf))
-            if (np.abs(free) <= limit).all():
-                return free, bound
-        except DependentPlanes:
-            if not np.isfinite(limit).all():
-                raise
-    else:
+def smallest_maximum(a: Complex, b: Complex, limit: Real) -> Optimum:
+    """Return the minimax corrections within limits (p,) and a lower bound of the largest |b + a w|.
+
+    Raises NotConverged.
+    """
+    try:
         free, _ = smallest_squares(a, b)
         largest = float(np.abs(b + np.matvec(a, free)).max())
-        if not largest > 64 * EPS * max(float(np.abs(b).max()), float((np.abs(a) @ np.abs(free)).max())):
-            return free, 0.0
-    space = _Space(a, b, limit)
-    q, c = space.residuals
-    caps = space.limits()
-    readings = len(c)
-    problem = ConeProblem(
-        np.concatenate([q, caps[0]]),
-        np.concatenate([c, caps[1]]),
-        np.concatenate([np.zeros(readings), caps[2]]),
-        np.concatenate([np.ones(readings), np.zeros(len(caps[2]))]),
-    )
-    x, force = solve(problem)
-    w = space.masses(x)
-    # the proof: y along the residuals, made orthogonal to the columns where no limit can take up the rest
-    y = force[:readings]
-    total = float(np.abs(y).sum())
-    bound = 0.0
-    if total > 0:
-        y = y / total
-        if not np.isfinite(limit).any():
-            y = y - q @ (q.conj().T @ y)
-            y = y - q @ (q.conj().T @ y)
-            # less what rounding may have added
-            proof = float(np.vdot(y, c).real) / float(np.abs(y).sum())
-            bound = (proof - roundings(readings)) * space.size
-        else:
-            bound = space.bound(y, w)
-    return w, max(bound, 0.0)
+        nothing = 64 * EPS * max(float(np.abs(b).max()), float((np.abs(a) @ np.abs(free)).max()))
+        if largest <= nothing and (np.abs(free) <= limit).all():
+            return Optimum(free, 0.0, 0.0)
+    except DependentPlanes:
+        if not np.isfinite(limit).all():
+            raise
+    return _Limited(limit, None, (a, b)).solved()
 
 
-class _Space:
-    """Orthonormal coordinates z of the masses, w = scale R⁻¹ z, in which neither κ(α) nor any unit is left.
+def _rounding(a: Complex, b: Complex, w: Complex) -> float:
+    """By how much b + a w can be wrong, w being rounded itself."""
+    return roundings(len(w)) * float((np.abs(b) + np.abs(a) @ np.abs(w)).max(initial=0.0))
 
-    Where masses are limited the limits' own rows |w_p/m_p| stand below the coefficients: with QR of both
-    together even dependent planes have coordinates.
+
+def _caps(limit: Real) -> Complex:
+    """Return the rows of w_p/m_p for planes with a limit m_p."""
+    return np.diag(1 / limit).astype(complex)[np.isfinite(limit)]
+
+
+class _Limited:
+    """One of the two problems: `squares` (B, b) to make least, or none; the `cones` (E, e) are within 1, or to make least.
+
+    Where there are cones within 1: corrections `inside` all limits, and whether given ones are, as results are computed.
     """
 
-    def __init__(self, a: Complex, b: Complex, limit: Real) -> None:
-        self.a, self.b, self.limit = a, b, limit
+    def __init__(
+        self,
+        limit: Real,
+        squares: tuple[Complex, Complex] | None,
+        cones: tuple[Complex, Complex],
+        inside: Complex | None = None,
+        kept: Callable[[Complex], bool] | None = None,
+    ) -> None:
+        self.limit, self.squares, self.cones, self.inside, self.kept = limit, squares, cones, inside, kept
         self.limited = np.flatnonzero(np.isfinite(limit))
-        w0 = np.zeros(a.shape[1], dtype=complex)
-        try:
-            free, _ = smallest_squares(a, b)
-            if not len(self.limited):
-                w0 = free
-        except DependentPlanes:
-            if len(self.limited) < a.shape[1]:
-                raise
-        left = b + a @ w0
-        self.start = w0
-        self.size = float(np.abs(left).max()) or 1.0
-        stack = a / self.size
-        if len(self.limited):
-            rows = np.zeros((len(self.limited), a.shape[1]), dtype=complex)
-            rows[np.arange(len(self.limited)), self.limited] = 1 / limit[self.limited]
-            stack = np.concatenate([stack, rows])
-        stack, self.scale = columns_scaled(stack)
-        self.q, self.r = np.linalg.qr(stack)
-        readings = len(b)
-        self.residuals = self.q[:readings], left / self.size
+        self.a, self.b = cones if squares is None else squares
+        self.tight = False
+        if inside is not None:
+            # limits that leave nothing to choose from in all digits that count: any corrections within them will do
+            room = 1 - float(np.abs(cones[1] + cones[0] @ inside).max())
+            self.tight = min(room, 1 - float((np.abs(inside) / limit).max())) <= DOUBTFUL
 
-    def limits(self) -> tuple[Complex, Complex, Real]:
-        """Return the rows, offsets and right sides of |w_p/m_p| <= 1."""
-        n = len(self.limited)
-        return self.q[len(self.b) :], np.zeros(n, dtype=complex), np.ones(n)
+    def solved(self) -> Optimum:
+        """Solve, again from what was reached where the gap is not closed; refuse what is not the optimum."""
+        start = self._start()
+        best: Optimum | None = None
+        for _ in range(1 if self.tight else 3):
+            unit = float(np.abs(self.b + self.a @ start).max()) or 1.0
+            problem = self._problem(start, unit)
+            w, force = solve(problem)
+            w = self._within(w)
+            reached = self._judged(
+                w, force[: len(self.cones[1])], unit, self._reach(problem.to_w, unit, self.b + self.a @ w)
+            )
+            if best is None or reached.gap < best.gap:
+                best = reached
+            if best.gap <= CLOSED:
+                break
+            start = best.corrections
+        assert best is not None
+        if not (best.gap <= REFUSED or self.tight):
+            sigma = np.linalg.svd(columns_scaled(self.a)[0], compute_uv=False)
+            raise NotConverged(best.gap, float(sigma[0] / sigma[-1]) if sigma[-1] > 0 else np.inf)
+        return best
 
-    def within(self, rows: Complex) -> Complex:
-        """Return rows over w as rows over z."""
-        return np.asarray(np.linalg.solve(self.r.T, (rows * self.scale).T).T, dtype=complex)
+    def _start(self) -> Complex:
+        if self.inside is not None:
+            return self.inside
+        if not len(self.limited):
+            return smallest_squares(self.a, self.b)[0]
+        return np.zeros(len(self.limit), dtype=complex)
 
-    def masses(self, z: Real) -> Complex:
-        """Return w of (Re z, Im z, ...)."""
-        p = len(self.scale)
-        w = np.asarray(
-            self.start + self.scale * np.linalg.solve(self.r, z[:p] + 1j * z[p : 2 * p]), dtype=complex
+    def _problem(self, start: Complex, unit: float) -> ConeProblem:
+        """Put the problem into coordinates in which its rows are orthonormal, and neither κ(α) nor any unit is left.
+
+        Where masses are limited the limits' own rows |w_p/m_p| stand below the coefficients: with QR of both together
+        even dependent planes have coordinates.
+        """
+        caps = _caps(self.limit)
+        stack, scale = columns_scaled(np.concatenate([self.a / unit, caps]))
+        order = np.argsort(-np.abs(stack).max(axis=1), kind="stable")
+        to_w: Complex = np.asarray(
+            scale[:, None] * np.linalg.inv(np.linalg.qr(stack[order], mode="r")), dtype=complex
         )
-        # a mass at its limit is the limit, and rounding must not carry it over
+        e, offset = self.cones
+        readings, ones, none = len(offset), np.ones(len(caps)), np.zeros(len(caps), dtype=complex)
+        free = self.squares is None
+        of_cones = unit if free else 1.0
+        return ConeProblem(
+            np.concatenate([e / of_cones, caps]),
+            np.concatenate([offset / of_cones, none]),
+            np.concatenate([np.full(readings, 0.0 if free else 1.0), ones]),
+            np.concatenate([np.full(readings, 1.0 if free else 0.0), 0 * ones]),
+            None if free else self.a / unit,
+            None if free else self.b / unit,
+            start,
+            to_w,
+        )
+
+    def _within(self, w: Complex) -> Complex:
+        """Bring w, which misses its limits by rounding, within all of them.
+
+        It is shortened as a whole: what planes do against each other then changes by no more than their sum.
+        """
         if len(self.limited):
-            over = np.abs(w) > self.limit * (1 - 4 * EPS)
-            w = np.where(over, w * (self.limit / np.where(over, np.abs(w), 1.0)), w)
-            tight = over & (np.abs(w) > self.limit)
-            w = np.where(tight, w * (1 - EPS), w)
+            w = w / max(1.0, float((np.abs(w) / self.limit).max()))
+            while (np.abs(w) > self.limit).any():
+                w = w * (1 - EPS)
+        inside, kept = self.inside, self.kept
+        if inside is not None and kept is not None and not kept(w):
+            # next to infeasible: towards the minimax corrections all limits hold
+            low, high = 0.0, 1.0
+            for _ in range(60):
+                middle = (low + high) / 2
+                low, high = (low, middle) if kept(w + middle * (inside - w)) else (middle, high)
+            w = inside if high == 1 else w + high * (inside - w)
         return np.asarray(w + 0.0, dtype=complex)
 
-    def bound(self, y: Complex, w: Complex) -> float:
-        """Re yᴴb - Σ m_p |(αᴴy)_p|: with limits any y with Σ|y| = 1 proves as much (unlimited planes: αᴴy = 0).
+    def _reach(self, to_w: Complex, unit: float, left: Complex) -> Real:
+        """Bound how far the masses (p,) of the optimum are from ones that keep the limits and leave `left`: it leaves less."""
+        most = float(np.linalg.norm(left))
+        if self.squares is None:
+            most = float(np.abs(left).max()) * np.sqrt(len(left))
+        length = 2 * np.hypot(most / unit, np.sqrt(len(self.limited)))
+        return np.asarray(1.01 * length * np.linalg.norm(to_w, axis=1))
 
-        Planes that do not touch their limit pull nothing at the optimum; y is made orthogonal to them.
+    def _judged(self, w: Complex, y: Complex, unit: float, reach: Real) -> Optimum:
+        """Hold what w leaves against the dual bound of the forces y of the cones; the optimum is within `reach` of w."""
+        left = self.b + self.a @ w
+        # the rounding of a residual that is small against the readings is no gap
+        excused = min(2 * _rounding(self.a, self.b, w), DOUBTFUL * float(np.abs(self.b).max()))
+        if self.squares is None:
+            value = float(np.abs(left).max())
+        else:
+            value = float(np.square(np.abs(left)).sum())
+            excused *= 2 * float(np.abs(left).sum()) + len(left) * excused
+        bound = 0.0
+        # planes that do not touch their limit pull nothing at the optimum; y is made orthogonal to them
+        for loose in (np.abs(w) < (1 - 1e-9) * self.limit, ~np.isfinite(self.limit)):
+            bound = max(bound, self._bound(w, y, unit, reach, loose))
+            if value - bound <= CLOSED * value:
+                break
+        gap = max(value - bound - excused, 0.0) / value if value > 0 else 0.0
+        return Optimum(w, bound, gap)
+
+    def _bound(self, w: Complex, y: Complex, unit: float, reach: Real, loose: NDArray[np.bool_]) -> float:
+        """Return the lower bound that the forces of the cones prove, made orthogonal to the `loose` planes.
+
+        The products with readings are taken as those with what w leaves, which is small: no digits cancel.
         """
-        best = 0.0
-        for loose in (~np.isfinite(self.limit), np.abs(w) < (1 - 1e-9) * self.limit):
-            u, sigma, _ = np.linalg.svd(self.a[:, loose], full_matrices=False)
-            u = u[:, sigma > 1e-13 * sigma.max(initial=0.0)]
+        e, offset = self.cones
+        rows, at, forces = e, offset, y
+        if self.squares is not None:
+            # the squares in units in which they stand beside those of the limits
+            rows, at = np.concatenate([self.a / unit, e]), np.concatenate([self.b / unit, offset])
+            forces = np.concatenate([(self.b + self.a @ w) / unit, y])
+        if loose.any():
+            u, sigma, _ = np.linalg.svd(columns_scaled(rows[:, loose])[0], full_matrices=False)
+            u = u[:, sigma > 1e-13 * sigma[0]]
             for _ in range(2):
-                y = y - u @ (u.conj().T @ y)
-            total = float(np.abs(y).sum())
-            if total > 0:
-                y = y / total
-                pull = float(np.abs(self.a.conj().T @ y)[self.limited] @ self.limit[self.limited])
-                proof = float(np.vdot(y, self.b).real) - pull
-                # less what rounding may have added
-                best = max(best, proof - roundings(len(y)) * (float(np.abs(self.b).max()) + pull))
-        return best
+                forces = forces - u @ (u.conj().T @ forces)
+        total = float(np.abs(forces[len(forces) - len(offset) :]).sum())
+        constant = 0.0
+        if self.squares is not None:
+            constant = 0.5 * float(np.square(np.abs(forces[: len(self.b)])).sum()) + total
+        elif total > 0:
+            forces = forces / total
+        pull = rows.conj().T @ forces
+        size = np.abs(pull)
+        lost = size * reach
+        k = self.limited
+        lost[k] = np.minimum(lost[k], size[k] * self.limit[k] + (pull[k].conj() * w[k]).real)
+        proof = float(np.vdot(forces, at + rows @ w).real) - float(lost.sum()) - constant
+        # less what rounding may have added
+        terms = np.abs(at) + np.abs(rows) @ np.abs(w)
+        proof -= roundings(len(w)) * float(np.abs(forces) @ terms) + 8 * EPS * constant
+        return proof * (1.0 if self.squares is None else 2.0 * unit**2)

@@ -34,10 +34,10 @@ def region_factor(probability: float, degrees_of_freedom: ArrayLike, dimensions:
     from scipy.special import fdtri, gammaincinv
 
     nu = np.asarray(degrees_of_freedom, dtype=float)
-    known = np.isinf(nu)
-    real = np.where(known | ~(nu > 0), 1.0, 2 * nu)
+    exact = np.isinf(nu)
+    real = np.where(exact | ~(nu > 0), 1.0, 2 * nu)
     square = np.where(
-        known, 2 * gammaincinv(dimensions / 2, probability), dimensions * fdtri(dimensions, real, probability)
+        exact, 2 * gammaincinv(dimensions / 2, probability), dimensions * fdtri(dimensions, real, probability)
     )
     return np.asarray(np.sqrt(np.where(nu > 0, square, np.nan)))
 
@@ -167,13 +167,13 @@ class LogBalance:
         flat = [part.reshape(*part.shape[:-2], -1) for part in of_readings]
         along = self.corrections if self.along is None else self.along
         own = components(flat[0], flat[1], along, *self._each())
-        known = fit.foreknown
-        if known is None:
+        prior = fit.foreknown
+        if prior is None:
             return self._together(own, None)
         # what was known before has errors that channels share
-        shared = np.einsum("...psn,...snq->...pq", linear, known.sources)
-        other = np.einsum("...psn,...snq->...pq", antilinear, known.sources.conj())
-        return self._together(own, components(shared, other, along, *_unit_errors(known.sources)))
+        shared = np.einsum("...psn,...snq->...pq", linear, prior.sources)
+        other = np.einsum("...psn,...snq->...pq", antilinear, prior.sources.conj())
+        return self._together(own, components(shared, other, along, *_unit_errors(prior.sources)))
 
     def _together(self, own: Real, before: Real | None) -> Spread:
         """Add the covariances (..., k, 2, 2) that readings and what was known before bring."""
@@ -215,11 +215,11 @@ class LogBalance:
         one, other = rng.standard_normal((2, n, *share.shape))
         error = np.vecdot(share.conj(), along * one + 1j * across * other)
         error = error * _wider(rng, float(self.errors.degrees_of_freedom[machine]), n)
-        known = self.fit.foreknown
-        if known is not None:
-            share = np.vecmat(masses.conj(), known.sources[machine])
+        prior = self.fit.foreknown
+        if prior is not None:
+            share = np.vecmat(masses.conj(), prior.sources[machine])
             one, other = rng.standard_normal((2, n, share.shape[-1])) / np.sqrt(2)
-            wider = _wider(rng, float(known.degrees_of_freedom[machine]), n)
+            wider = _wider(rng, float(prior.degrees_of_freedom[machine]), n)
             error = error + wider * ((one + 1j * other) @ share.T)
         return np.asarray(self.residual[machine] + error)
 
@@ -253,10 +253,10 @@ class LogBalance:
         own = components(gain[..., None, :], None, value[..., None], *self._by_channel())[..., 0, :, :]
         if reading:
             own = own + self._own(value)
-        known = self.fit.foreknown
-        if known is None:
+        prior = self.fit.foreknown
+        if prior is None:
             return self._together(own, None)
-        share = np.vecmat(rows[..., None, :].conj(), known.sources)
+        share = np.vecmat(rows[..., None, :].conj(), prior.sources)
         before = components(share[..., None, :], None, value[..., None], *_unit_errors(share))
         return self._together(own, before[..., 0, :, :])
 
@@ -287,16 +287,16 @@ class LogBalance:
         variance, nu = spread.covariance[..., 0, 0], spread.degrees_of_freedom
         node, share = np.polynomial.legendre.leggauss(80)
         node, share = (node + 1) / 2, share / 2
-        known = np.isinf(nu)
-        real = np.where(known | ~(nu > 0), 1.0, nu)[..., None]
-        ratio = np.where(known[..., None], 1.0, real / gammaincinv(real, node))
+        exact = np.isinf(nu)
+        real = np.where(exact | ~(nu > 0), 1.0, nu)[..., None]
+        ratio = np.where(exact[..., None], 1.0, real / gammaincinv(real, node))
         true = np.maximum(variance[..., None] * ratio, np.finfo(float).tiny)
         within = chndtr(
             np.square(ceiling)[..., None] / true, 2.0, np.square(np.abs(self.residual))[..., None] / true
         )
         sure = (np.abs(self.residual) <= ceiling).astype(float)
-        found = np.where(variance > 0, within @ share, sure)
-        return np.asarray(np.where(nu > 0, found, np.nan))
+        probability = np.where(variance > 0, within @ share, sure)
+        return np.asarray(np.where(nu > 0, probability, np.nan))
 
 
 def _unit_errors(sources: Complex) -> tuple[Complex, Real, Real]:

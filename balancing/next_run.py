@@ -66,10 +66,10 @@ def suggest_run(balance: LogBalance, max_mass: ArrayLike) -> NextRun:
     step = 0.5
     while step > 1e-9:
         around = np.concatenate([_around(w, limit, p, step) for p in range(planes)])
-        found = spread.after(around)
-        k = int(np.argmin(found))
-        if found[k] < least * (1 - 1e-15):
-            w, least = around[k], float(found[k])
+        variances = spread.after(around)
+        k = int(np.argmin(variances))
+        if variances[k] < least * (1 - 1e-15):
+            w, least = around[k], float(variances[k])
         else:
             step /= 2
     return NextRun(w, spread.deviation(spread.before), spread.deviation(least))

@@ -54,12 +54,12 @@ def optimum_bounds(
     """Bound the errors of the corrections and of the residual; inf with the reason where they are not bounded."""
     sensors, planes = solved.influence.shape
     try:
-        found = _Optimum(solved.corrections, minimax, _rows(solved, minimax, max_mass, max_residual))
+        optimum = _Optimum(solved.corrections, minimax, _rows(solved, minimax, max_mass, max_residual))
     except _NotBounded as reason:
         nothing = Bounds(np.full(planes, np.inf), np.full(sensors, np.inf))
         return nothing, str(reason)
-    residual = found.bound(solved.influence) + solved.evaluation_error
-    return Bounds(found.bound(np.eye(planes, dtype=complex)), residual), ""
+    residual = optimum.bound(solved.influence) + solved.evaluation_error
+    return Bounds(optimum.bound(np.eye(planes, dtype=complex)), residual), ""
 
 
 class _NotBounded(Exception):
@@ -122,6 +122,10 @@ class _Optimum:
         # the unit is chosen so that t = 1
         radius = rows.h + rows.f
         active = size >= radius * (1 - ACTIVE) - 4 * wrong
+        # a reading that stands twice holds the corrections once
+        twice = np.ones(len(size), dtype=bool)
+        twice[np.unique(np.column_stack([rows.e, rows.offset, radius]), axis=0, return_index=True)[1]] = False
+        active &= ~twice
         if not active.any():
             raise _NotBounded("no limit is reached, and the optimum lies within rounding of the edge of one")
         scaled, scale = columns_scaled(np.concatenate([rows.square, rows.e]))
@@ -160,6 +164,11 @@ class _Optimum:
         system = np.zeros((n + m, n + m))
         system[:n, :n], system[n:, :n], system[:n, n:] = hessian / unit, self.gradient, self.gradient.T
         if not np.linalg.cond(system) < SINGULAR:
+            if np.linalg.matrix_rank(self.gradient, rtol=1 / SINGULAR) < m:
+                raise _NotBounded(
+                    "more limits and readings are active at the optimum than hold the corrections, and what each one holds "
+                    "is not determined"
+                )
             raise _NotBounded(
                 "the optimum is not unique, or the next thing to it: other corrections leave as much"
             )
@@ -176,7 +185,7 @@ class _Optimum:
         self.value, self.mu, self.n, self.planes = value_left, mu, n, planes
         self.rows, self.turn, self.undo, self.left = rows, turn, undo, left
         self.squares, self.w = squares, np.abs(w)
-        self._check(rows, size, radius, active)
+        self._check(rows, size, radius, active, twice)
 
     def bound(self, of: Complex) -> Real:
         """Bound the error of a linear function of the corrections, its rows (..., p)."""
@@ -204,12 +213,19 @@ class _Optimum:
     def _of_active(self, rows: Real) -> Real:
         return rows[self.active]
 
-    def _check(self, rows: _Rows, size: Real, radius: Real, active: NDArray[np.bool_]) -> None:
+    def _check(
+        self,
+        rows: _Rows,
+        size: Real,
+        radius: Real,
+        active: NDArray[np.bool_],
+        twice: NDArray[np.bool_],
+    ) -> None:
         """See to it that what is inactive stays so, and that the values hardly turn: else first order is not enough."""
         self.active = active
         moved = self.bound(rows.e)
         turned = moved[active] / self.size
-        if turned.max(initial=0.0) > 1e-3 or (size + moved >= radius)[~active].any():
+        if turned.max(initial=0.0) > 1e-3 or (size + moved >= radius)[~(active | twice)].any():
             raise _NotBounded(
                 "the problem is so badly conditioned that rounding decides which limits are active"
             )

@@ -136,7 +136,7 @@ def before_and_after(
     masses = np.broadcast_to(
         corrections, (*np.broadcast_shapes(before.shape[:-1], corrections.shape[:-1]), p)
     )
-    found = [
+    vibrations = [
         Vibration(
             str(i + 1) if many else "",
             sensors or [str(k + 1) for k in range(s)],
@@ -150,7 +150,7 @@ def before_and_after(
         )
         for i, (v, r, w) in enumerate(zip(*rows, masses.reshape(-1, p)[:MOST], strict=True))
     ]
-    dials = vibration(found, amplitude, "g", figure=figure)
+    dials = vibration(vibrations, amplitude, "g", figure=figure)
     return dials if many else dials[0]
 
 
@@ -194,8 +194,8 @@ def vibration(
                 continue
             named = f"plane {mine[0][0]}: " if len(pairs) > 1 else ""
             masses = [mass * factor for mass in rotor.split[k]]
-            found = dial(axes, f"{named}{title}", vectors, RIM_ROOM)
-            labels.append((axes, found + _rim(axes, rotor.places, masses, amount, abs(mine[0][2]))))
+            drawn = dial(axes, f"{named}{title}", vectors, RIM_ROOM)
+            labels.append((axes, drawn + rim(axes, rotor.places, masses, amount, abs(mine[0][2]))))
     handles = [
         handle(
             GIVEN,
@@ -233,6 +233,38 @@ def readings(
     return axes
 
 
+def indexed(
+    readings: Complex,
+    residuals: Complex,
+    rotor: complex,
+    mandrel: complex,
+    quantity: str,
+    unit: str,
+    *,
+    figure: FigureBase | None = None,
+) -> PolarAxes:
+    """Draw index balancing: the readings (n,) on the circle that the rotor's part makes about the tip of the mandrel's."""
+    factor, unit = prefixed(_largest(readings, rotor, mandrel), unit)
+    figure = sheet(5.6, 6.2, figure)
+    axes: PolarAxes = _dials(figure, 1, 1)[0, 0]
+    circle = (mandrel + abs(rotor) * np.exp(1j * np.linspace(0, 2 * np.pi, 241))) * factor
+    axes.plot(np.angle(circle), np.abs(circle), color="0.6", lw=0.9)
+    vectors = [Vector(mandrel * factor, GIVEN, "mandrel"), Vector(rotor * factor, FOUND, "rotor")]
+    labels = dial(axes, f"{quantity}, {unit}", vectors)
+    read = readings * factor
+    _history(axes, read, read - residuals * factor)
+    labels += [Label(str(k + 1), (float(np.angle(v)), abs(v)), "tab:blue", 8.0) for k, v in enumerate(read)]
+    axes.set_rlim(0, ROOM * (_largest(read, circle, rotor * factor) or 1.0))
+    handles = [
+        handle(FOUND, "the rotor itself, in its position turned = 0"),
+        handle(GIVEN, "the mandrel"),
+        _reading("readings, in their order; to what was fitted"),
+    ]
+    _key(figure, handles, SENSE, 1)
+    place([(axes, labels)])
+    return axes
+
+
 def places(
     panels: Sequence[Places], unit: str, *, remove: bool = False, figure: FigureBase | None = None
 ) -> NDArray[np.object_]:
@@ -247,9 +279,9 @@ def places(
         vectors = [Vector(target * factor, WHOLE), Vector(total * factor, TOGETHER)]
         scale = _largest(target * factor, total * factor)
         title = f"{title}material to {'remove' if remove else 'add'}, {unit}"
-        found = dial(axes, title, vectors, RIM_ROOM)
+        drawn = dial(axes, title, vectors, RIM_ROOM)
         labels.append(
-            (axes, found + _rim(axes, angles, [m * factor for m in masses], unit, scale, remove=remove))
+            (axes, drawn + rim(axes, angles, [m * factor for m in masses], unit, scale, remove=remove))
         )
     filled = "white" if remove else "tab:red"
     what = "drilled or taken off" if remove else "mass"
@@ -276,8 +308,8 @@ def _dials(figure: FigureBase, rows: int, columns: int) -> Dials:
     if isinstance(engine, ConstrainedLayoutEngine):
         # a dial's title stands above its degrees, which the layout learns too late
         engine.set(h_pad=0.14)
-    found: Dials = figure.subplots(rows, columns, subplot_kw={"projection": "polar"}, squeeze=False)
-    return found
+    dials: Dials = figure.subplots(rows, columns, subplot_kw={"projection": "polar"}, squeeze=False)
+    return dials
 
 
 def _key(figure: FigureBase, handles: Sequence[object], title: str, columns: int) -> None:
@@ -299,9 +331,9 @@ def _measured(axes: PolarAxes, title: str, rotor: Vibration, scale: float) -> li
     vectors = [Vector(v, GIVEN, name) for v, name in zip(before, names, strict=True)]
     vectors += [Vector(r, FOUND, name) for r, name in zip(after, left, strict=True)]
     _history(axes, rotor.read * scale, rotor.fitted * scale)
-    found = dial(axes, title, vectors)
+    drawn = dial(axes, title, vectors)
     axes.set_rlim(0, ROOM * (_largest(before, after, rotor.read * scale, rotor.fitted * scale) or 1.0))
-    return found
+    return drawn
 
 
 DOT: dict[str, Any] = {
@@ -319,13 +351,13 @@ def _history(axes: PolarAxes, read: Complex, fitted: Complex) -> None:
         axes.plot(np.angle([v, w]), np.abs([v, w]), **DOT, markevery=[0])
 
 
-def _reading() -> Line2D:
+def _reading(label: str = "reading of a run; to what was fitted to it") -> Line2D:
     from matplotlib.lines import Line2D
 
-    return Line2D([], [], **DOT, label="reading of a run; to what was fitted to it")
+    return Line2D([], [], **DOT, label=label)
 
 
-def _rim(
+def rim(
     axes: PolarAxes,
     angles: ArrayLike,
     masses: Sequence[float],
@@ -336,15 +368,15 @@ def _rim(
 ) -> list[Label]:
     """Draw the places as spokes about the vectors, and the masses on them; return the labels of the masses."""
     scale = scale or 1.0
-    rim = 1.35 * scale
+    edge = 1.35 * scale
     largest = max(masses, default=0.0) or 1.0
     labels = []
     for k, (angle, mass) in enumerate(zip(np.asarray(angles, dtype=float).tolist(), masses, strict=True)):
         used = mass > 0
-        axes.plot([angle, angle], [1.12 * scale, rim], color="0.6", lw=3.0 if used else 2.0, zorder=2)
+        axes.plot([angle, angle], [1.12 * scale, edge], color="0.6", lw=3.0 if used else 2.0, zorder=2)
         axes.plot(
             [angle],
-            [rim],
+            [edge],
             "o",
             ms=4 + 12 * np.sqrt(mass / largest) if used else 5,
             mfc="tab:red" if used and not remove else "white",
@@ -354,8 +386,8 @@ def _rim(
         )
         if used:
             labels.append(
-                Label(f"{k + 1}: {mass:.4g} {unit}", (angle, 1.05 * rim), toward=float(np.degrees(angle)))
+                Label(f"{k + 1}: {mass:.4g} {unit}", (angle, 1.05 * edge), toward=float(np.degrees(angle)))
             )
         elif len(masses) <= 36:
-            labels.append(Label(f"{k + 1}", (angle, 1.04 * rim), "0.4", 7.0, float(np.degrees(angle))))
+            labels.append(Label(f"{k + 1}", (angle, 1.04 * edge), "0.4", 7.0, float(np.degrees(angle))))
     return labels

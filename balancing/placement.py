@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import comb
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +25,7 @@ Complex = NDArray[np.complex128]
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class Placement:
-    """Masses at given positions; see `place` and `place_from_stock`."""
+    """Masses at given positions; see `place`, `place_from_stock` and `place_weights`."""
 
     target: complex
     """What the masses together should be, complex kg."""
@@ -121,6 +122,8 @@ def place(target: complex, angles: ArrayLike, max_mass: ArrayLike | None = None)
     array([23.3, 61.5])
     """
     theta, cap = _positions(angles, max_mass)
+    if np.ndim(target):
+        raise ValueError(f"one target at a time, found the shape {np.shape(target)}")
     goal = complex(target)
     if not np.isfinite(goal):
         raise ValueError("the target must be finite")
@@ -135,11 +138,11 @@ def place(target: complex, angles: ArrayLike, max_mass: ArrayLike | None = None)
         # more than any share can be
         limit = np.where(np.isfinite(limit), limit, 4 * size / slimmest)
     masses, free = _exact(goal, arms, limit) or _nearest(goal, arms, limit)
-    found = np.zeros(n)
-    found[order] = np.where(masses > 4e-15 * size, masses, 0.0)
+    result = np.zeros(n)
+    result[order] = np.where(masses > 4e-15 * size, masses, 0.0)
     miss = abs(goal - complex((masses * arms).sum()))
     bound = miss if miss > 1e-12 * size else 0.0
-    return Placement(goal, theta, found, bound, tuple(order[list(free)].tolist()))
+    return Placement(goal, theta, result, bound, tuple(order[list(free)].tolist()))
 
 
 def _positions(angles: ArrayLike, max_mass: ArrayLike | None) -> tuple[Real, Real]:
@@ -192,7 +195,7 @@ def _exact(goal: complex, arms: Complex, limit: Real) -> tuple[Real, tuple[int, 
 
 def _nearest(goal: complex, arms: Complex, limit: Real) -> tuple[Real, tuple[int, ...]]:
     """The masses whose sum comes nearest to a goal out of reach: on an edge of the reachable polygon."""
-    best, found, free = np.inf, np.zeros(len(arms)), 0
+    best, nearest, free = np.inf, np.zeros(len(arms)), 0
     for j, arm in enumerate(arms):
         for side in (1j, -1j):
             masses = np.where(np.real(arms * np.conj(side * arm)) > 1e-12, limit, 0.0)
@@ -201,8 +204,8 @@ def _nearest(goal: complex, arms: Complex, limit: Real) -> tuple[Real, tuple[int
             masses[j] = min(max(((goal - base) * arm.conjugate()).real, 0.0), limit[j])
             miss = abs(goal - base - masses[j] * arm)
             if miss < best:
-                best, found, free = miss, masses, j
-    return found, (free,)
+                best, nearest, free = miss, masses, j
+    return nearest, (free,)
 
 
 SUMS = 300_000
@@ -235,8 +238,8 @@ def place_from_stock(
     -------
     Placement
         `.masses` (n,) sums of stock weights, of the least |error| there is, and among equals of the least total
-        mass. Where there are too many choices to search (some 18 positions with three weights) only the
-        positions nearest to the target's direction are used, and `.bound` is 0.
+        mass. Where there are too many choices to search (some 18 positions with three weights, some 60 with
+        `max_pieces` 3) only the positions nearest to the target's direction are used, and `.bound` is 0.
 
     Notes
     -----
@@ -260,7 +263,7 @@ def place_from_stock(
         raise ValueError("expected at least one piece a position")
     loads, counts = _loads(weights, pieces)
     away = np.abs(np.angle(np.exp(1j * theta) * np.conj(goal))) if goal else np.zeros(len(theta))
-    room = max(2 * int(np.log(SUMS) / np.log(len(loads))), 2)
+    room = _room(len(loads), len(theta), max_pieces)
     used = np.argsort(away, kind="stable")[:room]
     halves = []
     # every other one: both halves reach in all directions
@@ -274,9 +277,9 @@ def place_from_stock(
             count = (count[:, None] + counts[fit]).ravel()
             choice = np.repeat(choice, len(fit), axis=0)
             choice[:, column] = np.tile(fit, len(choice) // len(fit))
-        if max_pieces is not None:
-            keep = count <= max_pieces
-            sums, mass, count, choice = sums[keep], mass[keep], count[keep], choice[keep]
+            if max_pieces is not None:
+                keep = count <= max_pieces
+                sums, mass, count, choice = sums[keep], mass[keep], count[keep], choice[keep]
         halves.append((sums, mass, count, choice))
     (sa, ma, ca, xa), (sb, mb, cb, xb) = halves
     best: tuple[float, float, int, int] | None = None
@@ -305,14 +308,27 @@ def place_from_stock(
         for i in np.flatnonzero(distance <= least * (1 + 1e-9) + slack)[:1000]:
             near = tree.query_ball_point([wanted[i].real, wanted[i].imag], least * (1 + 1e-9) + slack)
             for j in near:
-                found = (least, float(ma[a[i]] + mb[b[j]]), int(a[i]), int(b[j]))
-                if best is None or found[0] < best[0] - slack or found[1] < best[1] - slack:
-                    best = found
+                pair = (least, float(ma[a[i]] + mb[b[j]]), int(a[i]), int(b[j]))
+                if best is None or pair[0] < best[0] - slack or pair[1] < best[1] - slack:
+                    best = pair
     # no weight anywhere is always a choice
     assert best is not None
     masses = np.zeros(len(theta))
     masses[used[0::2]], masses[used[1::2]] = loads[xa[best[2]]], loads[xb[best[3]]]
     return Placement(goal, theta, masses, best[0] if room >= len(theta) else 0.0)
+
+
+def _room(loads: int, positions: int, max_pieces: int | None) -> int:
+    """Tell of how many positions all choices can be searched: half of them have at most SUMS."""
+    if max_pieces is None:
+        return max(2 * int(np.log(SUMS) / np.log(loads)), 2)
+    half = 1
+    while 2 * half < positions:
+        many = sum(comb(half + 1, k) * (loads - 1) ** k for k in range(min(max_pieces, half + 1) + 1))
+        if many > SUMS:
+            break
+        half += 1
+    return 2 * half
 
 
 def _loads(weights: Real, pieces: int) -> tuple[Real, NDArray[np.intp]]:

@@ -206,8 +206,8 @@ def fit_with_prior(
     )
     leverage = np.clip(np.einsum("...rn,...snr->...rs", design(t), gain).real, 0.0, 1.0)
     nu = np.broadcast_to(prior.degrees_of_freedom, y.shape[:-2])
-    known = Foreknown(plain, of_mean @ prior.factor, nu)
-    return JointFit(y, t, None, np.asarray(unknowns + 0.0), gain, leverage, foreknown=known)
+    foreknown = Foreknown(plain, of_mean @ prior.factor, nu)
+    return JointFit(y, t, None, np.asarray(unknowns + 0.0), gain, leverage, foreknown=foreknown)
 
 
 def runs_alone(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None = None) -> JointFit:

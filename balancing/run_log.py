@@ -23,6 +23,7 @@ from balancing.dependence import Unseen, adjoint, design, directions, roundings,
 from balancing.qr import factors
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
+from dalembert.arithmetic.shapes import spread_to
 
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
@@ -89,19 +90,19 @@ class JointFit:
         parts = (self.readings, self.masses, self.unknowns, self.gain, self.leverage)
         y, t, unknowns, gain, leverage = (part[i] for part in parts)
         weights, count = (None if part is None else part[i] for part in (self.weights, self.count))
-        known = self.foreknown
-        if known is not None:
-            known = Foreknown(known.plain.machine(i), known.sources[i], known.degrees_of_freedom[i])
-        return JointFit(y, t, weights, unknowns, gain, leverage, count, known)
+        prior = self.foreknown
+        if prior is not None:
+            prior = Foreknown(prior.plain.machine(i), prior.sources[i], prior.degrees_of_freedom[i])
+        return JointFit(y, t, weights, unknowns, gain, leverage, count, prior)
 
     def without(self, runout: Complex) -> JointFit:
         """Return the fit with the run-out (s,) subtracted from every reading."""
         unknowns = self.unknowns.copy()
         unknowns[..., 0] -= runout
-        known = self.foreknown
-        if known is not None:
-            known = replace(known, plain=known.plain.without(runout))
-        return replace(self, readings=self.readings - runout, unknowns=unknowns, foreknown=known)
+        prior = self.foreknown
+        if prior is not None:
+            prior = replace(prior, plain=prior.plain.without(runout))
+        return replace(self, readings=self.readings - runout, unknowns=unknowns, foreknown=prior)
 
     @property
     def alone(self) -> JointFit:
@@ -237,8 +238,8 @@ class JointFit:
         """Return errors that are known: relative ones of the amplitude, and those of the phase in rad."""
         read = np.where(self.present, self.readings, 0.0)
         unit, size = directions(read), np.abs(read)
-        known = np.full(self.readings.shape[:-2], np.inf)
-        return Errors(unit, amplitude * size, phase * size, known)
+        degrees = np.full(self.readings.shape[:-2], np.inf)
+        return Errors(unit, amplitude * size, phase * size, degrees)
 
 
 def joint_fit(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None = None) -> JointFit:
@@ -294,7 +295,7 @@ def joint_fit(readings: ArrayLike, masses: ArrayLike, weights: ArrayLike | None 
     root: Real | None = None
     w: Real | None = None
     if weights is not None:
-        w = np.broadcast_to(np.asarray(weights, dtype=float), y.shape)
+        w = spread_to("weights", weights, y.shape)
         if not ((w >= 0) & (w < np.inf)).all():
             raise ValueError("weights must be finite and not negative")
         root = np.sqrt(w) * present
@@ -361,8 +362,8 @@ def _require(r: Complex, rows: Complex) -> None:
     size = np.where(size > 0, size, size.max() or 1.0)
     combination = np.linalg.svd(mine / size)[2][-1].conj() / size
     combination = combination / combination[np.argmax(np.abs(combination) * size)]
-    told = [
+    reasons = [
         "the initial vibration" if k == 0 else f"the coefficient of plane {k - 1}"
         for k in np.flatnonzero(np.abs(combination) * size > 1e-6 * np.abs(combination * size).max())
     ]
-    raise Undetermined(f"the runs do not determine {' and '.join(told)}", combination, case)
+    raise Undetermined(f"the runs do not determine {' and '.join(reasons)}", combination, case)

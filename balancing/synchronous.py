@@ -30,17 +30,28 @@ class OncePerTurn(NamedTuple):
     speed_deviation: float
     """Standard deviation of the speeds of single turns, rad/s; NaN with one turn."""
     turns: int
+    phase_resolution: float = 0.0
+    """By how much the phases may be off, either way, as samples tell the edge of a mark of two levels, rad."""
 
 
-def marks(t: ArrayLike, mark: ArrayLike) -> Real:
-    """Return the times at which a mark rises through half its height, (n,).
+class Marks(NamedTuple):
+    """When a mark rises."""
 
-    A mark of two levels rises at its first high sample, or shortly before: where the marks come as evenly as the samples
-    can tell they are taken as even, and as early as all of them allow. Any other mark rises between two samples, by linear
-    interpolation.
+    at: Real
+    """(n,), s."""
+    resolution: float
+    """By how much all of them together may be earlier or later, s."""
+
+
+def marks(t: ArrayLike, mark: ArrayLike) -> Marks:
+    """Find the times at which a mark rises through half its height.
+
+    A mark of two levels rises somewhere between its last low sample and its first high one: in the middle, half an interval
+    either way. Where the marks come as evenly as the samples can tell they are taken as even, in the middle of what all of
+    them allow. Any other mark rises between two samples by linear interpolation.
 
     >>> marks([0, 1, 2, 3], [0, 0, 1, 0]), marks([0, 1, 2, 3], [0, 0, 3, 4])
-    (array([2.]), array([1.66666667]))
+    (Marks(at=array([1.5]), resolution=0.5), Marks(at=array([1.66666667]), resolution=0.0))
     """
     time, level = np.asarray(t, dtype=float), np.asarray(mark, dtype=float)
     low, high = float(level.min()), float(level.max())
@@ -54,21 +65,33 @@ def marks(t: ArrayLike, mark: ArrayLike) -> Real:
         if level[0] >= half and len(pulses) and falls[0] >= pulses.min():
             # the recording begins with a whole pulse
             rises = np.concatenate([[0], rises])
-        return _even(time[rises], float(np.diff(time).max()))
+        step = np.diff(time, prepend=2 * time[0] - time[1])
+        return _even(time[rises] - step[rises], time[rises])
     share = (half - level[rises]) / (level[rises + 1] - level[rises])
-    return np.asarray(time[rises] + share * (time[rises + 1] - time[rises]))
+    return Marks(np.asarray(time[rises] + share * (time[rises + 1] - time[rises])), 0.0)
 
 
-def _even(at: Real, step: float) -> Real:
-    """Return marks that are late by less than a step as even ones, where they can be."""
-    if len(at) < 3:
-        return at
-    k = np.arange(len(at))
-    slope = float(np.polynomial.Polynomial.fit(k, at, 1).convert().coef[1])
-    late = at - slope * k
-    if np.ptp(late) >= step:
-        return at
-    return np.asarray(late.min() + slope * k)
+def _even(low: Real, high: Real) -> Marks:
+    """Return marks that each lie in an interval as even ones, where they can be."""
+    middle = (low + high) / 2
+    each = Marks(middle, float(np.max(high - low, initial=0.0)) / 2)
+    if len(middle) < 3:
+        return each
+    k = np.arange(len(middle)) - (len(middle) - 1) / 2
+
+    def room(slope: float) -> tuple[float, float]:
+        return float((low - slope * k).max()), float((high - slope * k).min())
+
+    # the distance from mark to mark that leaves most room: concave, so that thirds of its range close in on it
+    slope, apart = float(k @ middle / (k @ k)), each.resolution / len(k)
+    least, most = slope - 4 * apart, slope + 4 * apart
+    for _ in range(80):
+        one, other = least + (most - least) / 3, most - (most - least) / 3
+        (a, b), (c, d) = room(one), room(other)
+        least, most = (one, most) if b - a < d - c else (least, other)
+    slope = (least + most) / 2
+    first, last = room(slope)
+    return Marks(np.asarray((first + last) / 2 + slope * k), (last - first) / 2) if first < last else each
 
 
 def once_per_turn(
@@ -105,10 +128,12 @@ def once_per_turn(
 
     Examples
     --------
-    >>> t = np.arange(0, 1, 0.001)
+    >>> t = np.arange(0, 1, 0.001) + 0.0005
     >>> found = once_per_turn(t, 3 * np.cos(2 * np.pi * 20 * t + 0.5)[:, None], np.arange(1000) % 50 == 0)
     >>> np.abs(found.vector).round(9), np.angle(found.vector).round(9), round(found.speed / np.pi, 9), found.turns
     (array([3.]), array([0.5]), 40.0, 19)
+    >>> round(float(np.degrees(found.phase_resolution)), 9)  # half a sample of 7.2 degrees
+    3.6
     """
     time, x = np.asarray(t, dtype=float), np.asarray(signal, dtype=float)
     level = np.asarray(mark, dtype=float)
@@ -120,7 +145,7 @@ def once_per_turn(
         raise ValueError("the times must rise from row to row")
     if pulses < 1:
         raise ValueError(f"{pulses} pulses in a turn: expected one at least")
-    knots = marks(time, level)
+    knots, resolution = marks(time, level)
     if len(knots) < pulses + 1:
         expected = (
             "two at least, a turn apart" if pulses == 1 else f"{pulses + 1} at least, a turn of {pulses}"
@@ -141,14 +166,15 @@ def once_per_turn(
         scatter = np.square(np.abs(vectors - mean)).sum(axis=0) / (turns - 1)
         deviation = np.sqrt(scatter / 2 / turns)
         of_speed = float(np.std(2 * np.pi / each, ddof=1))
-    return OncePerTurn(mean, deviation, float(2 * np.pi * turns / (at[-1] - at[0])), of_speed, turns)
+    speed = float(2 * np.pi * turns / (at[-1] - at[0]))
+    return OncePerTurn(mean, deviation, speed, of_speed, turns, speed * resolution)
 
 
 def _counted(time: Real, tacho: Real, at: Real) -> tuple[Real, Real, int]:
     """Return the times of a tacho's pulses, the marks between the first and the last of them, and how many a turn has."""
     if tacho.shape != time.shape or not np.isfinite(tacho).all():
         raise ValueError("the tacho must be finite, a value for each time")
-    knots = marks(time, tacho)
+    knots = marks(time, tacho).at
     if len(knots) < 2:
         raise ValueError(f"the tacho rises {len(knots)} times: expected several pulses in each turn")
     at = at[(at >= knots[0]) & (at <= knots[-1])]
@@ -160,9 +186,9 @@ def _counted(time: Real, tacho: Real, at: Real) -> tuple[Real, Real, int]:
     odd = np.flatnonzero(np.abs(np.diff(passed) - pulses) > 0.5)
     if pulses < 1 or len(odd):
         k = int(odd[0]) if len(odd) else 0
-        found = float(passed[k + 1] - passed[k])
+        period = float(passed[k + 1] - passed[k])
         raise ValueError(
-            f"the turn at {at[k]:g} s has {found:.3g} pulses of the tacho: expected {max(pulses, 1)}, as others"
+            f"the turn at {at[k]:g} s has {period:.3g} pulses of the tacho: expected {max(pulses, 1)}, as others"
         )
     return knots, at, pulses
 
@@ -178,5 +204,5 @@ def _turn(t: Real, x: Real, start: float, end: float, knots: Real, angles: Real)
     grown = angle[:, None] * orders
     rows = np.concatenate([np.ones((samples, 1)), np.cos(grown), np.sin(grown)], axis=1)
     q, r = np.linalg.qr(rows)
-    found = np.linalg.solve(r, q.T @ x[first:last])
-    return np.asarray(found[1] - 1j * found[1 + len(orders)])
+    coefficients = np.linalg.solve(r, q.T @ x[first:last])
+    return np.asarray(coefficients[1] - 1j * coefficients[1 + len(orders)])

@@ -1,4 +1,4 @@
-"""Balance tolerances: the quality grades of ISO 21940-11 and the permissible residual unbalance."""
+"""Balance tolerances: the quality grades of ISO 21940-11, the limits of API and MIL-STD-167-1, their planes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def grade_value(name: str) -> float:
     if not (0 < value < float("inf")):
         grades = ", ".join(f"G{grade:g}" for grade in GRADES)
         raise ValueError(
-            f"'{name}' is no balance quality grade: expected one of {grades}, or G with a value in mm/s"
+            f"'{name}' is no balance quality grade: expected one of {grades}, or G with a value in mm/s; or API, or MIL"
         )
     return value / 1000
 
@@ -62,3 +62,52 @@ def allocate(permissible: ArrayLike, center: float, plane_a: float, plane_b: flo
     largest = 0.7 if share_a >= 0 and share_b >= 0 else 1.3
     shares = np.clip(np.abs([share_a, share_b]), 0.3, largest)
     return np.asarray(np.asarray(permissible, dtype=float)[..., None] * shares)
+
+
+# oz·in of each lb, times rpm, in kg·m of each kg, times rad/s
+_OZ_IN_RPM_PER_LB = 0.0254 / 16 * np.pi / 30
+
+
+def api_unbalance(journal_mass: ArrayLike, speed: ArrayLike) -> NDArray[np.float64]:
+    """Return the permissible residual unbalance of a plane after API (610, 617 …), kg·m: U = 4W/N.
+
+    U is in oz·in, W the static load of the plane's journal in lb, N the highest speed in rpm; with W in kg it is
+    6350 W/N g·mm. Parameters are W as a mass in kg and the speed in rad/s; they broadcast.
+
+    >>> round(float(api_unbalance(500.0, 3000 * np.pi / 30)) * 1e6, 6)  # g·mm
+    1058.333333
+    """
+    mass, omega = np.asarray(journal_mass, dtype=float), np.asarray(speed, dtype=float)
+    if not ((mass >= 0).all() and (omega > 0).all()):
+        raise ValueError("the load must not be negative, and the speed positive")
+    return np.asarray(4 * _OZ_IN_RPM_PER_LB * mass / omega)
+
+
+def mil_unbalance(rotor_mass: ArrayLike, speed: ArrayLike) -> NDArray[np.float64]:
+    """Return the permissible residual unbalance of each correction plane after MIL-STD-167-1, kg·m.
+
+    In oz·in, with W the weight of the whole rotor in lb and N the highest speed in rpm: 0.177 W below 150 rpm, 4000 W/N² from
+    150 to 1000 rpm, 4W/N above. Parameters are the rotor's mass in kg and the speed in rad/s; they broadcast.
+
+    >>> rpm = np.array([100.0, 500.0, 1800.0])
+    >>> (mil_unbalance(0.45359237 * 40, rpm * np.pi / 30) / (0.0254 * 0.45359237 / 16)).round(6)  # oz·in for 40 lb
+    array([7.08    , 0.64    , 0.088889])
+    """
+    mass, omega = np.asarray(rotor_mass, dtype=float), np.asarray(speed, dtype=float)
+    if not ((mass > 0).all() and (omega > 0).all()):
+        raise ValueError("mass and speed must be positive")
+    rpm = omega * (30 / np.pi)
+    of_weight = np.where(rpm < 150, 0.177, np.where(rpm <= 1000, 4000 / rpm**2, 4 / rpm))
+    return np.asarray(of_weight * mass * (0.0254 / 16))
+
+
+def journal_loads(mass: float, center: float, bearing_1: float, bearing_2: float) -> NDArray[np.float64]:
+    """Return the static loads of two bearings as masses, (2,), kg; that of a bearing which is lifted counts by its size.
+
+    >>> journal_loads(100.0, center=0.3, bearing_1=0.0, bearing_2=1.0)
+    array([70., 30.])
+    """
+    if bearing_1 == bearing_2:
+        raise ValueError("the two bearings lie at the same place")
+    span = bearing_2 - bearing_1
+    return np.abs(np.array([bearing_2 - center, center - bearing_1]) * (mass / span))

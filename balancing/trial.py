@@ -1,4 +1,4 @@
-"""Around the measurement: the trial mass to begin with, what it must do, index balancing, the error budget."""
+"""Around the measurement: the trial mass to begin with, what it must do, the error budget."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
+from dalembert.arithmetic.shapes import as_numbers, common_shape
 
 Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 STANDARD_GRAVITY = 9.80665
 
@@ -56,56 +56,13 @@ def trial_effect(before: ArrayLike, after: ArrayLike) -> TrialEffect:
     >>> effect.amplitude.round(2), np.degrees(effect.phase).round()
     (np.float64(0.47), np.float64(74.0))
     """
-    v0, v1 = np.asarray(before, dtype=complex), np.asarray(after, dtype=complex)
+    v0, v1 = as_numbers("before", before, complex), as_numbers("after", after, complex)
+    common_shape(before=v0.shape, after=v1.shape)
     size = np.abs(v0)
     change = np.abs(np.abs(v1) - size)
     amplitude = np.where(size > 0, change / np.where(size > 0, size, 1.0), np.where(change > 0, np.inf, 0.0))
     phase = np.where((size > 0) & (np.abs(v1) > 0), np.abs(np.angle(v1 * v0.conj())), 0.0)
     return TrialEffect(amplitude[()], phase[()])
-
-
-@record
-class Indexed(NamedTuple):
-    """The unbalance of the rotor itself, and that of what it is mounted on, in the plane's own unit."""
-
-    rotor: Complex
-    mounting: Complex
-
-
-def index_balancing(readings: ArrayLike, turned: ArrayLike = (0.0, np.pi)) -> Indexed:
-    """Separate a rotor's unbalance from its arbor's by readings with the rotor turned on the arbor.
-
-    Parameters
-    ----------
-    readings
-        The unbalances as read in the arbor's axes, complex (..., k).
-    turned
-        By how much the rotor was turned on the arbor for each, (k,), rad; default 0 and 180°.
-
-    Notes
-    -----
-    Reading k is mounting + rotor·e^{iφ_k}; for 0 and 180° mounting is half the sum and rotor half the difference
-    (ISO 21940-14:2012, index balancing). More positions are fitted by least squares.
-
-    >>> both = index_balancing([5 + 1j, 1 - 1j])
-    >>> complex(both.rotor), complex(both.mounting)
-    ((2+1j), (3+0j))
-    """
-    read = np.asarray(readings, dtype=complex)
-    phi = np.asarray(turned, dtype=float)
-    if phi.ndim != 1 or read.shape[-1:] != phi.shape or len(phi) < 2:
-        raise ValueError("expected as many readings as angles, and at least two")
-    if not (np.isfinite(read).all() and np.isfinite(phi).all()):
-        raise ValueError("readings and angles must be finite")
-    turn = np.exp(1j * phi)
-    if np.abs(turn - turn[0]).max() < 1e-6:
-        raise ValueError("the rotor was not turned: expected different angles")
-    if len(phi) == 2 and abs(abs(phi[1] - phi[0]) - np.pi) < 1e-15:
-        return Indexed((read[..., 0] - read[..., 1]) / 2 * turn[0].conj(), (read[..., 0] + read[..., 1]) / 2)
-    a = np.stack([turn, np.ones_like(turn)], axis=-1)
-    q, r = np.linalg.qr(a)
-    solution = np.linalg.solve(r, np.matvec(q.conj().T, read)[..., None])[..., 0]
-    return Indexed(solution[..., 0], solution[..., 1])
 
 
 @record

@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from benchmarks.speed import DOMAINS
-from cli.errors import DataError, nearest, one_line
 from cli.read import options
-from cli.show.columns import Column, Result, Table
 from cli.show.output import command
+from cli.show.result import Result
+from dalembert.errors import DataError, one_line
+from dalembert.hints import nearest
+from dalembert.results.columns import Column, Table
 
 if TYPE_CHECKING:
     from benchmarks.speed.measure import Measurement
@@ -28,7 +30,7 @@ app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Measure the program; docs/benchmarks.md holds its tables.",
+    help="Measure the program; docs/quality/benchmarks.md holds its tables.",
 )
 
 Docs = Annotated[Path | None, typer.Option(dir_okay=False)]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.speed.measure import Measurement, calibration, exponent
-from cli.errors import DataError
+from dalembert.errors import DataError
 
 if TYPE_CHECKING:
     from benchmarks.stress.campaigns import Tally

@@ -1,7 +1,7 @@
 """Count the files that a command passes, and how often it goes from one into another: `python benchmarks/trace_passes.py`.
 
 The command runs in this process, from its start with nothing imported; without arguments it is a pose sweep,
-`dalembert mechanism klann.toml --sweep 0deg:360deg:1deg`. Each call and each return of a Python function of the
+`dalembert mechanism klann.toml --over 0deg:360deg:1deg`. Each call and each return of a Python function of the
 program, the bodies of its modules too, is a step in the file of that function. *Files* are the files in which there is
 a step, *called* those of them of which a function was called (not only the module's body run), *changes* the steps in
 another file than the step before. Each package is counted by itself, as if there were no other, and all of them
@@ -75,7 +75,7 @@ def main() -> None:
     given = parser.parse_args()
     known = folders()
     klann = Path(known["cli"], "examples", "klann", "klann.toml")
-    found = steps(given.arguments or ["mechanism", str(klann), "--sweep", "0deg:360deg:1deg"])
+    found = steps(given.arguments or ["mechanism", str(klann), "--over", "0deg:360deg:1deg"])
     print("package,files,called,changes")
     for name, folder in [*known.items(), ("all", "")]:
         mine = counted([step for step in found if step[0].startswith(folder)])

@@ -2,32 +2,84 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable
 from importlib import import_module
 
 import typer
+from typer.core import TyperGroup
 
-from cli.errors import DataError, one_line
+from dalembert.arithmetic.choice import EngineError, wanted
+from dalembert.errors import DataError, one_line
 
-# name -> (module with a function `run`, the line shown by `dalembert --help`)
-COMMANDS = {
-    "balance": ("cli.balance.command", "Balance rotors from a table of known eccentric masses."),
-    "field": ("cli.field.command", "Balance rotors from measured vibration and trial masses."),
-    "place": ("cli.place.command", "Put a correction where masses can go: holes, blades, weights in stock."),
-    "mechanism": ("cli.mechanism.command", "Solve a planar mechanism: motion, limits, torque, joint forces."),
-    "work": ("cli.work.command", "Find the load that balances a table of link states, by virtual work."),
-    "body": ("cli.body.command", "Put a body together: inertia, angular momentum, shaft reactions."),
-    "spin": ("cli.spin.command", "Turn a body through time: free, under gravity, under a torque."),
-    "import": ("cli.imports.command", "Take over a mechanism drawn in another program."),
-    "export": (
-        "cli.exports.command",
-        "Write a mechanism for other programs: DXF, SVG, CSV, URDF, SDF, MJCF.",
-    ),
-    "completion": ("cli.completion.command", "Print the completion script for bash, zsh or fish."),
-    "examples": ("cli.examples.command", "List the worked examples, or write one into the current folder."),
+# heading -> name -> (module with a function `run`, the line shown by `dalembert --help`)
+GROUPS = {
+    "Rotors": {
+        "balance": ("cli.balance.command", "Balance rotors from a table of known eccentric masses."),
+        "field": ("cli.field.command", "Balance rotors from measured vibration and trial masses."),
+        "trial": ("cli.trial.command", "Suggest a trial mass for the first run in the field."),
+        "signal": ("cli.signal.command", "Compute amplitude and phase of a recorded vibration."),
+        "place": (
+            "cli.place.command",
+            "Put a correction where masses can go: holes, blades, weights in stock.",
+        ),
+        "index": ("cli.index.command", "Separate a rotor's unbalance from its mandrel's: index balancing."),
+        "engine": ("cli.engine.command", "Compute the shaking forces and couples of an engine."),
+        "flywheel": ("cli.flywheel.command", "Size the flywheel of a shaft from a table of its torque."),
+    },
+    "Mechanisms": {
+        "mechanism": ("cli.mechanism.command", "Solve the poses: positions, velocities, accelerations."),
+        "forces": (
+            "cli.forces.command",
+            "Compute the effort at the inputs, joint forces, the shaking force.",
+        ),
+        "inspect": (
+            "cli.inspect.command",
+            "Inspect mobility, Grashof classes, limits, dead and change points.",
+        ),
+        "equilibrium": (
+            "cli.equilibrium.command",
+            "Find the positions of rest, and whether they are stable.",
+        ),
+        "simulate": ("cli.simulate.command", "Simulate the motion in time under the loads."),
+        "tolerance": ("cli.tolerance.command", "Compute what the tolerances of dimensions do."),
+        "fit": ("cli.fit.command", "Fit dimensions to a target."),
+        "work": ("cli.work.command", "Find the load that balances a table of link states, by virtual work."),
+    },
+    "Bodies": {
+        "body": ("cli.body.command", "Put a body together: inertia, angular momentum, shaft reactions."),
+        "spin": ("cli.spin.command", "Turn a body through time: free, under gravity, under a torque."),
+    },
+    "Files": {
+        "import": ("cli.imports.command", "Import a mechanism drawn in another program."),
+        "export": (
+            "cli.exports.command",
+            "Write a mechanism for other programs: DXF, SVG, CSV, URDF, SDF, MJCF.",
+        ),
+        "examples": (
+            "cli.examples.command",
+            "List the worked examples, or write one into the current folder.",
+        ),
+        "completion": ("cli.completion.command", "Print the completion script for bash, zsh or fish."),
+    },
 }
+COMMANDS = {name: line for group in GROUPS.values() for name, line in group.items()}
+
+
+class Front(TyperGroup):
+    """The front door: its help has the commands in groups."""
+
+    def format_commands(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
+        """Write a heading for each group."""
+        for heading, names in GROUPS.items():
+            with formatter.section(heading):
+                formatter.write_dl([(name, line) for name, (_, line) in names.items()])
+
+
+# a file of standard output that takes no more
+FULL = (errno.ENOSPC, errno.EFBIG, errno.EIO, errno.EDQUOT)
 
 
 def _version(show: bool) -> None:
@@ -59,6 +111,7 @@ def _call_of(example: str) -> str:
 def build(called: str | None) -> typer.Typer:
     """Build the command line with only the called command's file loaded."""
     app = typer.Typer(
+        cls=Front,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
         add_completion=False,
@@ -99,22 +152,30 @@ def main(front: Callable[[str | None], Callable[..., object]] = build) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     called = next((word for word in _words() if not word.startswith("-")), None)
     if called is not None:
-        from cli.read.files import forget
+        from dalembert.tables.files import forget
 
         forget()
     try:
-        front(called)(prog_name="dalembert")
-    except DataError as error:
+        wanted()  # an unknown engine is refused before any work
+        try:
+            front(called)(prog_name="dalembert")
+        finally:
+            # what cannot be written is an error here, not at shutdown
+            sys.stdout.flush()
+    except (DataError, EngineError) as error:
         sys.exit(_fail(str(error)))
     except BrokenPipeError:
-        # The reader of the pipe has gone (`| head`): nothing more to say, and no complaint at shutdown.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # the reader of the pipe has gone (`| head`): nothing more to say
+        _silence()
         sys.exit(1)
     except KeyboardInterrupt:
         sys.exit(130)
     except MemoryError:
         sys.exit(_fail("not enough memory for this input"))
     except Exception as error:
+        if isinstance(error, OSError) and error.errno in FULL and error.filename is None:
+            _silence()
+            sys.exit(_fail(f"standard output: cannot write: {error.strerror}"))
         if os.environ.get("DALEMBERT_TRACEBACK"):
             raise
         sys.exit(
@@ -123,6 +184,11 @@ def main(front: Callable[[str | None], Callable[..., object]] = build) -> None:
                 "report it; DALEMBERT_TRACEBACK=1 shows where"
             )
         )
+
+
+def _silence() -> None:
+    """Send standard output nowhere, so that shutdown does not complain of what it cannot write."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _fail(message: str) -> int:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.exact import UNIT
 from dalembert.arithmetic.records import components, numbers, record, table
+from dalembert.arithmetic.shapes import common_shape
 from rigidbody3d import solids
 from rigidbody3d.inertia import Principal, point_tensor, principal, products, turned_tensor
 from rigidbody3d.rounding import BodyError, MassProperties, of_body
@@ -61,7 +62,7 @@ class Body:
             )
         if not (np.isfinite(mass).all() and np.isfinite(center).all() and np.isfinite(inertia).all()):
             raise ValueError("mass, center and inertia must be finite")
-        lead = np.broadcast_shapes(mass.shape, center.shape[:-1], inertia.shape[:-2])
+        lead = common_shape(mass=mass.shape, center=center.shape[:-1], inertia=inertia.shape[:-2])
         object.__setattr__(self, "mass", np.broadcast_to(mass, lead))
         object.__setattr__(self, "center", np.broadcast_to(center, lead + (3,)))
         object.__setattr__(self, "inertia", np.broadcast_to(inertia, lead + (3, 3)))
@@ -78,13 +79,13 @@ class Body:
     ) -> Body:
         """Return a body of a shape (see `shapes.SHAPES`) along its own axes."""
         m, c = np.asarray(mass, dtype=float), np.asarray(center, dtype=float)
-        given: dict[str, Given] = {"mass": (m, 0, 0.0), "center": (c, 1, 0.0)}
-        given |= {name: (x, 0, 0.0) for name, x in dimensions.items()}
+        quantities: dict[str, Given] = {"mass": (m, 0, 0.0), "center": (c, 1, 0.0)}
+        quantities |= {name: (x, 0, 0.0) for name, x in dimensions.items()}
         return cls(
             m,
             c,
             inertia_of(shape, mass, **dimensions),
-            partial(_error, _shaped, dict, given, shape),
+            partial(_error, _shaped, dict, quantities, shape),
             partial(solids.of_shape, shape, m, c, dimensions),
         )
 
@@ -277,12 +278,12 @@ def _whole(mass: Array, moment: Array, inertia: Array, shifted: Array, middle: A
 
 
 def _error(
-    formula: Formula, body: Callable[[], Mapping[str, Given]], given: Mapping[str, Given], *options: str
+    formula: Formula, body: Callable[[], Mapping[str, Given]], quantities: Mapping[str, Given], *options: str
 ) -> BodyError:
     """Bound what a formula makes of a body, or of nothing but what is given."""
     from dalembert.arithmetic.bounds import bounds
 
-    return BodyError(*bounds(formula, {**body(), **given}, *options))
+    return BodyError(*bounds(formula, {**body(), **quantities}, *options))
 
 
 def _composed_error(parts: Callable[[], dict[str, Given]], axis: int, middle: Array) -> BodyError:

@@ -89,6 +89,10 @@ class FreeRotation:
     # --- everything else ---
 
     def _prepare_general(self, bodies: NDArray[np.int64], H: Array) -> None:
+        self._general = bodies
+        # elliptic functions are imported for those that need them alone
+        if not len(bodies):
+            return
         I1, I2, I3 = (self.moments[bodies][:, i : i + 1] for i in range(3))
         H1, H2, H3 = (H[bodies][:, i : i + 1] for i in range(3))
         # measured by a power of two near |ω|: exact, and no square underflows
@@ -122,7 +126,6 @@ class FreeRotation:
         size = np.hypot(cn, sn)
         self._u0 = argument(sn / size, cn / size, self._p)
         self._I, self._scale = np.concatenate([I1, I2, I3], axis=1), scale
-        self._general = bodies
         self.m1[bodies] = self._p.m1[:, 0]
         # the node's angle: |H| a3 t + weight·third(u), third with parameter n; where n is large it is |H| a1 t less
         # an arctangent and a smooth rest, since n sn²/(1 + n sn²) is then all but constant (see _node)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
+from dalembert.arithmetic.shapes import as_numbers, common_shape
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.free_rotation import FreeRotation
-from rigidbody3d.inertia import principal
+from rigidbody3d.inertia import check, principal
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require, tensors_off
 from rigidbody3d.states import AtTimes, Seen, in_blocks
 
@@ -28,8 +30,7 @@ class FreeBody:
     ----------
     inertia
         Principal moments (..., 3) or the tensor at the centre of mass (..., 3, 3), kg·m². A single zero moment
-        is a thin rod. Moments that no body has, but for which Euler's equations make sense, are accepted
-        (`inertia.check` judges them).
+        is a thin rod; a flat body (I1 + I2 = I3) may miss the triangle inequality by rounding (`inertia.check`).
     omega
         Angular velocity at time zero in body axes, (..., 3), rad/s.
     attitude
@@ -38,7 +39,8 @@ class FreeBody:
     Raises
     ------
     ValueError
-        Not finite, a tensor that is not symmetric, a moment that is negative, shapes that do not fit.
+        Not finite, a tensor that is not symmetric, moments that no body has (negative, or one larger than the other two
+        together), shapes that do not fit.
 
     Notes
     -----
@@ -61,10 +63,12 @@ class FreeBody:
     _lead: tuple[int, ...] = field(init=False, repr=False, compare=False)
     _rotation: FreeRotation = field(init=False, repr=False, compare=False)
 
+    # moments put off by their errors, to see what that does, may be those of no body
+    _of_a_body: ClassVar[bool] = True
+
     def __post_init__(self) -> None:
         moments, axes = principal(self.inertia)
-        omega = np.asarray(self.omega, dtype=float)
-        q = np.asarray(self.attitude, dtype=float)
+        omega, q = as_numbers("omega", self.omega), as_numbers("attitude", self.attitude)
         if omega.shape[-1:] != (3,):
             raise ValueError(f"omega has three components, found the shape {omega.shape}")
         if not np.isfinite(omega).all():
@@ -75,7 +79,9 @@ class FreeBody:
             )
         if ((moments[..., 0] == 0) & (moments[..., 1] != moments[..., 2])).any():
             raise ValueError("a body with one zero moment is a thin rod: the other two moments must be equal")
-        lead = np.broadcast_shapes(moments.shape[:-1], omega.shape[:-1], q.shape[:-1])
+        if self._of_a_body and (reason := check(moments).reason):
+            raise ValueError(f"{reason}: no body has these")
+        lead = common_shape(inertia=moments.shape[:-1], omega=omega.shape[:-1], attitude=q.shape[:-1])
         unit = np.broadcast_to(quaternion.normalize(q), lead + (4,)).reshape(-1, 4)
         moments = np.broadcast_to(moments, lead + (3,)).reshape(-1, 3)
         axes = np.broadcast_to(axes, lead + (3, 3)).reshape(-1, 3, 3)
@@ -118,7 +124,7 @@ class FreeBody:
         size = quaternion.length(here) if of == "momentum" else np.abs(here)
         total = FEW * np.where(np.isfinite(size), size, 0.0)
         for other in tensors_off(self.inertia, tensor):
-            there = getattr(FreeBody(other, self.omega, self.attitude), of)
+            there = getattr(_PutOff(other, self.omega, self.attitude), of)
             with np.errstate(invalid="ignore"):
                 change = np.where(there == here, 0.0, np.abs(there - here))
             total = total + (change.max(axis=-1, keepdims=True) if of == "momentum" else change)
@@ -128,6 +134,12 @@ class FreeBody:
     def separatrix(self) -> Array:
         """The complementary parameter m₁ of the motion, (...): 0 on the separatrix, 1 far from it or for a symmetric body."""
         return self._rotation.m1.reshape(self._lead)
+
+
+class _PutOff(FreeBody):
+    """A free body whose tensor is put off by its error."""
+
+    _of_a_body = False
 
 
 @record
@@ -196,7 +208,7 @@ class FreeState(AtTimes):
         total: Array | float = 0.0
         # each entry of the tensor in turn is put off by its error, and by that of working out principal axes
         for other in tensors_off(body.inertia, tensor):
-            total = total + apart(FreeBody(other, body.omega, body.attitude).at(self.time), self, of)
+            total = total + apart(_PutOff(other, body.omega, body.attitude).at(self.time), self, of)
         return np.asarray(self._rounding(of) + total)
 
     def _rounding(self, of: str) -> Array:
@@ -217,5 +229,5 @@ class FreeState(AtTimes):
             return (bound @ np.abs(axes)).reshape(*shape, 3)
         # both stay what they were however late the state is
         size = FEW * 3 * (np.abs(body.energy) if of == "energy" else quaternion.length(body.momentum)[..., 0])
-        found = np.zeros(shape) + (size[..., None] if self.time.ndim else size)
-        return found[..., None] + np.zeros(3) if of == "momentum" else found
+        rounding = np.zeros(shape) + (size[..., None] if self.time.ndim else size)
+        return rounding[..., None] + np.zeros(3) if of == "momentum" else rounding

@@ -87,11 +87,11 @@ def steady_precession(
     side = np.where(I3 * w < 0, -1.0, 1.0)
     with np.errstate(invalid="ignore", divide="ignore"):
         slow, fast = _rates(I1, I3, a, c, w, side)
-    found = Steady(np.where((a == 0) & (w == 0), 0.0, slow), np.asarray(fast))
+    rates = Steady(np.where((a == 0) & (w == 0), 0.0, slow), np.asarray(fast))
     exact = {"I1": I1, "I3": I3, "mgl": a, "spin": w, "side": side}
     # a cosine errs by one unit in its last place
-    found.given = {"c": (c, 0, 2 * UNIT * np.abs(c)), **{name: (x, 0, 0.0) for name, x in exact.items()}}
-    return found
+    rates.given = {"c": (c, 0, 2 * UNIT * np.abs(c)), **{name: (x, 0, 0.0) for name, x in exact.items()}}
+    return rates
 
 
 def _rates(I1: Array, I3: Array, mgl: Array, c: Array, spin: Array, side: Array) -> tuple[Array, Array]:

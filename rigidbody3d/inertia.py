@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import record
+from dalembert.arithmetic.shapes import as_numbers
 from rigidbody3d import rounding
 
 Array = NDArray[np.float64]
@@ -188,7 +189,7 @@ def principal(inertia: ArrayLike) -> Principal:
     >>> principal(tensor(2, 2, 3, ixy=1)).moments.round(12)
     array([1., 3., 3.])
     """
-    I = np.asarray(inertia, dtype=float)
+    I = as_numbers("inertia", inertia)
     if not (I.shape[-1:] == (3,) and np.isfinite(I).all()):
         raise ValueError(
             f"inertia must be 3 moments or a 3 x 3 tensor of finite numbers, found the shape {I.shape}"
@@ -310,19 +311,24 @@ def nearest(inertia: ArrayLike) -> Array:
     I = np.asarray(inertia, dtype=float)
     if I.shape != (3, 3):
         raise ValueError(f"inertia must be a 3 x 3 tensor, found the shape {I.shape}")
-    found = principal(I)
-    if found.moments[0] + found.moments[1] >= found.moments[2] and found.moments[0] >= 0:
+    principal_values = principal(I)
+    if (
+        principal_values.moments[0] + principal_values.moments[1] >= principal_values.moments[2]
+        and principal_values.moments[0] >= 0
+    ):
         return np.asarray((I + I.T) / 2)
     # rows a of a·moments ≥ 0
     sides = np.ones((3, 3)) - 2 * np.eye(3)
     best = np.zeros(3)
     for chosen in ([0], [1], [2], [0, 1], [0, 2], [1, 2]):
         A = sides[chosen]
-        point = found.moments - A.T @ np.linalg.solve(A @ A.T, A @ found.moments)
-        inside = (sides @ point >= -1e-14 * np.abs(found.moments).max()).all()
-        if inside and np.linalg.norm(point - found.moments) < np.linalg.norm(best - found.moments):
+        point = principal_values.moments - A.T @ np.linalg.solve(A @ A.T, A @ principal_values.moments)
+        inside = (sides @ point >= -1e-14 * np.abs(principal_values.moments).max()).all()
+        if inside and np.linalg.norm(point - principal_values.moments) < np.linalg.norm(
+            best - principal_values.moments
+        ):
             best = point
     # on a face or an edge, to the last bit
     best[np.abs(best) <= 1e-15 * np.abs(best).max()] = 0.0
-    made = found.axes.T @ np.diag(best) @ found.axes
+    made = principal_values.axes.T @ np.diag(best) @ principal_values.axes
     return np.asarray((made + made.T) / 2)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.records import components, numbers, record, table
+from dalembert.arithmetic.shapes import as_numbers, common_shape
 from rigidbody3d.inertia import shift
 from rigidbody3d.rounding import BodyError, of_body
 from rigidbody3d.rounding_in_time import require
@@ -69,10 +70,10 @@ class _Formulas:
     def rate(self) -> Array:
         """Ḣ_G in fixed space, (..., 3), N·m: the moment about the centre of mass that the motion asks for."""
         I, w, alpha = self.inertia, self.omega, self.true_alpha
-        if "momentum" in self.__dict__ or I.ndim > 2 or w.ndim == 1 or w.shape != alpha.shape:
+        if I.ndim > 2 or w.ndim == 1 or w.shape != alpha.shape:
             return np.asarray(_times(I, alpha) + np.cross(w, self.momentum))
-        # both in one pass: while a block of ω is in the cache
-        momentum, rate = _momentum_and_rate(I, w, alpha)
+        # both in one pass, while a block of ω is in the cache; H is not worked out twice
+        momentum, rate = _momentum_and_rate(I, w, alpha, self.__dict__.get("momentum"))
         self.__dict__["momentum"] = momentum
         return rate
 
@@ -185,7 +186,7 @@ class Motion(_Formulas):
         acceleration: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
         def keep(name: str, given: ArrayLike, *wanted: int) -> None:
-            value = np.asarray(given, dtype=float)
+            value = as_numbers(name, given)
             if value.shape[value.ndim - len(wanted) :] != wanted:
                 shape = ", ".join(map(str, ("...", *wanted)))
                 raise ValueError(f"{name} must have the shape ({shape}), found {value.shape}")
@@ -202,6 +203,11 @@ class Motion(_Formulas):
         object.__setattr__(self, "frame_omega", None)
         if frame_omega is not None:
             keep("frame_omega", frame_omega, 3)
+        leads = {name: getattr(self, name).shape[:-1] for name in ("omega", "alpha", "center")}
+        leads |= {name: getattr(self, name).shape[:-1] for name in ("velocity", "acceleration")}
+        if self.frame_omega is not None:
+            leads["frame_omega"] = self.frame_omega.shape[:-1]
+        common_shape(inertia=self.inertia.shape[:-2], mass=self.mass.shape, **leads)
 
     def __repr__(self) -> str:
         states = np.broadcast_shapes(self.inertia.shape[:-2], self.omega.shape[:-1], self.mass.shape)
@@ -269,7 +275,10 @@ class Motion(_Formulas):
         frame_omega: ArrayLike | None = None,
     ) -> Motion:
         """Return the motion of a body that turns about a point fixed in space: v = ω × r, a = α × r + ω × v."""
-        motion, pivot = cls(inertia, omega, alpha, frame_omega, mass, center), np.asarray(point, dtype=float)
+        motion, pivot = cls(inertia, omega, alpha, frame_omega, mass, center), as_numbers("point", point)
+        if pivot.shape[-1:] != (3,):
+            raise ValueError(f"point must have the shape (..., 3), found {pivot.shape}")
+        common_shape(point=pivot.shape[:-1], center=motion.center.shape[:-1], omega=motion.omega.shape[:-1])
         velocity, acceleration = _about_pivot(motion, pivot)
         for name, value in (("velocity", velocity), ("acceleration", acceleration), ("pivot", pivot)):
             object.__setattr__(motion, name, value)
@@ -307,8 +316,8 @@ def _quantity(
     if pivot is not None:
         velocity, acceleration = _about_pivot(motion, pivot)
         motion = replace(motion, velocity=velocity, acceleration=acceleration)
-    found = getattr(motion, "rate" if of == "inertia_moment" else of)
-    return [found(point) if of.endswith("_about") else found]
+    value = getattr(motion, "rate" if of == "inertia_moment" else of)
+    return [value(point) if of.endswith("_about") else value]
 
 
 def _about_pivot(motion: _Formulas, pivot: Array) -> tuple[Array, Array]:
@@ -321,21 +330,36 @@ def _about_pivot(motion: _Formulas, pivot: Array) -> tuple[Array, Array]:
 def _times(I: Array, w: Array) -> Array:
     """I ω for states (..., 3)."""
     if I.ndim == 2:
+        if w.ndim > 1 and w.dtype == I.dtype == float:
+            return _in_blocks(w, I)
         return np.asarray(w @ I.T)
     return np.asarray((I * w[..., None, :]).sum(axis=-1))
 
 
-def _momentum_and_rate(I: Array, w: Array, alpha: Array) -> tuple[Array, Array]:
-    """I ω and I α + ω × I ω for states (..., 3) of one tensor, in blocks that stay in the cache."""
+def _in_blocks(w: Array, I: Array) -> Array:
+    """I ω for states (..., 3) of one tensor, in blocks that stay in the cache."""
+    flat, transposed = w.reshape(-1, 3), np.ascontiguousarray(I.T)
+    out = np.empty_like(flat)
+    for s in range(0, len(flat), BLOCK):
+        np.matmul(flat[s : s + BLOCK], transposed, out=out[s : s + BLOCK])
+    return out.reshape(w.shape)
+
+
+def _momentum_and_rate(
+    I: Array, w: Array, alpha: Array, momentum: Array | None = None
+) -> tuple[Array, Array]:
+    """I ω, unless it is given, and I α + ω × I ω for states (..., 3) of one tensor, in blocks that stay in the cache."""
     flat, turn = w.reshape(-1, 3), alpha.reshape(-1, 3)
     transposed, gyroscopic = np.ascontiguousarray(I.T), _gyroscopic(I)
-    momentum, rate = np.empty_like(flat), np.empty_like(flat)
+    rate = np.empty_like(flat)
+    new = np.empty_like(flat) if momentum is None else None
     most = min(BLOCK, len(flat))
     columns, products, terms = np.empty((3, most)), np.empty((6, most)), np.empty((most, 3))
     for s in range(0, len(flat), BLOCK):
         part, size = slice(s, s + BLOCK), min(BLOCK, len(flat) - s)
         spin, pairs = columns[:, :size], products[:, :size]
-        np.matmul(flat[part], transposed, out=momentum[part])
+        if new is not None:
+            np.matmul(flat[part], transposed, out=new[part])
         np.matmul(turn[part], transposed, out=rate[part])
         # products of components of ω as rows: whole columns of a block in one stroke
         spin[...] = flat[part].T
@@ -343,7 +367,10 @@ def _momentum_and_rate(I: Array, w: Array, alpha: Array) -> tuple[Array, Array]:
         for row, (a, b) in enumerate(_PAIRS, 3):
             np.multiply(spin[a], spin[b], out=pairs[row])
         rate[part] += np.matmul(pairs.T, gyroscopic, out=terms[:size])
-    return momentum.reshape(w.shape), rate.reshape(w.shape)
+    if new is not None:
+        momentum = new.reshape(w.shape)
+    assert momentum is not None
+    return momentum, rate.reshape(w.shape)
 
 
 _PAIRS = ((1, 2), (2, 0), (0, 1))
@@ -423,8 +450,14 @@ def strike(
     >>> strike(3.0, rod, [1, 0, 0], [0, 0, -1 / 6], pin=[0, 0, 0.5], axis=[0, 1, 0]).reaction.round(12) + 0.0
     array([0., 0., 0.])
     """
-    m, I = np.asarray(mass, dtype=float), np.asarray(inertia, dtype=float)
-    J, r = np.asarray(impulse, dtype=float), np.asarray(offset, dtype=float)
+    m, I = as_numbers("mass", mass), as_numbers("inertia", inertia)
+    J, r = as_numbers("impulse", impulse), as_numbers("offset", offset)
+    if I.shape[-2:] != (3, 3) or J.shape[-1:] != (3,) or r.shape[-1:] != (3,):
+        raise ValueError(
+            "inertia must be (..., 3, 3), impulse and offset (..., 3), "
+            f"found {I.shape}, {J.shape} and {r.shape}"
+        )
+    common_shape(mass=m.shape, inertia=I.shape[:-2], impulse=J.shape[:-1], offset=r.shape[:-1])
     if pin is None:
         spin = np.asarray(np.linalg.solve(I, np.cross(r, J)[..., None])[..., 0])
         move = np.asarray(J / m[..., None])

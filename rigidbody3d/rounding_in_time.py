@@ -39,10 +39,10 @@ class State(Protocol):
     def energy(self) -> Array: ...
 
 
-def require(of: str, *known: str) -> None:
+def require(of: str, *names: str) -> None:
     """Raise ValueError where there is no estimate of a quantity of this name."""
-    if of not in known:
-        raise ValueError(f"no estimate for '{of}': expected one of {', '.join(known)}")
+    if of not in names:
+        raise ValueError(f"no estimate for '{of}': expected one of {', '.join(names)}")
 
 
 def apart(there: State, here: State, of: str) -> Array:
@@ -69,10 +69,10 @@ def tensors_off(inertia: ArrayLike, tensor: ArrayLike, axes: bool = True) -> lis
         return []
     # a moment of zero, of a thin rod, shall not become negative
     rod = np.where(principal(I).moments[..., :1, None] <= 8 * E.max(), 4.0, 0.0) * E.max() * np.eye(3)
-    found = []
+    bounds = []
     for i in range(3):
         for j in range(i, 3):
             entry = np.zeros((3, 3))
             entry[i, j] = entry[j, i] = 1.0
-            found.append(I + rod + E * entry)
-    return found
+            bounds.append(I + rod + E * entry)
+    return bounds

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from dalembert.hints import nearest
 
 Array = NDArray[np.float64]
 Moments = tuple[Array, Array, Array]
@@ -129,19 +130,19 @@ def find(shape: str) -> Shape:
     ValueError: unknown shape 'cilinder': expected one of point, rod, ...; did you mean 'cylinder'?
     """
     if shape not in SHAPES:
-        close = get_close_matches(shape, SHAPES, n=1, cutoff=0.4)
-        hint = f"; did you mean '{close[0]}'?" if close else ""
-        raise ValueError(f"unknown shape '{shape}': expected one of {', '.join(SHAPES)}{hint}")
+        raise ValueError(
+            f"unknown shape '{shape}': expected one of {', '.join(SHAPES)}{nearest(shape, SHAPES)}"
+        )
     return SHAPES[shape]
 
 
-def _dimensions(shape: str, given: dict[str, ArrayLike]) -> dict[str, Array]:
-    known = find(shape)
-    missing = [name for name in known.dimensions if name not in given]
-    extra = [name for name in given if name not in known.dimensions + known.optional]
+def _dimensions(shape: str, dimensions: dict[str, ArrayLike]) -> dict[str, Array]:
+    definition = find(shape)
+    missing = [name for name in definition.dimensions if name not in dimensions]
+    extra = [name for name in dimensions if name not in definition.dimensions + definition.optional]
     if missing or extra:
         raise ValueError(
-            f"a {shape} needs {', '.join(known.dimensions) or 'no dimension'}: "
+            f"a {shape} needs {', '.join(definition.dimensions) or 'no dimension'}: "
             + (
                 f"{', '.join(missing)} missing"
                 if missing
@@ -149,13 +150,14 @@ def _dimensions(shape: str, given: dict[str, ArrayLike]) -> dict[str, Array]:
             )
         )
     values = {
-        name: np.asarray(given.get(name, 0.0), dtype=float) for name in known.dimensions + known.optional
+        name: np.asarray(dimensions.get(name, 0.0), dtype=float)
+        for name in definition.dimensions + definition.optional
     }
     for name, value in values.items():
         if (
             not np.isfinite(value).all()
             or (value < 0).any()
-            or (name in known.dimensions and (value == 0).any() and name != "inner_radius")
+            or (name in definition.dimensions and (value == 0).any() and name != "inner_radius")
         ):
             raise ValueError(f"the {name} of a {shape} must be a positive number, found {value}")
     if "inner_radius" in values and (values["inner_radius"] > values["radius"]).any():
@@ -190,9 +192,9 @@ def inertia_of(shape: str, mass: ArrayLike, **dimensions: ArrayLike) -> Array:
 
 def shape_tensor(shape: str, mass: Array, dimensions: Mapping[str, Array]) -> Array:
     """The same of arrays of any kind of number, which are not checked."""
-    known = SHAPES[shape]
-    full = dict.fromkeys(known.optional, 0.0) | dict(dimensions)
-    moments = [mass * np.asarray(x) for x in known.moments(**full)]
+    definition = SHAPES[shape]
+    full = dict.fromkeys(definition.optional, 0.0) | dict(dimensions)
+    moments = [mass * np.asarray(x) for x in definition.moments(**full)]
     diagonal = np.stack(np.broadcast_arrays(*moments), axis=-1)
     return np.asarray(diagonal[..., None, :] * np.eye(3))
 
@@ -212,11 +214,11 @@ def measure_of(shape: str, **dimensions: ArrayLike) -> tuple[Array, int]:
     >>> measure_of("box", width=1, height=2, depth=3)
     (array(6.), 3)
     """
-    known = find(shape)
+    definition = find(shape)
     values = _dimensions(shape, dimensions)
-    if known.measure is None:
+    if definition.measure is None:
         raise ValueError(f"a {shape} has no volume: give its mass")
-    return np.asarray(known.measure(**values), dtype=float), known.thin
+    return np.asarray(definition.measure(**values), dtype=float), definition.thin
 
 
 def mesh(vertices: ArrayLike, faces: ArrayLike, density: float = 1.0) -> tuple[Array, Array, Array]:

@@ -60,13 +60,13 @@ def of_shape(shape: str, mass: Array, center: Array, dimensions: Mapping[str, Ar
 
 def of_tensor(mass: Array, center: Array, inertia: Array) -> list[Solid]:
     """Return the homogeneous ellipsoids of bodies: half axes aᵢ² = 5 (Iⱼ + Iₖ − Iᵢ)/(2m)."""
-    found = []
+    solids = []
     for m, c, I in zip(mass.ravel(), center.reshape(-1, 3), inertia.reshape(-1, 3, 3), strict=True):
         moments, axes = principal(I * np.sign(m))
         square = 5 * (moments.sum() - 2 * moments) / (2 * abs(m))
         halves = np.sqrt(np.clip(square, 0, None))
-        found.append(Solid(ELLIPSOID, dict(zip("abc", halves.tolist(), strict=True)), float(m), c, axes.T))
-    return found
+        solids.append(Solid(ELLIPSOID, dict(zip("abc", halves.tolist(), strict=True)), float(m), c, axes.T))
+    return solids
 
 
 def moved(solids: Callable[[], list[Solid]], offset: Array) -> list[Solid]:
@@ -120,12 +120,12 @@ def _own(shape: str, d: Mapping[str, float], points: Array | None) -> list[tuple
     if shape in ("ring", "disk"):
         return [("line" if shape == "ring" else "hull", _circle(d["radius"]))]
     if shape in ("cylinder", "tube"):
-        found = []
+        solids = []
         for kind, name in (("hull", "radius"), ("hole", "inner_radius")):
             if d.get(name):
                 ends = [_circle(d[name], z * d["length"]) for z in (-0.5, 0.5)]
-                found += [(kind, np.concatenate(ends)), *(("line", end) for end in ends)]
-        return found
+                solids += [(kind, np.concatenate(ends)), *(("line", end) for end in ends)]
+        return solids
     if shape == "cone":
         base, apex = _circle(d["radius"], -d["length"] / 4), np.array([[0, 0, 0.75 * d["length"]]])
         return [("hull", np.concatenate([base, apex])), ("line", base)]
@@ -136,9 +136,9 @@ def _own(shape: str, d: Mapping[str, float], points: Array | None) -> list[tuple
         sides = [("line", np.array(pair)) for pair in zip(*faces, strict=True)] if depth else []
         return [("hull", np.concatenate(faces)), *(("line", face) for face in faces), *sides]
     if shape == "sphere":
-        found = [("hull", _ball([d["radius"]] * 3))]
+        solids = [("hull", _ball([d["radius"]] * 3))]
         inner = d.get("inner_radius", 0.0)
-        return found + ([("hole", _ball([inner] * 3))] if inner else [])
+        return solids + ([("hole", _ball([inner] * 3))] if inner else [])
     if shape == ELLIPSOID and max(d.values()) > 0:
         return [("hull", _ball([d["a"], d["b"], d["c"]]))]
     return [("point", np.zeros((1, 3)))]

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.records import record
+from dalembert.arithmetic.shapes import as_numbers, common_shape
 from rigidbody3d import attitude as quaternion
 from rigidbody3d.elliptic import Jacobi, argument, jacobi, parameter, third, third_complete
 from rigidbody3d.rounding_in_time import FEW, STATE, apart, require
@@ -84,8 +85,8 @@ class Top:
             if (I * np.eye(3) != I).any():
                 raise ValueError("a top's axis is body z: expected a tensor without products of inertia")
             I = np.diagonal(I, axis1=-2, axis2=-1)
-        omega, mgl = np.asarray(self.omega, dtype=float), np.asarray(self.mgl, dtype=float)
-        q = np.asarray(self.attitude, dtype=float)
+        omega, mgl = as_numbers("omega", self.omega), as_numbers("mgl", self.mgl)
+        q = as_numbers("attitude", self.attitude)
         if I.shape[-1:] != (3,) or omega.shape[-1:] != (3,):
             raise ValueError(f"inertia and omega have three components, found {I.shape} and {omega.shape}")
         if not (np.isfinite(I).all() and np.isfinite(omega).all() and np.isfinite(mgl).all()):
@@ -94,13 +95,15 @@ class Top:
             raise ValueError(
                 "a symmetric top has two equal positive moments across its axis, body z, and one about it"
             )
+        lead = common_shape(
+            inertia=I.shape[:-1], mgl=mgl.shape, omega=omega.shape[:-1], attitude=q.shape[:-1]
+        )
         turning = (I * omega**2).sum(axis=-1)
         if ((mgl != 0) & (turning > LIGHTEST * np.abs(mgl))).any():
             raise ValueError(
                 f"the weight is nothing beside the rotation (I ω² is more than {LIGHTEST:.0e} m g l): expected a slower "
                 "rotation, or a free body"
             )
-        lead = np.broadcast_shapes(I.shape[:-1], mgl.shape, omega.shape[:-1], q.shape[:-1])
         unit = np.broadcast_to(quaternion.normalize(q), lead + (4,)).reshape(-1, 4)
         rotation = TopRotation(
             np.broadcast_to(I, lead + (3,)).reshape(-1, 3),
@@ -183,11 +186,11 @@ class TopState(AtTimes):
         """
         require(of, *STATE)
         bound = self._rounding(of)
-        E, given = np.asarray(moments, dtype=float), self.top
+        E, top = np.asarray(moments, dtype=float), self.top
         # each moment in turn is put off by its error
         for entry in ([1.0, 1.0, 0.0], [0.0, 0.0, 1.0]) if E.any() else ():
-            I = _moments(given.inertia) + E * entry
-            bound = bound + apart(Top(I, given.mgl, given.omega, given.attitude).at(self.time), self, of)
+            I = _moments(top.inertia) + E * entry
+            bound = bound + apart(Top(I, top.mgl, top.omega, top.attitude).at(self.time), self, of)
         return bound
 
     def _rounding(self, of: str) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import random
 import shutil
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
 # for `benchmarks` and `tests`, which are not installed; last, so that what is installed is what is tested
 sys.path.append(str(Path(__file__).parents[1]))
@@ -28,13 +30,59 @@ TAKES_CTRL_C = [
 Dalembert = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
+# README's command is the same every time; the campaigns of `-m slow` draw anew, and print the seed of what fails
+settings.register_profile("same", derandomize=True, database=None, deadline=None)
+# without a database hypothesis prints the seed of what fails
+settings.register_profile("anew", derandomize=False, database=None, print_blob=True, deadline=None)
+SEED = "DALEMBERT_TESTS_SEED"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Choose the profile of hypothesis: `-m slow` alone draws other cases each time."""
+    slow = config.getoption("markexpr") == "slow"
+    settings.load_profile("anew" if slow else "same")
+    # workers of pytest-xdist take the seed of the process that starts them
+    os.environ.setdefault(SEED, str(random.SystemRandom().randrange(10**9) if slow else 0))
+
+
+@pytest.fixture
+def first_seed() -> int:
+    """Where a campaign's random cases begin: 0, or with `-m slow` another one each time, printed where it fails."""
+    print(f"to repeat: {SEED}={os.environ[SEED]} pytest -m slow")
+    return int(os.environ[SEED])
+
+
+def _draw_anew(items: list[pytest.Item]) -> None:
+    """Give campaigns (a parameter `seed` over 0, 1, …) other seeds; lists of seeds that once failed stay as they are."""
+    campaigns: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for item in items:
+        spec = getattr(item, "callspec", None)
+        if spec is not None and "seed" in spec.params:
+            key = item.nodeid.split("::")[0], item.originalname  # type: ignore[attr-defined]
+            campaigns.setdefault(key, []).append(spec.params)
+    for cases in campaigns.values():
+        seeds = {params["seed"] for params in cases}
+        if len(seeds) > CASES and seeds == set(range(len(seeds))):
+            for params in cases:
+                params["seed"] += 1000 * int(os.environ[SEED])
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Print, where a test of many seeds fails, how it is repeated."""
+    spec = getattr(item, "callspec", None)
+    if spec is not None and "seed" in spec.params:
+        print(f"seed {spec.params['seed']}; to repeat: {SEED}={os.environ[SEED]} pytest -m slow")
+
+
 # of a test with a table of cases so many run at once; the others are slow, so that README's command stays short
 CASES = 2
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark what is beyond the first cases of a test as slow: `-m slow` and .ci/run have them all."""
+    if config.getoption("markexpr") == "slow":
+        _draw_anew(items)
     seen: dict[tuple[str, str], int] = {}
     for item in items:
         if getattr(item, "callspec", None) is not None and item.get_closest_marker("whole") is None:

@@ -15,7 +15,7 @@ import pytest
 from benchmarks import page
 from benchmarks.speed import DOMAINS, measure
 from benchmarks.speed.measure import Measurement
-from cli.errors import DataError
+from dalembert.errors import DataError
 
 Benchmarks = Callable[..., subprocess.CompletedProcess[str]]
 ROOT = Path(__file__).parents[1]
@@ -190,7 +190,7 @@ def test_peers_that_are_missing_or_break_do_not_end_the_run(
 
 
 def test_the_pages_have_a_place_for_every_domain() -> None:
-    page.check(ROOT / "docs" / "benchmarks.md", ["aims", "stress", *DOMAINS])
+    page.check(ROOT / "docs" / "quality" / "benchmarks.md", ["aims", "stress", *DOMAINS])
 
 
 def test_a_page_without_marks(tmp_path: Path) -> None:

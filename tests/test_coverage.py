@@ -1,4 +1,4 @@
-"""docs/coverage.md names tests, functions and examples that exist."""
+"""docs/quality/coverage.md names tests, functions and examples that exist."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from cli.examples.command import names
 
 ROOT = Path(__file__).parents[1]
-TEXT = (ROOT / "docs" / "coverage.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs" / "quality" / "coverage.md").read_text(encoding="utf-8")
 
 
 def test_every_test_named_exists() -> None:

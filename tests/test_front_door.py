@@ -2,28 +2,64 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from importlib import import_module
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 
 import dalembert
+import rigidbody3d
+from benchmarks.library_page import page
 
 ROOMS = ("balancing", "virtualwork", "rigidbody3d")
 
 
-def test_every_public_name_is_handed_on() -> None:
-    for room in map(import_module, ROOMS):
-        for name in room.__all__:
-            assert getattr(dalembert, name) is getattr(room, name), name
-            assert name in dir(dalembert)
+def public() -> list[str]:
+    return [name for name in dir(dalembert) if not name.startswith("_")]
 
 
-def test_no_two_packages_have_one_name_for_two_things() -> None:
-    names = [name for room in map(import_module, ROOMS) for name in room.__all__]
-    assert len(names) == len(set(names)), sorted({name for name in names if names.count(name) > 1})
+def test_every_public_name_of_a_package_has_one_name_here() -> None:
+    here = [id(getattr(dalembert, name)) for name in public()]
+    there = [id(getattr(room, name)) for room in map(import_module, ROOMS) for name in room.__all__]
+    assert sorted(here) == sorted(there)
+
+
+def test_the_docstring_lists_every_public_name() -> None:
+    lists = re.findall(r"^    (.+)$", dalembert.__doc__ or "", re.MULTILINE)
+    assert sorted(re.findall(r"\w+", " ".join(lists))) == sorted(public())
+
+
+def test_motion_is_what_a_mechanism_moves_by() -> None:
+    crank = dalembert.Link({"O": 0j, "P": 1})
+    motion = dalembert.Mechanism({"O": 0j}, {"crank": crank}, inputs=dalembert.Input(link="crank")).motion(
+        0.0
+    )
+    assert type(motion) is dalembert.Motion
+    assert dalembert.BodyMotion is rigidbody3d.Motion
+
+
+@pytest.mark.parametrize(
+    ("short", "long"),
+    [
+        ("balancing.spread", "spread_of_corrections"),
+        ("virtualwork.sense", "direction_angle"),
+        ("rigidbody3d.check", "check_inertia"),
+    ],
+)
+def test_a_short_name_stays_in_its_package_and_is_longer_here(short: str, long: str) -> None:
+    package, name = short.split(".")
+    assert getattr(dalembert, long) is getattr(import_module(package), name)
+    with pytest.raises(AttributeError, match=f"'{name}': it is `dalembert.{long}` or `{short}`"):
+        getattr(dalembert, name)
+
+
+def test_the_page_of_public_names_is_up_to_date() -> None:
+    written = (Path(__file__).parents[1] / "docs" / "library.md").read_text(encoding="utf-8")
+    assert written.splitlines() == list(page()), "python -m benchmarks.library_page > docs/library.md"
 
 
 def test_the_version_is_that_of_the_distribution() -> None:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from virtualwork.family.target import Target
     from virtualwork.formulas.effort import ledger
     from virtualwork.mechanism import Mechanism, equilibria
+    from virtualwork.motion import Motion
     from virtualwork.study import counterweights
     from virtualwork.study.check import Check, grashof_class
     from virtualwork.study.cycle import Cycle
@@ -56,6 +57,7 @@ __all__ = [
     "Mechanism",
     "MechanismError",
     "MobilityError",
+    "Motion",
     "Motor",
     "Spring",
     "Target",
@@ -82,6 +84,7 @@ _ROOMS = {
     "virtualwork.describe.parts": "GROUND Force Friction Gear Guess Guide Input Link Motor Spring Torque TorsionSpring",
     "virtualwork.formulas.effort": "ledger",
     "virtualwork.mechanism": "Mechanism equilibria",
+    "virtualwork.motion": "Motion",
     "virtualwork.study": "counterweights",
     "virtualwork.family.target": "Target",
     "virtualwork.study.check": "Check grashof_class",

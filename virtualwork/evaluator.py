@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dalembert.hints import nearest
 from virtualwork.branch.assembly import Assembly
-from virtualwork.describe import DescriptionError, hint
+from virtualwork.describe import DescriptionError
 from virtualwork.formulas.asked import COMPLEX, Key
 from virtualwork.formulas.lanes import Lanes, Ready, ready, recorded, taped
 from virtualwork.formulas.numbers import xy
@@ -110,7 +111,7 @@ def key_of(assembly: Assembly, name: str) -> Key:
 
     def known(word: str, words: Mapping[str, Any] | tuple[str, ...], what: str) -> str:
         if word not in words:
-            raise DescriptionError(f"'{name}': no {what} is named '{word}'{hint(word, words)}")
+            raise DescriptionError(f"'{name}': no {what} is named '{word}'{nearest(word, words)}")
         return word
 
     def order(words: tuple[str, ...]) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.guard import guarded
 from virtualwork.formulas.dynamics import Dynamics
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from virtualwork.bounds.forces import ForceErrors
 
 
+@guarded
 class Forces(Dynamics):
     """The forces of a motion, with bounds of their rounding errors."""
 

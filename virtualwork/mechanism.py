@@ -18,6 +18,7 @@ from virtualwork.motion import Motion
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from virtualwork.describe.dimensions import Dimension
     from virtualwork.evaluator import Evaluator
     from virtualwork.family.design import Design
     from virtualwork.family.fitting import Fit
@@ -113,19 +114,20 @@ class Mechanism(Description):
     def motion(
         self,
         angle: ArrayLike | None = None,
-        speed: ArrayLike = 0.0,
-        acceleration: ArrayLike = 0.0,
-        jerk: ArrayLike = 0.0,
+        speed: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        jerk: ArrayLike | None = None,
     ) -> Motion:
         """Motion of the assembly that the guess chooses; every quantity is solved when first asked for.
 
         Parameters
         ----------
         angle : array (n,), or (n, k) for k inputs
-            The input: rad for a turning input, m for a slide. Without it the motion is the description's own: its
-            value, its speed and its acceleration.
+            The input: rad for a turning input, m for a slide.
         speed, acceleration, jerk : same shape or scalar
             Its derivatives in time.
+
+        Each of them that is not given is the description's own.
 
         Returns
         -------
@@ -139,8 +141,6 @@ class Mechanism(Description):
         >>> m.motion(0.0, speed=3.0).point("P").velocity
         array([[0., 6.]])
         """
-        if angle is None:
-            return Motion(self.assembly)
         return Motion(self.assembly, angle, speed, acceleration, jerk)
 
     def simulate(
@@ -216,6 +216,56 @@ class Mechanism(Description):
         from virtualwork.evaluator import Evaluator
 
         return Evaluator(self.assembly, *wanted)
+
+    @property
+    def dimensions(self) -> dict[str, Dimension]:
+        """Every number of the description by its path in the file, `links.crank.B.x`, with its kind and unit."""
+        from virtualwork.describe.dimensions import dimensions
+
+        return dimensions(self)
+
+    def value(self, path: str) -> float | complex:
+        """The number at a path, SI; x + iy of a point. A rate of an input that is not given is 0.
+
+        Raises
+        ------
+        DescriptionError
+            Where the path names no number.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link
+        >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": (3, 4)}, mass=2)}, inputs=Input("arm"))
+        >>> arm.value("links.arm.mass"), arm.value("links.arm.P")
+        (2.0, (3+4j))
+        """
+        from virtualwork.describe.dimensions import value
+
+        return value(self, path)
+
+    def changed(self, numbers: Mapping[str, complex | tuple[float, float]]) -> Mechanism:
+        """This mechanism with other numbers at some paths; everything else stays.
+
+        Parameters
+        ----------
+        numbers : mapping of path to number
+            SI; a point's own path takes x + iy or (x, y).
+
+        Raises
+        ------
+        DescriptionError
+            Where a path names no number, or the mechanism cannot be so.
+
+        Examples
+        --------
+        >>> from virtualwork import Input, Link
+        >>> arm = Mechanism({"O": 0j}, {"arm": Link({"O": 0j, "P": (3, 4)}, mass=2)}, inputs=Input("arm"))
+        >>> arm.changed({"links.arm.mass": 5.0, "links.arm.P.x": 1.0}).value("links.arm.P")
+        (1+4j)
+        """
+        from virtualwork.describe.dimensions import changed
+
+        return changed(self, numbers)
 
     def vary(self, numbers: Mapping[str, ArrayLike]) -> Variants:
         """Variants of this mechanism: other numbers at the paths of some dimensions.
@@ -365,19 +415,22 @@ class Mechanism(Description):
         """
         from virtualwork.study.equilibrium import equilibria as search
 
-        return search(self.assembly, spans, samples)
+        with self.assembly.lock:
+            return search(self.assembly, spans, samples)
 
     def newton(self, *inputs: float, limit: int = 50) -> AllAtOnce:
         """All loops at once by Newton-Raphson from the guess, with the table of iterates."""
         from virtualwork.study.newton_table import all_at_once
 
-        return all_at_once(self.assembly, inputs or self.at, limit)
+        with self.assembly.lock:
+            return all_at_once(self.assembly, inputs or self.at, limit)
 
     def assemblies(self) -> tuple[Assembly, ...]:
         """Every assembly at the input where the guess is meant, the guess's own first."""
         from virtualwork.branch.solutions import all_assemblies
 
-        return all_assemblies(self.assembly)
+        with self.assembly.lock:
+            return all_assemblies(self.assembly)
 
 
 def equilibria(mechanism: Mechanism, spans: ArrayLike | None = None, samples: int = 1440) -> Equilibria:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.records import alike
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
@@ -43,7 +44,11 @@ if TYPE_CHECKING:
     from virtualwork.formulas.lanes import Lanes
     from virtualwork.study.cycle import Cycle
 
+# poses at each end of a motion that a notebook shows
+ENDS = 10
 
+
+@guarded
 class Motion:
     """Position, velocity, acceleration, jerk and forces over given inputs, on demand.
 
@@ -66,7 +71,7 @@ class Motion:
         jerk: ArrayLike | None = None,
         block_of: EvenSweep | None = None,
     ) -> None:
-        self.assembly = assembly
+        self.assembly, self.lock = assembly, assembly.lock
         self.poses = Poses(assembly, angle, speed, acceleration, jerk, block_of)
         self._units: dict[int, Motion] = {}
 
@@ -414,7 +419,18 @@ class Motion:
         return DataFrame(columns(self.poses))
 
     def _repr_html_(self) -> str:
-        return str(self.to_frame().to_html(max_rows=20))
+        from pandas import DataFrame
+
+        from virtualwork.table import columns
+
+        # of many poses those alone are solved that are shown, and one more, which is shown as dots
+        shown = np.arange(self.n)
+        if self.n > 2 * ENDS:
+            shown = np.concatenate([shown[: ENDS + 1], shown[-ENDS:]])
+        which = np.zeros(self.n, dtype=bool)
+        which[shown] = True
+        frame = DataFrame(columns(self.poses.some(which)), index=shown)
+        return str(frame.to_html(max_rows=2 * ENDS))
 
 
 def _again(

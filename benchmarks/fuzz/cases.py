@@ -65,7 +65,7 @@ FURTHER: list[tuple[str, dict[str, str]]] = [
     ("field runs.csv --objective minimax --max-mass A=5g_m --max-residual 90um --save-influence out.csv", {"runs.csv": RUNS}),
     ("field runs.csv --report out.html --grade G6.3 --speed 3000rpm --rotor-mass 100kg --radius 100mm", {"runs.csv": RUNS}),
     ("field initial.csv --influence stored.csv --ridge 0.1 --blades 8", {"initial.csv": INITIAL, "stored.csv": STORED}),
-    ("field --suggest-trial --rotor-mass 120kg --speed 3000rpm --radius 100mm --planes 2", {}),
+    ("trial --rotor-mass 120kg --speed 3000rpm --radius 100mm --planes 2", {}),
     ("place 5g@30deg 20g@100deg --positions 0deg,90deg,200deg --max-mass 30g", {}),
     ("place 50g@30deg --blades 12 --drill 10mm --density 7850kg_m3 --drill-point 118deg --max-depth 20mm", {}),
     ("place 50g@30deg --at-radius 20mm --to-radius 35mm --at-z 10mm --to-z 0mm:90mm --blades 8 --stock 1g,2g,5g,10g", {}),
@@ -75,8 +75,8 @@ FURTHER: list[tuple[str, dict[str, str]]] = [
     ("body parts.csv --shaft 0mm:300mm --speed 1200rpm --speed-rate 10rad_s2 --correct A:0mm:50mm", {"parts.csv": PARTS}),
     ("spin body.toml --time 0:1/20", {"body.toml": BODY, "parts.csv": PARTS}),
     ("spin body.toml --at 1 --at 2", {"body.toml": TORQUED}),
-    ("mechanism driven.toml --forces", {"driven.toml": GRAVITY + DRIVEN, "law.csv": LAW}),
-    ("mechanism driven.toml --sweep 0deg:360deg/24 --check --counterweights crank", {"driven.toml": STEADY}),
+    ("forces driven.toml", {"driven.toml": GRAVITY + DRIVEN, "law.csv": LAW}),
+    ("forces driven.toml --over 0deg:360deg/24 --counterweights crank", {"driven.toml": STEADY}),
     ("examples klann", {}),
 ]  # fmt: skip
 
@@ -104,7 +104,7 @@ PLAUSIBLE = {
     "--graph": ["B.x", "crank.omega", "rod.angle", "B.slide", "A.jx", "crank.x", ".", "B."],
     "--counterweights": ["crank", "coupler", "rod,crank", "ground"],
     "--flywheel": ["0.02", "1e-300", "2"],
-    "--monte-carlo": ["10", "100"],
+    "--monte-carlo": ["40", "100"],
     "--pieces": ["2", "3"],
     "--max-pieces": ["2", "3"],
 }

@@ -107,10 +107,10 @@ def _vector(size: str, phase: str) -> Any:
 
 def _wrapped(rng: np.random.Generator) -> Pairs:
     """Single-plane balancing from a written table to the columns of the command."""
-    from cli.field.columns import corrections
-    from cli.field.read import read_runs, runs_table
+    from cli.field.field_balancing import FieldBalancing
     from cli.field.request import Request
-    from cli.field.solve import FieldBalancing
+    from cli.field.tables import corrections
+    from cli.field.trial_runs import read_runs, runs_table
 
     v0, t, v1 = _written(rng), _written(rng), _written(rng)
     if rng.random() < 0.4:  # a trial run that hardly differs from the initial one

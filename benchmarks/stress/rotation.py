@@ -100,6 +100,7 @@ def _oblique(rng: np.random.Generator) -> Pairs:
     moments = np.array([small[1] + small[2], small[0] + small[2], small[0] + small[1]])
     if rng.integers(2):
         moments[1] = moments[0] + 1
+        moments[2] = min(moments[2], moments[0] + moments[1])
     tensor = (R @ np.diag(moments) @ R.T).astype(float)
     spin = rng.normal(size=3)
     time = _time(rng, spin)
@@ -181,6 +182,8 @@ def _there_and_back(rng: np.random.Generator) -> Pairs:
     near = 10.0 ** rng.uniform(-16, 0)
     if rng.integers(2):
         moments[1] = moments[0] * (1 + near)
+        # no body has a moment above the sum of the others
+        moments[2] = min(moments[2], moments[0] + moments[1])
     omega = rng.normal(size=3) * 10.0 ** rng.uniform(-12, 0, 3) * 10.0 ** rng.uniform(-6, 6)
     if rng.integers(2):  # near the separatrix
         I1, I2, I3 = np.sort(moments)

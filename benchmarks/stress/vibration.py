@@ -136,7 +136,7 @@ def _of_optimum(fix: Balance) -> Pairs:
         if true is None:
             return out
         out += _of_balance(fix, true)
-        if fix.bound is not None:
+        if fix.of_largest and fix.bound is not None:
             weight = np.ones(len(fix.initial)) if fix.weights is None else fix.weights
             left = exact(fix.initial) + exact(fix.influence) * true
             best = max(abs(r) * mp.mpf(float(w)) for r, w in zip(left, weight, strict=True))

@@ -36,7 +36,7 @@ def optimum(fix: Balance) -> Any:
     alpha, v, w = fix.influence, fix.initial, fix.corrections
     planes = len(w)
     weight = np.ones(len(v)) if fix.weights is None else fix.weights
-    with_t = fix.bound is not None
+    with_t = fix.of_largest
     rows: list[tuple[list[Any], Any, Any]] = []  # row, offset, limit (None: t)
     if with_t:
         t0 = float((weight * np.abs(fix.residual)).max())

@@ -12,7 +12,7 @@ from cli.show.output import command
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.show.columns import Result
+    from cli.show.result import Result
 
 
 EXAMPLE = "riul-rotor"
@@ -30,7 +30,7 @@ How:
   workers N  Processes that solve many rotors.
 How: the tolerance:
   center_z Z  Where the centre of mass lies: for the couple and the tolerance.
-  grade GRADE  Balance quality grade of ISO 21940-11, such as G2.5.
+  grade GRADE  Balance quality grade of ISO 21940-11, such as G2.5; or API (4W/N), or MIL (MIL-STD-167-1).
   speed SPEED  Highest service speed, such as 3000rpm.
   rotor_mass MASS  Mass of the rotor, such as 12kg.
   permissible UNBALANCE  Permissible residual unbalance, such as 30g_mm, in place of a grade.
@@ -62,12 +62,11 @@ def run(
     Angles are counter-clockwise as seen against +z.
     """
     # numpy and what stands on it are loaded only once the command line itself is in order
-    from cli.balance import columns, words
-    from cli.balance.read import read_rotors
-    from cli.balance.solve import Balancing, Request
+    from cli.balance.rotors import Balancing, Request, read_rotors
+    from cli.balance.tables import METHOD, tables, warnings
     from cli.read.planes import from_options, from_table
     from cli.read.tolerance import tolerance_of
-    from cli.show.columns import Result, Sheet
+    from cli.show.result import Result
 
     if (plane is None) == (planes is None):
         raise options.bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
@@ -84,21 +83,18 @@ def run(
     chosen = from_table(planes) if planes is not None else from_options(plane or [])
     rotors = read_rotors(table, gravity, needs_z=chosen.several)
     with options.processes(workers) as executor:
-        found = Balancing(rotors, chosen, request, executor)
+        balancing = Balancing(rotors, chosen, request, executor)
 
     def figure() -> Figure:
         from cli.balance.picture import draw
 
-        return draw(found)
+        return draw(balancing)
 
     return Result(
-        document=lambda: columns.document(found),
-        tables={"corrections": lambda: columns.corrections(found)},
-        notes=lambda: words.notes(found),
-        afterword=lambda: words.verdicts(found),
+        tables=tables(balancing),
+        head={"correction": "remove" if remove else "add"},
         figure=figure,
-        method=words.METHOD,
-        sheets=lambda: [Sheet("", words.sections(found), figure)],
+        method=METHOD,
         about={"title": "Balancing of known masses"},
-        warnings=[*rotors.table.warnings, *words.warnings(found)],
+        warnings=[*rotors.table.warnings, *warnings(balancing)],
     )

@@ -9,9 +9,9 @@ import numpy as np
 
 from balancing import correct
 from balancing.picture import MOST, KnownMasses, known_masses
-from cli.balance.solve import Balancing
-from cli.read.units import from_si
+from cli.balance.rotors import Balancing
 from cli.show.picture import blank
+from dalembert.units import from_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

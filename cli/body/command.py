@@ -10,8 +10,8 @@ from cli.show.output import command
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.body.solve import ShaftRequest
-    from cli.show.columns import Result
+    from cli.body.moving import ShaftRequest
+    from cli.show.result import Result
 
 _VECTOR = "X,Y,Z"
 
@@ -64,10 +64,10 @@ def run(
     tube radius, inner_radius, length; box width, height, depth; plate width, height; sphere radius, inner_radius;
     tensor ixx iyy izz ixy ixz iyz, products as +∫xy dm; mesh file, file_unit (STL, OBJ). Thin shapes take linear_density_* or area_density_*.
     """
-    from cli.body import columns, words
-    from cli.body.solve import MovingBody, Request
+    from cli.body import tables
+    from cli.body.moving import MovingBody, Request
     from cli.read.parts import read_parts
-    from cli.show.columns import Result
+    from cli.show.result import Result
 
     request = Request(
         omega=options.vector("--omega", omega, "speed"),
@@ -92,45 +92,40 @@ def run(
     if shaft is not None:
         free = {"omega": omega, "alpha": alpha, "frame_omega": frame_omega, "fixed": fixed}
         options.refuse("a shaft turns about z at --speed and --speed-rate", **free, **of_center)
-    found = MovingBody(read_parts(parts), request)
+    moving = MovingBody(read_parts(parts), request)
 
     def figure() -> Figure:
-        from cli.body.picture import draw
-
-        return draw(found)
+        return tables.draw(moving)
 
     return Result(
-        document=lambda: columns.document(found),
-        tables={"body": lambda: columns.axes(found)},
-        screen=lambda: columns.quantities(found),
-        notes=lambda: words.notes(found),
+        tables=tables.tables(moving),
+        screen=lambda: tables.quantities(moving),
         figure=figure,
-        method=words.METHOD,
+        method=tables.METHOD,
         about={
             "title": "A shaft on two bearings"
             if shaft is not None
             else "Mass properties and motion of a body"
         },
-        warnings=[*found.parts.warnings, *words.warnings(found)],
+        warnings=[*moving.parts.warnings, *tables.warnings(moving)],
     )
 
 
 def _inertias(file: str) -> Result:
     from pathlib import Path
 
-    from cli.body.inertias import checks, document, table, warnings
-    from cli.read.files import read_bytes
+    from cli.body.inertias import checks, table, warnings
     from cli.read.robots.reading import read
-    from cli.show.columns import Result
+    from cli.show.result import Result
+    from dalembert.tables.files import read_bytes
 
     name, data = read_bytes(file)
     robot = read(name, data, None if file == "-" else Path(file).parent)
-    found = checks(robot)
+    each = checks(robot)
     return Result(
-        document=lambda: document(found),
-        tables={"inertias": lambda: table(found)},
-        warnings=warnings(robot, found),
-        failed=lambda: not all(check.valid for check in found),
+        tables={"inertias": lambda: table(each)},
+        warnings=warnings(robot, each),
+        failed=lambda: not all(check.valid for check in each),
     )
 
 
@@ -141,7 +136,7 @@ def _shaft(
     gravity: str | None,
     correct: list[str] | None,
 ) -> ShaftRequest | None:
-    from cli.body.solve import ShaftRequest
+    from cli.body.moving import ShaftRequest
     from cli.read.planes import from_options
 
     if shaft is None:

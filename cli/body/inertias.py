@@ -6,23 +6,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.errors import DataError
 from cli.read.robots.robot import DIAGONAL_FIRST, PLACES, ROWS, Inertial, Robot, RobotLink, symmetric
-from cli.show.columns import Column, Table
+from dalembert.errors import DataError
+from dalembert.results.columns import Table, names, number, vector
 from rigidbody3d import inertia
-
-if TYPE_CHECKING:
-    from cli.show.columns import Document
 
 Array = NDArray[np.float64]
 
 SLIPS = {1: "a slipped decimal", 2: "a slipped decimal", 3: "g for kg", 6: "mm for m"}
 ROUNDING = 1e-12
+# of a whole tensor, either way
+UNITS = {1e3: "g for kg, or a slipped decimal point, in all entries", 1e6: "mm for m", 1e9: "g mm² for kg m²"}
+# moments of what reaches so far lie between this share of m·r² and all of it: less is a point beside its joints
+LIGHT = 1e-3
 # without shapes a link is taken to reach no farther than this many times its joints
 ROOM = 3.0
 
@@ -42,7 +43,9 @@ class Check:
     link: RobotLink
     held: Inertial
     reach: float | None
-    """How far from its centre of mass the link has shapes or joints, m."""
+    """How far from its centre of mass the link reaches at most, m, by its shapes, its joints or the whole robot."""
+    spans: float = 0.0
+    """How far from it the link has shapes or joints for certain, m."""
 
     @cached_property
     def moments(self) -> Array:
@@ -79,7 +82,7 @@ class Check:
         if self.held.mass < 0:
             return "a stray minus sign in the mass"
         if self.missing == 0:
-            return self._too_large()
+            return self._whole()
         guesses = self._signs() or self._decimals()
         if guesses:
             least = min(g.spread for g in guesses)
@@ -89,7 +92,7 @@ class Check:
             return "entries in another order"
         if _can_be(self.held.tensor + self._carried()):
             return "the term m·d² of the parallel axis taken off once too often: about the origin instead of the centre"
-        return None
+        return self._whole()
 
     def _carried(self) -> Array:
         """What the parallel axis theorem adds at the link's origin, in the tensor's axes."""
@@ -129,22 +132,32 @@ class Check:
         pairs = zip(ROWS, DIAGONAL_FIRST, strict=True)
         return symmetric({meant: float(self.held.tensor[PLACES[typed]]) for typed, meant in pairs})
 
-    def _too_large(self) -> str | None:
-        """A body that reaches no farther than r from its centre has no moment above m·r²."""
-        held = self.held
-        if self.reach is None or held.mass <= 0:
+    def _whole(self) -> str | None:
+        """A body that reaches no farther than r from its centre has no moment above m·r², one that spans r hardly 0."""
+        held, largest = self.held, float(self.moments[2])
+        if held.mass <= 0 or largest <= 0:
+            return None
+        if self.too_small:
+            most = held.mass * self.spans**2
+            return _units(most / largest)
+        if self.reach is None or largest <= held.mass * self.reach**2 * (1 + 1e-9):
             return None
         most = held.mass * self.reach**2
-        if self.moments[2] <= most * (1 + 1e-9):
-            return None
         if np.linalg.norm(held.pose[:3, 3]) > 0:
             central = held.tensor - self._carried()
             if _can_be(central, 1e-3) and inertia.principal(central).moments[2] <= most * (1 + 1e-9):
                 return "about the origin instead of the centre of mass"
-        for factor, what in ((1e3, "g for kg"), (1e6, "mm for m"), (1e9, "g mm² for kg m²")):
-            if self.moments[2] / factor <= most and self.moments[2] / factor >= 1e-3 * most:
-                return what
-        return None
+        return _units(largest / (LIGHT * most))
+
+    @property
+    def too_small(self) -> bool:
+        """Whether its moments are those of a point beside what it spans."""
+        return 0 < float(self.moments[2]) < LIGHT * self.held.mass * self.spans**2
+
+
+def _units(times: float) -> str | None:
+    """Name the least power that brings moments back which are so many times off, and at most a thousand times as much."""
+    return next((what for power, what in UNITS.items() if power <= times <= power / LIGHT), None)
 
 
 def _can_be(tensor: Array, room: float = 1e-9) -> bool:
@@ -159,6 +172,7 @@ def _spread(tensor: Array) -> float:
 def checks(robot: Robot) -> list[Check]:
     """Return the check of every link whose tensor the file gives."""
     found = []
+    places = [end for j in robot.joints.values() for end in j.ends]
     for link in robot.links.values():
         held = link.inertial
         if held is None:
@@ -170,47 +184,35 @@ def checks(robot: Robot) -> list[Check]:
             for body, end in zip((j.parent, j.child), j.ends, strict=True)
             if body == link.name
         ]
-        reaches = [float(np.linalg.norm(end - center)) for end in ends]
-        reach: float | None = ROOM * max(reaches) if reaches else None
+        spans = max((float(np.linalg.norm(end - center)) for end in ends), default=0.0)
+        reach = ROOM * (
+            spans or max((float(np.linalg.norm(place - center)) for place in places), default=0.0)
+        )
         if link.shapes:
             at = held.pose[:3, 3]
             reach = max(float(np.linalg.norm(c - at)) + r for c, r in link.shapes)
-        found.append(Check(link, held, reach or None))
+            spans = max(float(r) for _, r in link.shapes)
+        found.append(Check(link, held, reach or None, spans))
     return found
 
 
-# -- what is shown of it: JSON, columns, words -----------------------------------------------------------
-
-
-def document(found: Sequence[Check]) -> Document:
-    """Return the JSON document."""
-    return {
-        "bodies": [
-            {
-                "link": c.link.name,
-                "valid": c.valid,
-                "principal_kg_m2": c.moments.tolist(),
-                "nearest_kg_m2": c.nearest.tolist(),
-                "likely": c.likely,
-            }
-            for c in found
-        ]
-    }
-
-
-def table(found: Sequence[Check]) -> Table:
-    """Return a row for each link: whether a body can have its tensor, its moments, the nearest tensor's entries."""
+def table(every: Sequence[Check]) -> Table:
+    """Return a row for each link: whether a body can have its tensor, its moments, the nearest tensor."""
     columns = [
-        Column("link", "", [c.link.name for c in found]),
-        Column("valid", "", ["yes" if c.valid else "no" for c in found]),
+        names("link", [c.link.name for c in every]),
+        names("valid", ["yes" if c.valid else "no" for c in every]),
     ]
-    columns += [Column(f"principal_{k + 1}", "kg_m2", [float(c.moments[k]) for c in found]) for k in range(3)]
+    columns[1].stored = [c.valid for c in every]
+    moments = np.array([c.moments for c in every]).reshape(-1, 3)
+    columns += vector("principal", "inertia", moments, "123")
     columns += [
-        Column(f"nearest_{entry}", "kg_m2", [float(c.nearest[place]) for c in found])
+        number(f"nearest_{entry}", "inertia", [float(c.nearest[place]) for c in every], place=None)
         for entry, place in PLACES.items()
     ]
-    columns.append(Column("likely", "", [c.likely for c in found]))
-    return Table(columns, keys=("link",))
+    columns.append(names("likely", [c.likely for c in every]))
+    nearest = names("nearest_kg_m2", [None] * len(every))
+    nearest.stored = [c.nearest.tolist() for c in every]
+    return Table(columns, keys=("link",), place="bodies[]", documented=[nearest])
 
 
 def warnings(robot: Robot, found: Sequence[Check]) -> list[str]:
@@ -228,7 +230,6 @@ def warnings(robot: Robot, found: Sequence[Check]) -> list[str]:
                 f"link '{c.link.name}': no body has it: {moments}: {'the first ' if I1 < 0 else ''}{why}{hint}"
             )
         elif hint:
-            said.append(
-                f"link '{c.link.name}': a body can have it, but it is larger than the link's reach allows{hint}"
-            )
+            off = "smaller than its span suggests" if c.too_small else "larger than the link's reach allows"
+            said.append(f"link '{c.link.name}': a body can have it, but it is {off}{hint}")
     return said

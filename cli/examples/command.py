@@ -8,11 +8,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.errors import DataError, nearest
 from cli.show.output import reported
+from dalembert.errors import DataError
+from dalembert.hints import nearest
 
 if TYPE_CHECKING:
-    from cli.show.columns import Result, Section
+    from cli.show.result import Result, Section
 
 EXAMPLES = Path(__file__).parent
 ABOUT = "example.toml"
@@ -34,7 +35,7 @@ Arguments:
 @reported(OPTIONS)
 def run(name: str | None = None) -> Result:
     """List the worked examples; with NAME, write its input files into the current folder and show its command."""
-    from cli.show.columns import Result, Sheet
+    from cli.show.result import Result, Sheet
 
     listed = names() if name is None else [name]
     if name is not None and name not in names():
@@ -80,8 +81,8 @@ def _here(name: str) -> dict[Path, tuple[bytes, str]]:
 
 def _section(name: str, said: Mapping[str, str], files: Mapping[Path, tuple[bytes, str]]) -> Section:
     """Return what a report says of an example, and its files."""
-    from cli.show.columns import Section
     from cli.show.report import CODE, LINES
+    from cli.show.result import Section
 
     parts = [said["line"], f"source: {said['source']}", CODE + said["command"]]
     for here, (data, _) in files.items():

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.errors import DataError
 from cli.read.options import bad
 from cli.show.output import reported
+from dalembert.errors import DataError
 
 if TYPE_CHECKING:
-    from cli.show.columns import Result, Sheet
+    from cli.show.result import Result, Sheet
 
 FORMATS = {
     ".dxf": "drawing (DXF), and curves over the travel of the input",
@@ -43,10 +43,11 @@ def run(file: str, output: Path, at: str | None = None) -> Result:
     A drawing shows the pose of the file's own input, and the curves over the travel of the input; a robot starts in that
     pose, closed to the last digit. What a format cannot hold is named on standard error.
     """
+    from cli.cases.axes import grids
+    from cli.cases.description import load
+    from cli.cases.inputs import of_one
     from cli.exports.written import written
-    from cli.mechanism.read import wanted
-    from cli.mechanism.solve import load
-    from cli.show.columns import Result
+    from cli.show.result import Result
     from virtualwork import MechanismError
 
     suffix = output.suffix.lower()
@@ -54,7 +55,8 @@ def run(file: str, output: Path, at: str | None = None) -> Result:
         raise bad("-o", f"'{output}': expected a name that ends in {', '.join(FORMATS)}")
     given = load(file)
     m, bare = given.mechanism, given.bare
-    inputs = tuple(wanted(m, None if at is None else [at], None, None, bare).values[0].tolist())
+    _, moved = grids(m, None if at is None else [at], None, None, bare, [])
+    inputs = tuple(of_one(m, moved).part(0, 1).values[0].tolist())
     name = "standard input" if file == "-" else Path(file).name
     try:
         data, notes = written(m, inputs, suffix, name, bare)
@@ -62,8 +64,8 @@ def run(file: str, output: Path, at: str | None = None) -> Result:
         raise DataError(f"{file}: {error}") from None
 
     def sheets() -> list[Sheet]:
-        from cli.mechanism.posed import posed
-        from cli.show.columns import Section
+        from cli.cases.posed import posed
+        from cli.show.result import Section
 
         whole = [] if notes else ["Nothing is left out."]
         first = Section("Written", [f"{output.name}: {FORMATS[suffix]}, {len(data)} bytes", *whole])

@@ -9,10 +9,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cli.errors import DataError
 from cli.exports.markup import add, digits, document
 from cli.exports.skeleton import Skeleton
 from cli.exports.travel import Travel
+from dalembert.errors import DataError
 from virtualwork import drawing
 from virtualwork.describe.parts import GROUND
 from virtualwork.drawing import Circle, Line, standing

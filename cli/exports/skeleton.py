@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cli.errors import DataError
 from cli.read.names import Groups, unused
+from dalembert.errors import DataError
 from virtualwork.describe.parts import GROUND, TorsionSpring
 from virtualwork.drawing import hull
 from virtualwork.parts_of_motion import SlideMotion

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.errors import DataError
 from cli.exports.drawing import DXF_UNITS, draw, dxf, svg
 from cli.exports.skeleton import Skeleton
 from cli.exports.travel import Travel
-from cli.read.units import UNITS
-from cli.show.text import csv_text
-from virtualwork.describe.units import unit
+from dalembert.errors import DataError
+from dalembert.results.text import csv_text
+from dalembert.units import UNITS, to_si
 
 if TYPE_CHECKING:
     from virtualwork import Mechanism
@@ -28,23 +27,22 @@ def written(
     """
     travel = Travel(m)
     length = bare.get("length", "m")
-    found = unit(length)
-    assert found is not None
+    metres = to_si(1.0, "length", length)
     if suffix == ".csv":
-        return _curves(travel, length, found[0], bare.get("angle", "rad")), []
+        return _curves(travel, length, metres, bare.get("angle", "rad")), []
     s = Skeleton(m, inputs, travel.limits)
     said = _said(m, inputs, file)
     if suffix in (".dxf", ".svg"):
         if length not in DXF_UNITS:
-            length, found = "m", (1.0, found[1])
-        drawing = draw(s, travel, length, found[0])
+            length, metres = "m", 1.0
+        drawing = draw(s, travel, length, metres)
         notes = (
             []
             if travel.motion is not None
             else ["curves are left out: they need one input, and it has several"]
         )
         if suffix == ".svg":
-            return svg(drawing, said, found[0] * 1000), notes
+            return svg(drawing, said, metres * 1000), notes
         return dxf(drawing, said), notes
     from cli.exports.mjcf import mjcf
     from cli.exports.sdf import sdf
@@ -71,7 +69,7 @@ def _curves(travel: Travel, length: str, factor: float, angle: str) -> bytes:
     m = travel.m
     if travel.motion is None:
         raise DataError(
-            "curves are of one input, and it has several: `dalembert mechanism --inputs` takes them"
+            "curves are of one input, and it has several: `dalembert mechanism --cases` takes them"
         )
     if length not in UNITS["length"]:
         length, factor = "m", 1.0

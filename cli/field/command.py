@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -16,50 +17,62 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cli.field.solve import FieldBalancing
-    from cli.show.columns import Document, Result, Sheet, Table
+    from cli.field.field_balancing import FieldBalancing
+    from cli.field.tables import Tables
+    from cli.show.result import Result, Sheet
+    from dalembert.results.columns import Column, Table
 
 
 EXAMPLE = "fan-one-plane"
+FEWEST_DRAWS = 40  # they give a standard deviation to a ninth
 OPTIONS = """
 Arguments:
   runs RUNS  CSV of runs; - is standard input.
 What:
-  influence COEFFICIENTS.csv  Stored coefficients in place of trial runs; of several machines (repeatable), or with uncertainties: prior knowledge of a fit.
+  influence FILE.csv  Stored coefficients, in place of trial runs.
   runout FILE.csv  Run-out vectors: sensor, amplitude_*, phase_deg.
   phase_lag  The instrument's phase lags.
-  rotation  Seen against +z: phases lead in that sense, mass angles are ccw.
-  exclude RUN  Leave a run out of the fit; repeatable.
-  signal FILE.csv  Once-per-turn vectors of a recording: t_s, mark, A_um …; no RUNS.
-  pulses  Pulses of the mark in a turn, for --signal.
-  workers N  Processes that solve what each of many machines needs alone.
 How:
-  objective  Least sum of squares of the residuals, or the smallest largest one.
-  max_mass [PLANE=]MASS  Limit of each correction (5g), or of one plane's (A=5g).
-  max_residual AMPLITUDE  No residual beyond this, such as 76um.
-  from_here  What to add to the rotor as it stands, kept trial masses on.
-  reading_error 2%,2deg  Standard deviations of amplitude and phase: adds uncertainties.
-  monte_carlo N  Uncertainties from N drawn sets of readings.
-  method  By influence coefficients, or by amplitudes only in one plane.
-  ridge NUMBER  Damp the corrections of nearly dependent planes, such as 0.1.
-  fit  Fit all runs at once, the initial one too (implied where runs are more than unknowns).
-  robust  Beside the fit one that hardly counts outliers (Huber).
-How: the tolerance, the first trial mass:
-  grade GRADE  Balance quality grade of ISO 21940-11, such as G6.3.
-  speed SPEED  Highest service speed, such as 3000rpm.
-  rotor_mass MASS  Mass of the rotor, such as 120kg.
-  permissible UNBALANCE  Permissible residual unbalance in place of a grade.
-  radius LENGTH  Radius of the trial masses: for the tolerance.
-  suggest_trial  Suggest a trial mass for --rotor-mass, --speed, --radius and --planes; no RUNS.
-  planes N  Number of planes, for --suggest-trial.
+  objective  Smallest squares or largest residual.
+  max_mass [PLANE=]MASS  Limit of each correction: 5g or A=5g.
+  max_residual AMPLITUDE  Limit of each residual, such as 76um.
+  from_here  Correct the rotor as it stands now.
+  reading_error 2%,2deg  Standard deviations of amplitude, phase.
+  grade GRADE  Tolerance: G6.3 (ISO 21940-11), API or MIL.
+  fit  Fit all runs, even where few are needed.
 Output: where masses go, the next run:
   save_influence FILE.csv  Store the coefficients.
-  blades N  Split the corrections onto so many places, evenly spaced.
-  positions ANGLES  Split them onto these places: 0deg,30deg,60deg.
+  blades N  Split onto N places, evenly spaced.
+  predict MASS@ANGLE,…  Predict a run: 10kg@-90deg or A=1g@0deg.
+Further options (docs/commands.md describes them):
+  columns FILE.toml  Read columns by other headers: lines such as mass_g = "Masse", as --column has them.
+  rotation  Direction of rotation seen against +z: phases lead in that direction, mass angles are ccw.
+  exclude RUN  Leave a run out of the fit; repeatable.
+  method  By influence coefficients, or by amplitudes only in one plane.
+  monte_carlo N  Uncertainties from N drawn sets of readings, 40 at least.
+  ridge NUMBER  Damp the corrections of nearly dependent planes, such as 0.1.
+  robust  In addition to the fit a robust one, on which outliers have little influence (Huber).
+  speed SPEED  Highest service speed, such as 3000rpm, for --grade.
+  rotor_mass MASS  Mass of the rotor, such as 120kg, for --grade.
+  permissible UNBALANCE  Permissible residual unbalance in place of a grade.
+  radius LENGTH  Radius of the trial masses, for the tolerance.
+  positions ANGLES  Split the corrections onto these places: 0deg,30deg,60deg.
   first ANGLE  Angle of the first of --blades.
-  predict [PLANE=]MASS@ANGLE,…  What a run with these masses should read: 10kg@-90deg.
-  suggest  The run within --max-mass that would tell most about the correction.
+  suggest  Suggest the next run within --max-mass that tells most about the corrections.
+  view  static-couple: the corrections of two planes as a static part and a couple.
+  workers N  Processes that solve many machines.
+Moved:
+  signal  Now dalembert signal.
+  pulses  Now dalembert signal.
+  suggest_trial  Now dalembert trial.
+  planes  Now dalembert trial.
 """
+MOVED = {
+    "signal": "dalembert signal FILE.csv",
+    "pulses": "dalembert signal FILE.csv --pulses N",
+    "suggest_trial": "dalembert trial --rotor-mass MASS --speed SPEED --radius LENGTH",
+    "planes": "dalembert trial --planes N",
+}
 
 
 @command(OPTIONS)
@@ -83,8 +96,6 @@ def run(
     rotor_mass: str | None = None,
     permissible: str | None = None,
     radius: str | None = None,
-    suggest_trial: bool = False,
-    planes: Annotated[int, typer.Option(min=1)] = 1,
     blades: Annotated[int | None, typer.Option(min=1, max=options.PLACES)] = None,
     positions: str | None = None,
     first: str = "0deg",
@@ -93,17 +104,27 @@ def run(
     predict: str | None = None,
     suggest: bool = False,
     robust: bool = False,
-    signal: str | None = None,
-    pulses: Annotated[int, typer.Option(min=1, max=10000)] = 1,
+    view: Literal["static-couple"] | None = None,
+    columns: str | None = None,
     workers: Annotated[int, typer.Option(min=1)] = 1,
+    signal: Annotated[str | None, typer.Option(hidden=True)] = None,
+    pulses: Annotated[str | None, typer.Option(hidden=True)] = None,
+    suggest_trial: Annotated[bool, typer.Option(hidden=True)] = False,
+    planes: Annotated[str | None, typer.Option(hidden=True)] = None,
 ) -> Result:
     """Balance rotors from measured vibration and trial masses (influence coefficients).
 
     RUNS has a row for each run and sensor: run, sensor, amplitude_*, phase_deg, trial_plane, trial_mass_* (or
-    trial_unbalance_*), trial_angle_deg, these three empty in the initial run; if wanted rotor, speed_*, weight
-    and trial_kept (yes: the trial mass stays on in all later runs). Several trial masses in one run are joined
-    by ';'. Phase and mass angle are counted in one common sense. amplitude_um_pp, _pk, _rms tell how it is read.
+    trial_unbalance_*), trial_angle_deg; in the initial run the last three are empty. trial_kept is yes where the trial
+    mass stays on. Phase and mass angle are counted in one sense. docs/field-balancing.md has the other columns.
     """
+    old = {"signal": signal, "suggest_trial": suggest_trial, "pulses": pulses, "planes": planes}
+    for name in options.given(**old):
+        raise options.bad(name, f"is a command of its own: {MOVED[name[2:].replace('-', '_')]}")
+    if columns is not None:
+        from dalembert.tables.headers import rename_from
+
+        rename_from(columns)
     four_run = method == "four-run"
     needs_phase: dict[str, object] = {"influence": influence, "runout": runout}
     needs_phase |= {"reading_error": reading_error, "phase_lag": phase_lag, "rotation": rotation}
@@ -115,31 +136,23 @@ def run(
     no_trials = "has no meaning with --influence: there are no trial masses"
     options.refuse(no_trials, from_here=from_here and influence)
     options.refuse("needs --reading-error", monte_carlo=monte_carlo and reading_error is None)
+    if 0 < monte_carlo < FEWEST_DRAWS:
+        spread = 100 / (2 * monte_carlo) ** 0.5
+        few = f"{monte_carlo} drawn set{'s' * (monte_carlo > 1)} of readings give a standard deviation to {spread:.0f} % only"
+        raise options.bad("--monte-carlo", f"{few}: expected {FEWEST_DRAWS} at least")
     arm = options.quantity("--radius", radius, "length", positive=True)
-    if suggest_trial:
-        no_runs = "is for the time before the first run: expected no RUNS"
-        options.refuse(no_runs, suggest_trial=runs is not None)
-        from cli.field.trial import suggestion
-
-        return suggestion(rotor_mass, speed, arm, planes)
-    if signal is not None:
-        options.refuse("reads a recording: expected no RUNS", signal=runs is not None)
-        from cli.field.signal import signal as recorded
-
-        return recorded(signal, pulses)
-    options.refuse("goes with --signal", pulses=pulses != 1)
     if runs is None:
         raise typer.BadParameter("expected RUNS, a CSV file or -", param_hint="RUNS")
 
-    from cli.field import request as asked
-    from cli.field.measured import read_measured
-    from cli.field.solve import FieldBalancing
+    from cli.field import request as read
+    from cli.field.field_balancing import FieldBalancing
+    from cli.field.readers import read_measured
     from cli.read.tolerance import tolerance_of
 
-    request = asked.Request(
-        reading_error=asked.reading_error(reading_error),
+    request = read.Request(
+        reading_error=read.reading_error(reading_error),
         tolerance=tolerance_of(grade, speed, rotor_mass, permissible, None),
-        max_mass=asked.limits(max_mass or []),
+        max_mass=read.limits(max_mass or []),
         max_residual=options.with_unit("--max-residual", max_residual, "amplitude", positive=True),
         objective=objective,
         from_here=from_here,
@@ -155,68 +168,101 @@ def run(
         predict=predict,
         suggest=suggest,
         robust=robust,
+        view=view,
     )
     measured, stored = read_measured(runs, request, influence or (), runout)
     with options.processes(workers) as executor:
-        found = FieldBalancing(measured, request, stored, executor)
-    return _result(found, save_influence)
+        balancing = FieldBalancing(measured, request, stored, executor)
+    return _result(balancing, save_influence)
 
 
-def _result(found: FieldBalancing, save_influence: Path | None) -> Result:
-    from cli.field import columns, remarks, words
-    from cli.show.columns import Result
+def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
+    from cli.field.doubts import warnings
+    from cli.field.tables import METHOD, sense
+    from cli.show.result import Result
 
-    warnings, fitted = remarks.warnings(found), found.runs.fitted
-    if fitted:
-        from cli.field import fit, fit_words
+    if b.runs.fitted:
+        from cli.field.fits import check
 
-        fit.check(found)
-        warnings += fit.remarks(found)
+        check(b)
+    remarks = warnings(b)
+    tables = _tables(b, remarks)
 
-    # what is not always asked for is loaded where it is
-    def influence() -> Table:
-        from cli.field.coefficient_columns import coefficients
+    def stored() -> bytes:
+        from dalembert.results.text import csv_text
 
-        return coefficients(found)
+        return csv_text(tables["influence"]().cells).encode()
 
     def sheets() -> Iterator[Sheet]:
         from cli.field.report import sheets
 
-        return sheets(found)
-
-    def stored() -> bytes:
-        from cli.show.text import csv_text
-
-        return csv_text(influence().cells).encode()
-
-    def document() -> Document:
-        from cli.field.document import document
-
-        return document(found)
+        return sheets(b, tables)
 
     def figure() -> Figure:
         from cli.field.picture import draw
 
-        return draw(found, range(min(len(found.runs.rotors), 3)))
+        return draw(b, range(min(len(b.runs.rotors), 3)))
 
-    companions = {"prediction": lambda: columns.prediction(found)}
-    if found.request.places is not None:
-        companions["split"] = lambda: columns.split(found)
-    tables = {"corrections": lambda: columns.corrections(found, warnings), "influence": influence}
-    tables |= companions
-    if fitted:
-        tables["residuals"] = lambda: columns.residuals(found)
+    def aside() -> list[str]:
+        if b.predict is None:
+            return []
+        from cli.field.fits import prediction_lines
+
+        return prediction_lines(b)
+
     return Result(
-        document=document,
         tables=tables,
-        companions=list(companions),
-        notes=lambda: (fit_words.notes(found) if fitted else "") + words.notes(found),
-        afterword=lambda: words.afterword(found) + (fit_words.afterword(found) if fitted else ""),
+        head={
+            "correction": "add",
+            "state": "as it stands" if b.request.from_here else "initial",
+            "convention": sense(b),
+            "amplitude_unit": b.runs.amplitude_unit,
+        },
+        aside=aside,
+        companions=[name for name in ("prediction", "split", "predict") if name in tables],
         figure=figure,
-        method=words.METHOD,
+        method=METHOD,
         sheets=sheets,
         shows_input=True,
         about={"title": "Balancing in the field"},
         beside={} if save_influence is None else {save_influence: stored},
-        warnings=warnings,
+        warnings=remarks,
     )
+
+
+def _tables(b: FieldBalancing, warnings: list[str]) -> Tables:
+    """The tables of a result, the CSV's first. `warnings` takes in why --digits leaves a correction whole."""
+    from cli.field import tables as of
+
+    def influence() -> Table:
+        # loaded where it is asked for
+        from cli.field.coefficients import coefficients
+
+        return coefficients(b)
+
+    fits: Tables = {}
+    further: list[Column] = []
+    if b.runs.fitted:
+        from cli.field.fits import tables, unsuggested
+
+        fits = tables(b)
+        further = [unsuggested(b)] if b.request.suggest else []
+    made: Tables = {
+        "corrections": cache(lambda: of.corrections(b, warnings)),
+        "influence": influence,
+        "prediction": lambda: of.prediction(b),
+    }
+    if b.request.places is not None:
+        made |= {"split": lambda: of.split(b), "trim_split": lambda: of.trim_split(b)}
+    made |= {
+        "trim": lambda: of.trim(b),
+        "standing": lambda: of.standing(b),
+        "rotors": lambda: of.rotors(b, further),
+    }
+    if b.request.tolerance is not None:
+        made["tolerance"] = lambda: of.tolerance(b)
+    if b.request.four_run:
+        made |= {"misfit": lambda: of.misfit(b), "alternatives": lambda: of.alternatives(b)}
+    if b.request.view is not None:
+        made |= {"static": lambda: of.static_couple(b, 0), "couple": lambda: of.static_couple(b, 1)}
+    return {**made, **fits}

@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cli.errors import DataError
-from cli.field.read import runs_table
-from cli.read.decoding import LINE
-from cli.read.sources import Source, open_source
-from cli.read.tables import Cells, Numbers, Table
-from cli.read.units import parse_number, phasor
+from cli.field.trial_runs import runs_table
+from cli.field.wide import is_wide
+from dalembert.angles import phasor
+from dalembert.errors import DataError
+from dalembert.quantities import parse_number
+from dalembert.tables.sources import LINE, Source, open_source
+from dalembert.tables.table import Cells, Numbers, Table
 
 NAMES = {
     "mode": "state",
@@ -75,6 +76,8 @@ def is_log(path: str) -> bool:
     source = open_source(path, {}, None)
     if _keyed_text(source) is not None:
         return True
+    if is_wide(source):
+        return False
     columns = {each.name.lower() for each in source.headings}
     own = any(name.startswith(("mass_", "unbalance_")) for name in columns)
     own = own and not any(name.startswith(("trial_mass", "trial_unbalance")) for name in columns)

@@ -8,18 +8,20 @@ from datetime import datetime
 
 import numpy as np
 
-from cli.errors import DataError, quote
 from cli.field.layouts import Layout, log_table
 from cli.field.log_groups import Logs
 from cli.field.log_rows import LogRows, Masses, numbered
-from cli.field.read import NEAR_SPEED
 from cli.field.request import Request
 from cli.field.runs import Channel, Real, Rows, Runs
 from cli.field.sisters import Sisters
+from cli.field.trial_runs import NEAR_SPEED
 from cli.read.options import bad
 from cli.read.rounding import vector_error
-from cli.read.tables import Cells, Table
-from cli.read.units import LARGEST, UNITS, phasor, to_si
+from dalembert.angles import phasor
+from dalembert.errors import DataError, quote
+from dalembert.quantities import parse_number
+from dalembert.tables.table import Cells, Table
+from dalembert.units import LARGEST, UNITS, to_si
 
 _ISO = re.compile(
     r"(\d{4})[-/](\d{1,2})(?:[-/](\d{1,2}))?(?:[T ]+(\d{1,2}):(\d{2})(?::(\d{2})(?:\.\d+)?)?Z?)?"
@@ -161,7 +163,8 @@ def _on_top(
     for i, text in enumerate(table.texts["ref"]):
         before = seen.setdefault((int(rotor[i]), state[i], sensor[i]), [])
         try:
-            below = int(float(text.replace(",", "."))) if text else -1
+            number = parse_number(text.replace(",", ".")) if text else -1
+            below = int(number) if number == int(number) else 0
         except ValueError:
             below = 0
         own = len(before) + 1

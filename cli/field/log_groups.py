@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import JointFit, determined, fit_with_prior, joint_fit, phase_sense
-from cli.errors import DataError
 from cli.field.log_rows import LogRows, Part, Sorted
 from cli.field.request import Request
 from cli.field.runs import SHOWN, Before, Complex, Group, Real, Rows, Runs
 from cli.field.sisters import Sisters
+from dalembert.errors import DataError
 
 Flags = NDArray[np.bool_]
 
@@ -105,7 +105,8 @@ class Logs:
                 fit.initial,
                 np.zeros((g, 0, s), dtype=complex),
                 none,
-                part.kept,
+                part.standing,
+                part.last,
                 part.weights,
                 np.ones((1, s), dtype=np.intp),
                 np.zeros((g, 1, s)),
@@ -154,11 +155,11 @@ class Logs:
                     f"expected {', '.join(known)}"
                 )
         at = [known.index(plane) for plane in planes]
-        masses, kept = (
-            np.zeros((*of.shape[:-1], len(known)), dtype=complex) for of in (part.masses, part.kept)
+        masses, standing = (
+            np.zeros((*of.shape[:-1], len(known)), dtype=complex) for of in (part.masses, part.standing)
         )
-        masses[..., at], kept[..., at] = part.masses, part.kept
-        return part._replace(planes=known, masses=masses, kept=kept)
+        masses[..., at], standing[..., at] = part.masses, part.standing
+        return part._replace(planes=known, masses=masses, standing=standing)
 
     def _say_lost(self, part: Part, keep: Flags) -> None:
         """Say which channels (g, s) the runs do not determine, and which run would; refuse a rotor without others."""

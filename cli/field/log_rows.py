@@ -9,9 +9,9 @@ from typing import NamedTuple, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.errors import DataError
-from cli.field.read import NO, YES
 from cli.field.runs import SHOWN, Channel, Complex, Log, Real, Rows, Runs
+from cli.field.trial_runs import NO, YES
+from dalembert.errors import DataError
 
 
 class Masses(NamedTuple):
@@ -112,8 +112,10 @@ class Part(NamedTuple):
     """(g, r, s)."""
     masses: Complex
     """(g, r, p)."""
-    kept: Complex
-    """What stays on after the last run, (g, p)."""
+    standing: Complex
+    """What is on the rotor in its last run, (g, p)."""
+    last: list[str]
+    """What that run is called, (g,)."""
     weights: Real | None
     """(g, s)."""
 
@@ -126,7 +128,8 @@ class Part(NamedTuple):
             self.planes,
             self.readings[np.ix_(rotors, lines, channels)],
             self.masses[np.ix_(rotors, lines)],
-            self.kept[rotors],
+            self.standing[rotors],
+            [self.last[k] for k in rotors],
             None if self.weights is None else self.weights[np.ix_(rotors, channels)],
         )
 
@@ -185,7 +188,7 @@ class Sorted:
         self._on()
 
     def _on(self) -> None:
-        """Tell what was on in each run, and what stays on after the last one of each rotor."""
+        """Tell what was on in each run, the last one of each rotor among them."""
         rows, masses = self.rows, self.rows.masses
         place = np.empty(len(self.order), dtype=np.intp)
         place[self.order] = np.arange(len(self.order))
@@ -210,20 +213,19 @@ class Sorted:
         self.has[self.run[at], self.planes.place] = True
         self.on = on
         stays = self._stays()
-        standing = np.zeros((rotors, width), dtype=complex)
         if stays.any():
+            standing = np.zeros((rotors, width), dtype=complex)
             for j in range(int(self.runs.count.max())):
                 mine = np.flatnonzero(self.runs.count > j)
                 run = self.runs.start[mine] + j
                 on[run] += standing[mine]
                 standing[mine[stays[run]]] = on[run[stays[run]]]
             self.has |= on != 0
-        if "run" not in rows.of.table.texts:
-            # masses written as on the rotor: where runs are told apart by them the last ones are still on
-            last = np.cumsum(np.bincount(self.rotor, minlength=rotors)) - 1
-            never = ~np.logical_or.reduceat(stays, self.runs.start)
-            standing[never] = on[self.run[last[never]]]
-        self.standing = standing
+        read = np.zeros(len(first), dtype=bool)
+        read[self.run[np.isfinite(rows.vibration[self.order])]] = True
+        numbers = np.where(read, np.arange(len(first)), np.repeat(self.runs.start, self.runs.count))
+        self.last = np.maximum.reduceat(numbers, self.runs.start)
+        """The last run of each rotor in which anything was read."""
 
     def _agree(
         self, told: Rows, first: Rows, at: Rows, plane: Rows, value: Complex, counts: NDArray[np.bool_]
@@ -265,6 +267,13 @@ class Sorted:
     def _planes(self) -> tuple[_Listed, Rows]:
         """List the planes of each rotor in which a run that takes part has a mass, and their columns in `on`."""
         active = np.logical_or.reduceat(self.has & self.takes_part[:, None], self.runs.start, axis=0)
+        alone = (self.on[self.last] != 0) & ~active
+        for rotor, place in np.argwhere(alone)[:SHOWN].tolist():
+            plane = self.rows.masses.planes[self.planes.code[self.planes.start[rotor] + place]]
+            self.warnings.append(
+                f"{self.rows.of.of(rotor)}the last run is excluded, and the mass that stands in plane {plane} with it: the trim "
+                "leaves it out, for no other run has a mass there"
+            )
         rotor, place = np.nonzero(active)
         return _Listed(rotor, self.planes.code[self.planes.start[rotor] + place], len(active)), place
 
@@ -318,7 +327,8 @@ class Sorted:
                 [rows.masses.planes[k] for k in planes.code[columns[0]].tolist()],
                 readings,
                 np.take_along_axis(self.on[run[first]], places[columns][:, None, :], axis=2),
-                np.take_along_axis(self.standing[group], places[columns], axis=1),
+                np.take_along_axis(self.on[self.last[group]], places[columns], axis=1),
+                [rows.runs[k] for k in self.runs.code[self.last[group]].tolist()],
                 self._weights(group, self.order[mine[channels.first[heads]]]),
             )
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import warnings
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
 
-from balancing import Balance, Infeasible, Readings, least_squares, minimax, spread
+from balancing import Balance, Doubtful, Infeasible, NotConverged, Readings, least_squares, minimax, spread
 from cli.field.runs import Complex, Real
+
+ROUNDED = 1 + 64 * float(np.finfo(float).eps)
+"""A residual that is beyond its limit by less than this factor is so by rounding."""
 
 
 class Sought(NamedTuple):
@@ -17,6 +21,7 @@ class Sought(NamedTuple):
     objective: str
     limit: Real | None
     """Of each plane, SI."""
+    ceiling: float | None
     ridge: float
     draws: int | None
 
@@ -31,12 +36,12 @@ def least_maximum(
     Infeasible
         Where even they leave more than the ceiling.
     """
-    fix = minimax(alpha, here, limit, weights=weights)
-    if ceiling is None or float(fix.residual_max) <= ceiling * (1 + 1e-9):
+    fix = _quietly(minimax, alpha, here, limit, weights=weights)
+    if ceiling is None or float(fix.residual_max) <= ceiling * ROUNDED:
         return fix, False
-    least = float(minimax(alpha, here, limit).residual_max) if weights is not None else fix.residual_max
-    if least > ceiling * (1 + 1e-9):
-        raise Infeasible(float(least))
+    least = _quietly(minimax, alpha, here, limit) if weights is not None else fix
+    if float(least.residual_max) > ceiling * ROUNDED:
+        raise Infeasible(float(least.residual_max) / ceiling, np.array([ceiling]))
     return fix, True
 
 
@@ -44,7 +49,14 @@ def within_limits(
     alpha: Complex, here: Complex, limit: Real | None, ceiling: float | None, weights: Real | None
 ) -> tuple[Balance, bool]:
     """Least-squares corrections that keep the limits; the weights never stand against them."""
-    return least_squares(alpha, here, weights, max_mass=limit, max_residual=ceiling), False
+    return _quietly(least_squares, alpha, here, weights, max_mass=limit, max_residual=ceiling), False
+
+
+def _quietly(solve: Callable[..., Balance], *data: object, **limits: object) -> Balance:
+    """Solve without Python's warning: the command reads it from the result."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Doubtful)
+        return solve(*data, **limits)
 
 
 def confidence(
@@ -66,7 +78,7 @@ def confidence(
             covariance = spread(samples, corrections)
         else:
             covariance = readings.covariance(total, weights, sought.ridge, along=corrections)
-    except ValueError:
+    except (ValueError, NotConverged):
         covariance = np.full((len(corrections), 2, 2), np.nan)
     left = np.abs(readings.residual_samples(total, draws)).max(axis=1)
     return covariance, float(np.quantile(left, 0.95))
@@ -80,7 +92,12 @@ def limited_samples(
     for alpha, v in problems:
         here = v + alpha @ standing
         if sought.objective == "minimax":
-            samples.append(minimax(alpha, here, sought.limit, weights=weights).corrections)
+            fix = _quietly(minimax, alpha, here, sought.limit, weights=weights)
         else:
-            samples.append(least_squares(alpha, here, weights, max_mass=sought.limit).corrections)
+            try:
+                fix, _ = within_limits(alpha, here, sought.limit, sought.ceiling, weights)
+            except Infeasible:
+                # readings from which the limit cannot be met: as near to it as can be
+                fix = _quietly(minimax, alpha, here, sought.limit)
+        samples.append(fix.corrections)
     return np.stack(samples)

@@ -9,11 +9,12 @@ import numpy as np
 
 from balancing import region_factor
 from balancing.doubt import LEVEL
-from balancing.picture import Vibration, vibration
-from cli.field.fit import predicted, rows, run_to_predict, suggested
+from balancing.picture import RIM_ROOM, Vibration, rim, vibration
+from cli.field.field_balancing import FieldBalancing
+from cli.field.fits import predicted, rows, run_to_predict, suggested
 from cli.field.runs import Complex, Real
-from cli.field.solve import FieldBalancing, Solved
-from cli.field.words import amplitude_unit
+from cli.field.solution import Solved
+from cli.field.tables import amplitude_unit
 from cli.show.picture import blank
 from dalembert.drawing.labels import Label, place
 from dalembert.drawing.polar import Look, arrow, free_direction
@@ -47,12 +48,7 @@ def _rotor(found: FieldBalancing, rotor: int) -> Vibration:
     k, i = found.place[rotor]
     solved = found.solved[k]
     places = found.request.places or ()
-    split = []
-    for w in solved.corrections[i].tolist() if places else ():
-        masses = [0.0] * len(places)
-        for name, _, mass in found.split(w):
-            masses[int(name) - 1] = float(found.amount(mass))
-        split.append(masses)
+    split = [_on_places(found, w) for w in solved.corrections[i].tolist()] if places else []
     return Vibration(
         found.runs.rotors[rotor] if found.runs.several else "",
         [str(channel) for channel in solved.group.channels],
@@ -60,10 +56,18 @@ def _rotor(found: FieldBalancing, rotor: int) -> Vibration:
         solved.residual[i],
         solved.planes,
         found.amount(solved.corrections[i]),
-        found.amount(solved.standing[i]),
+        found.amount(solved.start[i]),
         places=np.radians(places).tolist(),
         split=split,
     )
+
+
+def _on_places(found: FieldBalancing, w: complex) -> list[float]:
+    """Return what of a correction goes on each of the places, in the unit of the trial masses."""
+    masses = [0.0] * len(found.request.places or ())
+    for name, _, mass in found.split(w):
+        masses[int(name) - 1] = float(found.amount(mass))
+    return masses
 
 
 def _fits(found: FieldBalancing, rotors: Sequence[int], figure: Figure) -> Figure:
@@ -72,7 +76,10 @@ def _fits(found: FieldBalancing, rotors: Sequence[int], figure: Figure) -> Figur
     for rotor in rotors:
         k, i = found.place[rotor]
         blocks.append((rotor, found.solved[k], i))
-    heights = [-(-(min(len(solved.group.channels), CIRCLES) + 3) // ACROSS) for _, solved, _ in blocks]
+    heights = [
+        -(-(min(len(solved.group.channels), CIRCLES) + len(_dials(found, solved)) + 2) // ACROSS)
+        for _, solved, _ in blocks
+    ]
     sheet(11.4, 3.9 * sum(heights) + 0.5, figure)
     parts = figure.subfigures(len(blocks), 1, height_ratios=heights, squeeze=False)[:, 0]
     labels = []
@@ -96,10 +103,13 @@ def _block(
     for s in range(shown):
         axes: PolarAxes = part.add_subplot(cells[s], projection="polar")  # type: ignore[assignment]
         labels.append((axes, _circle(axes, found, solved, i, s)))
-    dial: PolarAxes = part.add_subplot(cells[shown], projection="polar")  # type: ignore[assignment]
-    labels.append((dial, _corrections(dial, found, solved, i)))
-    _regions(part.add_subplot(cells[shown + 1]), found, solved, i)
-    last = shown + 2
+    last = shown
+    for planes in _dials(found, solved):
+        dial: PolarAxes = part.add_subplot(cells[last], projection="polar")  # type: ignore[assignment]
+        labels.append((dial, _corrections(dial, found, solved, i, planes)))
+        last += 1
+    _regions(part.add_subplot(cells[last]), found, solved, i)
+    last += 1
     _residuals(part.add_subplot(grid[last // ACROSS, last % ACROSS :]), found, solved, i, shown)
     return labels
 
@@ -201,10 +211,20 @@ def _ellipse(center: complex, covariance: Real, k: float) -> Complex:
     return np.asarray(center + unit * (along + 1j * across))
 
 
-def _corrections(axes: PolarAxes, found: FieldBalancing, solved: Solved, i: int) -> list[Label]:
-    """Draw the corrections and their 95 % regions; where one is asked for, the next run's masses."""
-    masses = found.amount(solved.corrections[i])
-    known = zip(masses, _spread(found, solved, i), strict=False)
+def _dials(found: FieldBalancing, solved: Solved) -> list[list[int]]:
+    """Return the planes of each dial of corrections: where masses go onto places, each has its own."""
+    planes = list(range(len(solved.planes)))
+    return [[p] for p in planes] if found.request.places else [planes]
+
+
+def _corrections(
+    axes: PolarAxes, found: FieldBalancing, solved: Solved, i: int, planes: list[int]
+) -> list[Label]:
+    """Draw the corrections of planes and their 95 % regions, the places with their masses, and the next run's masses."""
+    every = found.amount(solved.corrections[i])
+    spreads = _spread(found, solved, i)
+    masses, spreads = every[planes], [spreads[p] for p in planes] if spreads else []
+    known = zip(masses, spreads, strict=False)
     outlines = [_ellipse(complex(w), *region) for w, region in known]
     scale = min(_largest(masses, *outlines), 2.5 * _largest(masses))
     for outline in outlines:
@@ -213,11 +233,19 @@ def _corrections(axes: PolarAxes, found: FieldBalancing, solved: Solved, i: int)
         arrow(axes, w, scale, Look(AFTER, 2.2))
     run = suggested(solved, i) if found.request.suggest else None
     if run is not None:
-        at = found.amount(run.masses)
+        at = found.amount(run.masses)[planes]
         scale = max(scale, float(np.abs(at).max()))
         _points(axes, at, "s", SUGGESTED, ms=6)
-    _finished(axes, f"corrections to ADD, {found.unit}", scale, list(masses))
-    return [_label(plane, w, AFTER, 8.0) for plane, w in zip(solved.planes, masses, strict=True)]
+    names = [solved.planes[p] for p in planes]
+    places = found.request.places
+    if not places:
+        _finished(axes, f"corrections to ADD, {found.unit}", scale, list(masses))
+        return [_label(plane, w, AFTER, 8.0) for plane, w in zip(names, masses, strict=True)]
+    (plane,) = planes
+    named = f"plane {names[0]}: " if len(solved.planes) > 1 else ""
+    _finished(axes, f"{named}correction to ADD, {found.unit}", RIM_ROOM / 1.15 * scale, list(masses))
+    split = _on_places(found, complex(solved.corrections[i, plane]))
+    return rim(axes, np.radians(places), split, found.unit, scale)
 
 
 def _spread(found: FieldBalancing, solved: Solved, i: int) -> list[tuple[Real, float]]:

@@ -1,88 +1,136 @@
-"""What the report of a balancing in the field says: before, after, what to trim, the verdict; a page for each rotor."""
+"""The report of a balancing in the field: before, after, what to trim, the verdict; a page for each rotor."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from cli.field import columns, fit_words, picture, words
+from cli.field import picture
+from cli.field.field_balancing import FieldBalancing
 from cli.field.runs import Complex, Real
-from cli.field.solve import FieldBalancing, Solved
-from cli.field.tolerance import LastRun, first_reading, last_run, measured_verdicts, verdicts
-from cli.read.units import degrees, from_si
-from cli.show.columns import Column, Section, Sheet, Table
-from cli.show.verdicts import verdict_columns
+from cli.field.solution import Solved
+from cli.field.tables import Tables, amplitude_unit, channels, masses_text, sense
+from cli.field.trim import LastRun, first_reading, last_run, measured_verdicts, verdicts
+from cli.show.result import Section, Sheet
+from cli.show.verdicts import verdict_table
+from dalembert.angles import degrees
+from dalembert.results.columns import Column, Table
+from dalembert.results.text import as_list
+from dalembert.units import from_si
 
 MOST = 24  # rotors of one report
 
 
-def sheets(found: FieldBalancing) -> Iterator[Sheet]:
-    """Yield for each rotor what to do and what it does, and on a page of its own how it was found."""
-    for rotor, (name, solved, i) in enumerate(found.each(MOST)):
+def sheets(b: FieldBalancing, tables: Tables) -> Iterator[Sheet]:
+    """Yield for each rotor what to do and what it does, and on a page of its own how that was computed."""
+    made = {name: table() for name, table in tables.items()}
+    for rotor, (name, solved, i) in enumerate(b.each(MOST)):
         title = f"Rotor {name}" if name else ""
-        yield Sheet(title, list(_sections(found, solved, i)), partial(picture.draw, found, [rotor]))
-        yield Sheet(title, [Section("How it was found", _found(found, solved, i))])
-    if len(found.runs.rotors) > MOST:
-        yield Sheet("", [Section("Further rotors", [f"{len(found.runs.rotors) - MOST} are not shown here."])])
+        of = _Rotor(b, made, b.runs.rotors[rotor], solved, i)
+        yield Sheet(title, list(of.sections()), partial(picture.draw, b, [rotor]))
+        yield Sheet(title, [Section("How it was computed", of.method())])
+    if len(b.runs.rotors) > MOST:
+        yield Sheet("", [Section("Further rotors", [f"{len(b.runs.rotors) - MOST} are not shown here."])])
 
 
-def _sections(found: FieldBalancing, solved: Solved, i: int) -> Iterator[Section]:
-    last = last_run(found, solved, i)
-    from_here = found.request.from_here and bool(solved.standing[i].any())
-    before, said = first_reading(found, solved, i), [_convention(found)]
-    if before is None:
-        said.append("Before: as fitted to all runs, of which none was without masses.")
-    states = {"before": solved.initial[i] if before is None else before}
-    if last is not None:
-        states[f"run {last.run}"] = last.vibration
-        said.append(f"Run {last.run}: with {_masses(found, solved, last.on)} on the rotor.")
-    states["predicted"] = solved.residual[i]
-    yield Section("Vibration", [_vibration(found, solved, states), *said])
-    state = (
-        "as it stands, with the trial masses left on"
-        if from_here
-        else "in its initial state, all trial masses off"
-    )
-    amounts = _amounts(found, solved, i, solved.corrections[i])
-    told = f"To ADD to the rotor {state}; or to REMOVE the same amounts opposite (+180°)."
-    title = "Trim: what to add now" if from_here else "Corrections"
-    yield Section(title, [amounts, *words.split_lines(found, solved, i), told])
-    if last is not None and not from_here:
-        told = f"To ADD to what was on the rotor in run {last.run}: together they are the corrections above."
-        yield Section(
-            "Trim: what to add now", [_amounts(found, solved, None, solved.total[i] - last.on), told]
-        )
-    yield Section("Verdict", _verdict(found, solved, i, last))
-    if found.runs.fitted and (lines := fit_words.expected(found, solved, i)):
-        yield Section("What to expect", ["\n".join(lines)])
-
-
-def _amounts(found: FieldBalancing, solved: Solved, i: int | None, masses: Complex) -> Table:
-    """Masses in their planes; with `i` the uncertainties of that rotor's corrections."""
-    table = [
-        Column("plane", "", solved.planes),
-        Column(found.runs.per, found.runs.mass_unit, found.amount(np.abs(masses))),
-        Column("angle", "deg", [degrees(w) if w else None for w in masses.tolist()]),
+def _of_rotor(table: Table, rotor: str) -> Table:
+    """Return the rows of a rotor, without its name."""
+    named = next(c for c in (*table.columns, *table.documented) if c.name == "rotor")
+    rows = [k for k, name in enumerate(named.values) if name == rotor]
+    columns = [
+        replace(c, values=[c.values[k] for k in rows], error=None) for c in table.columns if c.name != "rotor"
     ]
-    if i is not None and solved.covariance is not None:
-        along, across = (spread[i] for spread in solved.uncertainty)
-        table += [
-            Column("± ", found.runs.mass_unit, found.amount(along)),
-            Column("± angle", "deg", across),
+    return replace(table, columns=columns, documented=())
+
+
+class _Rotor:
+    """The pages of a rotor."""
+
+    def __init__(
+        self, b: FieldBalancing, made: Mapping[str, Table], rotor: str, solved: Solved, i: int
+    ) -> None:
+        self.b, self.solved, self.i = b, solved, i
+        self.tables = {name: _of_rotor(table, rotor) for name, table in made.items() if table.columns}
+        self.last = last_run(b, solved, i)
+
+    def parts(self, *of: str) -> list[str | Table]:
+        """Return tables of the result, where there are such, between the sentences above and below them."""
+        tables = [self.tables[name] for name in of if name in self.tables]
+        return [part for table in tables for part in (table.above, table, table.below)]
+
+    def sections(self) -> Iterator[Section]:
+        """Yield what to do, and what it does."""
+        b, solved, i, last = self.b, self.solved, self.i, self.last
+        before, sentences = first_reading(b, solved, i), [_convention(b)]
+        if before is None:
+            sentences.append("Before: as fitted to all runs, of which none was without masses.")
+        states = {"before": solved.initial[i] if before is None else before}
+        if last is not None:
+            states[f"run {last.run}"] = last.vibration
+            sentences.append(
+                f"Run {last.run}: with {masses_text(b, solved.planes, last.on, '.6g')} on the rotor."
+            )
+        states["predicted"] = solved.residual[i]
+        yield Section("Vibration", [_vibration(b, solved, states), *sentences])
+        fix = self.tables["corrections"]
+        amounts = replace(fix, columns=[c for c in fix.columns if not c.name.startswith("trim_")])
+        state = (
+            "as it stands in its last run"
+            if b.request.from_here
+            else "in its initial state, all trial masses off"
+        )
+        sentence = f"To ADD to the rotor {state}; or to REMOVE the same amounts opposite (+180°)."
+        title = "Trim: what to add now" if b.request.from_here else "Corrections"
+        yield Section(title, [amounts, *self.parts("static", "couple", "split"), sentence])
+        if solved.standing[i].any():
+            title = "On the rotor now" if b.request.from_here else "Trim: what to add now"
+            yield Section(title, self.parts("trim", "trim_split"))
+        yield Section("Verdict", _verdict(b, solved, i, last))
+        if expected := self.parts("predict", "suggest", "suggest_gain", "robust"):
+            yield Section("What to expect", expected)
+
+    def method(self) -> list[str | Table]:
+        """Return readings, coefficients, figures of merit."""
+        b, solved, i = self.b, self.solved, self.i
+        group, parts = solved.group, list[str | Table]()
+        if b.runs.fitted:
+            fit, residuals = self.tables["fit"], self.tables["residuals"]
+            parts += [as_list(fit), fit.below, self._as_read(residuals)]
+        for j, trial in enumerate(group.trials):
+            on = masses_text(b, solved.planes, group.on[i, j], ".6g")
+            parts += [f"Run {trial.run}{': ' + on if on else ''}{', kept' if trial.kept else ''}", _vibration(b, solved, {"amplitude": group.runs[i, j]})]  # fmt: skip
+        influence = self.tables["influence"]
+        shown = [c for c in influence.columns if c.name not in ("correlation", "amplitude_unit")]
+        parts += ["Influence coefficients:", replace(influence, columns=[c for c in shown if any(v == v and v is not None for v in c.values)])]  # fmt: skip
+        figures = self.tables["rotors"]
+        return [
+            *parts,
+            "Figures of merit:",
+            as_list(figures),
+            figures.below,
+            *self.parts("misfit", "alternatives"),
         ]
-    return Table(table, keys=("plane",))
+
+    def _as_read(self, residuals: Table) -> Table:
+        """Return the readings of a fit with phases as the instrument shows them."""
+        columns = list(residuals.columns)
+        for k, column in enumerate(columns):
+            if column.name == "phase" and self.b.against:
+                columns[k] = replace(column, values=[round(-float(v or 0) % 360, 2) for v in column.values])
+        return replace(residuals, columns=columns)
 
 
-def _vibration(found: FieldBalancing, solved: Solved, states: dict[str, Complex]) -> Table:
+def _vibration(b: FieldBalancing, solved: Solved, states: dict[str, Complex]) -> Table:
     """Vibration in several states, as the instrument shows it."""
-    unit, table = found.runs.amplitude_unit, columns.channels(found, solved.group.channels)
+    unit, (table, _) = b.runs.amplitude_unit, channels(b, solved.group.channels)
     keys = [column.header for column in table]
     for name, vibration in states.items():
         table.append(Column(name, unit, _four_digits(np.abs(vibration))))
-        if not found.request.four_run:
-            table.append(Column("phase", "deg", _phases(found, vibration)))
+        if not b.request.four_run:
+            table.append(Column("phase", "deg", _phases(b, vibration)))
     return Table(table, keys=keys)
 
 
@@ -90,16 +138,16 @@ def _four_digits(values: Real) -> list[float]:
     return [float(f"{value:.4g}") for value in values.tolist()]
 
 
-def _phases(found: FieldBalancing, vibration: Complex) -> list[float | None]:
+def _phases(b: FieldBalancing, vibration: Complex) -> list[float | None]:
     """Phases in the instrument's own sense, to a hundredth of a degree; none where nothing moves."""
-    shown = vibration.conj() if found.against else vibration
+    shown = vibration.conj() if b.against else vibration
     return [round(float(degrees(v)), 2) % 360 if abs(v) > 0 else None for v in shown.tolist()]
 
 
-def _convention(found: FieldBalancing) -> str:
-    if found.request.four_run:
-        return words.sense(found)
-    if not found.against:
+def _convention(b: FieldBalancing) -> str:
+    if b.request.four_run:
+        return sense(b)
+    if not b.against:
         return (
             "Phases as the instrument shows them; they and the mass angles are counted in one common sense, from one mark "
             "on the rotor."
@@ -110,35 +158,30 @@ def _convention(found: FieldBalancing) -> str:
     )
 
 
-def _masses(found: FieldBalancing, solved: Solved, masses: Complex) -> str:
-    said = words.masses_said(found, solved.planes, masses, ".6g")
-    return " and ".join(text for text, w in zip(said, masses, strict=True) if w)
-
-
-def _verdict(found: FieldBalancing, solved: Solved, i: int, last: LastRun | None) -> list[str | Table]:
+def _verdict(b: FieldBalancing, solved: Solved, i: int, last: LastRun | None) -> list[str | Table]:
     """The residual against what is permissible: measured where there is a run with the corrections, else predicted."""
-    read = first_reading(found, solved, i)
+    read = first_reading(b, solved, i)
     before = float(np.nanmax(np.abs(solved.initial[i] if read is None else read)))
     after = np.abs(solved.residual[i] if last is None else last.vibration)
-    largest, unit = float(np.nanmax(after)), words.amplitude_unit(found)
+    largest, unit = float(np.nanmax(after)), amplitude_unit(b)
     how = "as predicted" if last is None else f"as measured in run {last.run}"
     change = f", {100 * (largest - before) / before:+.1f} %" if before else ""
     parts: list[str | Table] = [
         f"Largest vibration {how}: {largest:.4g} {unit} (before: {before:.4g} {unit}{change})."
     ]
-    ceiling = found.ceiling
+    ceiling = b.ceiling
     if ceiling is not None:
         verdict = "within" if largest <= ceiling * (1 + 1e-9) else "beyond"
-        limit = [Column("largest", found.runs.amplitude_unit, [largest]), Column("permissible", found.runs.amplitude_unit, [ceiling])]  # fmt: skip
+        limit = [Column("largest", b.runs.amplitude_unit, [largest]), Column("permissible", b.runs.amplitude_unit, [ceiling])]  # fmt: skip
         parts.append(Table([*limit, Column("verdict", "", [verdict])]))
-    tolerance = found.request.tolerance
+    tolerance = b.request.tolerance
     if tolerance is not None:
         whole = from_si(tolerance.permissible, "unbalance", "g_mm")
         grade = f" {tolerance.grade}" if tolerance.grade else ""
-        planes = verdicts(found, solved, i) if last is None else measured_verdicts(found, solved, i, last)
+        planes = verdicts(b, solved, i) if last is None else measured_verdicts(b, solved, i, last)
         parts += [
-            f"Residual unbalance {how}; tolerance{grade}: {whole:.6g} g·mm, shared equally.",
-            Table(verdict_columns(planes, "g_mm"), keys=("plane",)),
+            f"Residual unbalance {how}; tolerance{grade}: {whole:.6g} g·mm, {tolerance.sharing}.",
+            _of_rotor(verdict_table([("", v) for v in planes], "g_mm"), ""),
         ]
     if last is None:
         parts.append(
@@ -146,24 +189,3 @@ def _verdict(found: FieldBalancing, solved: Solved, i: int, last: LastRun | None
             "measured."
         )
     return parts
-
-
-def _found(found: FieldBalancing, solved: Solved, i: int) -> list[str | Table]:
-    """Readings, coefficients, figures of merit."""
-    group = solved.group
-    parts: list[str | Table] = []
-    if found.runs.fitted:
-        parts += [fit_words.summary(found, solved, i), _history(found, solved, i)]
-    for j, trial in enumerate(group.trials):
-        on = _masses(found, solved, group.on[i, j])
-        parts += [f"Run {trial.run}{': ' + on if on else ''}{', kept' if trial.kept else ''}", _vibration(found, solved, {"amplitude": group.runs[i, j]})]  # fmt: skip
-    influence = words.influence_table(found, solved, i)
-    parts += ["Influence coefficients:", Table([Column(name, "", values) for name, values in influence.items()], keys=("sensor",))]  # fmt: skip
-    return [*parts, "\n".join(words.summary(found, solved, i)[1:])]
-
-
-def _history(found: FieldBalancing, solved: Solved, i: int) -> Table:
-    rows = fit_words.history(found, solved, i)
-    if found.against:
-        rows["phase°"] = [round(-float(v or 0) % 360, 2) for v in rows["phase°"]]
-    return Table([Column(name, "", values) for name, values in rows.items()], keys=("run", "sensor"))

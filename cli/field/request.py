@@ -10,7 +10,9 @@ import numpy as np
 from cli.field.runs import Runs
 from cli.read import options
 from cli.read.tolerance import Tolerance
-from cli.read.units import UNITS, amplitude_kind, parse_number, phasor, to_si
+from dalembert.angles import phasor
+from dalembert.quantities import parse_number
+from dalembert.units import UNITS, amplitude_kind, to_si
 
 Given = tuple[float, str]
 """A value and the unit it was given in."""
@@ -42,6 +44,8 @@ class Request:
     predict: str | None = None
     suggest: bool = False
     robust: bool = False
+    view: str | None = None
+    """`static-couple`: the corrections of two planes as a static part and a couple."""
 
     @property
     def against(self) -> bool:

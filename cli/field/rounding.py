@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from balancing import Balance, condition_number, influence_error
+from cli.field.field_balancing import FieldBalancing
 from cli.field.runs import Group, Real
-from cli.field.solve import FieldBalancing, Solved
+from cli.field.solution import Solved
 from cli.read.rounding import EPS
 
 
@@ -52,8 +53,8 @@ def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]
         initial = _fit_errors(group)[..., 0]
     here, limit, ceiling = solved.here, solved.limit, found.ceiling
     of_here = initial + 8 * EPS * (np.abs(found.runout(group)) + np.abs(solved.initial))
-    if solved.standing.any():
-        size = np.abs(solved.standing)
+    if solved.start.any():
+        size = np.abs(solved.start)
         of_standing = on.max(axis=1) + 4 * EPS * size
         of_here = of_here + np.matvec(of_alpha, size) + np.matvec(np.abs(solved.alpha), of_standing)
     whole = Balance(solved.alpha, here, solved.corrections, group.weights, ridge=request.ridge)
@@ -70,6 +71,7 @@ def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]
             corrections=solved.corrections[i],
             weights=group.own_weights(i),
             bound=None if solved.bound is None else float(solved.bound[i]),
+            of_largest=solved.bound is not None,
             max_mass=limit,
             max_residual=ceilings,
         )
@@ -80,6 +82,14 @@ def correction_errors(found: FieldBalancing, solved: Solved, warnings: list[str]
                 f"{one.error_reason}"
             )
     return np.where(np.isfinite(bounds), bounds, np.nan)
+
+
+def trim_errors(solved: Solved, bound: Real) -> Real:
+    """Bound the errors of the trims, (g, p), SI, where `bound` is that of the corrections."""
+    errors = solved.group.errors()[2]
+    # of stored coefficients no trial run takes part
+    of_masses = errors.max(axis=1) if errors.size else 0.0
+    return np.asarray(bound + of_masses + 8 * EPS * (np.abs(solved.total) + np.abs(solved.standing)))
 
 
 def uncertainty_share(found: FieldBalancing, solved: Solved, bound: Real) -> Real:

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import balancing
-from cli.errors import DataError
-from cli.read.tables import Table
-from cli.read.units import UNITS, Scaled, amplitude_kind, from_si, to_si
+from dalembert.errors import DataError
+from dalembert.tables.table import Table
+from dalembert.units import UNITS, Scaled, amplitude_kind, from_si, to_si
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -101,8 +101,10 @@ class Group:
     """(g, r, s)."""
     on: Complex
     """What was on the rotor in each trial run, (g, r, p), SI."""
-    kept: Complex
-    """What stays on after the last run, (g, p), SI."""
+    standing: Complex
+    """What is on the rotor in its last run, whether it is meant to stay or not, (g, p), SI."""
+    last: list[str]
+    """What that run is called, (g,)."""
     weights: Real | None
     counts: Rows
     """How often each sensor was read in the initial and in each trial run, (1 + r, s)."""

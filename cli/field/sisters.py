@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from balancing import pooled_prior, stored_prior
-from cli.errors import DataError
-from cli.field.files import Stored
 from cli.field.runs import Before, Channel, Complex, Runs
+from cli.field.stored import Stored
+from dalembert.errors import DataError
 
 
 class Sisters:

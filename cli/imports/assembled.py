@@ -10,6 +10,7 @@ from itertools import chain
 import numpy as np
 
 from cli.imports.drawn import GROUND, Drawing
+from cli.imports.inputs import fit
 from cli.imports.toml import text
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
@@ -25,6 +26,8 @@ LITTLE = 1e-3
 
 def described(d: Drawing, source: str) -> str:
     """Return the TOML text of a drawing, and note on the drawing what does not hold."""
+    if d.spare:
+        fit(d)
     if not d.posed:
         _seek(d, source)
     made = text(d, source)
@@ -76,7 +79,9 @@ def _seek(d: Drawing, source: str) -> None:
     Where nothing closes there, the input is tried all around.
     """
     why = ""
-    turns = chain([0.0], (math.radians(t) for t in TRIED[1:]) if d.drives[0].slide is None else ())
+    turns = chain(
+        [0.0], (math.radians(t) for t in TRIED[1:]) if d.drives and d.drives[0].slide is None else ()
+    )
     start = [e.at for e in d.drives]
     for turn in turns:
         for e, at in zip(d.drives, start, strict=True):

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.errors import DataError
 from cli.imports.words import KINDS
-from cli.read.files import read_bytes
 from cli.read.options import bad
 from cli.show.output import reported
+from dalembert.errors import DataError
+from dalembert.tables.files import read_bytes
 
 if TYPE_CHECKING:
-    from cli.show.columns import Result, Sheet
+    from cli.show.result import Result, Sheet
 
 Kind = StrEnum("Kind", {name.replace("-", "_"): name for name in KINDS})  # type: ignore[misc]
 
+
+# an address itself holds the mechanism: nothing is fetched
+LINK = re.compile(r"[a-z]+://", re.IGNORECASE)
 
 METHOD = (
     "Lengths are differences of the file's own decimals, rounded once. What was taken over is put together anew and compared "
@@ -26,7 +30,7 @@ METHOD = (
 
 OPTIONS = """
 Arguments:
-  file FILE  The other program's file or link; - is standard input.
+  file FILE  The other program's file, or its link in quotes; - is standard input.
 Options:
   output --output -o FILE.toml  Where to write it; else standard output.
   kind --from  The program it is from; else told by the content.
@@ -44,14 +48,15 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
     from cli.imports.assembled import described
     from cli.imports.drawn import settle
     from cli.imports.told import read
-    from cli.show.columns import Result
+    from cli.show.result import Result
 
     if output is not None and output.suffix.lower() != ".toml":
         raise bad("-o", f"'{output}': expected a name that ends in .toml")
-    name, data = read_bytes(file)
-    folder = None if file == "-" else Path(file).parent
+    link = LINK.match(file) is not None
+    name, data = ("the link", file.encode()) if link else read_bytes(file)
+    folder = None if link or file == "-" else Path(file).parent
     told, drawings = read(name, data, None if kind is None else str(kind.value), folder)
-    stem = "" if file == "-" else Path(file).stem
+    stem = "" if folder is None else Path(file).stem
     found: list[tuple[str, list[str]]] = []
     lost: list[str] = []
     for d in drawings:

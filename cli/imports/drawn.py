@@ -13,7 +13,7 @@ from itertools import product
 
 from cli.imports.words import damaged
 from cli.read.names import Groups, unused
-from virtualwork.describe.units import unit
+from dalembert.units import to_si
 
 GROUND = "ground"
 Place = tuple[Fraction, Fraction]
@@ -103,6 +103,11 @@ class Drive:
     speed: str | float | None = None
 
     @property
+    def moves(self) -> object:
+        """What it moves, the same of inputs that move the same."""
+        return id(self.slide) if self.slide else frozenset((self.link, self.on))
+
+    @property
     def pair(self) -> tuple[str, str]:
         """The two bodies that it moves against each other, that which moves first."""
         s = self.slide
@@ -138,6 +143,8 @@ class Drawing:
     slides: list[Slide] = field(default_factory=list)
     meshes: list[Mesh] = field(default_factory=list)
     drives: list[Drive] = field(default_factory=list)
+    spare: list[Drive] = field(default_factory=list)
+    """What may drive it where its inputs leave it free; of robots, whose files may name too few or too many of them."""
     loads: list[Load] = field(default_factory=list)
     welds: list[tuple[str, str]] = field(default_factory=list)
     gravity: tuple[float, float] | None = None
@@ -146,9 +153,7 @@ class Drawing:
     @property
     def metres(self) -> float:
         """What one of its lengths is, m."""
-        found = unit(self.length)
-        assert found is not None
-        return found[0]
+        return to_si(1.0, "length", self.length)
 
     def body(self, name: str) -> Body:
         """Return a body, made where there is none of that name."""
@@ -195,7 +200,7 @@ class Drawing:
             s.link, s.on = new(s.link), new(s.on)
         for m in self.meshes:
             m.a, m.b, m.arm = new(m.a), new(m.b), new(m.arm)
-        for e in self.drives:
+        for e in (*self.drives, *self.spare):
             e.link, e.on = e.link and new(e.link), new(e.on)
         for load in self.loads:
             load.ends = [(new(name), at) for name, at in load.ends]
@@ -409,6 +414,7 @@ def _part(d: Drawing, names: set[str], drives: list[Drive]) -> Drawing:
         slides=slides,
         meshes=[m for m in d.meshes if m.a in names or m.b in names],
         drives=drives,
+        spare=[e for e in d.spare if set(e.pair) <= {GROUND, *names}],
         loads=[load for load in d.loads if any(name in names for name, _ in load.ends)],
         notes=[],
     )

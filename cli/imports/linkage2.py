@@ -19,10 +19,13 @@ from cli.imports.drawn import (
 )
 from cli.imports.markup import Element, parse
 from cli.imports.words import damaged
+from cli.read.names import Groups, unused
 
 # the file's unit in the unit of the description
 UNITS = {"in": Fraction(1, 96), "mm": Fraction(254, 960)}
 DRAWING_LAYERS = {"1", "2"}
+# cycles a minute of an actuator that names none
+DEFAULT_CPM = 15.0
 
 
 def read(file: str, text: str) -> list[Drawing]:
@@ -67,12 +70,16 @@ class _Reader:
             if e.attributes.get("layer") in DRAWING_LAYERS:
                 layers += 1
                 continue
+            if e.id in self.connectors:
+                d.leave(f"second connector {e.id} (line {e.line})", "the program takes the first of that id")
+                continue
             x, y = place(self.number(e, "x"), self.number(e, "y"))
             self.connectors[e.id], self.at[e.id] = e, (x * self.scale, y * self.scale)
         self.links: dict[str, Element] = {}
         self.held: dict[str, list[str]] = {}
         for e in self.root.all("link", "element"):
-            id_ = e.attributes.get("id", str(len(self.links)))
+            # several links may have one id, or none: the first of them is called so
+            id_ = e.attributes["id"] = unused(e.attributes.get("id", "0"), self.links)
             if e.attributes.get("layer") in DRAWING_LAYERS:
                 layers += 1
                 continue
@@ -92,6 +99,9 @@ class _Reader:
             self._link(id_)
         for e in (*self.connectors.values(), *self.links.values()):
             self._fasten(e)
+        self.rigid = Groups(d.bodies)
+        for pair in d.welds:
+            self.rigid.join(*pair)
         for id_, e in self.connectors.items():
             if yes(e, "slider"):
                 self._slide(id_, e)
@@ -106,11 +116,14 @@ class _Reader:
 
     def _link(self, id_: str) -> None:
         d, e, ids = self.d, self.links[id_], self.held[id_]
-        if yes(e, "actuator") and len(ids) == 2 and apart(self.at[ids[0]], self.at[ids[1]]) > 0:
+        wanted = yes(e, "actuator")
+        if wanted and not (len(ids) == 2 and apart(self.at[ids[0]], self.at[ids[1]]) > 0):
+            d.notes.append(f"actuator L{id_}: it has not two ends apart: it is a link that keeps its length")
+        elif wanted:
             a, b = ids
             names = f"L{id_}", f"L{id_} rod"
             slide = d.cylinder(names, (f"C{a}", f"C{b}"), (self.at[a], self.at[b]))
-            throw, cpm = (self.number(e, key, 0.0) for key in ("throw", "cpm"))
+            throw, cpm = self.number(e, "throw", 0.0), self.number(e, "cpm", DEFAULT_CPM)
             speed = None
             if throw * cpm != 0 and not yes(e, "alwaysmanual"):
                 speed = f"{float(place(2 * throw * cpm, 0)[0] * self.scale / 60)!r} {d.length}/s"
@@ -184,6 +197,8 @@ class _Reader:
             d.leave(what, "a motor that is at no anchor")
             return
         turning = [n for n in links if not self._fixed(n)]
+        if self.number(e, "limitangle", 0.0) > 0:
+            d.leave(f"the limit of {what}", "it turns on, where the program turns it to and fro")
         if not turning:
             d.leave(what, "no link that could turn is on it")
             return
@@ -197,10 +212,11 @@ class _Reader:
         d.drives.append(Drive(turning[0], speed=None if by_hand else f"{-rpm!r} rpm"))
 
     def _fixed(self, name: str) -> bool:
-        """Return whether a link is the ground: all its connectors, or two of them, are anchors."""
-        held = self.held[name[1:]]
-        anchors = [c for c in held if yes(self.connectors[c], "anchor")]
-        return len({self.at[c] for c in anchors}) > 1
+        """Return whether a link is the ground: it and what is fastened to it have two anchors apart, or the ground's."""
+        top = self.rigid.of(name)
+        alike = [k for k in self.links if f"L{k}" in self.d.bodies and self.rigid.of(f"L{k}") == top]
+        anchors = [c for k in alike for c in self.held[k] if yes(self.connectors[c], "anchor")]
+        return top == self.rigid.of(GROUND) or len({self.at[c] for c in anchors}) > 1
 
     def _traced(self) -> None:
         for id_, e in self.connectors.items():
@@ -219,6 +235,12 @@ class _Reader:
             d.leave(what, "a size is 0")
             return
         first, second = (f"L{i}" for i in ids)
+        # where the one carries the other's centre, they cannot turn against each other
+        for one, other in (ids, ids[::-1]):
+            if self.held[one] and self.held[other] and self.held[other][0] in self.held[one][1:]:
+                d.welds.append((f"L{one}", f"L{other}"))
+                d.notes.append(f"{what}: L{one} carries the centre of L{other}: they are one body")
+                return
         found = next(centers(d, first, second), None)
         if found is None:
             d.leave(what, "no link holds the centres of both")

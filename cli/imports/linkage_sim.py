@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cli.errors import DataError
 from cli.imports.drawn import (
     GROUND,
     SAME,
@@ -21,6 +20,7 @@ from cli.imports.drawn import (
 )
 from cli.imports.words import damaged
 from cli.read.names import unused
+from dalembert.errors import DataError
 
 # type -> the table here, the keys of its bodies and of its points on them, and of its numbers
 LOADS: dict[str, tuple[str, tuple[tuple[str, str | None], ...], tuple[str, ...]]] = {

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from html import unescape
 
-from cli.errors import DataError
 from cli.imports.words import damaged
+from dalembert.errors import DataError
 
 ATTRIBUTE = re.compile(r"""([A-Za-z_][\w.-]*)\s*=\s*("[^"<]*"|'[^'<]*')""")
 DEEPEST = 20

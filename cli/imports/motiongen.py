@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from cli.errors import DataError
 from cli.imports.drawn import GROUND, Drawing, Drive, Place, Slide, direction, place
 from cli.imports.words import damaged
+from dalembert.errors import DataError
 
 LENGTHS = ("mm", "cm", "m", "in", "ft")
 # what is read of a document, and what only tells about it

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import tomllib
 
-from cli.mechanism.posed import posed
-from cli.show.columns import Section, Sheet
+from cli.cases.posed import posed
 from cli.show.report import CODE
+from cli.show.result import Section, Sheet
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
 

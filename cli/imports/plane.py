@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.errors import DataError
 from cli.read.robots.robot import RobotJoint
+from dalembert.errors import DataError
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import unquote
 
-from cli.errors import DataError, quote
 from cli.imports.drawn import (
     GROUND,
     Drawing,
@@ -25,6 +24,7 @@ from cli.imports.drawn import (
     place,
 )
 from cli.imports.words import damaged
+from dalembert.errors import DataError, quote
 
 TYPES = ("R", "P", "RP", "G")
 GROUNDS = {"gnd", "grnd", "grond", "gound", "groud", "0"}

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from itertools import takewhile
 from urllib.parse import unquote
 
-from cli.errors import DataError
 from cli.imports.drawn import GROUND, Drawing, Drive, Load, Place, Slide, direction, exact, place
 from cli.imports.words import damaged
+from dalembert.errors import DataError
 
 DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
 STRING = re.compile(r"[\w-]*\.[\w,-]*\.[\w,-]+\.\w*\.[^\s?]*")

@@ -12,11 +12,11 @@ from fractions import Fraction
 
 import numpy as np
 
-from cli.errors import DataError
 from cli.imports.drawn import GROUND, Body, Drawing, Drive, Load, Mesh, Place, Slide
 from cli.imports.plane import plane_of
 from cli.read.names import Groups, unused
 from cli.read.robots.robot import Motor, Robot, RobotJoint, RobotLink, Spring
+from dalembert.errors import DataError
 
 # what the bodies are called that the export makes of slots
 BLOCK = "block "
@@ -339,32 +339,36 @@ class _Layer:
 
     def _drives(self, moving: list[RobotJoint]) -> None:
         d, robot = self.d, self.robot
+        ground = self.group(robot.ground)
+        here = [j for j in moving if ground in (self.group(j.parent), self.group(j.child))]
+        # what may drive it too, where the actuators of the file do not determine its motion
+        ordered = [j for j in (*here, *(j for j in moving if j not in here)) if j.kind != "ball"]
         motors = list(robot.motors)
         if not motors:
-            ground = self.group(robot.ground)
-            here = [j for j in moving if ground in (self.group(j.parent), self.group(j.child))]
-            first = next((j for j in here if j.kind != "ball"), None)
+            first = ordered[0] if ordered and ordered[0] in here else None
             if first is None:
                 raise DataError(f"{robot.file}: nothing is driven: no actuator, and no joint on the ground")
             d.notes.append(f"the file says of no actuator: {first.name} is taken as the input")
             motors = [Motor(first.name, [(first.name, 1.0)])]
         for m in motors:
-            self._drive(m)
+            drive = self._drive(m)
+            if drive is None:
+                d.leave(f"actuator {m.name}", "it drives neither one slide nor the angle between two links")
+            elif all(drive.moves != e.moves for e in d.drives):
+                d.drives.append(drive)
+        spare = [self._drive(Motor(j.name, [(j.name, 1.0)])) for j in ordered]
+        d.spare = [e for e in spare if e is not None]
 
-    def _drive(self, m: Motor) -> None:
+    def _drive(self, m: Motor) -> Drive | None:
+        """Return the input that an actuator is; None where it is none."""
         d, robot = self.d, self.robot
-        where = f"actuator {m.name}"
         if len(m.terms) == 1 and m.terms[0][0] in self.slides:
             s = self.slides[m.terms[0][0]]
             j = robot.joints[m.terms[0][0]]
-            speed = None if m.speed is None else f"{m.speed!r} m/s"
-            if not any(e.slide is s for e in d.drives):
-                d.drives.append(Drive(slide=s, at=j.value, speed=speed))
-            return
-        shares = self._shares(m.terms, where, m.name)
+            return Drive(slide=s, at=j.value, speed=None if m.speed is None else f"{m.speed!r} m/s")
+        shares = self._shares(m.terms, f"actuator {m.name}", m.name)
         if shares is None or len(shares) != 2:
-            d.leave(where, "it drives neither one slide nor the angle between two links")
-            return
+            return None
         (link, c), (on, _) = sorted(shares.items(), key=lambda e: -e[1])
         sense = 1.0
         if link == GROUND:
@@ -373,9 +377,7 @@ class _Layer:
         value = sense * sum(factor * robot.joints[name].value for name, factor in m.terms) / c
         # the file's own coordinate may count whole turns
         at = turn + 2 * math.pi * round((value - turn) / (2 * math.pi)) if value else turn
-        speed = None if m.speed is None else f"{sense * m.speed / c!r} rad/s"
-        if not any({e.link, e.on} == {link, on} for e in d.drives):
-            d.drives.append(Drive(link, on, at=at, speed=speed))
+        return Drive(link, on, at=at, speed=None if m.speed is None else f"{sense * m.speed / c!r} rad/s")
 
 
 def _turn(angle: float) -> float:

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from cli.errors import DataError
-from cli.imports import linkage2, linkage_sim, motiongen, pmks, pmksweb, robots
+from cli.imports import linkage2, linkage_sim, motiongen, pmks, pmkslist, pmksweb, robots
 from cli.imports.drawn import Drawing
 from cli.imports.words import unknown
 from cli.read.robots import reading
 from cli.read.robots.elements import LARGEST_FILE
 from cli.read.robots.reading import ROOTS
+from dalembert.errors import DataError
 
 
 def decoded(file: str, data: bytes) -> str:
@@ -79,6 +79,8 @@ def kind_of(file: str, text: str) -> str:
     line = next((unquote(row).strip() for row in text.splitlines() if row.strip()), "")
     if "mech=" in text or "mech%3" in text.lower():
         return "pmks-text"
+    if pmkslist.LINK.search(text):
+        return "pmks-web"
     string = line.rpartition("?")[2]
     if pmksweb.STRING.fullmatch(string) or ("pmksplus" in line and "." in string):
         return "pmks-web"
@@ -98,6 +100,6 @@ def read(file: str, data: bytes, kind: str | None, folder: Path | None = None) -
     if kind == "pmks-text":
         return kind, pmks.read(file, parsed(file, text) if text.lstrip()[:1] in ("{", "[") else text)
     if kind == "pmks-web":
-        return kind, pmksweb.read(file, text)
+        return kind, (pmkslist if pmkslist.LINK.search(text) else pmksweb).read(file, text)
     document = parsed(file, text)
     return kind, (motiongen if kind == "motiongen" else linkage_sim).read(file, document)

@@ -1,55 +1,55 @@
-"""A drawing as the TOML text of a mechanism: shortest numbers that are read back as the same."""
+"""A drawing as the parts of a description, and its TOML text: shortest numbers that are read back as the same."""
 
 from __future__ import annotations
 
-import json
-import re
-from collections.abc import Iterable
+import math
 from fractions import Fraction
 
-from cli.imports.drawn import GROUND, Body, Drawing, Drive, Load, Place
+from cli.imports.drawn import GROUND, Body, Drawing, Load, Place, exact
 from cli.read.names import unused
+from virtualwork.describe.parts import Gear, Guess, Guide, Input, Link
+from virtualwork.describe.text import AsWritten, Table, document, written
 
 ORIGIN: Place = (Fraction(0), Fraction(0))
-Table = dict[str, object]
 
 
 def text(d: Drawing, source: str) -> str:
     """Return the TOML text; `source` says where the mechanism is from."""
-    lines: list[str] = []
-    for head, table in _tables(_named(d), source):
-        lines += ["", head] if head else []
-        lines += [f"{_key(k)} = {_value(v)}" for k, v in table.items()]
-    return "\n".join(lines) + "\n"
-
-
-def _tables(d: Drawing, source: str) -> Iterable[tuple[str, Table]]:
-    """Yield the tables of the file with their heads."""
-    gravity: Table = {} if d.gravity is None else {"gravity": d.gravity}
-    yield "", {"name": d.name, "source": source} | gravity
-    yield "[units]", {"length": d.length, "angle": d.angle}
-    yield "[ground]", _places(d.bodies[GROUND].points)
+    d = _named(d)
     origins = {name: _origin(d, name, body) for name, body in d.bodies.items()}
-    links = {name: body for name, body in d.bodies.items() if name != GROUND}
-    for name, b in links.items():
-        table: Table = {"points": _places(b.points, origins[name])}
-        if b.mass > 0:
-            table |= {"mass": b.mass, "center": _place(b.center, origins[name]), "inertia": b.inertia}
-        yield f"[links.{_key(name)}]", table
-    for s in d.slides:
-        table = {"point": s.point, "link": s.link, "on": s.on}
-        table |= {"through": _place(s.through, origins[s.on]), "angle": s.angle}
-        yield ("[[slots]]", table) if s.turned is None else ("[[sliders]]", table | {"turned": s.turned})
-    for m in d.meshes:
-        arm: Table = {} if m.arm == GROUND else {"arm": m.arm}
-        yield "[[gears]]", {"links": [m.a, m.b], "ratio": m.ratio} | arm
-    for e in d.drives:
-        yield "[input]" if len(d.drives) == 1 else "[[input]]", _input(e)
-    ats = [e.at for e in d.drives]
-    at: Table = {"at": ats[0] if len(ats) == 1 else ats}
-    yield "[guess]", at | {n: b.turn for n, b in links.items()}
+    tree = document(_parts(d, origins), AsWritten())
+    for drive, table in zip(d.drives, tree.get("input", []), strict=True):
+        # a speed keeps the unit of the other program
+        table |= {} if drive.speed is None else {"speed": drive.speed}
     for load in d.loads:
-        yield f"[[{load.table}]]", _ends(d, load, origins) | load.values
+        tree.setdefault(load.table, []).append(_ends(d, load, origins) | load.values)
+    return written(tree | {"source": source, "units": {"length": d.length, "angle": d.angle}})
+
+
+def _parts(d: Drawing, origins: dict[str, Place]) -> dict[str, object]:
+    """Return the parts of a description, their numbers in the units of the file."""
+    links = {name: body for name, body in d.bodies.items() if name != GROUND}
+    return {
+        "name": d.name,
+        "gravity": complex(*(d.gravity or (0.0, 0.0))),
+        "ground": _places(d.bodies[GROUND].points),
+        "links": {name: _link(b, origins[name]) for name, b in links.items()},
+        "guides": [
+            Guide(s.point, s.link, s.on, _place(s.through, origins[s.on]), s.angle, s.turned)
+            for s in d.slides
+        ],
+        "gears": [Gear((m.a, m.b), m.ratio, m.arm) for m in d.meshes],
+        "inputs": [
+            Input(e.link, e.on, value=e.at) if e.slide is None else Input(slider=e.slide.point, value=e.at)
+            for e in d.drives
+        ],
+        "guess": Guess([e.at for e in d.drives], {name: b.turn for name, b in links.items()}),
+    }
+
+
+def _link(b: Body, origin: Place) -> Link:
+    points = _places(b.points, origin)
+    return Link(points, b.mass, _place(b.center, origin), b.inertia) if b.mass > 0 else Link(points)
 
 
 def _origin(d: Drawing, name: str, body: Body) -> Place:
@@ -59,14 +59,6 @@ def _origin(d: Drawing, name: str, body: Body) -> Place:
     joints = set(d.pins()) | {s.point for s in d.slides}
     first = next((z for p, z in body.points.items() if p in joints), None)
     return first or next(iter(body.points.values()), ORIGIN)
-
-
-def _input(e: Drive) -> Table:
-    if e.slide is not None:
-        table: Table = {"slider": e.slide.point, "position": e.at}
-    else:
-        table = {"link": e.link} | ({} if e.on == GROUND else {"on": e.on}) | {"angle": e.at}
-    return table if e.speed is None else table | {"speed": e.speed}
 
 
 def _ends(d: Drawing, load: Load, origins: dict[str, Place]) -> Table:
@@ -79,11 +71,15 @@ def _ends(d: Drawing, load: Load, origins: dict[str, Place]) -> Table:
         ]
         return {"between": [".".join(end) for end in ends]}
     ((name, at),) = load.ends
-    return {"link": name} | ({} if at is None else {"point": _place(at, origins[name])})
+    if at is None:
+        return {"link": name}
+    z = _place(at, origins[name])
+    return {"link": name, "point": [z.real, z.imag]}
 
 
 def _named(d: Drawing) -> Drawing:
     """Give names that a description takes: no dots, no link `ground` or `at`, no point called as a link is."""
+    _own_points(d)
     links = {GROUND: GROUND}
     for name in d.bodies:
         if name != GROUND:
@@ -95,6 +91,10 @@ def _named(d: Drawing) -> Drawing:
                 held = d.bodies[name].points
                 if at is not None and at not in held.values():
                     held[d.fresh(f"S{d.loads.index(load) + 1}{'ab'[k]}")] = at
+    for e in d.drives:
+        if e.speed is not None and float(str(e.speed).split()[0]) == 0:
+            e.speed = None
+            d.notes.append(f"the input {' against '.join(e.pair)} has the speed 0: it has no speed here")
     for body in d.bodies.values():
         for p in body.points:
             if p not in points:
@@ -107,29 +107,28 @@ def _named(d: Drawing) -> Drawing:
     return d
 
 
-def _place(z: Place, origin: Place = ORIGIN) -> object:
-    return [float(z[0] - origin[0]), float(z[1] - origin[1])]
+def _own_points(d: Drawing) -> None:
+    """Give each further guide of a point a point of its own, as a guide is called as its point is.
 
-
-def _places(points: dict[str, Place], origin: Place = ORIGIN) -> Table:
-    return {p: _place(z, origin) for p, z in points.items()}
-
-
-def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _value(name)
-
-
-def _value(value: object) -> str:
-    """Return a value as TOML has it.
-
-    >>> _value(-0.0), _value(1e22), _value(["a", 0.1]), _value('x"'), _value({"A": [1.0]})
-    ('0.0', '1e+22', '["a", 0.1]', '"x\\\\""', '{ A = [1.0] }')
+    It lies on the guide's line away from the pin. A pin in two slots has a shoe in the second.
     """
-    if isinstance(value, float):
-        return repr(value + 0.0)
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_value, value))}]"
-    if isinstance(value, dict):
-        return f"{{ {', '.join(f'{_key(k)} = {_value(v)}' for k, v in value.items())} }}"
-    # a JSON string is a basic string of TOML, but for the one control character that JSON leaves as it is
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    guided: set[str] = set()
+    for s in d.slides:
+        if s.point in guided and not d.own_axes:
+            z, shared = d.bodies[s.link].points[s.point], s.point
+            if s.turned is None:
+                s.link, s.turned = unused(f"{shared} shoe", set(d.bodies)), -s.angle
+                d.body(s.link).points[shared] = z
+            way, far = math.radians(s.angle), d.size()
+            s.through = z[0] + exact(far * math.cos(way)), z[1] + exact(far * math.sin(way))
+            s.point = d.fresh(f"{shared} on {s.on}")
+            d.bodies[s.link].points[s.point] = s.through
+        guided.add(s.point)
+
+
+def _place(z: Place, origin: Place = ORIGIN) -> complex:
+    return complex(float(z[0] - origin[0]), float(z[1] - origin[1]))
+
+
+def _places(points: dict[str, Place], origin: Place = ORIGIN) -> dict[str, complex]:
+    return {p: _place(z, origin) for p, z in points.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cli.errors import DataError, quote
+from dalembert.errors import DataError, quote
 
 KINDS = {
     "pmks-text": "PMKS text or link (`ground, input, R, 0, 0`; `?mech=…`), and its JSON",

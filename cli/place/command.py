@@ -6,13 +6,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.place.read import Request, read_corrections, read_drill, read_planes, read_ratio, read_stock
+from cli.place.corrections import (
+    Request,
+    read_corrections,
+    read_drill,
+    read_planes,
+    read_ratio,
+    read_weights,
+)
 from cli.read import options
 from cli.show.commands import ShowOptions
 from cli.show.output import command
 
 if TYPE_CHECKING:
-    from cli.show.columns import Result, Table
+    from cli.show.result import Result
 
 
 EXAMPLE = "blades"
@@ -26,9 +33,11 @@ What:
   blades N  So many places, evenly spaced, numbered from 1.
   first ANGLE  Angle of the first blade.
   max_mass MASS  Limit of each place, such as 5g.
-  stock MASSES  Weights in stock, such as 1g,2g,5g; one a place.
+How: weights as they are:
+  stock MASSES  Weights in stock, such as 1g,2g,5g; one a place; the fewest that come within 1 % of the correction, at most three.
+  weights MASSES  Weights of fixed mass that stand at any angle, such as 4g,4g: the angle of each.
   pieces N  How many weights from stock go on one place.
-  max_pieces N  How many weights from stock altogether.
+  max_pieces N  Least error with so many weights from stock altogether, in place of the fewest within 1 %.
 How: elsewhere:
   at_radius R  Radius the corrections were found for.
   to_radius R  Radius the masses go to.
@@ -53,6 +62,7 @@ def run(
     first: str = "0deg",
     max_mass: str | None = None,
     stock: str | None = None,
+    weights: str | None = None,
     pieces: Annotated[int, typer.Option(min=1)] = 1,
     max_pieces: Annotated[int | None, typer.Option(min=1)] = None,
     at_radius: str | None = None,
@@ -72,43 +82,46 @@ def run(
     Several corrections are combined first. Without --positions or --blades the result is the one mass. Of a file each
     rotor's plane is placed by itself.
     """
-    read = read_corrections(corrections, rotor, plane)
+    every = read_corrections(corrections, rotor, plane)
     ratio = read_ratio(at_radius, to_radius)
     drilled = read_drill(drill, density, drill_point, max_depth)
-    weights = read_stock(stock)
-    if weights is not None and drilled is not None:
+    in_stock, fixed = read_weights("--stock", stock), read_weights("--weights", weights)
+    if in_stock is not None and drilled is not None:
         raise options.bad("--stock", "weights from stock are not drilled: expected --stock or --drill")
+    if fixed is not None:
+        turned = "does not go with --weights, which have a mass of their own and stand at any angle"
+        options.refuse(turned, positions=positions, blades=blades, stock=stock, max_mass=max_mass)
+        options.refuse(turned, max_pieces=max_pieces, drill=drill, remove=remove)
     moved = read_planes(at_z, to_z)
     chosen = options.places(positions, blades, first)
-    if weights is not None and chosen is None:
+    if in_stock is not None and chosen is None:
         raise options.bad("--stock", "expected --positions or --blades for the weights to go to")
     limit = options.quantity("--max-mass", max_mass, "mass", positive=True)
-    from cli.place import columns, picture, words
-    from cli.place.solve import Placing
-    from cli.show.columns import Result, Section, Sheet
+    from cli.place.placing import Placing
+    from cli.place.tables import METHOD, draw, tables
+    from cli.show.result import Result, Section, Sheet
+    from dalembert.results.text import heading
 
-    request = Request(chosen, limit, weights, pieces, max_pieces, ratio, drilled, moved, remove)
-    found = [Placing(of, request) for of in read]
-    alone = len(found) == 1
+    request = Request(chosen, limit, in_stock, fixed, pieces, max_pieces, ratio, drilled, moved, remove)
+    placings = [Placing(correction, request) for correction in every]
+    alone = len(placings) == 1
     if not alone and show.plot is not None:
         raise options.bad("--plot", "draws one correction: expected --rotor and --plane too")
 
     def sheet(placing: Placing) -> Sheet:
-        one = [placing]
-        parts: list[str | Table] = [words.notes(one), columns.masses(one), words.errors(one)]
-        title = "" if alone else placing.of.name
-        return Sheet(title, [Section("Masses", parts)], lambda: picture.draw(placing))
+        parts = {name: table() for name, table in tables([placing]).items()}
+        sections = [Section(heading(name), [table.above, table]) for name, table in parts.items()]
+        return Sheet(placing.of.name, sections, lambda: draw(placing))
 
     return Result(
-        document=lambda: columns.document(found),
-        tables={"masses": lambda: columns.masses(found)},
-        notes=lambda: words.notes(found),
-        afterword=lambda: words.errors(found),
-        figure=(lambda: picture.draw(found[0])) if alone else None,
-        method=words.METHOD,
-        sheets=lambda: map(sheet, found),
+        tables=tables(placings),
+        figure=(lambda: draw(placings[0])) if alone else None,
+        method=METHOD,
+        sheets=None if alone else lambda: map(sheet, placings),
         about={"title": "Placement of a correction"},
         warnings=[
-            text if alone else f"{placing.of.name}: {text}" for placing in found for text in placing.warnings
+            text if alone else f"{placing.of.name}: {text}"
+            for placing in placings
+            for text in placing.warnings
         ],
     )

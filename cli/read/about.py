@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from cli.errors import DataError, nearest
+from dalembert.errors import DataError
+from dalembert.hints import nearest
 
 HEAD = ("title", "machine", "customer", "date", "author")
 

@@ -5,15 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
-from cli.errors import DataError
-from cli.read.units import SMALLEST, UNITS, is_number, parse_number, parse_quantity, to_si
+from dalembert.errors import DataError
+from dalembert.quantities import is_number, parse_number, parse_quantity
+from dalembert.units import SMALLEST, UNITS, to_si
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+
+    import numpy as np
+    from numpy.typing import NDArray
 
 STATES = 250_000  # what a gigabyte holds, integrated and shown
 PLACES = 10_000  # holes or blades on one rotor
@@ -40,6 +44,17 @@ def refuse(message: str, **values: object) -> None:
     """Refuse the first of these options that is given."""
     for flag in given(**values):
         raise bad(flag, message)
+
+
+def column_names(pairs: list[str] | None) -> dict[str, str]:
+    """Read the values of --column, `mass_kg=Masse`: name here -> header in the file."""
+    names = {}
+    for pair in pairs or ():
+        name, equals, header = pair.partition("=")
+        if not equals or not name.strip():
+            raise bad("--column", f"'{pair}': expected NAME=HEADER, such as mass_kg=Masse")
+        names[name.strip()] = header.strip()
+    return names
 
 
 def _read(flag: str, text: str, dimension: str, positive: bool) -> tuple[float, str]:
@@ -166,40 +181,64 @@ def time_range(flag: str, text: str) -> list[float]:
     return grid(flag, text, lambda part: number_or_quantity(flag, part, "time"), "states", "0:10:0.01")
 
 
-def grid(
-    flag: str, text: str, read: Callable[[str], float], what: str, example: str, most: int = STATES
-) -> list[float]:
+class Steps(NamedTuple):
+    """A range in equal steps: (first + i·each)/below for i from 0 to n − 1, each the nearest double."""
+
+    first: int
+    each: int
+    below: int
+    n: int
+
+    def at(self, i: NDArray[np.intp]) -> NDArray[np.float64]:
+        """The values at some places."""
+        import numpy as np
+
+        largest = max(abs(self.first), abs(self.first + (self.n - 1) * self.each), self.below)
+        if largest < 2**53:
+            # whole numbers that doubles hold exactly: one rounding, that of the division
+            return np.asarray((self.first + i * self.each) / self.below)
+        return np.array([(self.first + k * self.each) / self.below for k in i.tolist()])
+
+
+def steps(flag: str, text: str, read: Callable[[str], float], example: str) -> Steps:
     """Read `START:STOP:STEP` or `START:STOP/N` (N equal steps); a step that divides the range includes its end.
 
-    `read` reads one of the three; `what` is counted, `most` of them at most.
+    `read` reads one of the three.
     """
     from fractions import Fraction
 
-    steps = None
+    count = None
     body = text
     if "/" in text:
         body, _, number = text.rpartition("/")
         if whole(number) < 1:
             raise bad(flag, f"'{text}': expected a number of equal steps after the /, such as 0:10/1000")
-        steps = whole(number)
+        count = whole(number)
     parts = body.split(":")
-    if len(parts) != (2 if steps else 3):
+    if len(parts) != (2 if count else 3):
         raise bad(flag, f"'{text}': expected START:STOP:STEP or START:STOP/N, such as {example}")
     # the decimals that the numbers print as, exactly: 50mm and a step of 1mm are 0.051, not 0.051000000000000004
     start, stop, *by = [Fraction(repr(read(part))) for part in parts]
-    if steps is None:
+    if count is None:
         if by[0] == 0 or (stop - start) * by[0] < 0:
             raise bad(flag, f"'{text}': a step of {parts[2]} never gets from {parts[0]} to {parts[1]}")
         ratio = (stop - start) / by[0]
-        steps = round(ratio)
-        if abs(ratio - steps) * 10**9 > max(Fraction(1), ratio):
-            stop, steps = start + int(ratio) * by[0], int(ratio)
-    if steps > most:
-        raise bad(flag, f"'{text}': {float(steps):.3g} {what}: expected at most {most}")
-    below = math.lcm(start.denominator, stop.denominator) * max(steps, 1)
+        count = round(ratio)
+        if abs(ratio - count) * 10**9 > max(Fraction(1), ratio):
+            stop, count = start + int(ratio) * by[0], int(ratio)
+    below = math.lcm(start.denominator, stop.denominator) * max(count, 1)
     first, last = int(start * below), int(stop * below)
-    each = (last - first) // max(steps, 1)
-    return [(first + i * each) / below for i in range(steps + 1)]
+    return Steps(first, (last - first) // max(count, 1), below, count + 1)
+
+
+def grid(
+    flag: str, text: str, read: Callable[[str], float], what: str, example: str, most: int = STATES
+) -> list[float]:
+    """The values of such a range; `what` is counted, `most` of them at most."""
+    first, each, below, n = steps(flag, text, read, example)
+    if n - 1 > most:
+        raise bad(flag, f"'{text}': {float(n - 1):.3g} {what}: expected at most {most}")
+    return [(first + i * each) / below for i in range(n)]
 
 
 @contextmanager

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.errors import DataError, nearest, needs, quote
-from cli.read.files import note
-from cli.read.tables import Table, read
-from cli.read.units import UNITS, cosine_sine, to_si
+from dalembert.angles import cosine_sine
+from dalembert.errors import DataError, needs, quote
+from dalembert.hints import nearest
+from dalembert.tables.files import note
+from dalembert.tables.table import Table, read
+from dalembert.units import UNITS, to_si
 from rigidbody3d import Body, check, compose, load_mesh, mesh, tensor
 from rigidbody3d.shapes import SHAPES
 

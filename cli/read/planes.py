@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.errors import DataError, quote
 from cli.read.options import bad
-from cli.read.tables import read
-from cli.read.units import SMALLEST, parse_quantity, to_si
+from dalembert.errors import DataError, quote
+from dalembert.quantities import parse_quantity
+from dalembert.tables.table import read
+from dalembert.units import SMALLEST, to_si
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.read.units import to_si
+from dalembert.units import to_si
 
 Real = NDArray[np.float64]
 

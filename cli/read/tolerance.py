@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from cli.read import options
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+STANDARDS = ("API", "MIL")
+"""What --grade takes beside the grades of ISO 21940-11."""
 
 
 class Verdict(NamedTuple):
@@ -30,29 +38,43 @@ class Tolerance:
 
     grade: str | None
     permissible: float
-    """U_per, kg·m."""
+    """U_per of the whole rotor, kg·m; with MIL that of each plane."""
     bearings: tuple[float, float] | None = None
     """Where along the shaft it holds, m; None: in the correction planes."""
 
-    def document(
-        self, verdicts: Iterable[Verdict]
-    ) -> dict[str, str | float | list[dict[str, str | float | None]] | None]:
-        """Return what the JSON says of it and of a rotor's planes."""
-        return {
-            "grade": self.grade,
-            "permissible_kg_m": self.permissible,
-            "planes": [
-                {
-                    "plane": plane,
-                    "permissible_kg_m": share,
-                    "initial_kg_m": before if before == before else None,
-                    "within": before <= share if before == before else None,
-                    "residual_kg_m": after if after == after else None,
-                    "residual_within": after <= share if after == after else None,
-                }
-                for plane, share, before, after in verdicts
-            ],
-        }
+    @property
+    def iso(self) -> bool:
+        """Whether it is a grade of ISO 21940-11."""
+        return self.grade is not None and self.grade not in STANDARDS
+
+    @property
+    def whole_in_each_plane(self) -> bool:
+        """Whether every plane may have the whole: MIL-STD-167-1."""
+        return self.grade == "MIL"
+
+    @property
+    def sharing(self) -> str:
+        """How the permissible unbalance goes to planes without --bearings and --center-z."""
+        return "in each plane" if self.whole_in_each_plane else "shared equally"
+
+    def shares(
+        self, planes: int, center: float | None = None, places: Sequence[float] = ()
+    ) -> NDArray[np.float64]:
+        """Return what is permissible in each plane, (planes,), kg·m.
+
+        `places` are those of the planes, m, where the centre of mass is known too.
+        """
+        import numpy as np
+
+        from balancing import allocate, journal_loads
+
+        if self.whole_in_each_plane:
+            return np.full(planes, self.permissible)
+        if planes != 2 or center is None or (self.grade == "API" and self.bearings is None):
+            return np.full(planes, self.permissible / planes)
+        if self.grade == "API":
+            return journal_loads(self.permissible, center, *places)
+        return allocate(self.permissible, center, *places)
 
 
 def tolerance_of(
@@ -63,7 +85,7 @@ def tolerance_of(
     bearings: str | None,
 ) -> Tolerance | None:
     """Read the tolerance; None where none is asked for."""
-    from balancing import grade_value, permissible_unbalance
+    from balancing import api_unbalance, grade_value, mil_unbalance, permissible_unbalance
 
     planes = None if bearings is None else options.two_bearings("--bearings", bearings)
     omega = options.quantity("--speed", speed, "speed", positive=True)
@@ -71,20 +93,28 @@ def tolerance_of(
     if permissible is not None:
         if grade is not None:
             raise options.bad("--permissible", "expected --grade or --permissible, not both")
+        of_grade = "goes with --grade; --permissible states the tolerance by itself"
+        options.refuse(of_grade, speed=speed, rotor_mass=rotor_mass)
         whole = options.needed("--permissible", permissible, "unbalance", positive=True)
         return Tolerance(None, whole, planes)
     if grade is None:
-        if planes is not None:
-            raise options.bad(
-                "--bearings", "the bearings are for a tolerance: expected --grade or --permissible too"
-            )
+        options.refuse("is for a tolerance: expected --grade or --permissible too", bearings=bearings)
+        options.refuse("is for a tolerance: expected --grade too", speed=speed, rotor_mass=rotor_mass)
         return None
-    try:
-        value = grade_value(grade)
-    except ValueError as error:
-        raise options.bad("--grade", error) from None
+    standard = grade.strip().upper().removesuffix("-STD-167-1")
+    value = 0.0
+    if standard not in STANDARDS:
+        try:
+            value = grade_value(grade)
+        except ValueError as error:
+            raise options.bad("--grade", error) from None
     if omega is None:
         raise options.bad("--speed", "--grade needs --speed and --rotor-mass")
     if mass is None:
         raise options.bad("--rotor-mass", "--grade needs --speed and --rotor-mass")
+    if standard == "MIL" and planes is not None:
+        raise options.bad("--bearings", "--grade MIL holds in the correction planes: expected no --bearings")
+    if standard in STANDARDS:
+        limit = api_unbalance if standard == "API" else mil_unbalance
+        return Tolerance(standard, float(limit(mass, omega)), planes)
     return Tolerance(f"G{value * 1000:g}", float(permissible_unbalance(value, omega, mass)), planes)

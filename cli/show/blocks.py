@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.errors import DataError
-from cli.show.columns import Table, Written
-from cli.show.digits import finished
+from cli.show.in_units import finished
+from cli.show.result import Written
+from dalembert.errors import DataError
+from dalembert.results.columns import Table
 
 if TYPE_CHECKING:
-    from cli.show.columns import Part, Result
+    from cli.show.result import Part, Result
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,12 @@ class Form:
     def __call__(self, table: Part, number: int) -> Written:
         """Make it of the part of this number, from 0 on."""
         if isinstance(table, list):
-            from cli.show.documents import json_elements
+            from dalembert.results.json_text import json_elements
 
             return Written(json_elements(table, first=number == 0).encode(), 0)
         table, unknown = finished(table, self.units, self.digits)
         if self.suffix == ".csv":
-            from cli.show.text import csv_text
+            from dalembert.results.text import csv_text
 
             return Written(csv_text(table.cells, header=number == 0).encode(), unknown)
         if self.folder is not None:
@@ -100,9 +101,9 @@ def stream(result: Result, suffix: str, output: Path | None, units: str | None, 
 
 def _document(result: Result, parts: Iterator[bytes]) -> Iterator[bytes]:
     """The JSON document around its list."""
-    from cli.show.documents import json_members
+    from dalembert.results.json_text import json_members
 
-    yield f'{{{json_members(result.document())},\n "{result.blocks_name}": ['.encode()
+    yield f'{{{json_members(result.documented())},\n "{result.blocks_name}": ['.encode()
     yield from parts
     # what there is to say is known by now
     said = [*result.warnings, *result.late_warnings()]

@@ -9,7 +9,7 @@ from typing import TextIO
 _GREEN, _RED, _YELLOW, _PLAIN = "\033[32m", "\033[1;31m", "\033[33m", "\033[0m"
 # verdicts stand in brackets, behind a colon or at the end of a line: elsewhere these are words like others
 _WORDS = (
-    r"(?<=\()(?:within|beyond)\b|(?<=: )(?:stable|unstable)\b|\b(?:ok|WRONG|outlier)(?=\s*$)"
+    r"(?<=\()(?:within|beyond)\b|(?<=: )(?:stable|unstable)\b|\b(?:ok|WRONG|outlier)(?=\s*$)|(?<=  )(?:within|beyond)(?=\s*$)"
     r"|^warning:|\b(?:dead|change) points?: (?!none)|\binput limits: (?!none)"
 )
 _COLOURS = {

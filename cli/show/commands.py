@@ -17,36 +17,31 @@ from typer.core import TyperCommand
 from cli.read.about import HEAD
 
 if TYPE_CHECKING:
-    from cli.show.columns import Result
+    from cli.show.result import Result
 
 
 SHARED = """
 What:
-  column NAME=HEADER  Read the column HEADER of a table as NAME, such as mass_kg=Masse; repeatable.
+  column NAME=HEADER  Read the column HEADER as NAME: mass_kg=Masse; repeatable.
 Output:
   json  Print one JSON document, SI units, full precision.
-  output -o --output FILE  Write the result to FILE (.csv, .json, .xlsx, .parquet, .md, .tex or .html).
-  plot FILE  Write a picture to FILE (.svg, .png or .pdf).
-  expect FILE.csv  Check the result against expected values under the same column names.
-  rtol NUMBER  Relative tolerance of --expect (for angles: radians).
-  digits  In tables and CSV print only the digits that hold against rounding.
-  units UNIT,...  Units of the columns, such as mm,g,deg,N_mm,rpm; JSON stays SI.
-  report FILE  Write a report to hand on to FILE (.html or .md): what was given, found, drawn, and how.
-Head of the report:
-  title TEXT  The report's title.
-  machine TEXT  The machine it is about.
-  customer TEXT  Whom it is for.
-  date TEXT  Its date, if not today's.
-  author TEXT  Who made it.
+  output -o --output FILE  Write to FILE (.csv .json .xlsx .parquet .md .tex).
+  plot FILE  Draw a picture (.svg, .png or .pdf).
+  expect FILE.csv  Check the result against expected values.
+  rtol NUMBER  Relative tolerance of --expect (angles: radians).
+  digits  Print only the digits that hold against rounding.
+  units UNIT,...  Units of the columns: mm,g,deg,N_mm,rpm.
+  report FILE  Write a report (.html or .md): data, results, method.
+  about KEY=TEXT  Its head: title=, machine=, customer=, date=, author=.
 Terminal:
   text  Print the aligned table even into a pipe.
-  no_color  No colours on a terminal; so does NO_COLOR in the environment.
+  no_color  No colours; so does NO_COLOR in the environment.
   help  Show this message and exit.
 """
 """What the help says of the options that every command shares."""
 
 
-FORMS = (".csv", ".json", ".xlsx", ".parquet", ".md", ".tex", ".html")
+FORMS = (".csv", ".json", ".xlsx", ".parquet", ".md", ".tex")
 """Suffixes of what every result can be written as."""
 
 
@@ -82,17 +77,20 @@ class ShowOptions:
     column: list[str] | None = None
     units: str | None = None
     report: Annotated[Path | None, typer.Option(callback=suffix_among(".html", ".htm", ".md"))] = None
-    title: str | None = None
-    machine: str | None = None
-    customer: str | None = None
-    date: str | None = None
-    author: str | None = None
+    about: list[str] | None = None
     no_color: bool = False
 
     @property
     def head(self) -> dict[str, str]:
-        """What the options say for the head of the report."""
-        return {name: text for name in HEAD if (text := getattr(self, name)) is not None}
+        """The head of the report, as --about has it."""
+        found = {}
+        for text in self.about or ():
+            key, equals, value = text.partition("=")
+            if not equals or key.strip() not in HEAD:
+                keys = ", ".join(f"{name}=" for name in HEAD)
+                raise typer.BadParameter(f"'{text}': expected one of {keys} and a text", param_hint="--about")
+            found[key.strip()] = value.strip()
+        return found
 
     @property
     def form(self) -> str:
@@ -123,6 +121,11 @@ class ShowOptions:
         return bool(self.text or self.plot or self.expect or self.report)
 
     @property
+    def needs_table(self) -> bool:
+        """Whether a table is formed: JSON alone needs none."""
+        return not self.json or self.expect is not None or self.output is not None
+
+    @property
     def as_json(self) -> bool:
         """Whether the JSON document is formed."""
         return self.json or (self.output is not None and self.output.suffix.lower() == ".json")
@@ -145,7 +148,7 @@ def told(options: str) -> dict[str, Told]:
     """
     found = {}
     heading = ""
-    for line in options.strip().splitlines():
+    for line in filter(str.strip, options.splitlines()):
         if not line.startswith(" "):
             heading = line.removesuffix(":")
             continue
@@ -163,23 +166,36 @@ def with_options(
     chosen: Sequence[str] | None,
     hand_on: Callable[[Result, ShowOptions, Mapping[str, str]], None],
     asked: Callable[..., object] | None = None,
+    declared: Mapping[str, Parameter] | None = None,
 ) -> Callable[..., None]:
     """Make a command that takes these of the shared options too, None for all, and hands on what it has found.
 
     `options` is what its help says of its own, as `told` reads it. `asked` is a class of them: then the function takes
-    one of these and the shared ones.
+    one of these and the shared ones. `declared`: its options, where their text is their only declaration.
     """
-    own, shared = _parameters(asked or find, options), _parameters(ShowOptions, SHARED)
+    own = dict(declared) if declared is not None else _parameters(asked or find, options)
+    shared = _parameters(ShowOptions, SHARED)
     shared = {name: p for name, p in shared.items() if chosen is None or name in chosen}
+    # a command may have a value of its own below --about, which is no KEY=TEXT
+    two = "about" in own
+    if two:
+        point, head = told(options)["about"], told(SHARED)["about"]
+        line = head._replace(metavar=point.metavar, help=f"{point.help} KEY=TEXT: {head.help}")
+        shared["about"] = shared["about"].replace(annotation=_annotated(list[str] | None, line))
 
     @wraps(find)
     def run(**given: object) -> None:
-        from cli.read.headers import rename
+        from cli.read.options import column_names
+        from dalembert.tables.headers import rename
 
         options = ShowOptions(**{name: given.pop(name) for name in shared})  # type: ignore[arg-type]
-        if options.report is None and (unused := next(iter(options.head), None)) is not None:
-            raise typer.BadParameter("expected --report FILE too", param_hint=f"--{unused}")
-        rename(options.column)
+        if two:
+            values = options.about or []
+            options.about = [text for text in values if "=" in text]
+            given["about"] = next((text for text in reversed(values) if "=" not in text), None)
+        if options.head and options.report is None:
+            raise typer.BadParameter("expected --report FILE too", param_hint="--about")
+        rename(column_names(options.column))
         said = {
             name.replace("_", " "): _said(value)
             for name, value in given.items()
@@ -191,7 +207,8 @@ def with_options(
         with result.within():
             hand_on(result, options, said)
 
-    parameters = [*(p for name, p in own.items() if name != "show"), *shared.values()]
+    mine = [p for name, p in own.items() if name != "show" and not (two and name == "about")]
+    parameters = [*mine, *shared.values()]
     run.__signature__ = signature(find).replace(parameters=parameters, return_annotation=None)  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run
@@ -230,6 +247,10 @@ def _annotated(kind: Any, said: Told) -> object:
     return Annotated[kind, info]
 
 
+FURTHER = "Further options"
+"""What a heading begins with whose options the help names only; docs/commands.md describes them."""
+
+
 class Command(TyperCommand):
     """A command whose help has the options below headings: what, how, output."""
 
@@ -237,6 +258,21 @@ class Command(TyperCommand):
     example = ""
     # the call that an example shows, by the example's name
     call_of: Callable[[str], str]
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words; an option of an older version is answered by one line that names the new one."""
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as error:
+            # of a NoSuchOption the option
+            option = getattr(error, "option_name", None)
+            from cli.renamed import renamed
+
+            line = None if option is None else renamed(ctx.info_name or "", option)
+            if line is None:
+                raise
+            typer.echo(line, err=True)
+            raise typer.Exit(2) from None
 
     def panels_of(self, ctx: Any) -> dict[str, list[tuple[str, str]]]:
         """Return the rows of help below their headings."""
@@ -253,7 +289,10 @@ class Command(TyperCommand):
     def format_options(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
         for heading, records in self.panels_of(ctx).items():
             with formatter.section(heading):
-                formatter.write_dl(records)
+                if heading.startswith(FURTHER):
+                    formatter.write_text(", ".join(flags for flags, _ in records))
+                else:
+                    formatter.write_dl(records)
 
     def format_epilog(self, ctx, formatter) -> None:  # type: ignore[no-untyped-def]
         if self.example:

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.errors import DataError, nearest
-from cli.read.tables import read
-from cli.read.units import column_dimensions, parse_number
+from dalembert.errors import DataError
+from dalembert.hints import nearest
+from dalembert.quantities import is_number, parse_number
+from dalembert.results.columns import Column, Table
+from dalembert.results.text import printed
+from dalembert.tables.table import read
+from dalembert.units import UNITS, column_dimensions, dimensions, find_unit, parted, to_si
+from dalembert.units import from_si as to_unit
 
 if TYPE_CHECKING:
-    from cli.show.columns import Cell, Table, Values
-
-    Columns = Mapping[str, Values]
-
+    from dalembert.results.columns import Cell, Values
+    from dalembert.tables.table import Table as ReadTable
 
 COMPARED = ("row", "column", "value", "expected", "error", "verdict")
 
@@ -28,9 +31,20 @@ COMPARED = ("row", "column", "value", "expected", "error", "verdict")
 class Comparison:
     """A row for each expected cell, and whether all hold."""
 
-    columns: Columns
+    table: Table
     summary: str
     passed: bool
+    warnings: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class _Expected:
+    """A column of the file: the result's column it is compared with, and what turns its unit into that one's."""
+
+    header: str
+    column: str
+    cells: list[str]
+    convert: Callable[[float], float]
 
 
 def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], Table]] = ()) -> Comparison:
@@ -38,59 +52,115 @@ def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], 
 
     Rows are matched by the key columns that the file has, else by their order. A number holds where its
     relative error is at most `rtol`, an angle where it is off by at most `rtol` radians, modulo a turn; an
-    expected zero is measured against the largest value in its column. Empty cells expect nothing. An input is a
-    key where no `step` is given: its row is the nearest within `rtol`. `others` are the result's further tables, for
-    a file with columns of one of them.
+    expected zero is measured against the largest value in its column. Empty cells expect nothing. A key that is a
+    number is matched to the digits that the file has. Values in another unit are converted; further columns of texts
+    (a student's name) are not compared. `others` are the result's further tables, for a file with columns of one of them.
     """
+    read_table = read(file, texts=None)
+    headers = list(read_table.texts)
+    tables = [table, *(of() for of in others)]
+    table = max(tables, key=lambda each: sum(_partner(header, each) is not None for header in headers))
     columns = table.cells
-    expected = read(file, texts=None)
-    spelled = {name.lower(): name for name in columns}
-    expected.texts = {
-        name if name in columns else spelled.get(name.lower(), name): cells
-        for name, cells in expected.texts.items()
-    }
-    header = list(expected.texts)
-    if not columns.keys() >= set(header):
-        table = next((it for other in others if (it := other()).cells.keys() >= set(header)), table)
-        columns = table.cells
-    keys = table.keys
-    for name in header:
-        if name not in columns:
-            raise DataError(
-                f"{file}: the result has no column '{name}': expected some of "
-                f"{', '.join(columns)}{nearest(name, _alike(name, columns))}"
-            )
-    expected.points(name for name in header if _is_number(columns[name]))
-    matched = [name for name in header if name in keys and not (is_input(name) and "step" in header)]
-    rows = list(_match(columns, file, expected.texts, matched, expected.rows, rtol))
-    named = [key for key in keys if key in columns and (key in matched or not is_input(key))]
+    compared, aside = _columns(read_table, table, file)
+    numbers = [c.header for c in compared if _has_numbers(columns[c.column])]
+    read_table.points(numbers)
+    keys = [c for c in compared if c.column in table.keys and not (is_input(c.column) and "step" in headers)]
+    _refuse_ambiguous(table, keys, file)
+    rows = list(_match(columns, file, keys, read_table.rows, rtol))
+    labels = [
+        key for key in table.keys if key in columns and (key in {c.column for c in keys} or not is_input(key))
+    ]
+    shown = {key: printed(key, columns[key]) for key in labels}
     lines: list[tuple[Cell, ...]] = []
+    blank = 0
     for index, row in enumerate(rows):
-        for name in header:
-            wanted = expected.texts[name][index]
-            if name in matched or not wanted:
+        for c in compared:
+            if c in keys:
                 continue
-            value = columns[name][row]
-            number, error = _error(name, value, wanted, columns[name])
-            label = "/".join(str(columns[key][row]) for key in named) or str(row + 1)
-            lines.append((label, name, value, number, error, "ok" if error <= rtol else "WRONG"))
+            wanted = c.cells[index]
+            if not wanted:
+                blank += 1
+                continue
+            value = columns[c.column][row]
+            number, error = _error(c, value, wanted, columns[c.column])
+            label = "/".join(shown[key][row] for key in labels) or str(row + 1)
+            lines.append((label, c.column, value, number, error, "ok" if error <= rtol else "WRONG"))
     if not lines:
         raise DataError(f"{file}: no expected value in it: nothing would be checked")
-    compared = dict(zip(COMPARED, zip(*lines, strict=True), strict=True))
-    right = compared["verdict"].count("ok")
-    return Comparison(compared, f"{right} of {len(lines)} values within {rtol:g}", right == len(lines))
+    cells = dict(zip(COMPARED, zip(*lines, strict=True), strict=True))
+    right = cells["verdict"].count("ok")
+    blanks = f", {blank} blank" if blank else ""
+    summary = f"{right} of {len(lines)} values within {rtol:g}{blanks}"
+    check = Table(
+        [Column(name, "", list(values), place=name) for name, values in cells.items()],
+        keys=("row", "column"),
+        place="check[]",
+        below=summary,
+    )
+    kept = [f"{file}: not compared: {', '.join(aside)}"] if aside else []
+    return Comparison(check, summary, right == len(lines), kept)
 
 
-def _alike(name: str, columns: Iterable[str]) -> list[str]:
-    """Return the columns of the dimension that a name's unit has; all of them for a name without a unit."""
-    asked = column_dimensions(name)
-    return [column for column in columns if not asked or asked & column_dimensions(column)]
+def _partner(header: str, table: Table) -> tuple[str, str] | None:
+    """Return the column that a header of the file means, and the header's unit; None if there is none."""
+    for column in table.columns:
+        if column.header.lower() == header.lower():
+            return column.header, column.unit
+    base, unit = parted(header)
+    for column in table.columns:
+        if (
+            unit
+            and column.name.lower() == base.lower()
+            and column.unit
+            and dimensions(column.unit) & dimensions(unit)
+        ):
+            return column.header, unit
+    return None
 
 
-def _is_number(column: Values) -> bool:
+def _columns(read_table: ReadTable, table: Table, file: str) -> tuple[list[_Expected], list[str]]:
+    """Return the file's columns that the result has, and those of texts that are left aside."""
+    by_header = {column.header: column for column in table.columns}
+    compared: list[_Expected] = []
+    aside: list[str] = []
+    for header, cells in read_table.texts.items():
+        partner = _partner(header, table)
+        if partner is None:
+            number = next((cell for cell in cells if cell and is_number(cell.replace(",", "."))), None)
+            if number is not None or column_dimensions(header):
+                raise DataError(
+                    f"{file}: the result has no column '{header}': expected some of "
+                    f"{', '.join(by_header)}{nearest(header, _alike(header, table), 0.4)}"
+                )
+            aside.append(header)
+            continue
+        column, unit = partner
+        compared.append(_Expected(header, column, cells, _conversion(unit, by_header[column].unit)))
+    if not compared:
+        raise DataError(f"{file}: no column of the result: expected some of {', '.join(by_header)}")
+    return compared, aside
+
+
+def _conversion(unit: str, into: str) -> Callable[[float], float]:
+    """What turns a number of a unit into another unit of the same dimension."""
+    if unit == into:
+        return float
+    dimension = min(dimensions(unit) & dimensions(into), key=list(UNITS).index)
+    own = find_unit(dimension, unit)
+    assert own is not None
+    return lambda x: float(to_unit(to_si(x, dimension, own), dimension, into))
+
+
+def _alike(header: str, table: Table) -> list[str]:
+    """Return the columns of the dimension that a header's unit has; all of them for a header without a unit."""
+    of = column_dimensions(header)
+    return [c for c in table.cells if not of or of & column_dimensions(c)]
+
+
+def _has_numbers(column: Values) -> bool:
     """Tell whether a column of the result holds numbers: names and verdicts keep their commas."""
-    known = next((value for value in column if value is not None), None)
-    return isinstance(known, Real)
+    first = next((value for value in column if value is not None), None)
+    return isinstance(first, Real)
 
 
 def is_input(name: str) -> bool:
@@ -98,8 +168,22 @@ def is_input(name: str) -> bool:
     return re.search(r"(?:^|_)input_[a-z]+$", name) is not None
 
 
+def _refuse_ambiguous(table: Table, keys: Sequence[_Expected], file: str) -> None:
+    """Refuse a file that cannot say which of several variants, rotors or assemblies its rows belong to."""
+    cells, there = table.cells, {c.column for c in keys}
+    for key in ("variant", "rotor", "branch"):
+        if key not in table.keys or key not in cells or key in there:
+            continue
+        names = dict.fromkeys(map(str, cells[key]))
+        if len(names) > 1:
+            raise DataError(
+                f"{file}: the result has {len(names)} {key}{'es' if key == 'branch' else 's'}: "
+                f"expected a column {key} that says which one a row belongs to"
+            )
+
+
 def _match(
-    columns: Columns, file: str, expected: dict[str, list[str]], keys: list[str], rows: int, rtol: float
+    columns: Mapping[str, Values], file: str, keys: Sequence[_Expected], rows: int, rtol: float
 ) -> Iterator[int]:
     """Yield for each expected row the result's row."""
     length = len(next(iter(columns.values())))
@@ -110,52 +194,66 @@ def _match(
             )
         yield from range(rows)
         return
-    names, numbers = [k for k in keys if not is_input(k)], [k for k in keys if is_input(k)]
+    texts = [c for c in keys if not _has_numbers(columns[c.column])]
+    numbers = [c for c in keys if _has_numbers(columns[c.column])]
     places: dict[tuple[str, ...], list[int]] = {}
     for row in range(length):
-        places.setdefault(tuple(str(columns[key][row]) for key in names), []).append(row)
+        places.setdefault(tuple(str(columns[c.column][row]) for c in texts), []).append(row)
     for index in range(rows):
-        left = places.get(tuple(expected[name][index] for name in names), [])
-        for name in numbers:
-            left = _nearest(name, columns[name], left, expected[name][index], rtol)
+        left = places.get(tuple(c.cells[index] for c in texts), [])
+        for c in numbers:
+            left = _nearest(c, columns[c.column], left, c.cells[index], rtol)
         if not left:
-            named = ", ".join(f"{name} {expected[name][index]}" for name in keys)
+            named = ", ".join(f"{c.header} {c.cells[index]}" for c in keys)
             raise DataError(f"{file}: row {index + 1}: the result has no (further) row with {named}")
         yield left[0]
-        places[tuple(expected[name][index] for name in names)].remove(left[0])
+        places[tuple(c.cells[index] for c in texts)].remove(left[0])
 
 
-def _nearest(name: str, column: Values, rows: list[int], wanted: str, rtol: float) -> list[int]:
-    """The rows whose number comes nearest to the one wanted, within the tolerance."""
+def _nearest(c: _Expected, column: Values, rows: list[int], wanted: str, rtol: float) -> list[int]:
+    """The rows whose number comes nearest to the one wanted, within the tolerance or half a unit of its last digit."""
     try:
-        number = parse_number(wanted)
+        number = c.convert(parse_number(wanted))
     except ValueError:
         return []
     away = np.array([column[row] for row in rows], dtype=float) - number
-    if name.endswith("_deg"):  # first the same angle, and of 0° and 360° the one that is meant
+    if c.column.endswith("_deg"):  # first the same angle, and of 0° and 360° the one that is meant
         turned = np.abs(np.radians(np.remainder(away + 180.0, 360.0) - 180.0))
-        best = turned <= min(rtol, turned.min(initial=np.inf) + 1e-12)
+        limit = max(rtol, math.radians(_half_unit(wanted)))
+        best = turned <= min(limit, turned.min(initial=np.inf) + 1e-12)
     else:
-        best = np.abs(away) <= rtol * max(abs(number), np.abs(away).max(initial=0.0))
+        most = max(abs(number), np.abs(away).max(initial=0.0))
+        best = np.abs(away) <= max(rtol * most, abs(c.convert(_half_unit(wanted))))
     away = np.where(best, np.abs(away), np.inf)
     return [row for row, d in zip(rows, away, strict=True) if d < np.inf and d == away.min()]
 
 
-def _error(name: str, value: Cell, wanted: str, column: Values) -> tuple[Cell, float]:
-    """Return the expected value and the error of the found one."""
+def _half_unit(number: str) -> float:
+    """Half a unit of the last digit of a decimal number.
+
+    >>> _half_unit("70"), _half_unit("0.25"), _half_unit("1.5e3")
+    (0.5, 0.005, 50.0)
+    """
+    mantissa, _, exponent = number.lower().partition("e")
+    decimals = len(mantissa.partition(".")[2])
+    return 0.5 * 10.0 ** (int(exponent or 0) - decimals)
+
+
+def _error(c: _Expected, value: Cell, wanted: str, column: Values) -> tuple[Cell, float]:
+    """Return the expected value in the result's unit, and the error of the result's."""
     if isinstance(value, str):
         return wanted, 0.0 if value == wanted else math.inf
     if isinstance(value, (bool, np.bool_)):
         return wanted, 0.0 if str(bool(value)).lower() == wanted.lower() else math.inf
     try:
-        number = parse_number(wanted)
+        number = c.convert(parse_number(wanted))
     except ValueError:
         return wanted, math.inf
     if value is None or value != value:
         return number, math.inf
-    if name.endswith("_deg"):
+    if c.column.endswith("_deg"):
         return number, abs(math.radians(math.remainder(value - number, 360.0)))
-    if name.endswith("angle_rad"):
+    if c.column.endswith("angle_rad"):
         return number, abs(math.remainder(value - number, math.tau))
     scale = abs(number) or max(
         (abs(other) for other in column if other is not None and not isinstance(other, str)), default=0.0

@@ -1,31 +1,28 @@
-"""Tables as text that is handed on: Markdown, LaTeX, HTML."""
+"""Tables as text for other documents: Markdown, LaTeX."""
 
 from __future__ import annotations
 
-import html
 import re
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from cli.show.text import Grid, has_names, printed
+from dalembert.results.text import Grid, has_names, printed
 
 if TYPE_CHECKING:
-    from cli.show.columns import Table
+    from dalembert.results.columns import Table
 
 
 def handed_on(suffix: str, tables: Mapping[str, Table], warnings: list[str]) -> bytes:
     """Return the file of this suffix: all tables, each with its name where there are several."""
-    form: Callable[[Grid], str] = {".md": markdown, ".tex": _latex, ".html": _html}[suffix]
-    title = {".md": "## {}\n\n", ".tex": "% {}\n", ".html": "<h2>{}</h2>\n"}[suffix]
+    form: Callable[[Grid], str] = {".md": markdown, ".tex": _latex}[suffix]
+    title = {".md": "## {}\n\n", ".tex": "% {}\n"}[suffix]
     several = len(tables) > 1
     parts = [title.format(name) * several + form(_grid(table)) for name, table in tables.items()]
     remarks = {
         ".md": [f"- {text}\n" for text in warnings],
         ".tex": [f"% {text}\n" for text in warnings],
-        ".html": [f"<p>{html.escape(text)}</p>\n" for text in warnings],
     }[suffix]
-    text = "\n".join([*parts, *(["".join(remarks)] if remarks else [])])
-    return (_PAGE.format(text) if suffix == ".html" else text).encode()
+    return "\n".join([*parts, *(["".join(remarks)] if remarks else [])]).encode()
 
 
 def _grid(table: Table) -> Grid:
@@ -61,28 +58,3 @@ def _latex(grid: Grid) -> str:
     form = "".join("r" if number else "l" for number in numbers)
     body = f"\\hline\n{line(header)}\\hline\n{''.join(map(line, rows))}\\hline\n"
     return f"\\begin{{tabular}}{{{form}}}\n{body}\\end{{tabular}}\n"
-
-
-_PAGE = """<!doctype html>
-<html lang="en">
-<meta charset="utf-8">
-<title>dalembert</title>
-<style>
-body {{ font: 11pt sans-serif; margin: 2em }}
-table {{ border-collapse: collapse; margin: 1em 0 }}
-th, td {{ padding: .2em .8em; border-bottom: 1px solid #ccc; text-align: left }}
-.n {{ text-align: right; font-variant-numeric: tabular-nums }}
-</style>
-{}</html>
-"""
-
-
-def _html(grid: Grid) -> str:
-    header, rows, numbers = grid
-
-    def line(row: list[str], tag: str) -> str:
-        each = zip(row, numbers, strict=True)
-        inner = "".join(f"<{tag}{' class=n' * number}>{html.escape(cell)}</{tag}>" for cell, number in each)
-        return f"<tr>{inner}</tr>\n"
-
-    return f"<table>\n{line(header, 'th')}{''.join(line(row, 'td') for row in rows)}</table>\n"

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cli.errors import nearest
 from cli.read.options import bad
-from cli.read.units import UNITS, Scaled, dimensions, find_unit, from_si, to_si, unit_name
+from dalembert.hints import nearest
+from dalembert.units import LISTED, UNITS, Scaled, dimensions, find_unit, from_si, to_si, unit_name
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cli.show.columns import Column, Table, Values
+    from dalembert.results.columns import Column, Table, Values
 
 # amplitudes keep the unit they were measured in, and what is per such a unit with them
 _DIMENSIONS = [dimension for dimension in UNITS if dimension not in ("number", "amplitude", "per")]
@@ -34,6 +34,9 @@ def chosen_units(text: str) -> dict[str, str]:
     for part in text.split(","):
         word = unit_name(part)
         found = {d: unit for d in _DIMENSIONS if (unit := find_unit(d, word))}
+        if not any(unit in LISTED[d] for d, unit in found.items()) and dimensions(word):
+            # a unit of vibration, such as mil
+            found = {}
         if not word or not found:
             known = sorted({unit for d in _DIMENSIONS for unit in UNITS[d]})
             hint = (
@@ -57,6 +60,18 @@ def in_units(table: Table, chosen: Mapping[str, str]) -> Table:
     columns = [_in_unit(column, chosen) for column in table.columns]
     renamed = {old.header: new.header for old, new in zip(table.columns, columns, strict=True)}
     return replace(table, columns=columns, keys=[renamed.get(key, key) for key in table.keys])
+
+
+def finished(table: Table, units: str | None, digits: bool) -> tuple[Table, int]:
+    """Return the table in the units of --units and with the digits of --digits, and of how many no digit is known."""
+    if units is not None:
+        table = in_units(table, chosen_units(units))
+    if not digits:
+        return table, 0
+    # loaded where --digits needs it
+    from dalembert.results.digits import digits_that_hold
+
+    return digits_that_hold(table)
 
 
 def _in_unit(column: Column, chosen: Mapping[str, str]) -> Column:

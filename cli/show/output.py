@@ -8,19 +8,20 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from shutil import get_terminal_size
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cli.errors import one_line
-from cli.read.about import HEAD
-from cli.read.files import refuse_inputs
 from cli.show.colour import coloured
 from cli.show.commands import FORMS, ShowOptions, with_options
+from cli.show.files import refuse_inputs
+from dalembert.errors import one_line
+from dalembert.results.columns import document as result_document
 
 if TYPE_CHECKING:
-    from cli.show.columns import Result, Table
     from cli.show.expect import Comparison
+    from cli.show.result import Result
+    from dalembert.results.columns import Table
 
     Made = Callable[[], bytes | Iterable[bytes]]
 
@@ -36,9 +37,25 @@ def command(
     return lambda find: with_options(find, options, None, show, asked)
 
 
+def declared_command(
+    options: str,
+    values: Callable[..., object],
+    eager: Mapping[str, Callable[[bool], None]] | None = None,
+    complete: Mapping[str, Callable[[Any, list[str], str], list[str]]] | None = None,
+) -> Callable[[Callable[..., Result]], Callable[..., None]]:
+    """Make a command whose options are declared by their text alone (`cli.show.declared`).
+
+    The function takes its own options, as attributes of a `values`, and the shared ones.
+    """
+    from cli.show.declared import parameters
+
+    own = parameters(options, eager, complete)
+    return lambda find: with_options(find, options, None, show, values, own)
+
+
 def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
     """Write the files asked for, print the result; status 1 if an expectation is not met, or nothing was found."""
-    from cli.read.headers import check_renamed
+    from dalembert.tables.headers import check_renamed
 
     if options.form == ".toml" and result.toml is None:
         raise typer.BadParameter(
@@ -55,13 +72,17 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
     if options.expect is not None:
         from cli.show.expect import compare
 
-        further = [*([] if result.screen is None else [result.screen]), *result.expected]
-        checked = compare(whole(), str(options.expect), options.rtol, further)
+        _, *others = result.tables.values()
+        screen = [] if result.screen is None else [result.screen]
+        checked = compare(whole(), str(options.expect), options.rtol, [*screen, *result.expected, *others])
+        result.warnings.extend(checked.warnings)
     check_renamed()
     if options.digits:
         result = _with_digits_that_hold(result)
     # a report cuts the digits of each of its tables
     pages = _report(_with_first(result, whole), options, asked, checked)
+    if checked is not None:
+        result = _with_check(result, checked)
     _write(result, options, pages)
     # a long table would carry the warnings out of sight
     at_the_end = options.output is None and not options.json and sys.stdout.isatty()
@@ -76,7 +97,7 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
 
 def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> None:
     """Write the files; where one of them is an input, none."""
-    from cli.show.files import write_all
+    from cli.show.files import check_folders, write_all
 
     output = options.output
     files: dict[Path, Made] = {}
@@ -84,8 +105,9 @@ def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> 
         for name in result.companions:
             beside = output.with_name(f"{output.stem}-{name}{output.suffix}")
             files[beside] = partial(_one_table, options.form, result.tables[name])
-    names = (output, options.plot, *result.beside, *pages, *files)
-    refuse_inputs([path for path in names if path is not None])
+    names = [path for path in (output, options.plot, *result.beside, *pages, *files) if path is not None]
+    refuse_inputs(names)
+    check_folders(names)
     files |= {**result.beside, **pages}
     if options.plot is not None and result.figure is not None:
         from cli.show.picture import drawn
@@ -96,11 +118,22 @@ def _write(result: Result, options: ShowOptions, pages: Mapping[Path, Made]) -> 
     write_all(files)
 
 
+def _with_check(result: Result, checked: Comparison) -> Result:
+    """Return the result with the check as its first table, and in its document."""
+    document = result.documented
+    check = result_document([checked.table])
+    return replace(
+        result,
+        tables={"check": lambda: checked.table, **result.tables},
+        document=lambda: {**document(), **check},
+    )
+
+
 def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> None:
     """Print what was asked for, in the form that standard output asks for."""
-    from cli.show.text import csv_text, paragraphs, table_text
+    from dalembert.results.text import csv_text, paragraphs, table_text
 
-    verdict = "" if checked is None else f"{table_text(checked.columns)}\n{checked.summary}"
+    verdict = "" if checked is None else f"{table_text(checked.table.cells)}\n{checked.summary}"
     if options.json:
         sys.stdout.writelines(_json_parts(result))
         if checked is not None:
@@ -108,14 +141,48 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
     elif checked is not None:
         print(coloured(verdict, sys.stdout, not options.no_color))
     elif options.text or (sys.stdout.isatty() and options.output is None):
-        table = (result.screen or _first(result))()
         width = get_terminal_size().columns if sys.stdout.isatty() else None
-        text = table_text(table.cells, table.keys, width)
-        said = paragraphs(result.notes(), text, result.afterword())
-        sys.stdout.write(coloured(said, sys.stdout, not options.no_color))
+        text = paragraphs(result.notes(), *_tables_text(result, width), result.afterword())
+        sys.stdout.write(coloured(text, sys.stdout, not options.no_color))
     elif options.output is None:
         sys.stdout.write(csv_text(_first(result)().cells))
     sys.stdout.flush()
+    shown = (
+        options.json or options.text or (checked is None and options.output is None and sys.stdout.isatty())
+    )
+    if not shown and options.form != ".json":
+        for line in result.aside():
+            print(f"note: {one_line(line)}", file=sys.stderr)
+
+
+ROWS = 12  # rows of a further table that a terminal shows
+
+
+def _tables_text(result: Result, width: int | None) -> Iterator[str]:
+    """Yield the tables as the terminal shows them: the first whole, of the others the first rows."""
+    from dalembert.results.text import as_list, heading, table_text
+
+    first, *others = result.tables.items()
+    table = (result.screen or first[1])()
+    yield _below_each_other(table.above, table_text(table.cells, table.keys, width), table.below)
+    if result.document is not None:
+        return
+    for name, of in others:
+        table = of()
+        if not table.columns:
+            # of the document alone
+            continue
+        if table.length == 1:
+            table = as_list(table)
+        cells = {header: values[:ROWS] for header, values in table.cells.items()}
+        more = f"… and {table.length - ROWS} further rows" if table.length > ROWS else ""
+        title = f"{heading(name)}: {table.above}" if table.above else f"{heading(name)}:"
+        yield _below_each_other(title, table_text(cells, table.keys, width), more, table.below)
+
+
+def _below_each_other(*parts: str) -> str:
+    """Join what is not empty, one below the other."""
+    return "".join(part.rstrip("\n") + "\n" for part in parts if part)
 
 
 def _first(result: Result) -> Callable[[], Table]:
@@ -133,7 +200,7 @@ def reported(options: str) -> Callable[[Callable[..., Result]], Callable[..., No
     `options` is what the help says of its own. The files are `beside` of its result, `notes` is what goes to standard
     output, `warnings` are the remarks.
     """
-    return lambda find: with_options(find, options, ("report", *HEAD), _hand_on)
+    return lambda find: with_options(find, options, ("report", "about"), _hand_on)
 
 
 def _hand_on(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
@@ -205,7 +272,9 @@ def _formed(result: Result, form: str) -> bytes | Iterable[bytes]:
         return result.toml()
     if form in (".csv", ".parquet"):
         return _one_table(form, _first(result))
-    formed = {name.strip("-"): table() for name, table in result.tables.items()}
+    # a table without columns is of the JSON document alone
+    every = ((name.strip("-"), table()) for name, table in result.tables.items())
+    formed = {name: table for name, table in every if table.columns}
     if form == ".xlsx":
         from cli.show.parts import workbook
 
@@ -221,7 +290,7 @@ def _one_table(form: str, table: Callable[[], Table]) -> bytes | Iterable[bytes]
         from cli.show.parts import parquet
 
         return parquet([table()])
-    from cli.show.text import csv_text
+    from dalembert.results.text import csv_text
 
     return csv_text(table().cells).encode()
 
@@ -239,14 +308,14 @@ def _unknown(count: int) -> list[str]:
 
 
 def _json_parts(result: Result) -> Iterator[str]:
-    from cli.show.documents import json_parts
+    from dalembert.results.json_text import json_parts
 
-    return json_parts({**result.document(), "warnings": result.warnings})
+    return json_parts({**result.documented(), "warnings": result.warnings})
 
 
 def _with_digits_that_hold(result: Result) -> Result:
     """Cut the first table and that of the terminal."""
-    from cli.show.digits import digits_that_hold
+    from dalembert.results.digits import digits_that_hold
 
     table, unknown = digits_that_hold(_first(result)())
     screen = result.screen if result.screen is None else cache(result.screen)

@@ -7,23 +7,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.read import options
-from cli.read.units import UNITS, to_si
 from cli.show.in_units import chosen_units, in_units
 from dalembert.page import Shown, fits
+from dalembert.units import UNITS, to_si
 
 if TYPE_CHECKING:
-    from cli.show.columns import Table
+    from dalembert.results.columns import Table
 
 # what a scene is drawn from: of these alone the page must know the unit
 DRAWN = ("length", "angle", "velocity", "acceleration", "speed", "force", "time")
 
 
 def refuse_long(count: int) -> None:
-    """Refuse --html of more poses than a page can hold."""
+    """Refuse --page of more poses than a page can hold."""
     try:
         fits(count)
     except ValueError as error:
-        raise options.bad("--html", str(error)) from None
+        raise options.bad("--page", str(error)) from None
 
 
 def shown(table: Table, units: str | None) -> dict[str, Shown]:

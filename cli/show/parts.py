@@ -5,16 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import count
-from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING, Any
 
-from cli.errors import needs
-from cli.show.text import plain
+from dalembert.errors import needs
+from dalembert.results.text import plain
 
 if TYPE_CHECKING:
     import pyarrow
 
-    from cli.show.columns import Column, Table
+    from dalembert.results.columns import Column, Table
 
 CHUNK = 1 << 20  # bytes
 MOST = 1_048_575  # rows of a sheet below its header
@@ -65,6 +64,9 @@ def workbook(tables: Mapping[str, Iterable[Table]]) -> Iterator[bytes]:
                 left -= 1
             if sheet is None:
                 sheet = begun(name, table)
+    # loaded here: a table alone needs no file
+    from tempfile import TemporaryFile
+
     with TemporaryFile() as stream:
         book.save(stream)
         yield from _chunks(stream)
@@ -77,6 +79,9 @@ def parquet(blocks: Iterable[Table]) -> Iterator[bytes]:
         from pyarrow.parquet import ParquetWriter
     except ImportError:
         raise needs("-o .parquet", "pyarrow", "parquet") from None
+    # loaded here: a table alone needs no file
+    from tempfile import TemporaryFile
+
     with TemporaryFile() as stream:
         writer = None
         for table in blocks:

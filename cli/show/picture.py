@@ -6,7 +6,7 @@ import io
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from cli.errors import needs
+from dalembert.errors import needs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

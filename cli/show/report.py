@@ -10,19 +10,22 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 from cli.read.about import HEAD
-from cli.read.files import load, named
-from cli.read.sources import open_source
-from cli.read.units import UNITS, is_number, parse_quantity, parted, written
-from cli.show.columns import Column, Section, Sheet, Table
-from cli.show.digits import finished
-from cli.show.text import Grid, has_names, heading, in_blocks, printed
+from cli.show.in_units import finished
+from cli.show.result import Section, Sheet
+from dalembert.quantities import is_number, parse_quantity
+from dalembert.results.columns import Column, Table
+from dalembert.results.text import Grid, has_names, heading, in_blocks, printed
+from dalembert.tables.files import load, named
+from dalembert.tables.sources import open_source
+from dalembert.units import UNITS, parted, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.show.columns import Cell, Result
     from cli.show.commands import ShowOptions
     from cli.show.expect import Comparison
+    from cli.show.result import Result
+    from dalembert.results.columns import Cell
 
 ROWS = 36  # so many rows of a result are shown
 READ = 24  # so many rows of an input
@@ -78,8 +81,7 @@ def report(
         if given:
             sections.insert(0, Section("Given", given))
         if checked is not None:
-            compared = Table([Column(name, "", values) for name, values in checked.columns.items()])
-            sections.append(Section("Compared with what was expected", [compared, checked.summary]))
+            sections.append(Section("Compared with what was expected", [checked.table, checked.summary]))
         sheets[0] = replace(sheets[0], sections=sections)
     pages = [
         Page(
@@ -105,10 +107,22 @@ def _plain_sheet(result: Result) -> Sheet:
     """The notes, every table, the afterword."""
     (name, first), *others = result.tables.items()
     sections = [
-        Section(heading(name), [result.notes(), (result.screen or first)(), result.afterword()]),
-        *(Section(heading(name), [table()]) for name, table in others),
+        Section(
+            heading(name), [result.notes(), *_with_sentences((result.screen or first)()), result.afterword()]
+        ),
+        *(
+            Section(heading(name), _with_sentences(table))
+            for name, of in others
+            # a table without columns is of the JSON document alone
+            if (table := of()).columns
+        ),
     ]
     return Sheet("", sections, result.figure)
+
+
+def _with_sentences(table: Table) -> list[str | Table]:
+    """A table between the sentences above and below it."""
+    return [table.above, table, table.below]
 
 
 def _given(asked: Mapping[str, str], files: Sequence[str]) -> Iterator[str | Table]:

@@ -8,16 +8,16 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.errors import DataError
 from cli.show.handed_on import markdown
 from cli.show.picture import drawn
 from cli.show.report import CODE, Page, Part, Report, report
-from cli.show.text import BAD, GOOD, Grid
+from dalembert.errors import DataError
+from dalembert.results.text import BAD, GOOD, Grid
 
 if TYPE_CHECKING:
-    from cli.show.columns import Result
     from cli.show.commands import ShowOptions
     from cli.show.expect import Comparison
+    from cli.show.result import Result
 
 _STYLE = """
 :root { color-scheme: light }
@@ -26,7 +26,7 @@ body { font: 10pt/1.4 "Helvetica Neue", Arial, "Liberation Sans", sans-serif; co
 h1 { font-size: 16pt; line-height: 1.2; margin: 0 0 2mm }
 h2 { font-size: 13pt; margin: 5mm 0 1mm } h3 { font-size: 11pt; margin: 4mm 0 1mm; border-bottom: .3mm solid #999 }
 h2, h3 { break-after: avoid }
-dl { display: grid; grid-template-columns: max-content 1fr; gap: 0 4mm; margin: 0 0 3mm } dt { color: #555 } dd { margin: 0 }
+dl { display: grid; grid-template-columns: fit-content(40%) 1fr; gap: 0 4mm; margin: 0 0 3mm } dt { color: #555 } dd { margin: 0 }
 p { margin: 1.5mm 0; white-space: pre-wrap } pre { font: 8pt/1.3 monospace; white-space: pre-wrap; margin: 1.5mm 0 }
 table { border-collapse: collapse; margin: 1.5mm 0 2.5mm; font-size: 9pt; max-width: 100% } thead { display: table-header-group }
 th, td { padding: .5mm 1.6mm; text-align: left; vertical-align: top; border-bottom: .2mm solid #ccc } tr { break-inside: avoid }
@@ -34,8 +34,8 @@ th { background: #eee; font-weight: 600; vertical-align: bottom } .n { text-alig
 td.n { white-space: nowrap } th, td { overflow-wrap: break-word } .long { overflow-wrap: anywhere } .good { color: #06632f; font-weight: 600 } .bad { color: #b00020; font-weight: 700 }
 .warning { border-left: 1mm solid #b00020; padding-left: 2mm } footer { margin-top: 4mm; font-size: 8.5pt; color: #444 }
 figure { margin: 3mm 0; break-inside: avoid } svg { display: block; max-width: 100%; height: auto; max-height: 95mm; margin: 0 auto } .rows svg { max-height: 220mm }
-section + section { break-before: page }
-@page { margin: 13mm 12mm } @media print { body { margin: 0; padding: 0; max-width: none } }
+.wide { overflow-x: auto } section + section { break-before: page }
+@page { margin: 13mm 12mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide { overflow: visible } }
 """
 _MARKS = {**dict.fromkeys(GOOD, "good"), **dict.fromkeys(BAD, "bad")}
 LONG = 40
@@ -113,7 +113,8 @@ def _html_part(part: Part) -> str:
         return f"<tr>{''.join(cells)}</tr>\n"
 
     body = "".join(line(row, "td") for row in part.rows)
-    return f"<table><thead>{line(part.header, 'th')}</thead><tbody>\n{body}</tbody></table>\n"
+    table = f"<table><thead>{line(part.header, 'th')}</thead><tbody>\n{body}</tbody></table>"
+    return f'<div class="wide">{table}</div>\n'
 
 
 def _markdown(path: Path, report: Report) -> dict[Path, bytes]:

@@ -15,11 +15,11 @@ from cli.show.output import command
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.show.columns import Result
+    from cli.show.result import Result
 
 
 class Method(StrEnum):
-    """How the rotation is found."""
+    """How the rotation is computed."""
 
     exact = "exact"
     integrate = "integrate"
@@ -43,7 +43,7 @@ How:
   method  Default: exact wherever a closed form exists, else integrate.
   integrator  For integration; the splitting is for a symmetric top.
 Output: of the rotation:
-  html FILE.html  Write a page that moves to FILE: play, slider, curves, values.
+  page FILE.html  Write a page that moves to FILE: play, slider, curves, values.
 """
 
 
@@ -54,7 +54,7 @@ def run(
     at: list[str] | None = None,
     method: Annotated[Method | None, typer.Option(show_default=False)] = None,
     integrator: Integrator = Integrator.dop853,
-    html: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
+    page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
     *,
     show: ShowOptions,
 ) -> Result:
@@ -67,10 +67,9 @@ def run(
     """
     import numpy as np
 
-    from cli.show.columns import Result
-    from cli.spin import columns, words
-    from cli.spin.read import read_body
-    from cli.spin.solve import Rotation
+    from cli.show.result import Result
+    from cli.spin import tables
+    from cli.spin.rotation import Rotation, read_body
 
     if time is not None and at:
         raise options.bad("--at", "expected --time or --at, not both")
@@ -78,35 +77,35 @@ def run(
         times = options.time_range("--time", time)
     else:
         times = [options.number_or_quantity("--at", text, "time") for text in at or ["0"]]
-    if html is not None:
+    if page is not None:
         from cli.show.page import refuse_long
 
         refuse_long(len(times))
-    given = read_body(body)
-    found = Rotation(given, np.array(times), method.value if method else None, integrator.value)
-    found.states  # noqa: B018  faults of the data are found before anything is shown
+    turning = read_body(body)
+    rotation = Rotation(turning, np.array(times), method.value if method else None, integrator.value)
+    rotation.states  # noqa: B018  faults of the data are errors before anything is shown
 
     def figure() -> Figure:
-        from cli.spin.picture import draw
+        return tables.draw(rotation)
 
-        return draw(found)
-
-    def page() -> bytes:
+    def moving() -> bytes:
         from cli.show.page import shown
         from rigidbody3d.animation import turning_page
 
-        table = shown(columns.states(found), show.units)
-        made = turning_page(given.name, given.inertia, given.omega, table, given.mgl is not None)
+        table = shown(tables.states(rotation), show.units)
+        made = turning_page(turning.name, turning.inertia, turning.omega, table, turning.mgl is not None)
         return made.html.encode()
 
     return Result(
-        document=lambda: columns.document(found),
-        tables={"states": lambda: columns.states(found)},
-        notes=lambda: words.notes(found),
-        afterword=lambda: words.afterword(found),
+        tables=tables.tables(rotation),
+        head={"method": "exact" if rotation.exact else rotation.integrator},
         figure=figure,
-        beside={} if html is None else {html: page},
-        method=words.METHOD,
-        about={"title": given.name or "Rotation in time"} | given.about,
-        warnings=[*given.warnings, *words.warnings(found), *(words.coarse(found) if html else ())],
+        beside={} if page is None else {page: moving},
+        method=tables.METHOD,
+        about={"title": turning.name or "Rotation in time"} | turning.about,
+        warnings=[
+            *turning.warnings,
+            *tables.warnings(rotation),
+            *(tables.coarse(rotation) if page else ()),
+        ],
     )

@@ -8,9 +8,7 @@ from cli.read import options
 from cli.show.output import command
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from cli.show.columns import Result
+    from cli.show.result import Result
 
 
 EXAMPLE = "riul-slider-crank"
@@ -35,27 +33,17 @@ def run(states: str, gravity: str | None = None, ledger: bool = False) -> Result
     column field.
     """
     g = 0j if gravity is None else options.plane_vector("--gravity", gravity)
-    from cli.show.columns import Result, Sheet
-    from cli.work import columns, words
-    from cli.work.read import read_states
-    from cli.work.solve import WorkBalance
+    from cli.show.result import Result
+    from cli.work.power import WorkBalance
+    from cli.work.states import read_states
+    from cli.work.tables import METHOD, draw, tables
 
     table = read_states(states)
-    found = WorkBalance(table, g)
-
-    def figure() -> Figure:
-        from cli.work.picture import draw
-
-        return draw(found)
-
-    tables = {"unknowns": lambda: columns.unknowns(found), "ledger": lambda: columns.ledger(found)}
+    balance = WorkBalance(table, g)
     return Result(
-        document=lambda: columns.document(found),
-        tables={"ledger": tables["ledger"]} if ledger else tables,
-        notes=(lambda: "") if ledger else (lambda: words.notes(found)),
-        figure=figure,
-        method=words.METHOD,
-        sheets=lambda: [Sheet("", words.sections(found), figure)],
+        tables=tables(balance, ledger_first=ledger),
+        figure=lambda: draw(balance),
+        method=METHOD,
         about={"title": "Balance of virtual power"},
-        warnings=[*table.table.warnings, *table.warnings, *found.warnings],
+        warnings=[*table.table.warnings, *table.warnings, *balance.warnings],
     )

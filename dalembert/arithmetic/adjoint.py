@@ -36,11 +36,11 @@ PARTIALS: Mapping[str, Sequence[Partial]] = {
 """∂v/∂argument of each kind of operation, from its arguments and its own value v; a select hands its own on."""
 
 
-def handed_on(kind: Kind, name: str, i: int, own: Number, given: list[Number], value: Number) -> Number:
+def handed_on(kind: Kind, name: str, i: int, own: Number, operands: list[Number], value: Number) -> Number:
     """What an operation hands on of its adjoint to its i-th argument; its derivative is often 1 or −1."""
     if name == "select":
-        return kind.select(given[0], *((own, 0.0) if i == 1 else (0.0, own)))
-    partial = PARTIALS[name][i](kind, given, value)
+        return kind.select(operands[0], *((own, 0.0) if i == 1 else (0.0, own)))
+    partial = PARTIALS[name][i](kind, operands, value)
     if isinstance(partial, float) and abs(partial) == 1.0:
         return own if partial > 0 else -own
     return partial if isinstance(own, float) and own == 1.0 else own * partial
@@ -49,21 +49,21 @@ def handed_on(kind: Kind, name: str, i: int, own: Number, given: list[Number], v
 def _adjoints(tape: Tape, values: list[Number], output: int) -> dict[str, Number]:
     """v̄ of every input that the output hangs on, by its name."""
     bar: dict[int, Number] = {output: 1.0}
-    found: dict[str, Number] = {}
+    adjoints: dict[str, Number] = {}
     for number in range(output, -1, -1):
         kind, *arguments = tape.operations[number]
         if number not in bar or kind == "const":
             continue
         own = bar.pop(number)
         if kind == "input":
-            found[arguments[0]] = own
+            adjoints[arguments[0]] = own
             continue
-        given = [values[a] for a in arguments]
+        operands = [values[a] for a in arguments]
         for i, a in enumerate(arguments):
             if tape.operations[a][0] != "const" and not (kind == "select" and i == 0):
-                moved = handed_on(RECORDED, kind, i, own, given, values[number])
+                moved = handed_on(RECORDED, kind, i, own, operands, values[number])
                 bar[a] = moved if a not in bar else bar[a] + moved
-    return found
+    return adjoints
 
 
 def derivatives(tape: Tape, to: Iterable[str], of: Iterable[str] | None = None) -> Tape:
@@ -100,13 +100,13 @@ def derivatives(tape: Tape, to: Iterable[str], of: Iterable[str] | None = None) 
     d(x)/d(r): v2
     d(x)/d(q): v5
     """
-    recorder, wanted, known = Recorder(), list(to), dict(tape.outputs)
+    recorder, wanted, outputs = Recorder(), list(to), dict(tape.outputs)
     values = tape.values({name: recorder.input(name) for name in tape.inputs}, RECORDED)
     for variable in wanted:
         if variable not in tape.inputs:
             raise KeyError(variable)
-    found: dict[str, Number] = {}
+    results: dict[str, Number] = {}
     for name in tape.names if of is None else of:
-        bar = _adjoints(tape, values, known[name])
-        found |= {f"d({name})/d({variable})": bar.get(variable, 0.0) for variable in wanted}
-    return recorder.tape(found)
+        bar = _adjoints(tape, values, outputs[name])
+        results |= {f"d({name})/d({variable})": bar.get(variable, 0.0) for variable in wanted}
+    return recorder.tape(results)

@@ -38,7 +38,7 @@ def read(value: ArrayLike, axes: int, relative: float) -> Given:
     return value, axes, relative * np.abs(np.asarray(value, dtype=float))
 
 
-def bounds(formula: Formula, given: Mapping[str, Given], *options: Hashable) -> list[Array]:
+def bounds(formula: Formula, inputs: Mapping[str, Given], *options: Hashable) -> list[Array]:
     """Bound the errors of what a formula gives, in its shapes; of a complex number: the size of its error.
 
     Parameters
@@ -56,25 +56,25 @@ def bounds(formula: Formula, given: Mapping[str, Given], *options: Hashable) -> 
     >>> [float(round(x * 2**53, 3)) for x in bound]
     [0.25, 0.75]
     """
-    arrays = {name: np.asarray(value, dtype=float) for name, (value, _, _) in given.items()}
-    own = {name: array.shape[array.ndim - given[name][1] :] for name, array in arrays.items()}
+    arrays = {name: np.asarray(value, dtype=float) for name, (value, _, _) in inputs.items()}
+    own = {name: array.shape[array.ndim - inputs[name][1] :] for name, array in arrays.items()}
     lead = np.broadcast_shapes(*(x.shape[: x.ndim - len(own[name])] for name, x in arrays.items()))
     tape, shapes = _taped(formula, options, tuple(own.items()))
     entering: dict[str, Any] = {}
     errors: list[str] = []
-    for name, (_, _, error) in given.items():
+    for name, (_, _, error) in inputs.items():
         entering |= _lanes(name, arrays[name], own[name], lead)
         if np.any(error):
             off = _lanes(f"off {name}", np.asarray(error, dtype=float), own[name], lead)
             errors += [key.removeprefix("off ") for key in off]
             entering |= off
-    found = _bounded(tape, tuple(name for name in errors if name in tape.inputs), entering, math.prod(lead))
+    result = _bounded(tape, tuple(name for name in errors if name in tape.inputs), entering, math.prod(lead))
     results = []
     for number, shape in enumerate(shapes):
         bound = np.zeros((math.prod(lead), math.prod(shape)))
         for k in range(bound.shape[1]):
             parts = [
-                found[f"error({part} {number} {k})"] for part in PARTS if f"{part} {number} {k}" in found
+                result[f"error({part} {number} {k})"] for part in PARTS if f"{part} {number} {k}" in result
             ]
             bound[:, k] = parts[0] if len(parts) == 1 else np.hypot(*parts)
         results.append(bound.reshape(lead + shape))

@@ -24,15 +24,15 @@ class Calls:
     passed, found : names of what each call is given, and of what it finds
     """
 
-    def __init__(self, recorder: Recorder, passed: Sequence[str], found: Sequence[str]) -> None:
-        self.recorder, self.passed, self.found = recorder, tuple(passed), tuple(found)
+    def __init__(self, recorder: Recorder, passed: Sequence[str], results: Sequence[str]) -> None:
+        self.recorder, self.passed, self.found = recorder, tuple(passed), tuple(results)
         self.count = 0
         self.outputs: dict[str, Number] = {}
 
-    def __call__(self, given: Mapping[str, Number]) -> list[Number]:
+    def __call__(self, inputs: Mapping[str, Number]) -> list[Number]:
         """What one more call finds."""
         number, self.count = self.count, self.count + 1
-        self.outputs |= {f"call {number} {name}": given[name] for name in self.passed}
+        self.outputs |= {f"call {number} {name}": inputs[name] for name in self.passed}
         return [self.recorder.input(f"call {number} {name}") for name in self.found]
 
 
@@ -117,24 +117,24 @@ class Loop:
     def whole(self) -> Tape:
         """The body with what it calls written out, for engines that know no calls."""
         recorder = Recorder()
-        given = {name: recorder.input(name) for name in (*self.states, *self.fed, *self.constants)}
+        inputs = {name: recorder.input(name) for name in (*self.states, *self.fed, *self.constants)}
         places = dict(self.body.outputs)
-        found: dict[int, Mapping[str, Number]] = {}
+        results: dict[int, Mapping[str, Number]] = {}
         values: list[Number] = []
         for kind, *arguments in self.body.operations:
             if kind == "input":
                 of = called(arguments[0])
                 if of is None:
-                    values.append(given[arguments[0]])
+                    values.append(inputs[arguments[0]])
                     continue
                 number, name = of
-                if number not in found:
+                if number not in results:
                     here = {
-                        x: values[places[f"call {number} {x}"]] if x in self.passed else given[x]
+                        x: values[places[f"call {number} {x}"]] if x in self.passed else inputs[x]
                         for x in self.inner.inputs
                     }
-                    found[number] = self.inner.on(here, RECORDED)
-                values.append(found[number][name])
+                    results[number] = self.inner.on(here, RECORDED)
+                values.append(results[number][name])
             elif kind == "const":
                 values.append(arguments[0])
             else:

@@ -112,10 +112,10 @@ def _result(
     part: tuple[Any, ...],
     future: Future[R | _Raised],
 ) -> R:
-    found = _sent(executor, calls, number, part, future)
-    if isinstance(found, _Raised):
-        raise found.again()
-    return found
+    result = _sent(executor, calls, number, part, future)
+    if isinstance(result, _Raised):
+        raise result.again()
+    return result
 
 
 def _sent(

@@ -48,11 +48,11 @@ class Recorder:
         if kind in ("add", "mul") and arguments[0] > arguments[1]:
             arguments = (arguments[1], arguments[0])
         operation = (kind, *arguments)
-        found = self._known.get(operation)
-        if found is None:
-            found = self._known[operation] = len(self.operations)
+        number = self._known.get(operation)
+        if number is None:
+            number = self._known[operation] = len(self.operations)
             self.operations.append(operation)
-        return found
+        return number
 
     def difference(self, a: int, b: int) -> Real:
         """a − b; b − a, where that is known, with the other sign."""
@@ -71,12 +71,12 @@ class Recorder:
 
     def numbers(self, outputs: Mapping[str, Number]) -> list[tuple[str, int]]:
         """The operations that have the values of named results; see `tape`."""
-        found = []
+        nodes = []
         for name, value in outputs.items():
             if isinstance(value, (Complex, complex)):
                 raise TypeError(f"output {name} is complex: record its parts")
-            found.append((name, lifted(self, value).settled))
-        return found
+            nodes.append((name, lifted(self, value).settled))
+        return nodes
 
 
 def lifted(recorder: Recorder, value: Number) -> Real:

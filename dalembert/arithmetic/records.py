@@ -1,4 +1,7 @@
-"""Records of arrays: compared by their numbers, told in one line, laid out as a table."""
+"""Records of arrays: compared by their numbers, told in one line, laid out as a table.
+
+numpy is loaded by what needs it: the description of a mechanism is made of records without it.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
+    from numpy.typing import ArrayLike, NDArray
 
 Kind = TypeVar("Kind", bound=type)
 
@@ -27,6 +29,7 @@ def record(kind: Kind) -> Kind:
     Examples
     --------
     >>> from typing import NamedTuple
+    >>> import numpy as np
     >>> @record
     ... class Wrench(NamedTuple):
     ...     force: np.ndarray
@@ -49,9 +52,12 @@ def record(kind: Kind) -> Kind:
 def numbers(value: object) -> str:
     """Tell numbers in one line: a few one by one, complex ones as size and angle, many by their shape.
 
+    >>> import numpy as np
     >>> numbers([0.5, 2j]), numbers(np.zeros((1000, 3)))
     ('[0.5∠0° 2∠90°]', '(1000, 3) numbers from 0 to 0')
     """
+    import numpy as np
+
     x = np.asarray(value)
     if x.dtype.kind not in "biufc":
         return str(value) if isinstance(value, str) else repr(value)
@@ -71,6 +77,7 @@ def table(columns: Mapping[str, ArrayLike], axes: Iterable[str]) -> pd.DataFrame
 
     Of columns with fewer axes than names the last names count; several leading axes are numbered.
     """
+    import numpy as np
     import pandas as pd
 
     arrays = dict(zip(columns, np.broadcast_arrays(*columns.values()), strict=True))
@@ -93,6 +100,8 @@ def components(name: str, vector: ArrayLike, of: str = "xyz") -> dict[str, NDArr
     >>> components("omega_*_rad_s", [1.0, 2.0, 3.0])["omega_y_rad_s"]
     array(2.)
     """
+    import numpy as np
+
     v = np.asarray(vector)
     return {name.replace("*", letter): v[..., i] for i, letter in enumerate(of)}
 
@@ -124,6 +133,8 @@ def alike(a: object, b: object) -> bool:
         or hasattr(b, "__array__")
         or (isinstance(a, list | tuple) and not hasattr(a, "_fields"))
     ):
+        import numpy as np
+
         x, y = np.asarray(a), np.asarray(b)
         return bool(np.array_equal(x, y, equal_nan=x.dtype.kind in "fc" and y.dtype.kind in "fc"))
     return bool(a == b)

@@ -104,18 +104,18 @@ def bounds_of_few(
     """The same for a few lanes, on numbers, without writing it down."""
     arrays = {name: np.asarray(value, dtype=float) for name, value in given.items()}
 
-    def found(numbers: Mapping[str, Any], kind: Kind) -> dict[str, Any]:
+    def results(numbers: Mapping[str, Any], kind: Kind) -> dict[str, Any]:
         errors = {name: numbers[other] for name, other in inputs.items()}
         return _Bounds(tape, numbers, kind, errors, constants, turned).of(of)
 
     if all(array.size == 1 for array in arrays.values()):
         # one pose: nothing of numpy, but at a singular place, where its numbers go on with infinity and NaN
         try:
-            return found({name: array.item() for name, array in arrays.items()}, RECORDED)
+            return results({name: array.item() for name, array in arrays.items()}, RECORDED)
         except (ZeroDivisionError, ValueError, OverflowError):
             pass
     with np.errstate(all="ignore"):
-        return found({name: array[()] for name, array in arrays.items()}, NUMPY)
+        return results({name: array[()] for name, array in arrays.items()}, NUMPY)
 
 
 class _Bounds:
@@ -124,7 +124,7 @@ class _Bounds:
     def __init__(
         self,
         tape: Tape,
-        given: Mapping[str, Any],
+        inputs: Mapping[str, Any],
         kind: Kind,
         errors: Mapping[str, Number],
         constants: float,
@@ -132,7 +132,7 @@ class _Bounds:
     ) -> None:
         self.tape, self.kind, self.errors, self.turned = tape, kind, errors, turned
         self.constants = constants
-        self.values = tape.values(given, kind)
+        self.values = tape.values(inputs, kind)
         # the slopes of roots that are no derivatives, and their τ
         self.slopes: dict[int, Number] = {}
         self.shares: dict[int, Number] = {}
@@ -158,13 +158,13 @@ class _Bounds:
         for number, argument in roots:
             if number in needed:
                 self._root(number, argument)
-        found: dict[str, Number] = {}
+        results: dict[str, Number] = {}
         for name, number in tape.outputs:
-            found[name] = self.values[number]
+            results[name] = self.values[number]
             if name in wanted:
-                found[f"error({name})"] = self.error(number)
-                found[f"tau({name})"] = self._largest(below[name]) if roots else 0.0
-        return found
+                results[f"error({name})"] = self.error(number)
+                results[f"tau({name})"] = self._largest(below[name]) if roots else 0.0
+        return results
 
     def _largest(self, below: frozenset[int]) -> Number:
         largest: Number = 0.0
@@ -189,14 +189,14 @@ class _Bounds:
         bars: dict[int, Number] = {output: 1.0}
         for number in pattern.swept:
             kind, *arguments = operations[number]
-            own, given = bars[number], [values[a] for a in arguments]
+            own, operands = bars[number], [values[a] for a in arguments]
             for i, a in enumerate(arguments):
                 if a not in pattern.needed or (kind == "select" and i == 0):
                     continue
                 if number in self.slopes:
                     moved = own * self.slopes[number]
                 else:
-                    moved = handed_on(self.kind, kind, i, own, given, values[number])
+                    moved = handed_on(self.kind, kind, i, own, operands, values[number])
                 bars[a] = moved if a not in bars else bars[a] + moved
         total: Number = 0.0
         for number, terms in pattern.sums:
@@ -227,15 +227,15 @@ class _Bounds:
             name, *arguments = self.tape.operations[number]
             operations = self.tape.operations
             if name == "input":
-                found: Number = abs(self.errors[arguments[0]] * (1 / UNIT_ROUNDOFF))
+                bound: Number = abs(self.errors[arguments[0]] * (1 / UNIT_ROUNDOFF))
             elif name in ("sin", "cos"):
-                found = self.kind.binade(self.values[number]) * ROUNDINGS[name]
+                bound = self.kind.binade(self.values[number]) * ROUNDINGS[name]
                 if self.turned and operations[arguments[0]][0] == "input":
-                    found = found + self.turned
+                    bound = bound + self.turned
             else:
                 constant = next(operations[a][1] for a in arguments if operations[a][0] == "const")
-                found = abs(self.values[number]) + self.constants * abs(constant)
-            self._own[number] = found
+                bound = abs(self.values[number]) + self.constants * abs(constant)
+            self._own[number] = bound
         return self._own[number]
 
     def _root(self, number: int, argument: int) -> None:

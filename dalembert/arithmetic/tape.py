@@ -159,8 +159,8 @@ class Tape:
         KeyError
             Where an output of that name is not on the tape.
         """
-        known = dict(self.outputs)
-        return shortened(self.operations, [(name, known[name]) for name in names])
+        outputs = dict(self.outputs)
+        return shortened(self.operations, [(name, outputs[name]) for name in names])
 
     def on(self, inputs: Mapping[str, Any], kind: Kind) -> dict[str, Any]:
         """The outputs, worked out operation by operation on any kind of number."""
@@ -169,15 +169,15 @@ class Tape:
 
     def values(self, inputs: Mapping[str, Any], kind: Kind) -> list[Any]:
         """The value of every operation, on any kind of number."""
-        found: list[Any] = []
+        results: list[Any] = []
         for name, *arguments in self.operations:
             if name == "const":
-                found.append(kind.const(arguments[0]))
+                results.append(kind.const(arguments[0]))
             elif name == "input":
-                found.append(inputs[arguments[0]])
+                results.append(inputs[arguments[0]])
             else:
-                found.append(performed(name, [found[a] for a in arguments], kind))
-        return found
+                results.append(performed(name, [results[a] for a in arguments], kind))
+        return results
 
 
 def performed(name: str, values: list[Any], kind: Kind) -> Any:
@@ -200,12 +200,12 @@ def performed(name: str, values: list[Any], kind: Kind) -> Any:
 
 
 def reached(
-    operations: Sequence[Operation], outputs: Iterable[int], known: Container[int] = frozenset()
+    operations: Sequence[Operation], outputs: Iterable[int], inputs: Container[int] = frozenset()
 ) -> list[int]:
     """The operations that some hang on, in order, they too; what is known hangs on nothing."""
     wanted = set(outputs)
     for number in range(max(wanted, default=-1), -1, -1):
-        if number in wanted and number not in known:
+        if number in wanted and number not in inputs:
             kind, *arguments = operations[number]
             if kind not in ("const", "input"):
                 wanted.update(arguments)
@@ -213,7 +213,7 @@ def reached(
 
 
 def shortened(
-    operations: Sequence[Operation], outputs: Sequence[tuple[str, int]], known: Mapping[int, str] = EMPTY
+    operations: Sequence[Operation], outputs: Sequence[tuple[str, int]], inputs: Mapping[int, str] = EMPTY
 ) -> Tape:
     """The tape of outputs: what they do not hang on is left out, and the rest numbered anew.
 
@@ -221,11 +221,11 @@ def shortened(
     """
     place: dict[int, int] = {}
     kept: list[Operation] = []
-    for number in reached(operations, (number for _, number in outputs), known):
+    for number in reached(operations, (number for _, number in outputs), inputs):
         kind, *arguments = operations[number]
         place[number] = len(kept)
-        if number in known:
-            kind, arguments = "input", [known[number]]
+        if number in inputs:
+            kind, arguments = "input", [inputs[number]]
         elif kind not in ("const", "input"):
             arguments = [place[a] for a in arguments]
         kept.append((kind, *arguments))

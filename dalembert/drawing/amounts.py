@@ -31,9 +31,9 @@ def prefixed(largest: float, unit: str, at_most: float = 1e4) -> tuple[float, st
     if not np.isfinite(largest) or largest <= 0 or 0.01 <= largest < at_most:
         return 1, unit
     steps = int(np.floor(np.log10(largest) / 3)) * 3
-    found = re.fullmatch(rf"([{''.join(PREFIXES.values())}]?)({'|'.join(LADDERS)})((?![A-Za-z]).*)", unit)
-    if found:
-        prefix, base, rest = found.groups()
+    parts = re.fullmatch(rf"([{''.join(PREFIXES.values())}]?)({'|'.join(LADDERS)})((?![A-Za-z]).*)", unit)
+    if parts:
+        prefix, base, rest = parts.groups()
         own = next(power for power, letter in PREFIXES.items() if letter == prefix)
         power = min(LADDERS[base], key=lambda p: abs(p - own - steps))
         if abs(power - own - steps) < 3:

@@ -167,7 +167,7 @@ def _apart(wanted: Real, pitch: float, low: float, high: float) -> Real:
             other, more = runs.pop()
             middle, count = (middle * count + other * more) / (count + more), count + more
         runs.append((middle, count))
-    found = np.concatenate([m + pitch * (np.arange(n) - (n - 1) / 2) for m, n in runs])
-    steps = pitch * np.arange(len(found))
-    found = np.maximum(found, low + steps)
-    return np.asarray(np.minimum(found, high - steps[::-1]))
+    places = np.concatenate([m + pitch * (np.arange(n) - (n - 1) / 2) for m, n in runs])
+    steps = pitch * np.arange(len(places))
+    places = np.maximum(places, low + steps)
+    return np.asarray(np.minimum(places, high - steps[::-1]))

@@ -72,16 +72,16 @@ class _Taken:
         rows, columns = (
             np.clip(k, 0, n) for k, n in zip(((bottom, top + 1), (left, right + 1)), self.shape, strict=True)
         )
-        found = []
+        covered = []
         for grid in (self.lines, self.words):
             sums = np.pad(grid.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
-            found.append(
+            covered.append(
                 sums[rows[1], columns[1]]
                 - sums[rows[0], columns[1]]
                 - sums[rows[1], columns[0]]
                 + sums[rows[0], columns[0]]
             )
-        return found[0], found[1]
+        return covered[0], covered[1]
 
 
 def place(wanted: Sequence[tuple[Axes, Sequence[Label]]]) -> list[Annotation]:
@@ -116,10 +116,12 @@ def _words(root: Figure) -> Iterable[Real]:
     from matplotlib.legend import Legend
     from matplotlib.text import Text
 
-    for found in root.findobj(lambda artist: isinstance(artist, Text | Legend)):
-        if found.get_visible() and (not isinstance(found, Text) or found.get_text().strip()):
+    for artist_ in root.findobj(lambda artist: isinstance(artist, Text | Legend)):
+        if artist_.get_visible() and (not isinstance(artist_, Text) or artist_.get_text().strip()):
             # of the words alone: an annotation's own extent has its arrow too
-            box = Text.get_window_extent(found) if isinstance(found, Text) else found.get_window_extent()
+            box = (
+                Text.get_window_extent(artist_) if isinstance(artist_, Text) else artist_.get_window_extent()
+            )
             yield np.array(list(box.extents))
 
 

@@ -64,8 +64,8 @@ def body(
     ]
     _legend(figure, solids, vectors or {})
     place(drawn)
-    found: NDArray[np.object_] = views
-    return found
+    grid: NDArray[np.object_] = views
+    return grid
 
 
 def shaft(

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from dalembert.arithmetic.adjoint import derivatives
-from dalembert.arithmetic.engines import ENGINES, run
+from dalembert.arithmetic.choice import ENGINES
+from dalembert.arithmetic.engines import run
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder
 from dalembert.arithmetic.rounding import bounds_of_few, rounding_bounds
 from dalembert.arithmetic.tape import Tape

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 from dalembert.arithmetic import engines
-from dalembert.arithmetic.engines import ENGINES, blocks, llvm, run
+from dalembert.arithmetic.choice import ENGINES
+from dalembert.arithmetic.engines import blocks, llvm, run
 from dalembert.arithmetic.recorded import RECORDED, Real, Recorder
 from dalembert.arithmetic.tape import Tape
 
@@ -136,9 +137,14 @@ def test_axes_signed_zeros_and_infinities_are_those_of_the_system() -> None:
     special = [0.0, -0.0, 1.0, -1.0, math.inf, -math.inf, math.nan, 5e-324, -5e-324, 1e308]
     xs, ys = map(np.ravel, np.meshgrid(special, special))
     found = run(tape, {"x": xs, "y": ys}, "llvm")
+    # sine and cosine of ±1 are the engine's own, to two units as above; of all else here they are exact, or the system's
+    own = np.abs(xs) == 1
     with np.errstate(all="ignore"):
         for name, exact in (("atan2", np.arctan2(ys, xs)), ("sin", np.sin(xs)), ("cos", np.cos(xs))):
-            np.testing.assert_array_equal(found[name], exact)
+            same = ~own if name != "atan2" else np.ones(len(xs), bool)
+            np.testing.assert_array_equal(found[name][same], exact[same])
+            if name != "atan2":
+                assert ulps(found[name][own], [getattr(mpmath, name)(float(v)) for v in xs[own]]) <= 2
             number = ~np.isnan(exact)
             np.testing.assert_array_equal(np.signbit(found[name][number]), np.signbit(exact[number]))
 

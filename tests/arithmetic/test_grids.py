@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dalembert.arithmetic.engines import ENGINES, grids, run, run_grid
+from dalembert.arithmetic.choice import ENGINES
+from dalembert.arithmetic.engines import grids, run, run_grid
 from dalembert.arithmetic.recorded import RECORDED, Recorder
 
 

@@ -9,7 +9,8 @@ from balancing import once_per_turn
 
 
 def test_other_orders_and_an_offset_do_not_leak_into_the_first() -> None:
-    t = np.arange(4000) / 4000
+    # the mark rises half a sample before its first high one
+    t = (np.arange(4000) + 0.5) / 4000
     angle = 2 * np.pi * 40 * t
     x = 5 + 3 * np.cos(angle + 0.7) + 2 * np.cos(2 * angle - 1) + np.sin(3 * angle)
     found = once_per_turn(t, x[:, None], np.arange(4000) % 100 == 0)
@@ -30,6 +31,33 @@ def test_a_mark_between_the_samples_is_found() -> None:
         assert np.angle(found.vector[0]) == pytest.approx(1.1 - shift, abs=1e-3)
         assert abs(found.vector[0]) == pytest.approx(2, rel=1e-3)
         assert found.speed == pytest.approx(2 * np.pi * 37.77, rel=1e-5)
+
+
+@pytest.mark.parametrize("cycles", [20.0, 24.7, 31.4159])
+def test_the_edge_lies_in_the_middle_between_two_samples(cycles: float) -> None:
+    """The first high sample is half a sample late on average: 2.2 degrees at 2048 Hz and 24.7 Hz."""
+    rng = np.random.default_rng(2)
+    t = np.arange(4096) / 2048
+    half = np.degrees(2 * np.pi * cycles / 2048 / 2)
+    off, told = [], []
+    for _ in range(60):
+        angle = 2 * np.pi * cycles * t - rng.uniform(0, 2 * np.pi)
+        found = once_per_turn(t, 3 * np.cos(angle + 1)[:, None], angle % (2 * np.pi) < 0.4)
+        off.append(float(np.degrees(np.angle(found.vector[0] * np.exp(-1j)))))
+        told.append(float(np.degrees(found.phase_resolution)))
+    # the samples of 2048 Hz meet 20 Hz at few angles of the turn, 24.7 Hz at many
+    assert max(told) <= 1.001 * half
+    assert np.abs(off).max() <= max(told) + 0.15 * half
+    assert abs(np.mean(off)) < 0.25 * half / np.sqrt(3)
+    assert min(told) > 0
+    assert cycles == 20.0 or max(told) < 0.1 * half
+
+
+def test_a_mark_between_two_levels_is_known_finer() -> None:
+    t = np.arange(20_000) / 10_000
+    angle = 2 * np.pi * 37.77 * t + 0.3
+    found = once_per_turn(t, np.cos(angle)[:, None], np.sin(angle))
+    assert found.phase_resolution == 0
 
 
 def test_the_uncertainty_of_the_mean_is_that_of_many_recordings() -> None:

@@ -246,7 +246,7 @@ def test_random_tables_never_break_the_command(
     import typer
 
     from cli.app import build
-    from cli.errors import DataError
+    from dalembert.errors import DataError
 
     path = tmp_path_factory.mktemp("random") / "t.csv"
     path.write_bytes(

@@ -37,9 +37,9 @@ at = 250
         (("--at", "60"), ("--at", "60deg")),
         (("--at", "60°"), ("--at", "60deg")),
         (("--at", "crank=-7.25"), ("--at", "-7.25deg")),
-        (("--sweep", "0:360:30"), ("--sweep", "0deg:360deg:30deg")),
-        (("--sweep", "0:360/7"), ("--sweep", "0deg:360deg/7")),
-        (("--sweep", "0:360deg:30"), ("--sweep", "0deg:360deg:30deg")),
+        (("--over", "0:360:30"), ("--over", "0deg:360deg:30deg")),
+        (("--over", "0:360/7"), ("--over", "0deg:360deg/7")),
+        (("--over", "0:360deg:30"), ("--over", "0deg:360deg:30deg")),
     ],
 )
 def test_angles_of_a_file_in_degrees(
@@ -109,7 +109,7 @@ table = "gas.csv"
 """
     (tmp_path / "law.csv").write_text("time_s,angle_deg\n0,0\n0.5,10\n1,25.5\n2,60\n")
     (tmp_path / "gas.csv").write_text("angle_deg,fx_N\n0,-1.5\n90,3\n")
-    plain = dalembert("mechanism", "-", "--forces", stdin=toml)
+    plain = dalembert("forces", "-", stdin=toml)
     assert plain.returncode == 0, plain.stderr
     (tmp_path / "law.csv").write_text("Law\n\nTime [ms];Angle\n;°\n0;0\n500;10,0\n1000;25,5\n2000;60\n")
     made = openpyxl.Workbook()
@@ -117,17 +117,15 @@ table = "gas.csv"
     for row in (("angle (deg)", "fx [kN]", "note"), (0, "-0,0015", "=1+1"), (90, 0.003, None)):
         sheet.append(row)
     made.save(tmp_path / "gas.xlsx")
-    done = dalembert("mechanism", "-", "--forces", stdin=toml.replace("gas.csv", "gas.xlsx#Sheet"))
+    done = dalembert("forces", "-", stdin=toml.replace("gas.csv", "gas.xlsx#Sheet"))
     assert done.returncode == 0, done.stderr
     assert done.stdout == plain.stdout
     assert "law.csv: the header is in line 3" in done.stderr
     assert "gas.xlsx: ignored the column 'note'" in done.stderr
-    over = dalembert(
-        "mechanism", "-", "--forces", "-o", "gas.xlsx", stdin=toml.replace("gas.csv", "gas.xlsx")
-    )
+    over = dalembert("forces", "-", "-o", "gas.xlsx", stdin=toml.replace("gas.csv", "gas.xlsx"))
     assert over.returncode == 2
     sheet["B3"] = "=A3"
     made.save(tmp_path / "gas.xlsx")
-    done = dalembert("mechanism", "-", "--forces", stdin=toml.replace("gas.csv", "gas.xlsx"))
+    done = dalembert("forces", "-", stdin=toml.replace("gas.csv", "gas.xlsx"))
     assert done.returncode == 1
     assert "gas.xlsx: sheet 'Sheet', cell B3: found the formula '=A3' without a stored value" in done.stderr

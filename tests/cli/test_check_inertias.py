@@ -166,3 +166,55 @@ def test_bad_calls(
     done = dalembert("body", "r.urdf", "--check-inertias", *arguments)
     assert done.returncode == status
     assert said in done.stderr
+
+
+def chain(inertia: str, shape: str = "", joint: str = "0 0 0.5") -> str:
+    """A link of 2 kg on a base, its joint at its origin, its centre at half its length."""
+    values = " ".join(f'{k}="{v}"' for k, v in zip(ENTRIES, (*inertia.split(), "0", "0", "0"), strict=False))
+    return (
+        '<robot name="r"><link name="base"/><link name="tip"/><link name="arm">'
+        f'<inertial><origin xyz="0 0 0.5"/><mass value="2"/><inertia {values}/></inertial>{shape}</link>'
+        '<joint name="j" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/></joint>'
+        f'<joint name="k" type="fixed"><parent link="arm"/><child link="tip"/><origin xyz="{joint}"/></joint></robot>'
+    )
+
+
+# a rod of 1 m and 0.1 m across
+ROD = 0.168, 0.168, 0.0025
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3, 1e6, 1e-6, 1.0, 10.0, 0.1])
+@pytest.mark.parametrize(
+    "shape", ["", '<visual><geometry><cylinder radius="0.05" length="1"/></geometry></visual>']
+)
+def test_a_whole_tensor_that_lost_its_decimals(factor: float, shape: str) -> None:
+    entries = " ".join(f"{v * factor:.6e}" for v in ROD)
+    found = only(chain(entries, shape.replace("<geometry>", '<origin xyz="0 0 0.5"/><geometry>')))
+    assert found.valid
+    if max(factor, 1 / factor) < 100:
+        # ten times as much no rod of 1 m can have
+        assert (found.likely is None) == (factor < 10 or not shape)
+    else:
+        power = round(abs(np.log10(factor)))
+        assert str(found.likely).startswith({3: "g for kg", 6: "mm for m"}[power])
+        assert found.too_small == (factor < 1)
+
+
+def test_a_wheel_whose_joint_is_at_its_centre_is_as_large_as_the_robot_at_most() -> None:
+    """Nothing says how far the link itself reaches."""
+    text = chain("{0} {0} {0}", joint="0 0 1").replace(
+        '<origin xyz="0 0 0.5"/><mass', '<origin xyz="0 0 0"/><mass'
+    )
+    text = text.replace('<link name="arm">', '<link name="far"/><link name="arm">').replace(
+        '<parent link="arm"/><child link="tip"/>', '<parent link="base"/><child link="tip"/>'
+    )
+    assert only(text.format("0.2")).likely is None
+    assert str(only(text.format("200")).likely).startswith("g for kg")
+
+
+def test_whole_numbers_of_a_tensor_that_no_body_has() -> None:
+    """0.0213 0.0218 0.0009 kg·m² of 0.2 kg that reach 0.5 m, without their points, read as thousandths of grams."""
+    text = chain("213 430 213").replace('value="2"', 'value="0.2"')
+    found = only(text)
+    assert not found.valid
+    assert found.likely is not None

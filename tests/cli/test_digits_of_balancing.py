@@ -14,9 +14,9 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from cli.show.columns import Column, Table
-from cli.show.digits import digits_that_hold
-from cli.show.text import table_text
+from dalembert.results.columns import Column, Table
+from dalembert.results.digits import digits_that_hold
+from dalembert.results.text import table_text
 from tests.conftest import Dalembert
 
 HEAD = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_g,trial_angle_deg"
@@ -230,7 +230,7 @@ def test_drilling_and_other_planes(dalembert: Dalembert) -> None:
 
 def test_suggested_trial(dalembert: Dalembert) -> None:
     given = ("--rotor-mass", "100kg", "--speed", "1500rpm", "--radius", "200mm")
-    (row,) = rows(dalembert("field", "--suggest-trial", *given, "--digits"))
+    (row,) = rows(dalembert("trial", *given, "--digits"))
     with mp.workdps(40):
         unbalance = mp.mpf("0.1") * 100 * mp.mpf("9.80665") / (1500 * mp.pi / 30) ** 2
         holds(row["unbalance_g_mm"], unbalance * 10**6, 13)

@@ -132,7 +132,7 @@ def _motion(q: mp.mpf) -> dict[str, mp.mpf]:
 
 @pytest.mark.parametrize(("angle", "least"), POSES)
 def test_forces(dalembert: Dalembert, four_bar: Path, angle: str, least: int) -> None:
-    (cut,) = table(dalembert("mechanism", four_bar, "--at", f"{angle}deg", "--forces", "--digits"))
+    (cut,) = table(dalembert("forces", four_bar, "--at", f"{angle}deg", "--digits"))
     exact = solved(four_bar, angle)
     with mp.workdps(50):
         true = exact.forces()
@@ -158,7 +158,7 @@ def test_states_and_their_balance(
 ) -> None:
     """The long table, cut, and the effort that `work` finds from the whole one."""
     states = tmp_path / "states.csv"
-    call = ("mechanism", four_bar, "--at", f"{angle}deg", "--states", states)
+    call = ("forces", four_bar, "--at", f"{angle}deg", "--states", states)
     assert dalembert(*call, "--digits").returncode == 0
     cut = list(csv.DictReader(io.StringIO(states.read_text())))
     assert [row["torque_N_m"] for row in cut] == ["?", "0.0", "0.0"]
@@ -216,9 +216,10 @@ def test_tables_of_every_kind(dalembert: Dalembert, name: str) -> None:
     from importlib.resources import files
 
     file = str(files("cli") / "examples" / f"{name}.toml")
-    for extra in ((), ("--forces",), ("--only", next(iter(Mechanism.from_toml(file).links)))):
-        whole = table(dalembert("mechanism", file, *extra))
-        cut = table(dalembert("mechanism", file, *extra, "--digits"))
+    only = ("mechanism", "--only", next(iter(Mechanism.from_toml(file).links)))
+    for command, *extra in (("mechanism",), ("forces",), only):
+        whole = table(dalembert(command, file, *extra))
+        cut = table(dalembert(command, file, *extra, "--digits"))
         assert [row.keys() for row in whole] == [row.keys() for row in cut]
         for a, b in zip(whole, cut, strict=True):
             for key in a:

@@ -10,13 +10,15 @@ import typer
 
 from cli.app import COMMANDS, build
 from cli.read.about import HEAD
-from cli.read.units import UNITS
-from cli.spin.read import KEYS
-from virtualwork.describe.entries import ENTRIES, FILE, GUESS, LINK, POINT
-from virtualwork.describe.entries import UNITS as OF_FILE
+from cli.spin.rotation import KEYS
+from dalembert.units import UNITS
+from virtualwork.describe.description import FILE
+from virtualwork.describe.description import UNITS as OF_FILE
+from virtualwork.describe.keys import table_keys
+from virtualwork.describe.parts import TABLES, Guess, Link, Polar
 
 ROOT = Path(__file__).parents[2]
-PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs").glob("*.md"))}
+PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs").rglob("*.md"))}
 DOCS = "\n".join(PAGES.values())
 # options as they stand in the pages; --plane is not --planes
 # amplitudes are said as units and tags
@@ -29,7 +31,12 @@ def options(command: str) -> list[str]:
     group = typer.main.get_command(build(command))
     assert isinstance(group, typer.core.TyperGroup)
     found = group.commands[command]
-    return [spelling for p in found.params if p.param_type_name == "option" for spelling in p.opts]
+    return [
+        spelling
+        for p in found.params
+        if p.param_type_name == "option" and not getattr(p, "hidden", False)
+        for spelling in p.opts
+    ]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -44,9 +51,12 @@ def test_every_command_is_documented() -> None:
 @pytest.mark.parametrize(
     ("page", "keys"),
     [
-        ("mechanism-file.md", {*FILE, *ENTRIES, *LINK, *POINT, *GUESS, *OF_FILE}),
-        ("mechanism-file.md", {key for keys in ENTRIES.values() for key in keys}),
-        ("tables.md", {f"--{key}" for key in HEAD}),
+        (
+            "mechanism-file.md",
+            {*FILE, *TABLES, *OF_FILE, *(key for part in (Link, Polar, Guess) for key in table_keys(part))},
+        ),
+        ("mechanism-file.md", {key for table, part in TABLES.items() for key in table_keys(part, table)}),
+        ("tables.md", {*HEAD}),
         ("rigid-body.md", {*KEYS, "mgl"}),
         ("tables.md", {unit for units in UNITS.values() for unit in units if unit} - AMPLITUDES),
     ],

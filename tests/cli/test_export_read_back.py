@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cli.errors import DataError
 from cli.exports.skeleton import Joint, Skeleton
+from dalembert.errors import DataError
 from tests.cli.exported import FILES, FOUR_BAR, MASSIVE, exported, home, moved
 from virtualwork import Mechanism
 

@@ -40,7 +40,7 @@ def test_the_document(dalembert: Dalembert) -> None:
 def test_the_columns(dalembert: Dalembert) -> None:
     out = dalembert("field", "-", stdin=FAN).stdout
     (row,) = csv.DictReader(io.StringIO(out))
-    assert list(row) == ["rotor", "plane", "mass_g", "angle_deg"]
+    assert list(row) == ["rotor", "plane", "mass_g", "angle_deg", "trim_mass_g", "trim_angle_deg"]
     assert float(row["mass_g"]) == pytest.approx(2.011676, rel=1e-6)
 
 
@@ -66,9 +66,10 @@ def test_masses_put_on_left_on_taken_off(masses: list[str], on: Any, dalembert: 
 def test_from_here(dalembert: Dalembert) -> None:
     text = runs("A,1,0,yes", "B,1,90,", on=[[1, 0], [1, 1j]])
     found = corrections(dalembert("field", "-", "--json", "--from-here", stdin=text))
-    assert np.abs(found * 1e3 - (W - [1, 0])).max() < 1e-12
-    done = dalembert("field", "-", "--json", "--from-here", stdin=FAN)
-    assert "no trial mass is kept" in document(done)["warnings"][0]
+    assert np.abs(found * 1e3 - (W - [1, 1j])).max() < 1e-12
+    bare = runs("A,1,0,", "B,1,90,", ",,,", ",,,", on=[[1, 0], [0, 1j], [0, 0], [0, 0]])
+    done = dalembert("field", "-", "--json", "--from-here", stdin=bare)
+    assert "the last run has no mass on the rotor" in " ".join(document(done)["warnings"])
 
 
 def test_units_and_unbalances(dalembert: Dalembert) -> None:
@@ -267,10 +268,10 @@ def test_many_rotors_in_one_table(dalembert: Dalembert) -> None:
 
 def test_a_trial_mass_is_suggested(dalembert: Dalembert) -> None:
     options = ["--rotor-mass", "100kg", "--speed", "1500rpm", "--radius", "200mm", "--planes", "2"]
-    done = json.loads(dalembert("field", "--suggest-trial", "--json", *options).stdout)
+    done = json.loads(dalembert("trial", "--json", *options).stdout)
     assert done["trial"]["mass_kg"] == pytest.approx(0.1 * 50 * 9.80665 / (157.07963267948966**2 * 0.2))
     assert "tenth" in done["trial"]["rule"]
-    assert dalembert("field", "--suggest-trial", *options[:-4]).returncode == 2
+    assert dalembert("trial", *options[:-4]).returncode == 2
 
 
 def test_text_report_and_pictures(dalembert: Dalembert, tmp_path: Path) -> None:
@@ -288,7 +289,14 @@ def test_text_report_and_pictures(dalembert: Dalembert, tmp_path: Path) -> None:
         stdin=text,
     )
     assert done.returncode == 0, done.stderr
-    for said in ("one common sense", "ADD", "REMOVE", "predicted vibration", "condition number", "95 %"):
+    for said in (
+        "one common sense",
+        "ADD",
+        "REMOVE",
+        "vibration before, and as predicted",
+        "condition number",
+        "95 %",
+    ):
         assert said in done.stdout
     page = (tmp_path / "r.html").read_text()
     for said in ("Vibration", "Influence coefficients", "Corrections", "predicted", "<svg"):

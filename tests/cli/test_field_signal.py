@@ -1,4 +1,4 @@
-"""`dalembert field --signal`: a recording becomes rows of a log."""
+"""`dalembert signal`: a recording becomes rows of a log."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from tests.conftest import Dalembert
 
 
 def test_the_command_gives_the_rows_of_a_log(dalembert: Dalembert, tmp_path: Path) -> None:
-    t = np.arange(3000) / 1000
+    # the mark rises half a sample before its first high one
+    t = (np.arange(3000) + 0.5) / 1000
     lines = ["t_s,mark,A_um,B_um"]
     for k, s in enumerate(t.tolist()):
         angle = 2 * np.pi * 10 * s
@@ -20,7 +21,7 @@ def test_the_command_gives_the_rows_of_a_log(dalembert: Dalembert, tmp_path: Pat
         time, a, b = (f"{value:.17g}" for value in values)
         lines.append(f"{time},{int(k % 100 == 0)},{a},{b}")
     (tmp_path / "s.csv").write_text("\n".join(lines) + "\n")
-    done = dalembert("field", "--signal", "s.csv", "--json")
+    done = dalembert("signal", "s.csv", "--json")
     assert done.returncode == 0, done.stderr
     first, second = json.loads(done.stdout)["signal"]
     assert (first["sensor"], second["sensor"]) == ("A", "B")
@@ -29,14 +30,17 @@ def test_the_command_gives_the_rows_of_a_log(dalembert: Dalembert, tmp_path: Pat
     assert second["phase_deg"] == pytest.approx(360 - np.degrees(2), rel=1e-9)
     assert first["speed_rad_s"] == pytest.approx(20 * np.pi, rel=1e-9)
     assert first["turns"] == 29
-    head, row = dalembert("field", "--signal", "s.csv").stdout.splitlines()[:2]
+    # half of a sample's 3.6 degrees
+    assert first["phase_resolution_deg"] == pytest.approx(1.8, rel=1e-9)
+    assert any("hold to ± 1.8°" in warning for warning in json.loads(done.stdout)["warnings"])
+    head, row = dalembert("signal", "s.csv").stdout.splitlines()[:2]
     assert head == "sensor,speed_rpm,amplitude_um,phase_deg,amplitude_uncertainty_um,turns"
     assert float(row.split(",")[1]) == pytest.approx(600)
     (tmp_path / "bad.csv").write_text("t_s,A_um\n0,1\n")
-    bad = dalembert("field", "--signal", "bad.csv")
+    bad = dalembert("signal", "bad.csv")
     assert bad.returncode == 1
     assert "no column mark" in bad.stderr
-    assert dalembert("field", "s.csv", "--signal", "s.csv").returncode == 2
+    assert dalembert("field", "--signal", "s.csv").returncode == 2
 
 
 def test_a_tacho_with_several_pulses(dalembert: Dalembert, tmp_path: Path) -> None:
@@ -49,15 +53,15 @@ def test_a_tacho_with_several_pulses(dalembert: Dalembert, tmp_path: Path) -> No
     ):
         lines = [",".join(f"{value:.12g}" for value in row) for row in rows[:, columns]]
         (tmp_path / name).write_text("\n".join([header, *lines]) + "\n")
-    both = dalembert("field", "--signal", "both.csv", "--json")
+    both = dalembert("signal", "both.csv", "--json")
     (one,) = json.loads(both.stdout)["signal"]
     assert one["amplitude"] == pytest.approx(4, rel=1e-4)
     assert one["phase_deg"] == pytest.approx(np.degrees(1), abs=0.01)
-    alone = dalembert("field", "--signal", "tacho.csv", "--pulses", "6", "--json")
+    alone = dalembert("signal", "tacho.csv", "--pulses", "6", "--json")
     found = json.loads(alone.stdout)
     # the first pulse after 0.3 rad is at a sixth of a turn
     assert found["signal"][0]["phase_deg"] == pytest.approx(np.degrees(1) + 60, abs=0.01)
     assert found["signal"][0]["speed_rad_s"] == pytest.approx(20 * np.pi, rel=1e-5)
     assert any("the first of 6 pulses" in warning for warning in found["warnings"])
-    assert dalembert("field", "--signal", "both.csv", "--pulses", "6").returncode == 2
+    assert dalembert("signal", "both.csv", "--pulses", "6").returncode == 2
     assert dalembert("field", "both.csv", "--pulses", "6").returncode == 2

@@ -34,14 +34,14 @@ FREE = (
     *("--free", "links.crank.B.x=28:52", "--free", "links.coupler.C.x=84:156"),
     *("--free", "links.coupler.H.angle=21:39"),
 )
-FIT = ("mechanism", "m.toml", "--fit", "t.csv", "--point", "H")
+FIT = ("fit", "m.toml", "t.csv", "--want", "H")
 
 
 @pytest.fixture
 def target(dalembert, tmp_path):
     """The file, and a target that the sweep of another mechanism wrote."""
     (tmp_path / "m.toml").write_text(FOUR_BAR)
-    options = (*TRUE, "--sweep", "0:330:30", "--only", "H", "-o", "t.csv")
+    options = (*TRUE, "--over", "0:330:30", "--only", "H", "-o", "t.csv")
     assert dalembert("mechanism", "m.toml", *options).returncode == 0
     return tmp_path / "t.csv"
 
@@ -68,7 +68,7 @@ def test_the_file_is_written_with_what_was_found(dalembert, target, tmp_path):
     again = dalembert(
         "mechanism",
         "fitted.toml",
-        "--sweep",
+        "--over",
         "0:330:30",
         "--only",
         "H",
@@ -94,24 +94,22 @@ def test_without_timing_the_inputs_are_found_too(dalembert, target):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--point", "H", "--fit", "t.csv"), "expected --free"),
-        ((*FREE, "--fit", "t.csv"), "expected --point"),
-        ((*FREE, "--point", "H"), "expected --fit"),
-        ((*FREE, "--point", "X", "--fit", "t.csv"), "no point is named 'X'"),
+        (("--want", "H"), "expected --free"),
+        (FREE, "expected --want"),
+        ((*FREE, "--want", "X"), "no point, link or slide is named 'X'"),
         (
-            ("--free", "links.crnk.B.x=1:2", "--point", "H", "--fit", "t.csv"),
+            ("--free", "links.crnk.B.x=1:2", "--want", "H"),
             "did you mean 'links.crank.B.x'",
         ),
-        (("--free", "ground.D.x=3:2", "--point", "H", "--fit", "t.csv"), "the lower bound first"),
-        (("--free", "ground.D.x=3", "--point", "H", "--fit", "t.csv"), "PATH=LOW:HIGH"),
-        (("--free", "ground.D=1:2", "--point", "H", "--fit", "t.csv"), "two numbers"),
-        (("--free", "links.crank.mass=1:2", "--point", "H", "--fit", "t.csv"), "moves no point"),
-        ((*FREE, "--point", "H", "--fit", "t.csv", "--at", "3"), "without --at"),
-        (("--at", "3"), "has no known suffix"),
+        (("--free", "ground.D.x=3:2", "--want", "H"), "the lower bound first"),
+        (("--free", "ground.D.x=3", "--want", "H"), "NAME=LOW:HIGH"),
+        (("--free", "ground.D=1:2", "--want", "H"), "two numbers"),
+        (("--free", "links.crank.mass=1:2", "--want", "H"), "moves no point"),
+        ((*FREE, "--want", "H", "--at", "3"), "rows of the target have the inputs"),
     ],
 )
 def test_a_bad_option_is_named_and_nothing_is_written(dalembert, target, tmp_path, options, said):
-    found = dalembert("mechanism", "m.toml", *options, "-o", "fitted.toml")
+    found = dalembert("fit", "m.toml", "t.csv", *options, "-o", "fitted.toml")
     assert found.returncode == 2
     assert said in found.stderr
     assert not found.stdout
@@ -136,9 +134,9 @@ def test_a_bad_target_is_one_line_and_nothing_is_written(dalembert, target, tmp_
 
 
 def test_a_link_and_a_point_with_weights(dalembert, target, tmp_path):
-    options = (*TRUE, "--sweep", "0:330:30", "--only", "H,rocker", "-o", "t.csv")
+    options = (*TRUE, "--over", "0:330:30", "--only", "H,rocker", "-o", "t.csv")
     assert dalembert("mechanism", "m.toml", *options).returncode == 0
-    found = dalembert(*FIT, "--link", "rocker", "--weight", "rocker=0.5", *FREE, "--json")
+    found = dalembert(*FIT, "--want", "rocker.angle", "--weight", "rocker=0.5", *FREE, "--json")
     assert found.returncode == 0, found.stderr
     fit = json.loads(found.stdout)["fit"]
     assert fit["max_m"] < 1e-10
@@ -152,7 +150,7 @@ def test_a_link_and_a_point_with_weights(dalembert, target, tmp_path):
             for r in rows((tmp_path / "t.csv").read_text())[::3]
         )
     )
-    again = dalembert(*FIT, "--fit", "r.csv", "--link", "rocker", *FREE, "--text")
+    again = dalembert(*FIT, "r.csv", "--want", "rocker.angle", *FREE, "--text")
     assert again.returncode == 0, again.stderr
     assert "rocker comes within" in again.stdout
 
@@ -163,7 +161,7 @@ def test_the_options_of_the_search(dalembert, target, tmp_path):
     fit = json.loads(found.stdout)["fit"]
     assert fit["starts"] == 16
     assert "<svg" in (tmp_path / "fit.svg").read_text()
-    told = "fit: found 1 distinct of 3 solutions asked for"
+    told = "fit: 1 distinct of the 3 solutions of --best"
     others = fit.get("others", [])
     assert all(each["max_m"] >= fit["max_m"] for each in others)
     assert (told in found.stderr) == (not others)
@@ -178,20 +176,20 @@ def test_workers_find_the_same(dalembert, target):
 @pytest.mark.parametrize(
     ("options", "status", "said"),
     [
-        (("--link", "rockr"), 2, "did you mean 'rocker'"),
-        (("--slide", "B"), 2, "no slot or slider is named 'B'"),
-        (("--point", "H", "--point", "H"), 2, "given twice"),
-        (("--point", "H", "--weight", "H=-1"), 2, "0 or more"),
-        (("--point", "H", "--weight", "C=1"), 2, "expected one of H"),
-        (("--point", "H", "--starts", "0"), 2, "--starts"),
-        (("--point", "H", "--best", "0"), 2, "--best"),
-        (("--link", "rocker"), 1, "no column"),
-        (("--point", "H", "--point", "C"), 1, "no columns of C"),
-        (("--point", "H", "--fit", "nothing.csv"), 1, "nothing.csv"),
+        (("--want", "rockr"), 2, "did you mean 'rocker'"),
+        (("--want", "B.position"), 2, "no point, link or slide is named 'B.position'"),
+        (("--want", "H", "--want", "H"), 2, "given twice"),
+        (("--want", "H", "--weight", "H=-1"), 2, "0 or more"),
+        (("--want", "H", "--weight", "C=1"), 2, "expected one of H"),
+        (("--want", "H", "--starts", "0"), 2, "--starts"),
+        (("--want", "H", "--best", "0"), 2, "--best"),
+        (("--want", "rocker.angle"), 1, "no column"),
+        (("--want", "H", "--want", "C"), 1, "no columns of C"),
+        (("--want", "H", "nothing.csv"), 1, "nothing.csv"),
     ],
 )
 def test_a_bad_name_or_number_is_one_line(dalembert, target, tmp_path, options, status, said):
-    found = dalembert("mechanism", "m.toml", "--fit", "t.csv", *options, *FREE, "-o", "fitted.toml")
+    found = dalembert("fit", "m.toml", "t.csv", *options, *FREE, "-o", "fitted.toml")
     assert found.returncode == status
     assert said in found.stderr
     assert not found.stdout
@@ -203,7 +201,7 @@ def test_the_example_finds_scott_russells_mechanism(dalembert):
     dalembert("examples", "straight-line-fit")
     free = ("links.crank.A.x=70:115", "links.rod.P.x=-130:-80", "links.rod.P.y=-15:15")
     options = [word for path in free for word in ("--free", path)]
-    found = dalembert("mechanism", "straight-line.toml", "--fit", "line.csv", "--point", "P", *options)
+    found = dalembert("fit", "straight-line.toml", "line.csv", "--want", "P", *options)
     (row,) = rows(found.stdout)
     # crank, rod and its extension are equal: then the point is on the line exactly
     numbers = [float(row[f"{path.split('=')[0]}_m"]) for path in free]

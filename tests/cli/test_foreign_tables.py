@@ -142,3 +142,13 @@ def test_expected_values_under_foreign_headers(dalembert: Dalembert, tmp_path: P
     (tmp_path / "expected.csv").write_text(expected.replace("Mass", "Masse"))
     mapped = ("--expect", "expected.csv", "--column", "mass_g=Masse")
     assert dalembert("balance", "-", *PLANE, *mapped, stdin=PLAIN).stdout == done.stdout
+
+
+def test_a_column_name_may_add_how_an_amplitude_is_read(dalembert):
+    rows = "run,sensor,Schwing [mm/s],phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,1,5,40,,,\n1,1,6,90,A,10,0\n"
+    done = dalembert("field", "-", "--column", "amplitude_mm_s_rms=Schwing [mm/s]", "--json", stdin=rows)
+    assert done.returncode == 0, done.stderr
+    assert '"amplitude_unit": "mm_s_rms"' in done.stdout
+    done = dalembert("field", "-", "--column", "amplitude_um=Schwing [mm/s]", stdin=rows)
+    assert done.returncode == 1
+    assert "expected 'um'" in done.stderr

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cli.errors import DataError
+from dalembert.errors import DataError
 from tests.cli.imported import FORMATS, FOUR_BAR, at, moves, only, taken
 from tests.conftest import Dalembert
 from virtualwork import Mechanism

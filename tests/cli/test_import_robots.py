@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cli.errors import DataError
 from cli.imports.assembled import described
 from cli.imports.drawn import settle
 from cli.imports.told import read
+from dalembert.errors import DataError
 from tests.conftest import Dalembert
 from virtualwork import Mechanism
 

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from cli.show.documents import json_elements, json_members, json_parts
+from dalembert.results.json_text import json_elements, json_members, json_parts
 
 DOCUMENTS = [
     {},

@@ -28,10 +28,11 @@ def columns(path: Path) -> dict[str, list[str]]:
 @pytest.mark.parametrize("count", [16384, 20000])  # the last block is of one pose, or of many
 def test_the_digits_of_the_sweep_solved_whole(count: int, dalembert: Dalembert, tmp_path: Path) -> None:
     sweep = f"0deg:360deg/{count}"
-    done = dalembert("mechanism", "klann.toml", "--sweep", sweep, "--only", "H,leg", "-o", "h.csv")
+    done = dalembert("mechanism", "klann.toml", "--over", sweep, "--only", "H,leg", "-o", "h.csv")
     assert done.returncode == 0, done.stderr
     found = columns(tmp_path / "h.csv")
-    degrees = 360.0 * (np.arange(count + 1) / count)
+    # each the nearest double of i·360/count
+    degrees = 360.0 * np.arange(count + 1) / count
     motion = Mechanism.from_toml(tmp_path / "klann.toml").motion(np.radians(degrees), speed=10.0)
     assert np.array_equal(np.array(found["H_x_m"], dtype=float), motion.point("H").position[:, 0] + 0.0)
     assert np.array_equal(np.array(found["leg_omega_rad_s"], dtype=float), motion.link("leg").omega + 0.0)
@@ -58,7 +59,7 @@ def test_poses_that_are_not_there_are_counted_over_all_blocks(dalembert: Dalembe
         rocker = 2
     """
     (tmp_path / "m.toml").write_text(text)
-    done = dalembert("mechanism", "m.toml", "--sweep", "0deg:360deg/20000", "--only", "C", "-o", "c.csv")
+    done = dalembert("mechanism", "m.toml", "--over", "0deg:360deg/20000", "--only", "C", "-o", "c.csv")
     assert done.returncode == 0, done.stderr
     empty = columns(tmp_path / "c.csv")["C_x_m"].count("")
     assert 8192 < empty < 20001
@@ -67,7 +68,7 @@ def test_poses_that_are_not_there_are_counted_over_all_blocks(dalembert: Dalembe
 
 def test_the_reader_of_a_pipe_may_leave(tmp_path: Path) -> None:
     begun = time.monotonic()
-    call = [str(COMMAND), "mechanism", "klann.toml", "--sweep", "0deg:360deg/999999999", "--only", "H"]
+    call = [str(COMMAND), "mechanism", "klann.toml", "--over", "0deg:360deg/999999999", "--only", "H"]
     with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path) as running:
         assert running.stdout is not None
         assert running.stdout.readline().startswith(b"step,input_deg,H_x_m")
@@ -80,7 +81,7 @@ def test_the_reader_of_a_pipe_may_leave(tmp_path: Path) -> None:
 
 def test_json_names_the_largest_count_that_fits(dalembert: Dalembert) -> None:
     sweep = "0deg:360deg/999999999"
-    done = dalembert("mechanism", "klann.toml", "--sweep", sweep, "--forces", "--json")
+    done = dalembert("forces", "klann.toml", "--over", sweep, "--json")
     assert (done.returncode, done.stdout) == (1, "")
     most = re.search(r"expected at most (\d+) poses", done.stderr)
     assert most is not None

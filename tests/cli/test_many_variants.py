@@ -5,19 +5,17 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
-import os
 
 import numpy as np
 import pyarrow.parquet
 import pytest
 
-from cli.errors import DataError
-from cli.mechanism.many import Many, as_it_is
-from cli.mechanism.options import Options
-from cli.mechanism.read import wanted
-from cli.mechanism.variants import Variants
-from cli.mechanism.variants_of_poses import AskedOfPoses
+from cli.cases.analysis import Request
+from cli.cases.axes import Grid, grids, listed
+from cli.cases.loop import Loop, as_it_is
+from cli.cases.values import Varied
+from cli.mechanism.newton import Poses
+from dalembert.errors import DataError
 from virtualwork import Mechanism
 from virtualwork.describe.dimensions import dimensions
 
@@ -57,40 +55,8 @@ def rows_of(text):
     return list(csv.DictReader(io.StringIO(text)))
 
 
-@pytest.mark.parametrize(
-    "asked",
-    [(), ("--forces",), ("--only", "H,rocker"), ("--forces", "--only", "rocker", "--order", "position")],
-)
-def test_rows_of_many_are_those_of_a_few_described_one_by_one(dalembert, table, asked):
-    # less than 32 variants are not worth writing the formulas down
-    call = ("mechanism", "m.toml", "--sweep", "0deg:720deg:24deg", *asked, "--variants")
-    many = dalembert(*call, table("all.csv", 0, 40))
-    few = [dalembert(*call, table(f"{low}.csv", low, low + 20)) for low in (0, 20)]
-    found, expected = rows_of(many.stdout), [row for part in few for row in rows_of(part.stdout)]
-    assert len(found) == len(expected) == 40 * 31
-    assert {row["assembled"] for row in found} == {"true", "false"}
-    scale = {key: max(abs(float(row[key] or 0)) for row in found) for key in found[0] if key != "assembled"}
-    apart = 0
-    for i, (mine, its) in enumerate(zip(found, expected, strict=True)):
-        assert mine.keys() == its.keys()
-        assert mine["assembled"] == "true" or not any(mine[key] for key in mine if key.startswith("shaking"))
-        for key, cell in its.items():
-            if key == "variant":
-                assert int(mine[key]) == i // 31 + 1
-            elif key in ("assembled", "step") or not cell or not mine[key]:
-                assert mine[key] == cell, (i, key)
-            elif not key.startswith("difference"):
-                difference = float(mine[key]) - float(cell)
-                if key.endswith("_deg"):
-                    difference = math.remainder(difference, 360)
-                assert abs(difference) <= 1e-9 * scale[key], (i, key)
-                apart += mine[key] != cell
-    # the formulas were written down: not every digit is that of the other way
-    assert apart
-
-
 def test_remarks_are_those_of_each_described_alone(dalembert, table):
-    call = ("mechanism", "m.toml", "--sweep", "0deg:360deg:24deg", "--only", "H", "--variants")
+    call = ("mechanism", "m.toml", "--over", "0deg:360deg:24deg", "--only", "H", "--cases")
     many = dalembert(*call, table("all.csv", 0, 40)).stderr.splitlines()
     few = dalembert(*call, table("few.csv", 0, 31)).stderr.splitlines()
     assert len(few) == len(many) == 11
@@ -100,15 +66,15 @@ def test_remarks_are_those_of_each_described_alone(dalembert, table):
     assert 0 < further[0] < further[1]
 
 
-@pytest.mark.parametrize("asked", [("--only", "H"), ("--check",)])
+@pytest.mark.parametrize("asked", [("mechanism", "--only", "H"), ("forces",)])
 def test_no_byte_hangs_on_the_number_of_workers(dalembert, table, tmp_path, asked):
     call = (
-        "mechanism",
+        asked[0],
         "m.toml",
-        "--sweep",
+        "--over",
         "0deg:360deg:24deg",
-        *asked,
-        "--variants",
+        *asked[1:],
+        "--cases",
         table("v.csv", 0, 40),
     )
     alone = dalembert(*call, "-o", "alone.csv")
@@ -124,9 +90,9 @@ def test_no_digit_hangs_on_what_a_process_has_done_before(dalembert, tmp_path):
     # work that pays for compiled code, but no part of it does; where there is none all is numpy's
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     vary = (
-        "--vary",
+        "--over",
         f"links.crank.B.x=0.035:0.045/{182 * 48 - 1}",
-        "--sweep",
+        "--over",
         "0deg:359deg:1deg",
         "--only",
         "H",
@@ -144,7 +110,7 @@ def test_no_digit_hangs_on_what_a_process_has_done_before(dalembert, tmp_path):
 def test_workers_write_parquet_into_a_folder_that_reads_as_one_table(dalembert, tmp_path):
     (tmp_path / "m.toml").write_text(FOUR_BAR)
     # 4000 variants in 37 poses are three parts
-    vary = ("--vary", "links.crank.B.x=0.035:0.045/3999", "--sweep", "0deg:360deg:10deg", "--only", "C")
+    vary = ("--over", "links.crank.B.x=0.035:0.045/3999", "--over", "0deg:360deg:10deg", "--only", "C")
     call = ("mechanism", "m.toml", *vary, "--units", "mm,deg")
     for options in (("-o", "one.parquet"), ("--workers", "2", "-o", "parts.parquet")):
         done = dalembert(*call, *options)
@@ -164,7 +130,7 @@ def test_workers_write_parquet_into_a_folder_that_reads_as_one_table(dalembert, 
 
 
 def test_json_of_several_workers_is_that_of_one(dalembert, table, tmp_path):
-    call = ("mechanism", "m.toml", "--sweep", "0deg:720deg:6deg", "--json", "--variants")
+    call = ("mechanism", "m.toml", "--over", "0deg:720deg:6deg", "--json", "--cases")
     # 121 poses each: a part holds 33 of the variants
     alone, shared = (dalembert(*call, table("v.csv", 0, 40), *more) for more in ((), ("--workers", "2")))
     assert shared.stdout == alone.stdout
@@ -173,44 +139,6 @@ def test_json_of_several_workers_is_that_of_one(dalembert, table, tmp_path):
     written = dalembert(*words, "v.csv", "-o", "v.json")
     assert written.stderr == alone.stderr
     assert (tmp_path / "v.json").read_text() == alone.stdout
-
-
-@pytest.mark.parametrize(
-    "asked", [(), ("--only", "H,rocker"), ("--forces", "--at", "40deg", "--at", "100deg")]
-)
-def test_documents_of_many_are_those_of_a_few_described_one_by_one(dalembert, table, asked):
-    poses = () if "--at" in asked else ("--sweep", "0deg:720deg:24deg")
-    call = ("mechanism", "m.toml", *poses, *asked, "--json", "--variants")
-    many = json.loads(dalembert(*call, table("all.csv", 0, 40)).stdout)["variants"]
-    few = [json.loads(dalembert(*call, table("f.csv", a, a + 20)).stdout)["variants"] for a in (0, 20)]
-    expected = [{**v, "variant": str(i)} for i, v in enumerate([*few[0], *few[1]], 1)]
-    marks, numbers, apart = set(), 0, 0
-
-    def same(found, its, at):
-        nonlocal numbers, apart
-        if isinstance(its, dict):
-            assert list(found) == list(its), at
-            for key in its:
-                same(found[key], its[key], (*at, key))
-        elif isinstance(its, list):
-            marks.update(its if at[-1] == "marks" else ())
-            assert len(found) == len(its), at
-            for i, pair in enumerate(zip(found, its, strict=True)):
-                same(*pair, (*at, i))
-        elif isinstance(its, float):
-            difference = found - its
-            if at[-1].endswith("_deg"):
-                difference = math.remainder(difference, 360)
-            # close to a limit digits are lost, to either way
-            assert abs(difference) <= 1e-9 * max(abs(its), 1.0), at
-            numbers, apart = numbers + 1, apart + (found != its)
-        else:
-            assert found == its, at
-
-    same(many, expected, ("variants",))
-    # the formulas were written down: not every digit is that of the other way
-    assert 0 < apart < numbers
-    assert not poses or "change point" in marks
 
 
 class Sent:
@@ -224,18 +152,20 @@ class Sent:
 
 
 def question(v):
-    """Variants of the four-bar at one pose, one by one, as a branch is asked for."""
+    """Variants of the four-bar at one pose, one by one, as with --branch."""
     m = Mechanism.from_toml_text(FOUR_BAR)
-    varied = Variants((dimensions(m)["ground.D.x"],), [np.linspace(0.1, 0.11, v)], grid=True)
-    q = wanted(m, ["40deg"], None, None).part(0, 1)
-    asked = Options("m.toml", branch="1", order="position")
-    return Many(AskedOfPoses(asked, m, varied.dimensions, {}, False, q), varied, 2)
+    varied = Grid(
+        (listed("--cases", [Varied(dimensions(m)["ground.D.x"])], np.linspace(0.1, 0.11, v)[:, None]),)
+    )
+    _, moved = grids(m, ["40deg"], None, None, {}, [])
+    study = Poses(Request("m.toml", order=0, branch="1"), m, {}, False, False, varied.names, moved)
+    return Loop(study, varied, 2)
 
 
 def test_a_part_whose_worker_died_is_done_again(tmp_path):
     flag = tmp_path / "died"
     dies_once = f"(p := __import__('pathlib').Path({str(flag)!r})).exists() or (p.touch(), __import__('os')._exit(1)) and None"
-    form = Sent(f"(None, {dies_once}, __import__('cli.mechanism.many', fromlist=['as_it_is']).as_it_is)[2]")
+    form = Sent(f"(None, {dies_once}, __import__('cli.cases.loop', fromlist=['as_it_is']).as_it_is)[2]")
     found = [row for part in question(130).blocks(form) for row in part.data.columns[0].values]
     assert flag.exists()
     expected = [row for part in question(130).blocks(as_it_is) for row in part.data.columns[0].values]
@@ -247,11 +177,3 @@ def test_a_part_whose_worker_died_is_done_again(tmp_path):
 def test_variants_that_kill_their_worker_twice_are_named():
     with pytest.raises(DataError, match="variants 1 to 64: the process that solved them died"):
         list(question(130).blocks(Sent("__import__('os')._exit(1)")))
-
-
-def test_workers_without_work_are_refused(dalembert, tmp_path):
-    (tmp_path / "m.toml").write_text(FOUR_BAR)
-    found = dalembert("mechanism", "m.toml", "--workers", "2")
-    assert found.returncode == 2
-    assert "--variants" in " ".join(found.stderr.split())
-    assert os.listdir(tmp_path) == ["m.toml"]

@@ -105,14 +105,14 @@ two = 140
 """
 
 
-def run_json(dalembert: Dalembert, *arguments: str, stdin: str = "") -> Any:
-    done = dalembert("mechanism", *arguments, "--json", stdin=stdin)
+def run_json(dalembert: Dalembert, command: str, *arguments: str, stdin: str = "") -> Any:
+    done = dalembert(command, *arguments, "--json", stdin=stdin)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
 
 def test_json_of_forces(dalembert: Dalembert) -> None:
-    found = run_json(dalembert, "-", "--forces", "--at", "40deg", "--at", "200deg", stdin=FOUR_BAR)
+    found = run_json(dalembert, "forces", "-", "--at", "40deg", "--at", "200deg", stdin=FOUR_BAR)
     for pose in found["poses"]:
         effort = pose["effort"]
         assert effort["input_torque_N_m"] == pytest.approx(effort["virtual_work_torque_N_m"], rel=1e-12)
@@ -128,7 +128,7 @@ def test_json_of_forces(dalembert: Dalembert) -> None:
 
 
 def test_only_restricts_the_reactions(dalembert: Dalembert) -> None:
-    found = run_json(dalembert, "-", "--forces", "--only", "C", stdin=FOUR_BAR)
+    found = run_json(dalembert, "forces", "-", "--only", "C", stdin=FOUR_BAR)
     (pose,) = found["poses"]
     assert [r["joint"] for r in pose["reactions"]] == ["C"]
 
@@ -139,7 +139,7 @@ def test_three_links_at_a_pin(dalembert: Dalembert) -> None:
     text = text.replace("D = [100, 0]", "D = [100, 0]\nH = [200, 20]").replace(
         "rocker = 57", "rocker = 57\narm = 10\nlast = 70"
     )
-    (pose,) = run_json(dalembert, "-", "--forces", stdin=text)["poses"]
+    (pose,) = run_json(dalembert, "forces", "-", stdin=text)["poses"]
     rows = [r for r in pose["reactions"] if r["joint"] == "C"]
     assert [(r["on"], r["from"]) for r in rows] == [("coupler", "pin"), ("rocker", "pin"), ("arm", "pin")]
     size = max(abs(r["fx_N"]) for r in rows)
@@ -149,7 +149,7 @@ def test_three_links_at_a_pin(dalembert: Dalembert) -> None:
 
 def test_cycle_and_flywheel(dalembert: Dalembert) -> None:
     found = run_json(
-        dalembert, "-", "--forces", "--sweep", "0deg:360deg:2deg", "--flywheel", "0.05", stdin=FOUR_BAR
+        dalembert, "forces", "-", "--over", "0deg:360deg:2deg", "--flywheel", "0.05", stdin=FOUR_BAR
     )
     cycle = found["cycle"]
     assert set(cycle) >= {
@@ -157,10 +157,11 @@ def test_cycle_and_flywheel(dalembert: Dalembert) -> None:
     }  # fmt: skip
     torque = [pose["effort"]["input_torque_N_m"] for pose in found["poses"]]
     assert cycle["mean_torque_N_m"] == pytest.approx(sum(torque[:-1]) / 180, rel=1e-12)
-    assert cycle["peak_torque_N_m"] == pytest.approx(max(map(abs, torque)), rel=1e-12)
+    # between the poses: `test_cycles_of_time_and_turns.py` compares it with dense sweeps
+    assert max(map(abs, torque)) <= cycle["peak_torque_N_m"] <= 1.01 * max(map(abs, torque))
     assert cycle["work_J"] == pytest.approx(cycle["mean_torque_N_m"] * 2 * math.pi, rel=1e-14)
     assert abs(cycle["energy_closure_J"]) <= 1e-12 * cycle["peak_torque_N_m"]
-    without = run_json(dalembert, "-", "--forces", "--sweep", "0deg:360deg:2deg", stdin=FOUR_BAR)["cycle"]
+    without = run_json(dalembert, "forces", "-", "--over", "0deg:360deg:2deg", stdin=FOUR_BAR)["cycle"]
     assert without["flywheel_inertia_kg_m2"] is None
     assert cycle["flywheel_inertia_kg_m2"] > 0
 
@@ -168,8 +169,8 @@ def test_cycle_and_flywheel(dalembert: Dalembert) -> None:
 @pytest.mark.parametrize("text", [FOUR_BAR, CYLINDER, FIVE_BAR], ids=["four-bar", "cylinder", "five-bar"])
 def test_work_reads_the_states_that_mechanism_writes(dalembert: Dalembert, tmp_path: Path, text: str) -> None:
     (tmp_path / "m.toml").write_text(text)
-    assert dalembert("mechanism", "m.toml", "--states", "states.csv").returncode == 0
-    effort = run_json(dalembert, "m.toml", "--forces")["poses"][0]["effort"]
+    assert dalembert("forces", "m.toml", "--states", "states.csv").returncode == 0
+    effort = run_json(dalembert, "forces", "m.toml")["poses"][0]["effort"]
     done = dalembert("work", "states.csv", "--gravity", "0,-9.81", "--json")
     assert done.returncode == 0, done.stderr
     (step,) = json.loads(done.stdout)["steps"]
@@ -198,18 +199,25 @@ def test_equilibrium(dalembert: Dalembert) -> None:
     [input]
     link = "bob"
     """
-    found = run_json(dalembert, "-", "--equilibrium", stdin=text)
+    found = run_json(dalembert, "equilibrium", "-", stdin=text)
     assert [(round(e["input_deg"], 9), e["stable"]) for e in found["equilibria"]] == [
         (90.0, False),
         (270.0, True),
     ]
     assert found["equilibria"][1]["potential_J"] == pytest.approx(-9.81, rel=1e-14)
-    assert "effort" not in found["poses"][0]
+    assert set(found) == {"name", "equilibria", "warnings"}
 
 
 def test_counterweights(dalembert: Dalembert) -> None:
     found = run_json(
-        dalembert, "-", "--sweep", "0deg:360deg:5deg", "--counterweights", "crank,rocker", stdin=FOUR_BAR
+        dalembert,
+        "forces",
+        "-",
+        "--over",
+        "0deg:360deg:5deg",
+        "--counterweights",
+        "crank,rocker",
+        stdin=FOUR_BAR,
     )
     part = found["counterweights"]
     assert part["shaking_rms_after_N"] <= 1e-12 * part["shaking_rms_before_N"]
@@ -218,8 +226,8 @@ def test_counterweights(dalembert: Dalembert) -> None:
 
 def test_explain_names_what_is_left_out(dalembert: Dalembert) -> None:
     text = FOUR_BAR.replace('speed = "30 rad/s"', "").replace("center = [10, 3]", "center = [0, 0]")
-    done = dalembert("mechanism", "-", "--forces", "--explain", "--text", stdin=text)
-    assert "do no work, never evaluated for it: crank: weight" in done.stdout
+    done = dalembert("inspect", "-", "--text", stdin=text)
+    assert "do no work: crank: weight" in done.stdout
     assert "absent: no inertia loads" in done.stdout
     assert "joint forces, action and reaction, do no work together" in done.stdout
 
@@ -234,7 +242,7 @@ def test_a_change_point_is_said_and_spoils_no_other_pose(dalembert: Dalembert) -
         guess={"coupler": 0, "rocker": 60},
     )
     found = run_json(
-        dalembert, "-", "--forces", "--at", "60deg", "--at", "180deg", "--at", "240deg", stdin=text
+        dalembert, "forces", "-", "--at", "60deg", "--at", "180deg", "--at", "240deg", stdin=text
     )
     torques = [pose["effort"]["virtual_work_torque_N_m"] for pose in found["poses"]]
     # the parallelogram: every centre of mass falls with the crank
@@ -249,23 +257,23 @@ def test_a_change_point_is_said_and_spoils_no_other_pose(dalembert: Dalembert) -
 BAD = {
     "flywheel alone": (["--flywheel", "0.02"], 2, "expected a cycle too"),
     "negative flywheel": (
-        ["--flywheel", "-1", "--sweep", "0deg:360deg:9deg"],
+        ["--flywheel", "-1", "--over", "0deg:360deg:9deg"],
         2,
         "positive speed fluctuation",
     ),
     "counterweight": (
-        ["--counterweights", "coupler", "--sweep", "0deg:360deg:9deg"],
+        ["--counterweights", "coupler", "--over", "0deg:360deg:9deg"],
         1,
         "does not turn about a pin",
     ),
-    "unknown link": (["--counterweights", "krank", "--sweep", "0deg:360deg:9deg"], 1, "unknown link 'krank'"),
+    "unknown link": (["--counterweights", "krank", "--over", "0deg:360deg:9deg"], 1, "unknown link 'krank'"),
 }
 
 
 @pytest.mark.parametrize("case", BAD)
 def test_bad_calls_are_one_line(dalembert: Dalembert, case: str) -> None:
     options, status, expected = BAD[case]
-    done = dalembert("mechanism", "-", *options, stdin=FOUR_BAR)
+    done = dalembert("forces", "-", *options, stdin=FOUR_BAR)
     assert done.returncode == status
     assert expected in done.stderr
     assert status == 2 or len(done.stderr.splitlines()) == 1
@@ -273,9 +281,8 @@ def test_bad_calls_are_one_line(dalembert: Dalembert, case: str) -> None:
 
 def test_bad_friction_joint(dalembert: Dalembert) -> None:
     done = dalembert(
-        "mechanism",
+        "forces",
         "-",
-        "--forces",
         stdin=FOUR_BAR + '[[friction]]\njoint = "B"\ncoefficient = 0.1\nradius = 5\n',
     )
     assert done.returncode == 0
@@ -283,7 +290,7 @@ def test_bad_friction_joint(dalembert: Dalembert) -> None:
         FOUR_BAR.replace("C = [120, 0]", "C = [120, 0], Z = [5, 5]")
         + '[[friction]]\njoint = "Z"\ncoefficient = 0.1\n'
     )
-    done = dalembert("mechanism", "-", "--forces", stdin=bad)
+    done = dalembert("forces", "-", stdin=bad)
     assert done.returncode == 1
     assert "'Z' is no joint" in done.stderr
 
@@ -304,7 +311,7 @@ def test_scissors_lift_in_closed_form(dalembert: Dalembert) -> None:
     """The thrust is W cot θ, with cos θ = x/1.2."""
     dalembert("examples", "scissors-lift")
     for x in (1.1, 0.5):
-        (pose,) = run_json(dalembert, "lift.toml", "--forces", "--at", f"{x}m")["poses"]
+        (pose,) = run_json(dalembert, "forces", "lift.toml", "--at", f"{x}m")["poses"]
         exact = -400 * 9.81 * x / math.sqrt(1.44 - x * x)
         assert pose["effort"]["input_force_N"] == pytest.approx(exact, rel=1e-12)
         assert pose["effort"]["virtual_work_force_N"] == pytest.approx(exact, rel=1e-12)
@@ -316,7 +323,7 @@ def test_a_force_table_holds_finite_numbers(bad: str, dalembert, tmp_path) -> No
     assert dalembert("examples", "engine").returncode == 0
     table = tmp_path / "gas.csv"
     table.write_text(table.read_text() + bad + "\n")
-    done = dalembert("mechanism", "engine.toml", "--forces", "--at", "100deg")
+    done = dalembert("forces", "engine.toml", "--at", "100deg")
     assert done.returncode == 1
     assert "expected" in done.stderr
     assert "number" in done.stderr
@@ -380,7 +387,7 @@ damping = {damping}
         ["--at", "-360deg"],
     ):
         for more in ([], ["--digits"]):
-            done = dalembert("mechanism", "m.toml", *poses, "--forces", *more)
+            done = dalembert("forces", "m.toml", *poses, *more)
             assert done.returncode == 0
             assert named in done.stderr
             assert "RuntimeWarning" not in done.stderr
@@ -388,5 +395,5 @@ damping = {damping}
             row, *others = csv.DictReader(io.StringIO(done.stdout))
             assert row["input_torque_N_m"] == row["O_ground_on_crank_fx_N"] == ""
             assert all(float(other["input_torque_N_m"]) > 0 for other in others)
-    for study in ("--equilibrium", "--check"):
-        assert "RuntimeWarning" not in dalembert("mechanism", "m.toml", study).stderr
+    for study in ("equilibrium", "inspect"):
+        assert "RuntimeWarning" not in dalembert(study, "m.toml").stderr

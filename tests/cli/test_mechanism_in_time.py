@@ -7,6 +7,7 @@ import io
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -38,7 +39,7 @@ def pendulum(tmp_path: Path) -> Path:
 
 
 def test_json_has_what_is_promised(dalembert: Dalembert, pendulum: Path) -> None:
-    done = dalembert("mechanism", str(pendulum), "--time", "0:1:0.5", "--only", "P,bob", "--forces", "--json")
+    done = dalembert("simulate", str(pendulum), "--time", "0:1:0.5", "--only", "P,bob", "--forces", "--json")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert [row["t_s"] for row in found["time"]] == [0, 0.5, 1]
@@ -64,7 +65,7 @@ def test_json_has_what_is_promised(dalembert: Dalembert, pendulum: Path) -> None
 
 
 def test_csv_and_the_event(dalembert: Dalembert, pendulum: Path) -> None:
-    done = dalembert("mechanism", str(pendulum), "--time", "0:10:0.25", "--until", "bob=-90")
+    done = dalembert("simulate", str(pendulum), "--time", "0:10:0.25", "--until", "bob=-90")
     rows = list(csv.DictReader(io.StringIO(done.stdout)))
     assert list(rows[0]) == [
         "t_s", "input_deg", "input_speed_rad_s", "input_acceleration_rad_s2", "input_error_estimate_deg", "energy_J"
@@ -75,7 +76,7 @@ def test_csv_and_the_event(dalembert: Dalembert, pendulum: Path) -> None:
 
 
 def test_digits_are_those_of_the_estimate(dalembert: Dalembert, pendulum: Path) -> None:
-    done = dalembert("mechanism", str(pendulum), "--time", "0:1:1", "--accuracy", "1e-4", "--digits")
+    done = dalembert("simulate", str(pendulum), "--time", "0:1:1", "--accuracy", "1e-4", "--digits")
     rows = list(csv.DictReader(io.StringIO(done.stdout)))
     assert len(rows[-1]["input_deg"].lstrip("-")) < 12
     assert float(rows[-1]["input_deg"]) == pytest.approx(math.degrees(-2.975823638319696), abs=1e-2)
@@ -83,7 +84,7 @@ def test_digits_are_those_of_the_estimate(dalembert: Dalembert, pendulum: Path) 
 
 def test_a_picture(dalembert: Dalembert, pendulum: Path, tmp_path: Path) -> None:
     done = dalembert(
-        "mechanism", str(pendulum), "--time", "0:1:0.1", "--plot", str(tmp_path / "p.svg"), "--text"
+        "simulate", str(pendulum), "--time", "0:1:0.1", "--plot", str(tmp_path / "p.svg"), "--text"
     )
     assert done.returncode == 0, done.stderr
     assert "explicit Runge-Kutta method of order 8" in done.stdout
@@ -97,9 +98,8 @@ def test_a_picture(dalembert: Dalembert, pendulum: Path, tmp_path: Path) -> None
         (("--time", "1:0:-0.1"), 2, "rising"),
         (("--time", "0:1:0.1", "--accuracy", "fine"), 2, "--accuracy"),
         (("--time", "0:1:0.1", "--until", "bab=3"), 2, "no input drives 'bab'"),
-        (("--time", "0:1:0.1", "--sweep", "0:360:10"), 2, "expected without --sweep"),
-        (("--time", "0:1:0.1", "--check"), 2, "expected without --check"),
-        (("--until", "bob=3"), 2, "expected --time too"),
+        (("--time", "0:1:0.1", "--check"), 2, "--check is now dalembert inspect"),
+        (("--until", "bob=3"), 2, "such as --time 0:10:0.01"),
         (("--time", "0:1:0.1", "--only", "Q"), 1, "no link or point is named 'Q'"),
         (("--time", "0:1:0.1", "--set", "links.bob.mass=0"), 1, "no mass moves with input 'bob'"),
     ],
@@ -107,7 +107,7 @@ def test_a_picture(dalembert: Dalembert, pendulum: Path, tmp_path: Path) -> None
 def test_what_is_refused(
     dalembert: Dalembert, pendulum: Path, words: tuple[str, ...], status: int, said: str
 ) -> None:
-    done = dalembert("mechanism", str(pendulum), *words)
+    done = dalembert("simulate", str(pendulum), *words)
     assert done.returncode == status
     assert said in " ".join(done.stderr.split())
     assert "Traceback" not in done.stderr
@@ -116,20 +116,20 @@ def test_what_is_refused(
 def test_a_torque_over_time_is_refused_in_a_pose(dalembert: Dalembert, pendulum: Path) -> None:
     pendulum.write_text(PENDULUM + '[[torques]]\nlink = "bob"\ntorque = "t.csv"\n')
     pendulum.with_name("t.csv").write_text("t_s,torque_N_m\n0,1\n2,1\n")
-    done = dalembert("mechanism", str(pendulum), "--at", "30deg", "--forces")
+    done = dalembert("forces", str(pendulum), "--at", "30deg")
     assert done.returncode == 1
     assert "only a motion in time has it" in done.stderr
-    assert dalembert("mechanism", str(pendulum), "--time", "0:1:1").returncode == 0
+    assert dalembert("simulate", str(pendulum), "--time", "0:1:1").returncode == 0
 
 
 def test_variants_are_let_go_together(dalembert: Dalembert, pendulum: Path) -> None:
     """Rows begin with the variant; each is what the file with that number gives."""
-    vary = "--vary", "links.bob.P.x=1:2:1", "--set", "links.bob.center.x=0.5"
-    done = dalembert("mechanism", pendulum, "--time", "0:1:0.5", *vary)
+    vary = "--over", "links.bob.P.x=1:2:1", "--set", "links.bob.center.x=0.5"
+    done = dalembert("simulate", pendulum, "--time", "0:1:0.5", *vary)
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader(io.StringIO(done.stdout)))
     assert [row["variant"] for row in rows] == ["1"] * 3 + ["2"] * 3
-    one = dalembert("mechanism", pendulum, "--time", "0:1:0.5", *vary[2:], "--set", "links.bob.P.x=2")
+    one = dalembert("simulate", pendulum, "--time", "0:1:0.5", *vary[2:], "--set", "links.bob.P.x=2")
     alone = list(csv.DictReader(io.StringIO(one.stdout)))
     for row, own in zip(rows[3:], alone, strict=True):
         assert float(row["links.bob.P.x_m"]) == 2
@@ -138,8 +138,8 @@ def test_variants_are_let_go_together(dalembert: Dalembert, pendulum: Path) -> N
 
 
 def test_variants_with_an_end_and_points_in_json(dalembert: Dalembert, pendulum: Path) -> None:
-    more = "--vary", "links.bob.mass=0:1:1", "--until", "bob=-90deg", "--only", "P", "--json"
-    done = dalembert("mechanism", pendulum, "--time", "0:2:1", *more)
+    more = "--over", "links.bob.mass=0:1:1", "--until", "bob=-90deg", "--only", "P", "--json"
+    done = dalembert("simulate", pendulum, "--time", "0:2:1", *more)
     assert done.returncode == 0, done.stderr
     none, one = json.loads(done.stdout)["variants"]
     assert none["time"] == []
@@ -154,10 +154,10 @@ def test_variants_by_several_processes_give_the_same_bytes(
     dalembert: Dalembert, pendulum: Path, tmp_path: Path
 ) -> None:
     """In parts of fixed size: as CSV, each variant to its own event, and as a folder of Parquet."""
-    vary = "--vary", "links.bob.center.x=0.5:2:0.00125", "--time", "0:1:1"
+    vary = "--over", "links.bob.center.x=0.5:2:0.00125", "--time", "0:1:1"
     one, two = tmp_path / "one.csv", tmp_path / "two.csv"
     for path, workers in ((one, "1"), (two, "2")):
-        done = dalembert("mechanism", pendulum, *vary, "--until", "bob=-90", "--workers", workers, "-o", path)
+        done = dalembert("simulate", pendulum, *vary, "--until", "bob=-90", "--workers", workers, "-o", path)
         assert done.returncode == 0, done.stderr
     assert one.read_bytes() == two.read_bytes()
     rows = list(csv.DictReader(io.StringIO(one.read_text())))
@@ -167,7 +167,7 @@ def test_variants_by_several_processes_give_the_same_bytes(
         assert float(row["t_s"]) == pytest.approx(quarter, abs=1e-9)
     parquet = pytest.importorskip("pyarrow.parquet")
     folder = tmp_path / "variants.parquet"
-    done = dalembert("mechanism", pendulum, *vary, "--workers", "2", "-o", folder)
+    done = dalembert("simulate", pendulum, *vary, "--workers", "2", "-o", folder)
     assert done.returncode == 0, done.stderr
     assert parquet.read_table(folder).num_rows == 2 * 1201
     assert len(list(folder.iterdir())) == 3
@@ -179,15 +179,15 @@ def test_digits_of_variants_one_by_one_and_by_processes(dalembert: Dalembert, pe
         "0:1:1",
         "--accuracy",
         "1e-5",
-        "--vary",
+        "--over",
         "links.bob.mass=0:9:1",
         "--digits",
         "--only",
         "P",
     )
-    done = dalembert("mechanism", pendulum, *more)
+    done = dalembert("simulate", pendulum, *more)
     assert done.returncode == 0, done.stderr
-    assert dalembert("mechanism", pendulum, *more, "--workers", "2").stdout == done.stdout
+    assert dalembert("simulate", pendulum, *more, "--workers", "2").stdout == done.stdout
     rows = list(csv.DictReader(io.StringIO(done.stdout)))
     assert len(rows) == 1 + 2 * 9
     assert rows[0]["P_x_m"] == rows[0]["t_s"] == ""
@@ -198,25 +198,25 @@ def test_digits_of_variants_one_by_one_and_by_processes(dalembert: Dalembert, pe
 
 def test_a_page_of_variants_in_time(dalembert: Dalembert, pendulum: Path, tmp_path: Path) -> None:
     page = tmp_path / "variants.html"
-    vary = "--time", "0:1:0.1", "--vary", "links.bob.mass=0:2:1", "--vary", "input.speed=0:1:1"
-    done = dalembert("mechanism", pendulum, *vary, "--html", page)
+    vary = "--time", "0:1:0.1", "--over", "links.bob.mass=0:2:1", "--over", "input.speed=0:1:1"
+    done = dalembert("simulate", pendulum, *vary, "--page", page)
     assert done.returncode == 0, done.stderr
     text = page.read_text()
     assert "variant 3" in text
     assert "variant 6" in text
     assert "variant 1" not in text
-    done = dalembert("mechanism", pendulum, *vary, "--html", page, "--until", "bob=-90")
+    done = dalembert("simulate", pendulum, *vary, "--page", page, "--until", "bob=-90")
     assert done.returncode == 2
-    assert "expected no --until beside variants" in " ".join(done.stderr.split())
+    assert "variants have one clock" in " ".join(done.stderr.split())
 
 
 def test_the_first_row_is_as_it_was_given(dalembert: Dalembert, pendulum: Path) -> None:
     """60° is 59.99999999999999° on the way through radians and back."""
     pendulum.write_text(PENDULUM.replace("angle = 0", "angle = 60"))
-    done = dalembert("mechanism", pendulum, "--time", "0:1:1", "--only", "bob")
+    done = dalembert("simulate", pendulum, "--time", "0:1:1", "--only", "bob")
     first = next(csv.DictReader(io.StringIO(done.stdout)))
     assert (first["input_deg"], first["bob_angle_deg"]) == ("60.0", "60.0")
-    done = dalembert("mechanism", pendulum, "--time", "0:1:1", "--vary", "input.angle=60:61:1", "--json")
+    done = dalembert("simulate", pendulum, "--time", "0:1:1", "--over", "input.angle=60:61:1", "--json")
     shown = [of["time"][0]["inputs"]["bob"]["angle_deg"] for of in json.loads(done.stdout)["variants"]]
     assert shown == [60.0, 61.0]
 
@@ -237,12 +237,12 @@ speed = 0
 )
 
 
-@pytest.mark.parametrize("more", [(), ("--digits",), ("--vary", "input.1.speed=0:0:1")])
+@pytest.mark.parametrize("more", [(), ("--digits",), ("--over", "input.1.speed=0:0:1")])
 def test_where_no_digit_is_known_cells_are_empty_with_one_warning(
     dalembert: Dalembert, pendulum: Path, more: tuple[str, ...]
 ) -> None:
     pendulum.write_text(CHAOS)
-    done = dalembert("mechanism", pendulum, "--time", "0:60:12", "--only", "Q", *more)
+    done = dalembert("simulate", pendulum, "--time", "0:60:12", "--only", "Q", *more)
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader(io.StringIO(done.stdout)))
     lost = [name for name, cell in rows[-1].items() if not cell]
@@ -255,8 +255,32 @@ def test_where_no_digit_is_known_cells_are_empty_with_one_warning(
     (line,) = done.stderr.splitlines()
     assert "no digit is known from" in line
     if not more:
-        done = dalembert("mechanism", pendulum, "--time", "0:60:12", "--json")
+        done = dalembert("simulate", pendulum, "--time", "0:60:12", "--json")
         found = json.loads(done.stdout)
         assert found["time"][-1]["inputs"]["lower"]["angle_deg"] is None
         assert found["time"][-1]["inputs"]["lower"]["error_estimate_deg"] > 5
         assert len(found["warnings"]) == 1
+
+
+def test_json_with_forces_has_points_and_links_too(dalembert: Dalembert, pendulum: Path) -> None:
+    """INTERFACE: points, links, and reactions with --forces; alone, and of variants; `--only` leaves out the others."""
+
+    def rows(*more: str) -> list[dict[str, Any]]:
+        done = dalembert("simulate", str(pendulum), "--time", "0:1:0.5", "--forces", "--json", *more)
+        assert done.returncode == 0, done.stderr
+        document = json.loads(done.stdout)
+        found: list[dict[str, Any]] = (
+            document["variants"][0]["time"] if "variants" in document else document["time"]
+        )
+        return found
+
+    alone, named, varied = rows(), rows("--only", "P,bob"), rows("--set", "links.bob.mass=1")
+    for row in alone:
+        del row["points"]["O"]
+    assert alone == named
+    assert alone[-1]["points"]["P"]["ay_m_s2"] == named[-1]["points"]["P"]["ay_m_s2"]
+    assert alone[-1]["reactions"]
+    assert varied[-1]["points"]["P"]["x_m"] == pytest.approx(alone[-1]["points"]["P"]["x_m"], abs=1e-8)
+    only = rows("--only", "bob")[-1]
+    assert "bob" in only["links"]
+    assert "P" not in only.get("points", {})

@@ -1,44 +1,67 @@
-"""Which options of `dalembert mechanism` go together: the rules name options that there are, and each is obeyed."""
+"""Options of the commands on a mechanism: an old spelling is answered by the new one, what means nothing is refused."""
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import pytest
 
-from cli.mechanism.options import RULES, Options
+from cli.renamed import MECHANISM, renamed
 from tests.conftest import Dalembert
 from tests.four_bars import four_bar
 
 
-@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.of)
-def test_rules_name_options(rule):
-    # --plot is every command's, and --branch all is one value of an option
-    known = {field.name for field in fields(Options)} | {"plot", "every_branch"}
-    named = " ".join([rule.of, rule.needs, rule.without, rule.where]).split()
-    assert set(named) <= known
-    assert bool(rule.needs) != bool(rule.without)
+@pytest.mark.parametrize("option", ["--sweep", *MECHANISM])
+def test_an_old_spelling_is_answered_by_one_line(dalembert: Dalembert, option: str) -> None:
+    if option in ("--newton", "--order"):
+        assert renamed("inspect", option)
+        return
+    done = dalembert("mechanism", "m.toml", option, "x")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"dalembert mechanism: {option} is now {MECHANISM[option]}\n"
 
 
 @pytest.mark.parametrize(
-    ("given", "flag", "told"),
+    ("words", "refusal"),
     [
-        (("--flywheel", "0.02"), "--flywheel", "expected a cycle too"),
-        (("--graph", "C.x"), "--graph", "expected --plot FILE too"),
-        (("--vary", "links.crank.B.x=1:2:1", "--explain"), "--explain", "expected one mechanism"),
-        (("--tolerance", "--check", "--branch", "1"), "--tolerance", "no --branch or --check beside it"),
-        (("--fit", "a.csv", "--at", "1deg"), "--fit", "expected without --at"),
-        (("--fit", "a.csv", "--draws", "5"), "--fit", "expected without --draws"),
-        (("--time", "0:1:1", "--branch", "all"), "--time", "expected without --branch all"),
-        (("--until", "crank=1deg"), "--until", "expected --time too"),
+        (("forces", "--flywheel", "0.02"), "expected a cycle too"),
+        (("forces", "--states", "s.csv", "--over", "links.crank.B.x=1:2:1"), "expected one mechanism"),
+        (("inspect", "--at", "3deg"), "the whole range of the input"),
+        (("equilibrium", "--at", "3deg"), "expected --over"),
+        (("simulate", "--time", "0:1:1", "--branch", "all"), "follows one assembly"),
+        (("simulate",), "expected the times"),
+        (("mechanism", "--at", "3deg", "--over", "0deg:9deg:1deg"), "given twice"),
+        (("mechanism", "--over", "crank=0:9:1", "--over", "0:9:1"), "given twice"),
+        (("mechanism", "--over", "krank=0:9:1"), "did you mean"),
+        (("mechanism", "--branch", "none"), "expected all, or the number"),
     ],
 )
-def test_options_that_do_not_go_together_are_refused(
-    dalembert: Dalembert, tmp_path, given, flag, told
-) -> None:
+def test_what_means_nothing_is_refused(dalembert: Dalembert, tmp_path, words, refusal) -> None:
     (tmp_path / "m.toml").write_text(four_bar())
-    done = dalembert("mechanism", "m.toml", *given)
+    done = dalembert(words[0], "m.toml", *words[1:])
     assert (done.returncode, done.stdout) == (2, "")
-    said = " ".join(done.stderr.replace("│", " ").split())
-    assert flag in said
-    assert told in said
+    assert refusal in " ".join(done.stderr.split())
+
+
+def test_names_choose_single_quantities(dalembert: Dalembert, tmp_path) -> None:
+    (tmp_path / "m.toml").write_text(four_bar(head="gravity = [0, -9.81]", rates="speed = 2"))
+    only = "C.x,coupler.omega,crank.torque,B.coupler.fx,B.crank.fx,shaking.fx"
+    header, row = (
+        line.split(",") for line in dalembert("forces", "m.toml", "--only", only).stdout.splitlines()
+    )
+    assert header == [
+        "step", "input_deg", "C_x_m", "coupler_omega_rad_s", "input_torque_N_m", "B_crank_on_coupler_fx_N",
+        "B_coupler_on_crank_fx_N", "shaking_fx_N",
+    ]  # fmt: skip
+    assert float(row[5]) == -float(row[6])
+
+
+def test_a_row_of_cases_sets_inputs_and_dimensions(dalembert: Dalembert, tmp_path) -> None:
+    (tmp_path / "m.toml").write_text(four_bar())
+    (tmp_path / "cases.csv").write_text("crank_deg,links.crank.B.x_mm\n40,40\n50,42\n")
+    lines = dalembert("mechanism", "m.toml", "--cases", "cases.csv", "--only", "C.x").stdout.splitlines()
+    assert lines[0] == "variant,links.crank.B.x_m,assembled,step,input_deg,C_x_m"
+    for line, (angle, x) in zip(lines[1:], ((40, 40), (50, 42)), strict=True):
+        alone = dalembert(
+            "mechanism", "m.toml", "--set", f"links.crank.B.x={x}mm", "--at", f"{angle}deg", "--only", "C.x"
+        ).stdout.splitlines()[1]
+        assert float(line.split(",")[-1]) == pytest.approx(float(alone.split(",")[-1]), rel=1e-13)
+        assert float(line.split(",")[-2]) == angle

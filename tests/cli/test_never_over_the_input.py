@@ -88,21 +88,21 @@ def test_expected_values_are_kept(dalembert: Dalembert, tmp_path: Path) -> None:
 
 
 def test_one_file_for_two_outputs(dalembert: Dalembert, tmp_path: Path) -> None:
-    done = dalembert("mechanism", "m.toml", "--states", "s.csv", "-o", "./s.csv")
+    done = dalembert("forces", "m.toml", "--states", "s.csv", "-o", "./s.csv")
     assert done.returncode == 2
     assert "given twice" in done.stderr
     assert not (tmp_path / "s.csv").exists()
 
 
 def test_decimal_commas_in_the_tables_of_a_mechanism(dalembert: Dalembert, tmp_path: Path) -> None:
-    shown = dalembert("mechanism", "m.toml", "--forces")
+    shown = dalembert("forces", "m.toml")
     assert shown.returncode == 0, shown.stderr
     (tmp_path / "law.csv").write_text("time_s,angle_deg\n0,0\n0.5,10\n1,25.5\n2,60\n")
     (tmp_path / "gas.csv").write_text("angle_deg,fx_N\n0,-1.5\n90,3\n")
-    assert dalembert("mechanism", "m.toml", "--forces").stdout == shown.stdout
+    assert dalembert("forces", "m.toml").stdout == shown.stdout
     # 2.500 beside 1,5 may be 2500
     (tmp_path / "gas.csv").write_text("angle_deg;fx_N\n0;-1,5\n90;2.500\n")
-    done = dalembert("mechanism", "m.toml", "--forces")
+    done = dalembert("forces", "m.toml")
     assert done.returncode == 1
     assert (
         "gas.csv: row 2 (line 3), column fx_N: found '2.500', expected a number with a decimal comma"
@@ -116,7 +116,7 @@ def test_a_spring_between_plain_names(dalembert: Dalembert, tmp_path: Path) -> N
     texts = [
         base + spring.format(ends) for ends in ('"P", "S"', '"crank.P", "ground.S"', '"P", "O"', '"P", "Q"')
     ]
-    plain, named, doubled, unknown = (dalembert("mechanism", "-", "--forces", stdin=text) for text in texts)
+    plain, named, doubled, unknown = (dalembert("forces", "-", stdin=text) for text in texts)
     assert plain.returncode == 0, plain.stderr
     assert plain.stdout == named.stdout
     assert doubled.returncode == 1
@@ -127,7 +127,7 @@ def test_a_spring_between_plain_names(dalembert: Dalembert, tmp_path: Path) -> N
 @pytest.mark.parametrize("end", ["[0, 0]", "{ link = 'crank' }", "5"])
 def test_a_spring_at_no_name(dalembert: Dalembert, end: str) -> None:
     text = f"{CRANK}[[springs]]\nbetween = [{end}, 'crank.P']\n"
-    done = dalembert("mechanism", "-", "--forces", stdin=text)
+    done = dalembert("forces", "-", stdin=text)
     assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
     assert "[[springs]] 1 between: found" in done.stderr
     assert "expected a link and its point such as" in done.stderr

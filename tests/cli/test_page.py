@@ -21,8 +21,8 @@ Row = dict[str, str]
 def four_bar(dalembert: Dalembert, tmp_path: Path, browser: Any) -> tuple[Opened, list[Row], list[Row]]:
     """Return the page, its poses and its forces as CSV."""
     (tmp_path / "m.toml").write_text(FOUR_BAR)
-    sweep = ("m.toml", "--sweep", "0:360:1")
-    done = dalembert("mechanism", *sweep, "--forces", "--html", "m.html")
+    sweep = ("m.toml", "--over", "0:360:1")
+    done = dalembert("forces", *sweep, "--page", "m.html")
     assert done.returncode == 0, done.stderr
     poses = dalembert("mechanism", *sweep, "--only", ",".join((*POINTS, "crank", "rocker", EVIL)))
     assert poses.returncode == 0, poses.stderr
@@ -238,7 +238,7 @@ def test_it_fits_a_phone(four_bar: tuple[Opened, list[Row], list[Row]]) -> None:
 def test_a_pose_that_cannot_be_assembled_is_named(dalembert: Dalembert, tmp_path: Path, browser: Any) -> None:
     text = FOUR_BAR.replace("B = [40, 0]", "B = [70, 0]")
     (tmp_path / "m.toml").write_text(text)
-    done = dalembert("mechanism", "m.toml", "--sweep", "0:180:1", "--html", "m.html")
+    done = dalembert("mechanism", "m.toml", "--over", "0:180:1", "--page", "m.html")
     assert done.returncode == 0
     opened = Opened(browser, tmp_path / "m.html")
     shown = [

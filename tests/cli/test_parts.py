@@ -15,7 +15,7 @@ import pyarrow.parquet
 import pytest
 
 from cli.show import parts
-from cli.show.columns import Column, Table
+from dalembert.results.columns import Column, Table
 from tests.conftest import Dalembert
 from virtualwork.formulas.positions import BLOCK
 
@@ -59,7 +59,7 @@ def test_a_long_sweep_has_the_digits_of_its_csv(
     suffix: str, read: Callable[[Path], object], dalembert: Dalembert, tmp_path: Path
 ) -> None:
     dalembert("examples", "klann")
-    call = ("mechanism", "klann.toml", "--sweep", f"0deg:360deg/{LONG}", "--only", "H")
+    call = ("mechanism", "klann.toml", "--over", f"0deg:360deg/{LONG}", "--only", "H")
     for name in ("h.csv", f"h{suffix}"):
         done = dalembert(*call, "-o", name)
         assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
@@ -72,7 +72,7 @@ def test_a_long_sweep_has_the_digits_of_its_csv(
 
 def test_a_block_is_a_row_group(dalembert: Dalembert, tmp_path: Path) -> None:
     dalembert("examples", "klann")
-    dalembert("mechanism", "klann.toml", "--sweep", f"0deg:360deg/{LONG}", "--only", "H", "-o", "h.parquet")
+    dalembert("mechanism", "klann.toml", "--over", f"0deg:360deg/{LONG}", "--only", "H", "-o", "h.parquet")
     file = pyarrow.parquet.ParquetFile(tmp_path / "h.parquet")
     assert [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)] == [BLOCK, BLOCK, 6]
     assert file.schema_arrow.field("H_x_m").type == pyarrow.float64()
@@ -120,10 +120,3 @@ def test_names_and_empty_cells_stay_what_they_are(dalembert: Dalembert, tmp_path
     names, found = of_parquet(tmp_path / "b.parquet")
     assert names == header
     assert same(found, expected)
-
-
-def test_one_table_alone(dalembert: Dalembert) -> None:
-    dalembert("examples", "klann")
-    done = dalembert("mechanism", "klann.toml", "--check", "--newton", "-o", "c.parquet")
-    assert done.returncode == 2
-    assert "ask for --json or --text" in " ".join(done.stderr.split())

@@ -59,7 +59,16 @@ def test_a_technician_with_a_german_csv_and_a_workbook(dalembert: Dalembert, tmp
         trial = ["A", 10, 90] if on else [None, None, None]
         sheet.append([run, "Lager", abs(v), math.degrees(np.angle(v)) % 360, *trial])
     book.save(tmp_path / "Lüfter.xlsx")
-    options = ("--report", "Bericht.html", "--machine", "Lüfter 3", "--customer", "Müller", "-o", "fix.xlsx")
+    options = (
+        "--report",
+        "Bericht.html",
+        "--about",
+        "machine=Lüfter 3",
+        "--about",
+        "customer=Müller",
+        "-o",
+        "fix.xlsx",
+    )
     done(dalembert("field", "Lüfter.xlsx#Messung", *options))
     header, row = openpyxl.load_workbook(tmp_path / "fix.xlsx")["corrections"].iter_rows(values_only=True)
     fix = dict(zip(header, row, strict=True))
@@ -91,17 +100,17 @@ def test_a_teacher_with_degrees_and_millimetres(dalembert: Dalembert, tmp_path: 
     wrong = dalembert(*call, "--expect", "answers.csv")
     assert wrong.returncode == 1
     assert "WRONG" in wrong.stdout
-    done(dalembert("mechanism", "bar.toml", "--sweep", "0:360:30", "--only", "rocker", "-o", "sheet.tex"))
+    done(dalembert("mechanism", "bar.toml", "--over", "0:360:30", "--only", "rocker", "-o", "sheet.tex"))
     assert (tmp_path / "sheet.tex").read_text().count(r"\\") == 14
     # the check of the linkage, in a pipe
-    rows = list(csv.DictReader(done(dalembert("mechanism", "bar.toml", "--check")).splitlines()))
+    rows = list(csv.DictReader(done(dalembert("inspect", "bar.toml")).splitlines()))
     assert {"quantity": "grashof", "of": "crank, coupler, rocker", "value": "crank-rocker"} in rows
 
 
 def test_a_designer_with_six_bars_and_a_wide_table(dalembert: Dalembert, tmp_path: Path) -> None:
     """A Watt six-bar: all of it over a turn in a workbook and Parquet, variants, a report that fits the paper."""
     done(dalembert("examples", "watt-six-bar"))
-    call = ("mechanism", "watt.toml", "--sweep", "0deg:5deg:0.5deg")
+    call = ("mechanism", "watt.toml", "--over", "0deg:5deg:0.5deg")
     links = [
         line.split(".")[1].rstrip("]")
         for line in (tmp_path / "watt.toml").read_text().splitlines()
@@ -118,7 +127,7 @@ def test_a_designer_with_six_bars_and_a_wide_table(dalembert: Dalembert, tmp_pat
     for written, row in zip(cells, rows, strict=True):
         assert [float(c) for c in written] == [float(c) for c in row.values()]
     # the terminal's width is kept, each block with the key columns in front
-    text = done(dalembert(*call, *everything, "--report", "watt.html", "--title", "Draft 2", "--text"))
+    text = done(dalembert(*call, *everything, "--report", "watt.html", "--about", "title=Draft 2", "--text"))
     assert "step" in text
     page = (tmp_path / "watt.html").read_text()
     assert "<h1>Draft 2</h1>" in page
@@ -138,7 +147,7 @@ def test_a_designer_with_six_bars_and_a_wide_table(dalembert: Dalembert, tmp_pat
                     "0deg",
                     "--only",
                     crank,
-                    "--vary",
+                    "--over",
                     "input.speed=30rpm:90rpm:30rpm",
                 )
             ).splitlines()

@@ -65,7 +65,7 @@ def test_what_cannot_be_placed(dalembert: Dalembert, solved: Path) -> None:
     for options, status, said in (
         (["fix.csv", "--plane", "fore"], 1, "no plane 'fore': expected one of aft, forward"),
         (["fix.csv", "--rotor", "2"], 1, "no rotor '2': expected one of 1"),
-        (["fix.csv", "5g@20deg"], 2, "beside a file expected nothing"),
+        (["fix.csv", "5g@20deg"], 2, "expected nothing in addition to a file"),
         (["5g@20deg", "--plane", "A"], 2, "expected a file"),
         (["fix.csv", "--plot", "p.svg"], 2, "expected --rotor and --plane too"),
         (["u.csv"], 1, "corrections as unbalances: expected masses"),
@@ -80,6 +80,15 @@ def test_what_cannot_be_placed(dalembert: Dalembert, solved: Path) -> None:
         assert status == 2 or done.stderr.count("\n") == 1
 
 
+def test_two_corrections_of_one_plane_are_placed_apart(dalembert: Dalembert, tmp_path: Path) -> None:
+    (tmp_path / "two.csv").write_text("mass_g,angle_deg\n3,0\n4,90\n")
+    done = dalembert("place", "two.csv", "--blades", "4", "--json")
+    placements = json.loads(done.stdout)["placements"]
+    assert [[m["position"] for m in each["masses"]] for each in placements] == [["1"], ["2"]]
+    assert [each["target"]["mass_kg"] for each in placements] == pytest.approx([0.003, 0.004])
+    assert {(each["rotor"], each["plane"]) for each in placements} == {("1", "1")}
+
+
 def test_the_prediction_goes_beside_the_corrections(dalembert: Dalembert, solved: Path) -> None:
     document = json.loads((solved / "fix.json").read_text())["rotors"][0]
     predicted = rows(solved / "fix-prediction.csv")
@@ -91,7 +100,7 @@ def test_the_prediction_goes_beside_the_corrections(dalembert: Dalembert, solved
         [0.68, 0.56, 1.94, 2.07]
     )
     book = openpyxl.load_workbook(solved / "fix.xlsx")
-    assert book.sheetnames == ["corrections", "influence", "prediction", "split"]
+    assert book.sheetnames[:4] == ["corrections", "influence", "prediction", "split"]
     # a pipe has the corrections alone
     plain = dalembert("field", "pump.csv", "--blades", "12").stdout
     assert plain == (solved / "fix.csv").read_text()

@@ -29,7 +29,7 @@ rocker.points = { D = [0, 0], C = [0.08, 0] }
 PARTS = 12
 # of 65 536 rows each
 VARY = f"links.crank.B.x=0.035:0.045/{PARTS * 182 - 1}"
-CALL = ["mechanism", "m.toml", "--vary", VARY, "--sweep", "0deg:359deg:1deg"]
+CALL = ["mechanism", "m.toml", "--over", VARY, "--over", "0deg:359deg:1deg"]
 
 
 @pytest.fixture

@@ -150,3 +150,25 @@ def test_pictures_and_files(dalembert: Dalembert, tmp_path: Path) -> None:
     ledger = dalembert("work", "states.csv", "--ledger", "--gravity", "0,-10").stdout.splitlines()
     assert ledger[0] == "step,link,kind,power_W"
     assert "1,2,unknown,2060000.0" in ledger
+
+
+def test_terms_that_do_work_are_of_the_document_alone(dalembert: Dalembert, tmp_path: Path) -> None:
+    """A table without columns was an empty section of every other file."""
+    (tmp_path / "fields.csv").write_text(FIELDS)
+    for form in ("md", "html"):
+        option = "--report" if form == "html" else "-o"
+        assert dalembert("work", "fields.csv", option, f"out.{form}").returncode == 0
+        text = (tmp_path / f"out.{form}").read_text()
+        assert "edger" in text
+        assert "erms</h" not in text
+        assert "## terms" not in text
+    (step,) = json.loads(dalembert("work", "fields.csv", "--json").stdout)["steps"]
+    first = step["terms"][0]
+    assert (first["field"], first["link"], first["power_W"]) == ("p", "c", 10.0)
+    assert step["condition"] > 1
+
+
+def test_the_ledger_can_be_checked_beside_the_unknowns(dalembert: Dalembert, tmp_path: Path) -> None:
+    (tmp_path / "expected.csv").write_text("step,field,link,kind,power_W\n1,p,c,applied torque,10\n")
+    (tmp_path / "fields.csv").write_text(FIELDS)
+    assert dalembert("work", "fields.csv", "--expect", "expected.csv").returncode == 0

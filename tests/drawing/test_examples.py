@@ -20,15 +20,15 @@ Draw = Callable[..., Figure]
 FURTHER = {
     "engine": [
         "--at 150deg",
-        "--sweep 90deg:450deg:30deg",
-        "--sweep 0deg:720deg:5deg --graph B.y,B.vy,B.ay,rod.omega",
+        "--over 90deg:450deg:30deg",
+        "--over 0deg:720deg:5deg --only B.y,B.vy,B.ay,rod.omega",
     ],
-    "klann": ["--sweep 0deg:360deg:10deg", "--sweep 0deg:360deg:10deg --forces"],
-    "parallelogram": ["--sweep 0deg:720deg:5deg --graph coupler.omega,rocker.omega,coupler.alpha"],
-    "peaucellier": ["--sweep=-90deg:90deg:1deg --graph B.x,B.y"],
+    "klann": ["--over 0deg:360deg:10deg", "forces: --over 0deg:360deg:10deg"],
+    "parallelogram": ["--over 0deg:720deg:5deg --only coupler.omega,rocker.omega,coupler.alpha"],
+    "peaucellier": ["--over=-90deg:90deg:1deg --only B.x,B.y"],
     "planetary-gear": ["--at 60deg"],
-    "scissors-lift": ["--sweep 0.4m:1.15m:0.05m"],
-    "quick-return": ["--sweep 0deg:360deg:10deg"],
+    "scissors-lift": ["--over 0.4m:1.15m:0.05m"],
+    "quick-return": ["--over 0deg:360deg:10deg"],
     "fan-one-plane": ["--blades 12"],
     "pump-trials-left-on": ["--blades 12"],
     "turbine-train": [""],
@@ -37,7 +37,7 @@ FURTHER = {
     "riul-rod": ["--shaft=-500mm:500mm --speed 10rad_s --correct A:-200mm:50mm --correct B:200mm:50mm"],
     "tennis-racket": ["--at 5"],
 }
-"""Further calls of an example's file: the command, the file, then these words in place of its own options."""
+"""Further calls of an example's file: these words in place of its own options; before a colon another command."""
 CALLS = [(name, None) for name in names()] + [
     (name, words) for name, more in FURTHER.items() for words in more
 ]
@@ -55,6 +55,9 @@ def draw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Draw:
         if "--plot" in call:
             del call[call.index("--plot") : call.index("--plot") + 2]
         if words is not None:
+            command, colon, others = words.partition(": ")
+            if colon:
+                call[1], words = command, others
             call = [
                 *(
                     call

@@ -12,7 +12,8 @@ import pytest
 
 from cli.examples.command import EXAMPLES, describe, names
 from tests.conftest import Dalembert
-from virtualwork.describe.entries import ENTRIES
+from virtualwork.describe.keys import table_keys
+from virtualwork.describe.parts import TABLES
 
 G = 9.81
 
@@ -79,10 +80,10 @@ def test_every_load_stands_in_an_example() -> None:
         for file in EXAMPLES.joinpath(name).iterdir():
             if file.name.endswith(".toml") and file.name != "example.toml":
                 document = tomllib.loads(file.read_text(encoding="utf-8"))
-                for table in ENTRIES:
+                for table in TABLES:
                     entries = document.get(table, [])
                     keys = [entries] if isinstance(entries, dict) else entries
                     used |= {f"{table}.{key}" for entry in keys for key in entry}
     loads = ("forces", "torques", "springs", "torsion_springs", "motors", "friction")
-    missed = {f"{table}.{key}" for table in loads for key in ENTRIES[table]} - used
+    missed = {f"{table}.{key}" for table in loads for key in table_keys(TABLES[table], table)} - used
     assert not missed

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from dalembert.arithmetic.engines import ENGINES
+from dalembert.arithmetic.choice import ENGINES
 from dalembert.arithmetic.processes import Processes
 from virtualwork import Force, Gear, Guess, Input, Link, Mechanism, Motor, Spring, Torque, TorsionSpring
 from virtualwork.describe import DescriptionError, MechanismError

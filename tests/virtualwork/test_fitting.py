@@ -10,7 +10,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from dalembert.arithmetic.engines import ENGINES
+from dalembert.arithmetic.choice import ENGINES
 from virtualwork import DescriptionError, Guess, Guide, Input, Link, Mechanism, MechanismError
 from virtualwork.describe.dimensions import changed, value
 from virtualwork.family.target import Target

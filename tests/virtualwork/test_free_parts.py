@@ -67,8 +67,8 @@ def test_a_plate_on_one_pin_is_named() -> None:
 def test_the_command_names_it_too(dalembert, tmp_path) -> None:
     file = tmp_path / "gripper.toml"
     file.write_text(gripper())
-    for options in (["--check"], ["--sweep", "20mm:30mm:10mm"]):
-        run = dalembert("mechanism", str(file), *options)
+    for command, *options in (["inspect"], ["mechanism", "--over", "20mm:30mm:10mm"]):
+        run = dalembert(command, str(file), *options)
         assert run.returncode != 0
         assert "plate, post1, post2, post3 can still move" in run.stderr
 

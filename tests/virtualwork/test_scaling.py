@@ -105,7 +105,7 @@ def test_ctrl_c_stops_all_workers(tmp_path):
         *TAKES_CTRL_C,
         "mechanism",
         "m.toml",
-        "--sweep",
+        "--over",
         "0deg:360deg:10deg",
     ]
     options = ["--draws", "300000", "--workers", "2", "--only", "C"]

@@ -124,13 +124,14 @@ def test_the_command_names_it(dalembert, tmp_path):
     """
     file = tmp_path / "bar.toml"
     file.write_text(text)
-    run = dalembert("mechanism", str(file), "--sweep", "0deg:360deg:30deg", "--check", "--forces", "--json")
+    run = dalembert("forces", str(file), "--over", "0deg:360deg:30deg", "--json")
     assert run.returncode == 0, run.stderr
     found = json.loads(run.stdout)
     assert any("singular in every pose" in w and "not determined" in w for w in found["warnings"])
     assert not any("dead or change point" in w or "meet; taken" in w for w in found["warnings"])
-    assert found["check"]["change_points_deg"] == []
-    assert found["check"]["singular"] == ["rod + bar"]
+    check = json.loads(dalembert("inspect", str(file), "--json").stdout)["check"]
+    assert check["change_points_deg"] == []
+    assert check["singular"] == ["rod + bar"]
     for pose in found["poses"]:
         assert pose["assembled"]
         assert pose["marks"] == []

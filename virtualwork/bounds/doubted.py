@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.exact import two_sum
+from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
 from dalembert.arithmetic.rounding import UNIT_ROUNDOFF
 from dalembert.arithmetic.varied import made
@@ -147,6 +148,7 @@ def _differences(
     return found
 
 
+@guarded
 class Doubted(Recording):
     """The formulas of an assembly, with constants as inputs and unknowns that may be wrong.
 

@@ -15,6 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
+from dalembert.arithmetic.guard import guarded
 from virtualwork.bounds.quantities import Bounds
 from virtualwork.bounds.second_order import grown, inverse
 from virtualwork.describe.parts import GROUND
@@ -25,11 +26,12 @@ from virtualwork.formulas.statics import Column
 from virtualwork.plan.steps import Joint
 
 
+@guarded
 class ForceErrors:
     """Bounds of the rounding errors of forces, under the names of what they bound; each is formed when asked for."""
 
     def __init__(self, dynamics: Dynamics) -> None:
-        self.dynamics, self.n = dynamics, dynamics.poses.n
+        self.dynamics, self.n, self.lock = dynamics, dynamics.poses.n, dynamics.lock
         self.mechanism = dynamics.poses.mechanism
         self.bounds = Bounds(dynamics.poses)
 

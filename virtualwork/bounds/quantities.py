@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.rounding import FEW, bounds_of_few, rounding_bounds
 from dalembert.arithmetic.tape import Tape
 from virtualwork.bounds.doubted import Doubted
@@ -45,11 +46,12 @@ EMPTY: Mapping[str, Any] = MappingProxyType({})
 BESIDE_LIMIT = 0.5
 
 
+@guarded
 class Bounds:
     """Bounds of the rounding errors of quantities, by their keys (`Recording.value`)."""
 
     def __init__(self, poses: Poses, *, careful: bool = False, swept: bool = False) -> None:
-        self.poses, self.n = poses, poses.n
+        self.poses, self.n, self.lock = poses, poses.n, poses.lock
         # poses that are asked for bounds are those of an assembly
         self.branch = cast(Turning, poses.branch)
         # every group's unknowns are judged by the gaps that they leave, however they were found

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.guard import guarded
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.guess import choose
 from virtualwork.branch.track import Track
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from virtualwork.branch.limits import Reach
 
 
+@guarded
 class Assembly(Choice):
     """A mechanism put together in one way, ready to move."""
 

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from math import factorial
 from typing import Any, Protocol
 
 import numpy as np
 
 from virtualwork.branch.choice import Choice
-from virtualwork.formulas.numbers import EPS, Number, Reals, stack, stack_rows
+from virtualwork.branch.sampling import chebyshev_nodes
+from virtualwork.formulas.numbers import Number, Reals, stack, stack_rows
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.rates import Passage, Rates
 from virtualwork.plan.steps import Group, Step
@@ -25,8 +27,8 @@ from virtualwork.plan.steps import Group, Step
 ORDER = 12
 # share of the series' radius of convergence, within which it replaces the closed form
 REACH = 0.03
-# a last coefficient below this share of the largest is none: what is divided by it would overflow
-NONE = 1e-100
+# of a turn over 2π: how far to each side of a change point its branches are compared with the closed form
+SPANS = 0.02, 0.0025, 3e-4, 4e-5, 5e-6
 
 
 class Along(Passage, Protocol):
@@ -145,23 +147,24 @@ def _roots(a: float, b: float, c: float) -> list[float]:
     return [float(r) for r in roots]
 
 
-def through(way: Along, group: Group, q0: float) -> ChangePoint:
+def through(way: Along, group: Group, q0: float, share: float) -> ChangePoint:
     """The exact branch through a change point.
 
     Where the links are nearly equal one of the branches turns many times faster than the input: the closed form
-    is then compared with the series closer to the point, until one of the series is the branch.
+    is then compared with the series closer to the point, until one of the series is the branch. Everything is looked
+    at `share` times as near as where the input itself is what turns fastest.
     """
-    for span in (0.02, 0.0025, 3e-4, 4e-5):
-        change, miss = _nearest(way, group, q0, span)
+    for span in SPANS:
+        change, miss = _nearest(way, group, q0, span, share)
         if miss < 1e-6:
             break
     return change
 
 
-def _nearest(way: Along, group: Group, q0: float, span: float) -> tuple[ChangePoint, float]:
+def _nearest(way: Along, group: Group, q0: float, span: float, share: float) -> tuple[ChangePoint, float]:
     """The series that the closed form follows within a span around a change point, and how far they are apart."""
     choice = way.assembly
-    nodes = span * chebyshev_nodes(12) * way.length / (2 * np.pi)
+    nodes = span * share * chebyshev_nodes(12) * way.length / (2 * np.pi)
     st = State([q0 + nodes], many=True)
     way.run(choice.needed(choice.plan.writes(group)), st)
     weights = _at_centre(nodes)
@@ -215,9 +218,11 @@ def _nearest(way: Along, group: Group, q0: float, span: float) -> tuple[ChangePo
     scale = np.array([1.0] * len(turn) + [choice.mechanism.size] * len(slide))
     terms = [float(np.abs(r / scale).max()) / factorial(k) for k, r in enumerate(best, 1)]
     radius = (
-        min(t ** (-1 / k) for k, t in enumerate(terms, 1) if t > 0 and k >= 3) if max(terms[2:]) > 0 else 1.0
+        min(t ** (-1 / k) for k, t in enumerate(terms, 1) if t > 0 and k >= 3)
+        if max(terms[2:]) > 0
+        else np.inf
     )
-    reach = REACH * min(radius, 1.0 if way.length > 6 else way.length)
+    reach = REACH * min(radius, share * (1.0 if way.length > 6 else way.length))
     others = [rates[0] for rates in found if rates is not best]
     change = ChangePoint(
         group.name, q0, tuple(turn), tuple(slide), np.array(best), reach, others[0] if others else None
@@ -233,9 +238,34 @@ def _at_centre(nodes: Reals) -> Reals:
 
 
 # --- poses close to one ------------------------------------------------------------------------------------------
-def mend(changes: Iterable[ChangePoint], group: Group, st: State) -> None:
+class ChangePoints(tuple[ChangePoint, ...]):
+    """The change points of one group in the order of their inputs; what `mend` looks up."""
+
+    @cached_property
+    def between(self) -> Reals:
+        """The inputs half way from each to the next."""
+        at = np.array([change.input for change in self])
+        return np.asarray((at[1:] + at[:-1]) / 2)
+
+    def close_by(self, q: Number) -> Iterator[tuple[ChangePoint, Any, Number]]:
+        """Those close to inputs q: each with which of the inputs (None: the one), and how far they are."""
+        if not self:
+            return
+        places = np.searchsorted(self.between, q)
+        if np.ndim(q) == 0:
+            change = self[int(places)]
+            if abs(q - change.input) < change.reach:
+                yield change, None, q - change.input
+            return
+        for i in np.unique(places):
+            near = (places == i) & (np.abs(q - self[i].input) < self[i].reach)
+            if near.any():
+                yield self[i], near, q[near] - self[i].input
+
+
+def mend(changes: ChangePoints, group: Group, st: State) -> None:
     """Replace positions close to a change point by the series through it."""
-    for change, near, delta in _close_by(changes, st.inputs[0]):
+    for change, near, delta in changes.close_by(st.inputs[0]):
         move = change.unknown(delta, 0)
         for j, body in enumerate(group.angles):
             put(st.turn, body, near, change.turn[j] * np.exp(1j * move[..., j]))
@@ -246,24 +276,13 @@ def mend(changes: Iterable[ChangePoint], group: Group, st: State) -> None:
             st.turn[tie.body] = st.rotate(tie.angle)
 
 
-def mend_rates(changes: Iterable[ChangePoint], q: Number, k: int, x: list[Number]) -> list[Number]:
+def mend_rates(changes: ChangePoints, q: Number, k: int, x: list[Number]) -> list[Number]:
     """The same for the unknowns' k-th derivatives."""
-    for change, near, delta in _close_by(changes, q):
+    for change, near, delta in changes.close_by(q):
         rate = change.unknown(delta, k)
         for j in range(len(x)):
             put(x, j, near, rate[..., j])
     return x
-
-
-def _close_by(changes: Iterable[ChangePoint], q: Number) -> Iterator[tuple[ChangePoint, Any, Number]]:
-    """The change points close to inputs q: each with which of the inputs (None: the one), and how far they are."""
-    one = np.ndim(q) == 0
-    for change in changes:
-        near = abs(q - change.input) < change.reach
-        if one and near:
-            yield change, None, q - change.input
-        elif not one and near.any():
-            yield change, near, q[near] - change.input
 
 
 def put(store: Any, key: Any, near: Any, value: Any) -> None:
@@ -274,56 +293,3 @@ def put(store: Any, key: Any, near: Any, value: Any) -> None:
     whole = np.array(np.broadcast_to(store[key], near.shape))
     whole[near] = value
     store[key] = whole
-
-
-# --- smooth functions of the input ---------------------------------------------------------------------------------
-def chebyshev_nodes(n: int) -> Reals:
-    """The n Chebyshev points of the first kind in (−1, 1)."""
-    return np.cos(np.pi * (np.arange(n) + 0.5) / n)
-
-
-def real_roots(series: np.polynomial.Chebyshev, within: float) -> Reals:
-    """The real roots of a series within ±`within`; none of a series that is zero or not finite.
-
-    Examples
-    --------
-    >>> from numpy.polynomial import Chebyshev
-    >>> nodes = chebyshev_nodes(8)
-    >>> real_roots(Chebyshev.fit(nodes, 1e-300 * (nodes - 0.25), 6, domain=[-1, 1]), 1.0).round(12)
-    array([0.25])
-    >>> real_roots(Chebyshev([np.nan, 1.0]), 1.0)
-    array([], dtype=float64)
-    """
-    largest = float(np.abs(series.coef).max(initial=0.0))
-    if not (np.isfinite(largest) and largest > 0):
-        return np.empty(0)
-    # by a power of two, which rounds nothing
-    scaled = type(series)(np.ldexp(series.coef, -int(np.frexp(largest)[1]))).trim(NONE)
-    roots = scaled.roots()
-    return np.asarray(np.real(roots[(np.abs(np.imag(roots)) < 1e-6) & (np.abs(np.real(roots)) <= within)]))
-
-
-def lowest(
-    margin: Callable[[Reals], Reals], a: float, b: float, rounding: float
-) -> tuple[float, float, float] | None:
-    """The lowest point of a radicand near a sampled dip: where, how low, and the rounding in that depth.
-
-    The radicand is smooth: it is fitted at Chebyshev points, and its slope's root is free of cancellation.
-    """
-    centre, half = (a + b) / 2, (b - a) / 2
-    for widen in (1.0, 4.0):
-        nodes = chebyshev_nodes(14)
-        m = margin(centre + widen * half * nodes)
-        if not np.isfinite(m).all():
-            if widen == 1.0:
-                return None
-            break
-        fit = np.polynomial.Chebyshev.fit(nodes, m, 11, domain=[-1, 1])
-        real = real_roots(fit.deriv(), 1.2)
-        if not len(real):
-            return None
-        best = real[np.argmin(np.abs(fit(real)))]
-        where, depth = centre + widen * half * float(best), float(fit(best))
-        level = float(np.abs(m).max())
-        centre = where
-    return where, depth, rounding + 1e-9 * EPS * level

@@ -8,14 +8,17 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.records import Record, record
 from virtualwork.describe.description import Description
 from virtualwork.formulas.closed_forms import Case
+from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.positions import State, principal, run
 from virtualwork.plan.order import plan
 from virtualwork.plan.steps import Group, Plan, Step, turns
 
 
+@guarded
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class Choice(Record):
@@ -44,6 +47,11 @@ class Choice(Record):
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.mechanism!r}, {self.number})"
 
+    @property
+    def lock(self) -> Lock:
+        """Of all that is worked out of it: its poses, loads and forces have the same."""
+        return own_lock(self)
+
     @cached_property
     def cases(self) -> dict[str, Case]:
         """The closed forms that are ready to be solved, by their group's name."""
@@ -54,6 +62,14 @@ class Choice(Record):
         if group.name not in self.cases:
             self.cases[group.name] = Case(group)
         return self.cases[group.name]
+
+    @cached_property
+    def seeds(self) -> dict[str, tuple[Reals, Reals]]:
+        """Nodes (inputs, unknowns) of groups without a closed form, of a mechanism much like this one, by their names.
+
+        A `Continuation` begins with what they lead to, as far as that goes on from the guess: no number hangs on them.
+        """
+        return {}
 
     @cached_property
     def merged(self) -> tuple[Plan, Group | None]:

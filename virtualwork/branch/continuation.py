@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from virtualwork.branch.change_point import Along, chebyshev_nodes, put, real_roots
+from virtualwork.branch.change_point import Along, put
+from virtualwork.branch.sampling import chebyshev_nodes, real_roots
 from virtualwork.formulas.newton import gaps, newton, settle, singular, write_unknowns
 from virtualwork.formulas.numbers import SINGULAR, Number, Reals, solve, stack, stack_rows
 from virtualwork.formulas.positions import State, columns
 from virtualwork.formulas.rates import Rates
+from virtualwork.formulas.winding import NODES
 from virtualwork.plan.steps import Group
 
-# of one turn
-NODES = 120
 # of one turn: a step this short has met a limit
 FINEST = 1e-7
 # of one turn: nodes this near to where they are to end have reached it
@@ -66,16 +66,22 @@ class Continuation:
 
     def _rate(self, st: State) -> tuple[Reals, float]:
         """dx/dq and the determinant (its sign is the branch) at a pose whose unknowns are written."""
+        rates, dets = self._rates(st, 1)
+        return rates[0], float(dets[0])
+
+    def _rates(self, st: State, n: int) -> tuple[Reals, Reals]:
+        """The same at n poses, (n, unknowns) and (n,)."""
         d = Rates(self.assembly.plan, st, [[1.0]], self.track)
         d.advance(self.before, 1)
-        jacobian = stack(columns(self.group, st), 1)
-        right = stack_rows(d.right_side(self.group, 1), 1)
-        rate = solve(jacobian, -right)[0]
+        jacobian = stack(columns(self.group, st), n)
+        right = stack_rows(d.right_side(self.group, 1), n)
+        rate = solve(jacobian, -right)
         if jacobian.shape[1] == jacobian.shape[2]:
-            return rate, float(np.linalg.det(jacobian[0]))
-        if not np.isfinite(jacobian).all():
-            return rate, np.nan
-        return rate, float(np.prod(np.linalg.svd(jacobian[0], compute_uv=False)))
+            return rate, np.asarray(np.linalg.det(jacobian))
+        det = np.full(n, np.nan)
+        good = np.isfinite(jacobian).all(axis=(1, 2))
+        det[good] = np.prod(np.linalg.svd(jacobian[good], compute_uv=False), axis=1)
+        return rate, det
 
     def _begin_upright(self) -> None:
         """Lay a node to each side of a guess where the branch stands upright: unknowns go as the cube root of the input.
@@ -139,10 +145,60 @@ class Continuation:
     def extend(self, a: float, b: float) -> None:
         """Go on until the nodes cover a to b."""
         h = self.track.length / NODES
+        for side, to in ((1, b + h), (-1, a - h)):
+            if self.group.name in self.assembly.seeds and not self.stopped[side]:
+                self._lead(side, to)
         while not self.stopped[1] and b + h - self.q[-1] > SEAM * self.track.length:
             self._advance(1, min(h, b + h - self.q[-1]))
         while not self.stopped[-1] and self.q[0] - (a - h) > SEAM * self.track.length:
             self._advance(-1, min(h, self.q[0] - (a - h)))
+
+    def _lead(self, side: int, to: float) -> None:
+        """Lay down the nodes that another mechanism's lead to, all at once, as far as each goes on from the one before.
+
+        A step has to be what it is in `_advance`; from the first one that is not, the way is gone step by step.
+        """
+        q, x = self.assembly.seeds[self.group.name]
+        end, seam = (-1 if side > 0 else 0), SEAM * self.track.length
+        some = (side * (q - self.q[end]) > seam) & (side * (q - to) <= seam)
+        if not some.any():
+            return
+        q, x = (
+            np.concatenate([own[None], its[some][::side]])
+            for own, its in ((np.array(self.q[end]), q), (self.x[end], x))
+        )
+        st = State([q], many=True)
+        with np.errstate(all="ignore"):
+            self.track.run(self.before, st)
+            x, closed = newton(self.group, st, x, self.size, limit=8)
+            rate, det = self._rates(st, len(q))
+            x[0], rate[0] = self.x[end], self.rate[end]
+            far = np.maximum(np.abs(x[:-1]), self.size)
+            far[:, : len(self.group.angles)] = 1.0
+            fine = self._fine(np.diff(q)[:, None], np.diff(x, axis=0), rate[:-1], rate[1:], far)
+            fine &= (
+                closed[1:] & np.isfinite(rate[1:]).all(axis=1) & (np.sign(det[1:]) == np.sign(self.det[end]))
+            )
+        count = len(fine) if fine.all() else int(np.argmin(fine))
+        for i in range(1, count + 1):
+            self._put(side, float(q[i]), x[i], rate[i], float(det[i]))
+
+    def _put(self, side: int, q: float, x: Reals, rate: Reals, det: float) -> None:
+        """Lay down a node at one end."""
+        place = len(self.q) if side > 0 else 0
+        self.q.insert(place, q)
+        self.x.insert(place, x)
+        self.rate.insert(place, rate)
+        self.det.insert(place, det)
+
+    def _fine(self, step: Number, moved: Reals, rate: Reals, new: Reals, far: Reals) -> Any:
+        """Whether a step is short enough: by how much the unknowns moved, their rates at both ends, and their scales."""
+        # the cubic's own defect: what the two rates say of the step, against what it was
+        defect = np.abs((moved - step * 0.5 * (rate + new)) / far).max(axis=-1)
+        change = np.abs(moved / far).max(axis=-1)
+        # gears alone may turn a link many times in a step, but evenly
+        even = (np.abs(moved - step * rate) <= 1e-9 * far).all(axis=-1)
+        return (defect <= 0.05 * np.maximum(change, 1e-6)) & ((change < 0.5) | even)
 
     def _advance(self, side: int, h: float) -> None:
         """Lay down one more node, at most h away: what the group hangs on is known no farther."""
@@ -164,19 +220,10 @@ class Continuation:
                 # a slide that runs away is measured by itself
                 far = np.maximum(np.abs(x), self.size)
                 far[: len(self.group.angles)] = 1.0
-                # the cubic's own defect: what the two rates say of the step, against what it was
-                defect = np.abs((found[0] - x - side * step * 0.5 * (rate + new)) / far).max()
-                change = np.abs((found[0] - x) / far).max()
-                # gears alone may turn a link many times in a step, but evenly
-                even = (np.abs(found[0] - guess) <= 1e-9 * far).all()
-                if np.isfinite(new).all() and defect <= 0.05 * max(change, 1e-6) and (change < 0.5 or even):
+                if np.isfinite(new).all() and self._fine(side * step, found[0] - x, rate, new, far):
                     if np.sign(det) != np.sign(self.det[end]):
                         crossed.append((min(q, to), max(q, to)))
-                    place = len(self.q) if side > 0 else 0
-                    self.q.insert(place, to)
-                    self.x.insert(place, found[0])
-                    self.rate.insert(place, new)
-                    self.det.insert(place, det)
+                    self._put(side, to, found[0], new, det)
                     self._crossed += crossed
                     # the last one before the end is short by the end alone
                     if step < h or not step < self.step[side] < np.inf:

@@ -13,7 +13,9 @@ from math import lcm
 
 import numpy as np
 
-from virtualwork.branch.track import SAME, Track
+from dalembert.arithmetic.guard import guarded
+from virtualwork.branch.noted import SAME
+from virtualwork.branch.track import Track
 from virtualwork.formulas.closed_forms import Gap
 from virtualwork.formulas.newton import gaps, newton
 from virtualwork.formulas.numbers import EPS, Complexes, Reals, stack_rows
@@ -62,24 +64,38 @@ class Shortfall:
         return text if text.startswith(self.group.split(" + ")[0]) else f"{self.group}: {text}"
 
 
+@guarded
 class Reach:
     """How far the one input goes, and the branch's own scale; each is looked for when first asked for."""
 
     def __init__(self, track: Track) -> None:
-        self.track = track
+        self.track, self.lock = track, track.lock
+        # where a radicand is zero between two inputs, and on which side of it the group is assembled
+        self._crossings: dict[tuple[str, float, float], tuple[float, int]] = {}
 
     @cached_property
     def turns(self) -> int | None:
         """How many turns of the input tell the poses of the branch apart: its period.
 
-        A branch between two limits needs what tells its own inputs apart; any other as many as bring every group back
-        to where it stood. None with a slide or several inputs, and where no number of turns up to `TURNS` does it.
+        As many as bring every group back to where it stood; a branch between two limits needs only what tells its own
+        inputs apart, where change points do not make other limits of other turns. None with a slide or several inputs, and where no number of turns up to
+        `TURNS` does it.
         """
         n, track = self.repetition, self.track
         if n == 1 or track.slides or not track.has_limits:
             return n
         low, high = self.range
-        return max(1, int(np.ceil((high - low) / track.length))) if np.isfinite(high - low) else n
+        if not np.isfinite(high - low):
+            return n
+        own = max(1, int(np.ceil((high - low) / track.length)))
+        if n is None or own >= n or not track.crossings:
+            return own
+        track.cover(track.start, track.start + n * track.length)
+        ends, whole = np.array([limit.input for limit in self._ends()]), n * track.length
+        beside = np.abs((ends[:, None] + own * track.length - ends + whole / 2) % whole - whole / 2).min(
+            axis=1
+        )
+        return own if (beside < SAME * track.length).all() else n
 
     @cached_property
     def repetition(self) -> int | None:
@@ -91,7 +107,7 @@ class Reach:
         if not track.active or track.slides:
             return None
         track.cover(track.start, track.start + track.length)
-        if track.settled or track.one_turn is not None or not track.plan.groups:
+        if track.settled or track.comes_back or not track.plan.groups:
             return 1
         steps = track.assembly.needed([key for g in track.plan.groups for key in track.plan.writes(g)])
         factors = [k for t in turns(steps) for _, k in t.angle.inputs]
@@ -177,10 +193,13 @@ class Reach:
         """The limits in what was covered."""
         track = self.track
         by_name = {g.name: g for g in track.plan.groups}
-        found = [
-            Limit(name, *crossing(partial(track.margin, by_name[name]), a, b))
-            for name, a, b in track.brackets
-        ]
+        found = []
+        for x in track.brackets:
+            here = x.group, x.low, x.high
+            if here not in self._crossings:
+                self._crossings[here] = crossing(partial(track.margin, by_name[x.group]), x.low, x.high)
+            q, side = self._crossings[here]
+            found.append(Limit(x.group, q + x.on, side))
         for name, way in track.continuations.items():
             found += [Limit(name, q, side) for q, side in way.ends]
         unique: list[Limit] = []

@@ -8,22 +8,13 @@ from typing import Any
 import numpy as np
 
 from virtualwork.branch.change_point import Along
-from virtualwork.branch.continuation import FINEST, NODES
-from virtualwork.describe.description import Description
+from virtualwork.branch.continuation import FINEST
 from virtualwork.formulas.newton import newton, write_unknowns
-from virtualwork.formulas.numbers import Reals, solve, stack, stack_rows
-from virtualwork.formulas.positions import FAR, SHORTEST, State, columns, principal, unwound
+from virtualwork.formulas.numbers import Complexes, Reals, solve, stack, stack_rows
+from virtualwork.formulas.positions import State, columns, unwound
 from virtualwork.formulas.rates import Rates
+from virtualwork.formulas.winding import counted, straight_lines
 from virtualwork.plan.steps import Group, Step
-
-
-def straight_lines(m: Description, st: State) -> tuple[Reals, Reals, Reals]:
-    """From the guess to each pose of a state: the guess's inputs, the ways (n, k), the longest steps as shares of them."""
-    n = max(np.size(v) for v in st.inputs)
-    at = np.array(m.at)
-    way = np.array([np.broadcast_to(np.asarray(v, dtype=float), n) for v in st.inputs]).T - at
-    unit = np.array([m.size if e.is_slide else 2 * np.pi for e in m.inputs])
-    return at, way, 1 / np.maximum(1.0, np.abs(way / unit).max(axis=1) * NODES)
 
 
 def along_lines(track: Along, group: Group, st: State) -> None:
@@ -31,7 +22,7 @@ def along_lines(track: Along, group: Group, st: State) -> None:
     assembly = track.assembly
     m = assembly.mechanism
     before = assembly.before(group)
-    at, way, longest = straight_lines(m, st)
+    at, way, longest = straight_lines(m, st.inputs)
     n = len(way)
     x: Any = np.tile(np.asarray(assembly.starts[group.name], dtype=float), (n, 1))
     # of each pose: the share of its way that is gone, the next step, and dx of the whole way
@@ -85,38 +76,23 @@ def wind_along_lines(track: Along, group: Group, st: State, bodies: Collection[s
     assembly = track.assembly
     case, sign, size = assembly.case(group), assembly.signs[group.name], assembly.mechanism.size
     before = assembly.before(group)
-    at, way, longest = straight_lines(assembly.mechanism, st)
-    n = len(way)
-    start = State(list(assembly.mechanism.at))
-    track.run(before, start)
-    case.solve(start, sign, size)
-    last = {body: np.full(n, start.turn[body], dtype=complex) for body in bodies}
-    total = {body: principal(np.angle(last[body])) for body in bodies}
-    # of each pose: the share of its way that is gone, and the next step
-    gone, step = np.zeros(n), longest.copy()
-    reached = np.asarray(np.isfinite(way).all(axis=1))
+
+    def rotations(inputs: list[Reals]) -> Complexes:
+        trial = State(list(inputs), many=True)
+        track.run(before, trial)
+        case.solve(trial, sign, size)
+        n = len(inputs[0])
+        found = np.array([np.broadcast_to(trial.turn[body], n) for body in bodies], dtype=complex)
+        found[:, np.broadcast_to(~(np.asarray(trial.margin[group.name]) >= 0), n)] = np.nan
+        return found
+
     with np.errstate(all="ignore"):
-        while (left := np.flatnonzero(reached & (gone < 1))).size:
-            to = np.minimum(gone[left] + step[left], 1.0)
-            trial = State(list((at + to[:, None] * way[left]).T), many=True)
-            track.run(before, trial)
-            case.solve(trial, sign, size)
-            closed = np.broadcast_to(np.asarray(trial.margin[group.name]) >= 0, to.shape)
-            turned = {body: np.angle(trial.turn[body] / last[body][left]) for body in bodies}
-            divide = np.max([np.broadcast_to(np.abs(v), to.shape) for v in turned.values()], axis=0) > FAR
-            divide &= closed & (step[left] > SHORTEST * longest[left])
-            reached[left[~closed]] = False
-            step[left[divide]] /= 2
-            some = closed & ~divide
-            on = left[some]
-            for body in bodies:
-                total[body][on] += np.broadcast_to(turned[body], to.shape)[some]
-                last[body][on] = np.broadcast_to(trial.turn[body], to.shape)[some]
-            gone[on], step[on] = to[some], np.minimum(2 * step[on], longest[on])
-    for body in bodies:
+        totals, reached = counted(rotations, assembly.mechanism, st.inputs)
+    n = len(reached)
+    for body, total in zip(bodies, totals, strict=True):
         angle = np.angle(st.turn[body])
         # what no input moves is one number for all poses
-        wound = np.broadcast_to(unwound(angle, total[body]), n)
+        wound = np.broadcast_to(unwound(angle, total), n)
         turn, margin = (
             np.where(reached, st.turn[body], np.nan),
             np.where(reached, st.margin[group.name], -1.0),

@@ -3,67 +3,81 @@
 A closed form's Jacobian is ± the root of its radicand. Where the radicand touches zero without crossing it, two
 branches meet (a change point: the parallelogram at 0° and 180°, the folded kite); turning steadily through it, the
 Jacobian changes its sign. Where the radicand crosses zero the input can go no further (a limit). Both are found
-once, by sampling a turn of the input, and then to full precision. A pose's branch follows from the number of change
-points between the guess and it: nothing is marched in angle.
+once, by sampling a turn of the input as finely as what moves asks for (`sampling`), and then to full precision. A
+pose's branch follows from the number of change points between the guess and it: nothing is marched in angle.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dalembert.arithmetic.guard import alone
 from virtualwork.branch.choice import Choice
+from virtualwork.branch.noted import NOWHERE, SAME, Bracket, Noted, Seen, divides
+from virtualwork.branch.pace import Pace
+from virtualwork.branch.sampling import (
+    DIP,
+    FINE,
+    depths,
+    hardly_moves,
+    loop_rows,
+    moves_far,
+    parts,
+    refined,
+    touched,
+    turns_far,
+)
 from virtualwork.describe import MechanismError
-from virtualwork.formulas.closed_forms import Case
-from virtualwork.formulas.numbers import EPS, Number, Reals
+from virtualwork.formulas.numbers import Complexes, Number, Reals
 from virtualwork.formulas.positions import NONE, Samples, State, follow, run, whole
 from virtualwork.plan.steps import Group, Step, turns
 
 if TYPE_CHECKING:
     # a mechanism that passes no change point, and whose groups all have a closed form, loads neither
-    from virtualwork.branch.change_point import ChangePoint
     from virtualwork.branch.continuation import Continuation
 
-# places nearer than this share of a turn are one
-SAME = 1e-6
 # of one turn, or of one mechanism's size of slide
 SAMPLES = 720
-# a radicand below this may touch zero between two samples
-DIP = 0.05
+# what it is below this share of where nothing is special is zero but for rounding
+STRETCHED = 1e-14
+# states by their inputs, each with the steps that were run there
+Looked = dict[bytes, tuple[State, set[int]]]
 
 
 class Track:
     """What happens to an assembly along its one input."""
 
     def __init__(self, assembly: Choice) -> None:
-        self.assembly = assembly
+        self.assembly, self.lock = assembly, assembly.lock
         m = assembly.mechanism
         self.plan = assembly.plan
         self.active = len(m.inputs) == 1
         self.start = m.at[0]
         self.low = self.high = self.start
         self.slides = m.inputs[0].is_slide
-        self.length = m.size if self.slides else 2 * np.pi
-        self.flips: dict[str, Reals] = {}
-        self.changes: dict[str, list[ChangePoint]] = {}
-        self.brackets: list[tuple[str, float, float]] = []
+        self.pace = Pace(assembly)
+        self.length = self.pace.length
+        self.noted = Noted(self, self.pace)
+        self.flips, self.changes, self.brackets = self.noted.flips, self.noted.changes, self.noted.brackets
         self.continuations: dict[str, Continuation] = {}
         # of bodies of which a gear of fractional ratio needs the angle itself
         self._samples: dict[str, Samples] = {}
         # one turn says it all where every turn of a body is a whole number of turns of the input
-        factors = [k for t in turns(self.plan.steps) for _, k in (*t.angle.inputs, *t.angle.bases)]
+        angles = [t.angle for t in turns(self.plan.steps)]
+        factors = [k for angle in angles for _, k in (*angle.inputs, *angle.bases)]
         self.whole = not self.slides and all(float(k).is_integer() for k in factors)
         self.repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
+        # no body turns with one of a loop, or with a slide's line, any faster than the input
+        follows = any(angle.bases for angle in angles) or any(g.kind == "RPR" for g in self.plan.groups)
+        self.even = not follows and all(abs(k) <= 1 for k in factors)
         # no change point anywhere, however far the input turns: without a loop there is none
         self.settled = not self.plan.groups
         # groups that are singular in every pose
         self.folded: set[str] = set()
-        # where one turn begins and what it has, where all others have the same
-        self.one_turn: tuple[float, dict[str, list[ChangePoint]]] | None = None
         if not self.active:
             self._look_around()
 
@@ -82,7 +96,8 @@ class Track:
             from virtualwork.branch.change_point import mend
 
             case.solve(st, self.sign(group.name, st.inputs[0]), size)
-            mend(self.changes.get(group.name, ()), group, st)
+            if group.name in self.changes:
+                mend(self.changes[group.name], group, st)
         else:
             case.solve(st, self.assembly.signs[group.name], size, group.name in self.folded)
         bodies = self.assembly.geared.intersection(group.members)
@@ -95,6 +110,7 @@ class Track:
             found = whole(self._samples.get(body, NONE), st.inputs[0], np.angle(st.turn[body]))
             st.angle[body] = found if np.ndim(st.inputs[0]) else float(found)
 
+    @alone
     def cover(self, low: float, high: float) -> None:
         """Look for change points and limits over the inputs from low to high."""
         if self.settled or not self.active:
@@ -111,18 +127,29 @@ class Track:
             )
         with np.errstate(all="ignore"):
             while self.high < high:
-                self._turn(self.high)
-                self.high += self.length
+                self._go_on(1, high - self.high)
                 if first and self._seen_all():
                     return
                 first = False
             while self.low > low:
-                self.low -= self.length
-                self._turn(self.low)
+                self._go_on(-1, self.low - low)
                 if first and self._seen_all():
                     return
                 first = False
             self._look_back(low, high)
+
+    def _go_on(self, side: int, way: float = 0.0) -> None:
+        """Look through one turn more, or take over all the turns of a way where every group repeats itself."""
+        loops = [g for g in self.plan.groups if g.kind != "PRP"]
+        repeats = all(g.name in self.noted.seen for g in loops)
+        more = self.length * (max(1, int(np.ceil(way / self.length))) if repeats else 1)
+        a = self.high if side > 0 else self.low - more
+        self.low, self.high = min(self.low, a), max(self.high, a + more)
+        if not repeats:
+            self._scan(a, a + more)
+        else:
+            for group in loops:
+                self.noted.take_over(group, a, a + more)
 
     def _look_back(self, low: float, high: float) -> None:
         """Beyond an end of a group without a closed form it may stand as a turn before: then its other end matters too."""
@@ -133,41 +160,28 @@ class Track:
                 and way.end(1) < high
                 and self.low > way.end(1) - self.length
             ):
-                self.low -= self.length
-                self._turn(self.low)
+                self._go_on(-1)
             while (
                 way.stopped[-1]
                 and not way.stopped[1]
                 and way.end(-1) > low
                 and self.high < way.end(-1) + self.length
             ):
-                self._turn(self.high)
-                self.high += self.length
+                self._go_on(1)
 
     def _seen_all(self) -> bool:
         """Whether the one turn looked through says it all, or that it repeats."""
         self.settled = self.repeats and not any(len(f) for f in self.flips.values())
-        if self.repeats and not self.assembly.geared:
-            # the first point of the turn may be found at its end again
-            seam = self.low + (1 - SAME) * self.length
-            turn = {name: [c for c in points if c.input < seam] for name, points in self.changes.items()}
-            # every group is back on its branch
-            if not any(len(points) % 2 for points in turn.values()):
-                self.one_turn = self.low, turn
         return self.settled
 
-    def _turn(self, a: float) -> None:
-        """Look through the turn that begins at a, or take over what a turn before it had."""
-        if self.one_turn is None:
-            self._scan(a, a + self.length)
-            return
-        begin, turn = self.one_turn
-        for name, points in turn.items():
-            for change in points:
-                where = change.input + self.length * round((a - begin) / self.length)
-                if np.abs(self.flips[name] - where).min() > SAME * self.length:
-                    self.flips[name] = np.sort(np.append(self.flips[name], where))
-                    self.changes[name].append(replace(change, input=where))
+    @property
+    def comes_back(self) -> bool:
+        """Whether a turn brings every group back to where it stood, as far as was looked through."""
+        return all(
+            g.kind == "PRP"
+            or (g.name in self.noted.seen and divides(self.noted.seen[g.name].period, self.length))
+            for g in self.plan.groups
+        )
 
     def sign(self, group: str, q: Number) -> Number:
         """The sign of a closed form's Jacobian at inputs q."""
@@ -182,7 +196,7 @@ class Track:
         """The k-th derivatives of a group's unknowns with those close to a change point replaced by the series through it."""
         from virtualwork.branch.change_point import mend_rates
 
-        return mend_rates(self.changes.get(group.name, ()), q, k, x)
+        return mend_rates(self.changes[group.name], q, k, x) if group.name in self.changes else x
 
     def bridge_rates(self, group: Group, q: Number, k: int, x: list[Number], singular: Any) -> list[Number]:
         """Derivatives of a Newton group at poses where its Jacobian is singular though the branch goes on."""
@@ -208,7 +222,7 @@ class Track:
                 self.assembly.run_untracked([s], st)
                 if isinstance(s, Group) and s.kind != "PRP":
                     case, size = self.assembly.case(s), self.assembly.mechanism.size
-                    if vanishes(st.margin[s.name], rounding(case, size)):
+                    if vanishes(st.margin[s.name], depths(case, st, size)[1]):
                         self._fold(s.name)
                         case.solve(st, 1, size, folded=True)
 
@@ -226,6 +240,33 @@ class Track:
         meeting = tuple(f"[guess] at: {name} " for name in self.folded)
         return (*found, *(w for w in self.assembly.warnings if not (meeting and w.startswith(meeting))))
 
+    def samples(self, low: float, high: float, count: int) -> Reals:
+        """Inputs from low to high, at least so many steps, between which no body turns far."""
+        if low == high:
+            return np.array([low])
+        loops = [g for g in self.plan.groups if g.members]
+        ratios = {body: 1.0 for g in loops for body in g.members}
+        for body, r in (base for t in turns(self.plan.steps) for base in t.angle.bases):
+            ratios[body] = max(abs(r), ratios[body])
+        fast = max((abs(k) for t in turns(self.plan.steps) for _, k in t.angle.inputs), default=0.0)
+        step = (high - low) / count
+        step = step if self.slides else min(step, FINE / max(fast, FINE / step))
+        uneven = partial(turns_far, np.array([*ratios.values()], dtype=float))
+
+        def look(q: Reals) -> Complexes:
+            st = State([q], many=True)
+            self.run(self.plan.steps, st)
+            rows = [np.broadcast_to(st.turn[body], q.shape) for body in ratios]
+            return np.array(rows, dtype=complex).reshape(len(rows), len(q))
+
+        self.cover(low, high)
+        with np.errstate(all="ignore"):
+            some = [
+                refined(np.linspace(a, b, n + 1), uneven, look) if ratios else np.linspace(a, b, n + 1)
+                for a, b, n in parts(low, high, step)
+            ]
+        return np.unique(np.concatenate(some))
+
     # --- looking ahead ------------------------------------------------------------------------------------------
     def margin(self, group: Group, q: Reals) -> Reals:
         """The group's radicand at inputs q, on the branch known so far."""
@@ -235,33 +276,114 @@ class Track:
         return np.broadcast_to(st.margin[group.name], q.shape).astype(float)
 
     def _scan(self, a: float, b: float) -> None:
+        """Look through the inputs from a to b, group by group in their order."""
         step = (b - a) / SAMPLES
         q: Reals = a + step * (np.arange(-3, SAMPLES + 3, dtype=float) + 0.5)
         st = State([q], many=True)
         waiting: list[Step] = []
+        looked: Looked = {}
         for s in self.plan.steps:
-            if not isinstance(s, Group):
+            if not isinstance(s, Group) or s.name in self.noted.seen:
                 waiting.append(s)
+                if isinstance(s, Group):
+                    self.noted.take_over(s, a, b)
                 continue
-            run(waiting, st)
+            self.run(waiting, st)
             waiting = []
-            if s.kind != "Newton":
-                self.close(s, st)
-                if s.kind == "PRP":
-                    continue
-                m = np.broadcast_to(st.margin[s.name], q.shape)
-                if self._look(s, q, m, a, b):
-                    self.close(s, st)
-                for body in self.assembly.geared.intersection(s.members):
-                    known = self._samples.get(body, NONE)
-                    samples = follow(partial(self._angle, body), q, self.start, self.length, known)
-                    self._samples[body] = samples
-                    st.angle[body] = whole(samples, q, np.angle(st.turn[body]))
-            else:
+            if s.kind == "Newton":
                 self._continued(s).extend(a, b)
                 if self._continued(s).singular():
                     self._fold(s.name)
                 self.close(s, st)
+                continue
+            self.close(s, st)
+            if s.kind == "PRP":
+                continue
+            grid = self._look_through(s, q, st, a, b, looked)
+            if s.name in self.flips or s.name in self.folded:
+                self.close(s, st)
+            for body in self.assembly.geared.intersection(s.members):
+                known = self._samples.get(body, NONE)
+                samples = follow(partial(self._angle, body), grid, self.start, self.length, known)
+                self._samples[body] = samples
+                st.angle[body] = whole(samples, q, np.angle(st.turn[body]))
+
+    def _look_through(self, group: Group, q: Reals, st: State, a: float, b: float, looked: Looked) -> Reals:
+        """Note a group's change points and limits from a to b, at the samples that are there or at finer ones.
+
+        Returns the samples that are fine enough.
+        """
+        case = self.assembly.case(group)
+        fast, driving = (1.0, {}) if self.even else (self.pace.fastest(group), self.pace.driving(group))
+        uneven = partial(moves_far, group.kind, np.array([*driving.values()], dtype=float))
+        winds = bool(self.assembly.geared.intersection(group.members))
+        if self.even and self.repeats and not self.flips and not winds:
+            # nothing that it hangs on has a longer period than the input
+            period = self.length
+        else:
+            rate = None if winds else self.pace.rate(group, self.noted.seen)
+            period = np.inf if rate is None else 2 * np.pi / rate
+        coarse = (b - a) / SAMPLES
+        step = coarse if self.slides or not fast else min(coarse, FINE / fast)
+        if step == coarse and (
+            (not driving and hardly_moves(case, st)) or not uneven(loop_rows(case, st, [*driving])).any()
+        ):
+            flips, brackets = self._look(group, q, st, a, b)
+            changes = self.noted.note(group, flips, brackets, 1.0)
+            if len(flips) % 2 == 0 and divides(period, self.length):
+                self.noted.seen[group.name] = Seen(self.length, changes, tuple(brackets))
+            return q
+        before = self.assembly.before(group)
+
+        def look(q: Reals) -> Complexes:
+            return loop_rows(case, self._standing(before, q, looked), [*driving])
+
+        def along(end: float) -> tuple[Reals, list[Bracket]]:
+            flips, brackets = NOWHERE, list[Bracket]()
+            for low, high, count in parts(a, end, step):
+                grid = low + (high - low) / count * (np.arange(-3.0, count + 3) + 0.5)
+                grid = refined(grid, uneven, look)
+                there = self._standing(before, grid, looked)
+                self.close(group, there)
+                more, crossed = self._look(group, grid, there, low, high)
+                flips, brackets = np.append(flips, more), [*brackets, *crossed]
+                grids.append(grid)
+            return flips, brackets
+
+        share, grids = step / coarse, list[Reals]()
+        repeats = period <= self.length * (1 + SAME)
+        if repeats:
+            flips, brackets = along(a + period)
+            flips = self.noted.apart(group, flips, period)
+            if len(flips) % 2:
+                # on the other branch next time
+                flips, brackets = (
+                    np.append(flips, flips + period),
+                    [*brackets, *[x.carried(period) for x in brackets]],
+                )
+                period *= 2
+                repeats = period <= self.length * (1 + SAME)
+        if repeats:
+            changes = self.noted.note(group, flips, [], share)
+            self.noted.seen[group.name] = Seen(period, changes, tuple(brackets))
+            self.noted.take_over(group, a, b)
+        else:
+            flips, brackets = along(b)
+            self.noted.note(group, self.noted.apart(group, flips), brackets, share)
+        return np.unique(np.concatenate(grids))
+
+    def _standing(self, steps: Iterable[Step], q: Reals, looked: Looked) -> State:
+        """Return the state after some steps at inputs q, going on from where an earlier group left it there.
+
+        Near an end of the input all groups behind it are looked at in the same places.
+        """
+        fresh: tuple[State, set[int]] = State([q], many=True), set()
+        # grids of fast loops are long, and each group's own
+        st, done = looked.setdefault(q.tobytes(), fresh) if len(q) <= 2 * SAMPLES else fresh
+        new = [step for step in steps if id(step) not in done]
+        self.run(new, st)
+        done.update(map(id, new))
+        return st
 
     def _angle(self, body: str, q: Reals) -> Reals:
         """A body's angle at inputs q, but for whole turns."""
@@ -269,51 +391,21 @@ class Track:
         self.run(self.assembly.needed((f"angle:{body}",)), st)
         return np.broadcast_to(np.angle(st.turn[body]), q.shape)
 
-    def _look(self, group: Group, q: Reals, m: Reals, a: float, b: float) -> bool:
-        """Find where the radicand crosses or touches zero; say whether a change point was found."""
-        noise = rounding(self.assembly.case(group), self.assembly.mechanism.size)
+    def _look(self, group: Group, q: Reals, st: State, a: float, b: float) -> tuple[Reals, list[Bracket]]:
+        """Find from a to b where the radicand touches zero, and where it crosses it."""
+        m = np.broadcast_to(st.margin[group.name], q.shape)
+        if group.kind != "RPR" and m.min() > DIP:
+            return NOWHERE, []
+        level, noise = depths(self.assembly.case(group), st, self.assembly.mechanism.size)
         if vanishes(m, noise):
             self._fold(group.name)
-            return True
-        if np.mean(np.abs(m) < 1e-14) > 0.9:
+            return NOWHERE, []
+        if np.mean(np.abs(m) < STRETCHED * level) > 0.9:
             # stretched all along: zeros of rounding are no change points
-            return False
-        inside = (q >= a) & (q < b)
-        crossing = np.flatnonzero((m[:-1] >= 0) != (m[1:] >= 0))
-        for i in crossing:
-            if np.isfinite(m[i]) and np.isfinite(m[i + 1]) and inside[i] | inside[i + 1]:
-                self.brackets.append((group.name, float(q[i]), float(q[i + 1])))
-        dips = 1 + np.flatnonzero((m[1:-1] <= m[:-2]) & (m[1:-1] < m[2:]) & (np.abs(m[1:-1]) < DIP))
-        if not len(dips):
-            return False
-        from virtualwork.branch.change_point import lowest, through
-
-        fresh: list[float] = []
-        for i in dips:
-            found = lowest(partial(self.margin, group), float(q[i - 1]), float(q[i + 1]), noise)
-            if found is None:
-                continue
-            where, depth, left = found
-            # the gap is narrower than the samples
-            if depth < -left and m[i] > 0:
-                self.brackets += [(group.name, float(q[i - 1]), where), (group.name, where, float(q[i + 1]))]
-            # a change point at the seam of two chunks belongs to both
-            edge = 1e-9 * self.length
-            if abs(depth) <= left and a - edge <= where < b + edge:
-                known = self.flips.setdefault(group.name, np.empty(0))
-                self.assembly.plain.pop(group.name, None)
-                if not len(known) or np.abs(known - where).min() > SAME * self.length:
-                    self.brackets = [
-                        x for x in self.brackets if not (x[0] == group.name and x[1] <= where <= x[2])
-                    ]
-                    # a guess at the change point itself means the branch beyond it
-                    here = min(where, self.start) if abs(where - self.start) < 1e-9 * self.length else where
-                    self.flips[group.name] = np.sort(np.append(known, here))
-                    fresh.append(where)
-        # the branch through each one can be told only once all of them are known
-        for where in fresh:
-            self.changes.setdefault(group.name, []).append(through(self, group, where))
-        return bool(fresh)
+            return NOWHERE, []
+        edge = 1e-9 * self.pace.one_turn(group)
+        flips, crossed = touched(partial(self.margin, group), q, m, (level, noise), (a, b, edge))
+        return flips, [Bracket(group.name, *ends) for ends in crossed]
 
     @property
     def has_limits(self) -> bool:
@@ -342,12 +434,6 @@ class Track:
             from virtualwork.branch.lines import along_lines
 
             along_lines(self, group, st)
-
-
-def rounding(case: Case, size: float) -> float:
-    """The rounding of a group's radicand, by its shortest arm and the mechanism's size."""
-    shortest = min((abs(a) for a in case.arms if a), default=size)
-    return 256 * EPS * (1 + (size / shortest) ** 2 if shortest else 1)
 
 
 def vanishes(margin: Number, noise: float) -> bool:

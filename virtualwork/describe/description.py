@@ -1,21 +1,24 @@
-"""A mechanism as its designer describes it: who is pinned, guided, geared, driven and loaded by what. Frozen, SI.
+"""A mechanism as its designer describes it: its links, guides, gears, inputs and loads. Frozen, SI.
 
-What it must not say is refused: unknown names, links of zero length, gears that are none. Nothing is solved here:
-this is what the order of solution, the formulas and the studies work on.
+Unknown names, links of zero length and parts that contradict themselves are refused. Nothing is solved here: the order
+of solution, the formulas and the studies work on this.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 from dalembert.arithmetic.records import Record, record
-from dalembert.arithmetic.varied import heading, rotation
-from virtualwork.describe import DescriptionError, known
+from virtualwork.describe import DescriptionError, require
+from virtualwork.describe.forms import Form, Free, Pair
+from virtualwork.describe.keys import Key, Keys, Part, check, declared, place_of, table_keys
 from virtualwork.describe.parts import (
     GROUND,
+    PARTS,
     Force,
     Friction,
     Gear,
@@ -24,22 +27,18 @@ from virtualwork.describe.parts import (
     Input,
     Link,
     Motor,
-    Point,
     Rigid,
     Spring,
     Torque,
     TorsionSpring,
-    as_point,
-    as_points,
 )
-
-Bodies = Mapping[str, Mapping[str, complex]]
+from virtualwork.describe.points import Point, as_point, as_points, by_name
 
 
 @record
 @dataclass(frozen=True, eq=False, repr=False)
 class Description(Record):
-    """The description of a planar mechanism; `virtualwork.Mechanism` is one that can also be asked.
+    """The description of a planar mechanism; `virtualwork.Mechanism` adds its motion and its studies.
 
     Raises
     ------
@@ -47,21 +46,25 @@ class Description(Record):
         Where names are unknown or sizes contradict each other; the message names the place.
     """
 
-    ground: Mapping[str, complex]
-    links: Mapping[str, Link]
+    ground: Mapping[str, complex] = declared(Free("ground"), "named fixed points [x, y]", needed=False)
+    links: Mapping[str, Link] = declared(Free("links"), "the moving links by name")
     guides: tuple[Guide, ...] = ()
     gears: tuple[Gear, ...] = ()
     inputs: tuple[Input, ...] = ()
-    guess: Guess = field(default_factory=Guess)
-    name: str = ""
-    gravity: complex = 0j
+    guess: Guess = declared(Free("guess"), "roughly how it stands: this chooses the assembly", default=None)
+    name: str = declared(Free("name"), "what the mechanism is called", default="")
+    gravity: complex = declared(Pair("acceleration"), "its two components, m/s2", default=0j)
     forces: tuple[Force, ...] = ()
     torques: tuple[Torque, ...] = ()
     springs: tuple[Spring, ...] = ()
     torsion_springs: tuple[TorsionSpring, ...] = ()
     motors: tuple[Motor, ...] = ()
     friction: tuple[Friction, ...] = ()
-    tolerances: Mapping[str, float] = field(default_factory=dict)
+    tolerances: Mapping[str, float] = declared(
+        Free("tolerances"),
+        'limits of dimensions by their paths: "links.crank.B.x" = "0.05 mm" is ± that',
+        default=None,
+    )
 
     def __init__(
         self,
@@ -83,30 +86,31 @@ class Description(Record):
     ) -> None:
         values = {
             "ground": as_points(ground),
-            "links": MappingProxyType(dict(links)),
-            "guides": tuple(guides),
-            "gears": tuple(gears),
-            "inputs": (inputs,) if isinstance(inputs, Input) else tuple(inputs),
+            "links": MappingProxyType(dict(by_name("links", links))),
+            "guides": _several("guides", guides),
+            "gears": _several("gears", gears),
+            "inputs": (inputs,) if isinstance(inputs, Input) else _several("inputs", inputs),
             "guess": guess or Guess(),
             "name": name,
             "gravity": as_point(gravity),
-            "forces": tuple(forces),
-            "torques": tuple(torques),
-            "springs": tuple(springs),
-            "torsion_springs": tuple(torsion_springs),
-            "motors": tuple(motors),
-            "friction": tuple(friction),
+            "forces": _several("forces", forces),
+            "torques": _several("torques", torques),
+            "springs": _several("springs", springs),
+            "torsion_springs": _several("torsion_springs", torsion_springs),
+            "motors": _several("motors", motors),
+            "friction": _several("friction", friction),
             "tolerances": MappingProxyType(dict(tolerances or {})),
         }
         for key, value in values.items():
             object.__setattr__(self, key, value)
+        refuse_kinds(self)
         refuse(self)
 
     def __repr__(self) -> str:
         counts = ((len(self.links), "link"), (len(self.pins) + len(self.guides) + len(self.gears), "joint"))
-        said = ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for n, what in counts)
+        sizes = ", ".join(f"{n} {noun}{'' if n == 1 else 's'}" for n, noun in counts)
         driven = ", ".join(e.name for e in self.inputs) or "nothing"
-        return f"{type(self).__name__}({self.name!r}: {said}, driven: {driven})"
+        return f"{type(self).__name__}({self.name!r}: {sizes}, driven: {driven})"
 
     @cached_property
     def size(self) -> float:
@@ -130,11 +134,11 @@ class Description(Record):
     @cached_property
     def points(self) -> Mapping[str, tuple[str, complex]]:
         """Each named point: the first body that has it, the ground before the links, and its place in that body's axes."""
-        found: dict[str, tuple[str, complex]] = {}
+        places: dict[str, tuple[str, complex]] = {}
         for body, points in self.bodies.items():
             for name, z in points.items():
-                found.setdefault(name, (body, z))
-        return found
+                places.setdefault(name, (body, z))
+        return places
 
     @cached_property
     def pins(self) -> Mapping[str, tuple[str, ...]]:
@@ -161,8 +165,8 @@ class Description(Record):
 
         The common centre is Σ m z / Σ m, and the inertia about it gains Σ m |z − z_G|² (Steiner).
 
-        >>> arm = Description({"O": 0j}, {"arm": Link({"O": 0j, "P": 1}, mass=2, center=0.25, inertia=0.1)},
-        ...                   motors=[Motor("arm", "tool", mass=1, center=1)])
+        >>> links = {"arm": Link({"O": 0j, "P": 1}, mass=2, center=0.25, inertia=0.1), "tool": Link({"P": 0j})}
+        >>> arm = Description({"O": 0j}, links, motors=[Motor("arm", "tool", mass=1, center=1)])
         >>> arm.rigid["arm"]
         Rigid(mass=3.0, center=(0.5+0j), inertia=0.475)
         """
@@ -214,8 +218,29 @@ class Description(Record):
         return [j for j, e in enumerate(self.inputs) if not e.is_slide and self.carrier(j) != e.on]
 
 
+UNITS: Keys = {
+    "length": Key(Form(), "the unit of bare lengths", name="length", default="m"),
+    "angle": Key(Form(), "the unit of bare angles", name="angle", default="rad"),
+}
+"""The keys of [units]."""
+
+FILE: Keys = {
+    **table_keys(Description),
+    "source": Key(Free("anything"), "where it is from; not evaluated"),
+    "note": Key(Free("anything"), "a remark; not evaluated"),
+    "report": Key(
+        Free("report"), "the head of a report: title, machine, customer, date, author; not evaluated"
+    ),
+    "units": Key(Free("units"), "what bare lengths and angles mean"),
+}
+"""What stands at the top of the file beside the tables of the parts."""
+
+
 def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]]:
     """Rough link angles and point positions from the guess, the ground and the inputs, as far as they reach."""
+    # the schema needs no tape
+    from dalembert.arithmetic.varied import heading, rotation
+
     angles = dict(m.guess.angles)
     points = dict(m.ground) | dict(m.guess.points)
     for j, e in enumerate(m.inputs):
@@ -247,6 +272,24 @@ def known_by_guess(m: Description) -> tuple[dict[str, float], dict[str, complex]
     return angles, points
 
 
+def refuse_kinds(m: Description) -> None:
+    """Refuse a part that stands in the list of others, each with its place.
+
+    Raises
+    ------
+    DescriptionError
+    """
+    for kind in PARTS:
+        for i, part in enumerate(getattr(m, kind.collection), 1):
+            if not isinstance(part, kind):
+                raise DescriptionError(
+                    f"{kind.collection} {i}: expected {kind.__name__}, found {type(part).__name__}"
+                )
+    for name, link in m.links.items():
+        if not isinstance(link, Link):
+            raise DescriptionError(f"links '{name}': expected Link, found {type(link).__name__}")
+
+
 def refuse(m: Description) -> None:
     """Refuse unknown names and impossible sizes, each with its place.
 
@@ -259,74 +302,51 @@ def refuse(m: Description) -> None:
     if not m.links:
         raise DescriptionError("[links]: the mechanism has no links")
     for name, link in m.links.items():
-        _link(name, link, m.pins, {g.point for g in m.guides if g.link == name})
-    for i, guide in enumerate(m.guides, 1):
-        _guide(f"[[{'sliders' if guide.is_slider else 'slots'}]] {i} ({guide.point})", guide, m.bodies)
-    for i, gear in enumerate(m.gears, 1):
-        for body in (*gear.links, gear.arm):
-            known(body, m.bodies, f"[[gears]] {i}", "link")
-        if gear.ratio == 0 or len({*gear.links, gear.arm}) < 3:
+        for point, z in link.points.items():
+            if not (abs(z) < float("inf")):
+                raise DescriptionError(
+                    f"[links.{name}] points.{point}: found {z}, expected finite coordinates"
+                )
+        check(link, f"[links.{name}]", m)
+    for name, earlier, later in joints_apart(m):
+        points = m.links[name].points
+        if points[earlier] == points[later]:
             raise DescriptionError(
-                f"[[gears]] {i}: expected two links, an arm that is neither, and a ratio other than 0"
+                f"[links.{name}] points: {earlier} and {later} are both joints at the same place: "
+                "a link of zero length; pin the links at one point name instead"
             )
-    for i, entry in enumerate(m.inputs, 1):
-        _input("[input]" if len(m.inputs) == 1 else f"[[input]] {i}", entry, m)
+    for _, number, part in listed(m):
+        check(part, place_of(part.table, number, len(m.inputs)) + part.label, m)
     if m.guess.at is not None and len(m.guess.at) != len(m.inputs):
         raise DescriptionError(
             f"[guess] at: found {len(m.guess.at)} values, expected one for each of {len(m.inputs)} inputs"
         )
     for name in m.guess.angles:
-        known(name, m.links, f"[guess] {name}", "link or point")
-    loads: Mapping[str, Sequence[Force | Torque]] = {"forces": m.forces, "torques": m.torques}
-    for table, entries in loads.items():
-        for i, load in enumerate(entries, 1):
-            known(load.link, m.links, f"[[{table}]] {i} link", "link")
-            if isinstance(load, Force) and isinstance(load.point, str):
-                what = f"point of link {load.link}"
-                known(load.point, m.bodies[load.link], f"[[{table}]] {i} point", what)
-    for i, spring in enumerate(m.springs, 1):
-        for body, point in spring.between:
-            known(body, m.bodies, f"[[springs]] {i} between", "link")
-            if isinstance(point, str):
-                known(point, m.bodies[body], f"[[springs]] {i} between", f"point of {body}")
+        require(name, m.links, f"[guess] {name}", "link or point")
 
 
-def _link(name: str, link: Link, pins: Collection[str], guided: Collection[str]) -> None:
-    seen: dict[complex, str] = {}
-    for point, z in link.points.items():
-        if not (abs(z) < float("inf")):
-            raise DescriptionError(f"[links.{name}] points.{point}: found {z}, expected finite coordinates")
-        shared = point in pins or point in guided
-        if z in seen and shared and seen[z] in pins:
-            raise DescriptionError(
-                f"[links.{name}] points: {seen[z]} and {point} are both joints at the same place: "
-                "a link of zero length; pin the links at one point name instead"
-            )
-        if shared:
-            seen[z] = point
-    if link.mass < 0 or link.inertia < 0:
-        raise DescriptionError(f"[links.{name}]: mass and inertia must not be negative")
+def listed(m: Description) -> Iterator[tuple[int, int, Part]]:
+    """Every part that stands in a list: its index there, its number in its table of the file from 1, and the part."""
+    for kind in PARTS:
+        count: dict[str, int] = {}
+        for i, part in enumerate(getattr(m, kind.collection)):
+            count[part.table] = count.get(part.table, 0) + 1
+            yield i, count[part.table], part
 
 
-def _guide(where: str, guide: Guide, bodies: Bodies) -> None:
-    known(guide.link, bodies, where + " link", "link")
-    known(guide.on, bodies, where + " on", "link")
-    owner = GROUND if guide.link == GROUND else f"link {guide.link}"
-    known(guide.point, bodies[guide.link], where + " point", f"point of {owner}")
-    if isinstance(guide.through, str):
-        known(guide.through, bodies[guide.on], where + " through", f"point of {guide.on}")
-    if guide.link == guide.on:
-        raise DescriptionError(f"{where}: link '{guide.link}' cannot be guided by itself")
+def _several(what: str, entries: object) -> tuple[Any, ...]:
+    """Return the entries of a list as a tuple."""
+    if not isinstance(entries, Iterable) or isinstance(entries, str | Mapping):
+        raise DescriptionError(
+            f"{what}: expected a list, found {type(entries).__name__}: write [...] around it"
+        )
+    return tuple(entries)
 
 
-def _input(where: str, entry: Input, m: Description) -> None:
-    names = [guide.point for guide in m.guides]
-    if (entry.link is None) == (entry.slider is None):
-        raise DescriptionError(f"{where}: expected either a link or a slider")
-    if entry.slider is None:
-        known(entry.link, m.links, where + " link", "link")
-        known(entry.on, m.bodies, where + " on", "link")
-        return
-    known(entry.slider, names, where + " slider", "slot or slider")
-    if names.count(entry.slider) > 1:
-        raise DescriptionError(f"{where} slider: '{entry.slider}' runs in more than one guide")
+def joints_apart(m: Description) -> Iterator[tuple[str, str, str]]:
+    """Pairs of joints of one link, (link, point, later point), that must not stand at one place."""
+    for name, link in m.links.items():
+        guided = {g.point for g in m.guides if g.link == name}
+        joints = [point for point in link.points if point in m.pins or point in guided]
+        for i, later in enumerate(joints):
+            yield from ((name, earlier, later) for earlier in joints[:i] if earlier in m.pins)

@@ -10,24 +10,17 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
-from virtualwork.describe import DescriptionError, hint
-from virtualwork.describe.description import Description
-from virtualwork.describe.entries import ENTRIES, LOADS, numbers
-from virtualwork.describe.parts import joined
-from virtualwork.describe.units import HEADERS
+from dalembert.hints import nearest
+from dalembert.units import LISTED
+from virtualwork.describe import DescriptionError
+from virtualwork.describe.description import Description, listed
+from virtualwork.describe.keys import keys_of, table_keys
+from virtualwork.describe.parts import Link
+from virtualwork.describe.points import joined
 
 D = TypeVar("D", bound=Description)
 Where = tuple[str | int, ...]
 """The way into a description: names of fields, keys, places in a list; x or y of a point comes last."""
-
-# the numbers of an entry in a list, with their kinds of quantity
-_LISTS: Mapping[str, Mapping[str, str]] = {name: numbers(ENTRIES[name]) for name in ("gears", *LOADS)} | {
-    "forces": {"force": "pair of force", "point": "pair of length"},
-    "torques": {"torque": "torque"},
-}
-_GUIDE = {"angle": "angle", "turned": "angle", "through": "pair of length"}
-_LINK = {"mass": "mass", "inertia": "inertia", "center": "pair of length"}
-_POLAR = {"length": "length", "angle": "angle"}
 
 
 @dataclass(frozen=True)
@@ -38,7 +31,7 @@ class Dimension:
     ----------
     path : str
     kind : str
-        Which quantity it is, a key of `units.EXPECTED`.
+        Which quantity it is, a key of `dalembert.units.DIMENSIONS`.
     where : tuple
         The way to it.
     """
@@ -50,7 +43,7 @@ class Dimension:
     @property
     def unit(self) -> str:
         """How a column of it ends: `m`, `deg`; empty for a plain number."""
-        return HEADERS[self.kind]
+        return LISTED[self.kind][0]
 
     @property
     def header(self) -> str:
@@ -65,8 +58,8 @@ def dimensions(m: Description) -> dict[str, Dimension]:
     --------
     >>> from virtualwork.describe.parts import Input, Link, Polar
     >>> arm = Link({"O": 0j, "P": (0.06, 0), "Q": Polar("P", 0.02, 0.5)}, mass=2)
-    >>> found = dimensions(Description({"O": 0j}, {"arm": arm}, inputs=Input("arm")))
-    >>> found["links.arm.P.x"].header, found["links.arm.Q.angle"].header, "links.arm.Q.x" in found
+    >>> listed = dimensions(Description({"O": 0j}, {"arm": arm}, inputs=Input("arm")))
+    >>> listed["links.arm.P.x"].header, listed["links.arm.Q.angle"].header, "links.arm.Q.x" in listed
     ('links.arm.P.x_m', 'links.arm.Q.angle_deg', False)
     """
     return {dimension.path: dimension for dimension in _all(m)}
@@ -74,50 +67,42 @@ def dimensions(m: Description) -> dict[str, Dimension]:
 
 def _all(m: Description) -> Iterator[Dimension]:
     for point in m.ground:
-        yield from _numbers(f"ground.{point}", "pair of length", ("ground", point))
+        yield from _numbers(f"ground.{point}", "length", True, ("ground", point))
     for name, link in m.links.items():
         for point in link.points:
             # a point that is called as a key of the link is named by the longer path
-            path = f"links.{name}.points.{point}" if point in _LINK else f"links.{name}.{point}"
+            key = f"points.{point}" if point in table_keys(Link) else point
             if point in link.polar:
-                for key, kind in _POLAR.items():
-                    yield Dimension(f"{path}.{key}", kind, ("links", name, "polar", point, key))
+                yield from _declared(
+                    f"links.{name}.{key}.", ("links", name, "polar", point), link.polar[point]
+                )
             else:
-                yield from _numbers(path, "pair of length", ("links", name, "points", point))
-        for key, kind in _LINK.items():
-            yield from _numbers(f"links.{name}.{key}", kind, ("links", name, key))
-    count = {"slots": 0, "sliders": 0}
-    for i, guide in enumerate(m.guides):
-        table = "sliders" if guide.is_slider else "slots"
-        count[table] += 1
-        for key, kind in _GUIDE.items():
-            if getattr(guide, key) is not None and not isinstance(getattr(guide, key), str):
-                yield from _numbers(f"{table}.{count[table]}.{key}", kind, ("guides", i, key))
-    for j, entry in enumerate(m.inputs):
-        path = "input" if len(m.inputs) == 1 else f"input.{j + 1}"
-        slide = "slide " if entry.is_slide else ""
-        value = ("position", "length") if entry.is_slide else ("angle", "angle")
-        yield Dimension(f"{path}.{value[0]}", value[1], ("inputs", j, "value"))
-        for key in ("speed", "acceleration", "jerk"):
-            yield Dimension(f"{path}.{key}", slide + key, ("inputs", j, key))
-    yield from _numbers("gravity", "pair of slide acceleration", ("gravity",))
-    for table, keys in _LISTS.items():
-        for i, load in enumerate(getattr(m, table)):
-            for key, kind in keys.items():
-                tabled = key == "force" and load.history is not None
-                if not tabled and isinstance(getattr(load, key), (int, float, complex)):
-                    yield from _numbers(f"{table}.{i + 1}.{key}", kind, (table, i, key))
+                yield from _numbers(f"links.{name}.{key}", "length", True, ("links", name, "points", point))
+        yield from _declared(f"links.{name}.", ("links", name), link)
+    yield from _declared("", (), m)
+    for i, number, part in listed(m):
+        # the path of a single input has no number
+        path = part.table if part.table == "input" and len(m.inputs) == 1 else f"{part.table}.{number}"
+        yield from _declared(f"{path}.", (part.collection, i), part, part.slides)
 
 
-def _numbers(path: str, kind: str, where: Where) -> Iterator[Dimension]:
-    one = kind.removeprefix("pair of ")
-    if one == kind:
-        yield Dimension(path, kind, where)
+def _declared(prefix: str, where: Where, part: Any, slides: bool = False) -> Iterator[Dimension]:
+    """The numbers of one part, by the keys that it declares."""
+    for key in keys_of(type(part)):
+        kind, held = key.form.dimension(slides), getattr(part, key.field)
+        number = not isinstance(held, str) and not (held is None and key.form.is_pair)
+        if kind and number and key.applies(part):
+            yield from _numbers(prefix + key.name, kind, key.form.is_pair, (*where, key.field))
+
+
+def _numbers(path: str, kind: str, is_pair: bool, where: Where) -> Iterator[Dimension]:
+    if is_pair:
+        yield from (Dimension(f"{path}.{axis}", kind, (*where, axis)) for axis in "xy")
     else:
-        yield from (Dimension(f"{path}.{axis}", one, (*where, axis)) for axis in "xy")
+        yield Dimension(path, kind, where)
 
 
-def named(m: Description, path: str, known: Mapping[str, Dimension] | None = None) -> tuple[Dimension, ...]:
+def named(m: Description, path: str, every: Mapping[str, Dimension] | None = None) -> tuple[Dimension, ...]:
     """The dimensions that a path names: one, or both coordinates of a point.
 
     Raises
@@ -125,26 +110,28 @@ def named(m: Description, path: str, known: Mapping[str, Dimension] | None = Non
     DescriptionError
         Where the path names none, or is of the wrong kind; the nearest is named.
     """
-    known = dimensions(m) if known is None else known
-    if path in known:
-        return (known[path],)
-    if f"{path}.x" in known:
-        return known[f"{path}.x"], known[f"{path}.y"]
+    every = dimensions(m) if every is None else every
+    if not isinstance(path, str):
+        raise DescriptionError(f"expected a path such as '{next(iter(every), 'links')}', found {path!r}")
+    if path in every:
+        return (every[path],)
+    if f"{path}.x" in every:
+        return every[f"{path}.x"], every[f"{path}.y"]
     stem, _, last = path.rpartition(".")
-    # what the point has in place of what was asked for
+    # the key of the other form of a point
     other = {"x": "length", "y": "length", "length": "x", "angle": "x"}.get(last)
-    if f"{path}.length" in known or (other == "length" and f"{stem}.length" in known):
-        point = path if f"{path}.length" in known else stem
+    if f"{path}.length" in every or (other == "length" and f"{stem}.length" in every):
+        point = path if f"{path}.length" in every else stem
         raise DescriptionError(
             f"'{path}': the point is given by distance and direction: expected {point}.length or {point}.angle"
         )
-    if other == "x" and f"{stem}.x" in known:
+    if other == "x" and f"{stem}.x" in every:
         raise DescriptionError(f"'{path}': the point is given by coordinates: expected {stem}.x or {stem}.y")
-    held = [each for each in known if each.startswith(f"{path}.")]
+    held = [each for each in every if each.startswith(f"{path}.")]
     if held:
         more = f" and {len(held) - 4} more" if len(held) > 4 else ""
         raise DescriptionError(f"'{path}' is no single number: expected one of {', '.join(held[:4])}{more}")
-    raise DescriptionError(f"unknown dimension '{path}'{hint(path, known)}")
+    raise DescriptionError(f"unknown dimension '{path}'{nearest(path, every)}")
 
 
 def value(m: Description, path: str) -> float | complex:
@@ -157,19 +144,18 @@ def value(m: Description, path: str) -> float | complex:
     >>> value(arm, "links.arm.mass"), value(arm, "links.arm.P"), value(arm, "input.speed")
     (2.0, (3+4j), 0.0)
     """
-    found = [_value(m, dimension) for dimension in named(m, path)]
-    return found[0] if len(found) == 1 else joined(*found)
+    numbers = [_value(m, dimension) for dimension in named(m, path)]
+    return numbers[0] if len(numbers) == 1 else joined(*numbers)
 
 
 def _value(m: Description, dimension: Dimension) -> float:
-    found: Any = m
+    number: Any = m
     for key in dimension.where:
-        found = _part(found, key)
-    if found is None:
+        number = _part(number, key)
+    if number is None:
         _, j, key = dimension.where
         return m.at[int(j)] if key == "value" else 0.0
-    number: float = found
-    return number
+    return number  # type: ignore[no-any-return]
 
 
 def by_path(dimensions: Iterable[Dimension], numbers: Iterable[float]) -> dict[str, float]:
@@ -201,12 +187,12 @@ def changed(m: D, numbers: Mapping[str, Any]) -> D:
     >>> changed(m, {"links.arm.P": (1, 0)}).links["arm"].points["Q"]
     (1.25+0j)
     """
-    known = dimensions(m)
+    every = dimensions(m)
     parts: dict[str | int, Any] = {f.name: getattr(m, f.name) for f in fields(m)}
     for path, number in numbers.items():
-        found = named(m, path, known)
-        pair = (number.real, number.imag) if isinstance(number, complex) and len(found) == 2 else number
-        for dimension, part in zip(found, pair if len(found) == 2 else (number,), strict=True):
+        places = named(m, path, every)
+        pair = (number.real, number.imag) if isinstance(number, complex) and len(places) == 2 else number
+        for dimension, part in zip(places, pair if len(places) == 2 else (number,), strict=True):
             first, *rest = dimension.where
             parts[first] = _with(parts[first], tuple(rest), part)
     return type(m)(**parts)  # type: ignore[arg-type]

@@ -1,5 +1,8 @@
 """The parts of a mechanism: links, guides, gears, inputs, the guess that chooses the assembly, and the loads.
 
+A field is declared once, with its key in the file: the form of its value, its meaning, its default. The reader, the
+schema, the paths of dimensions, the checks of names and the TOML text follow from that (`describe.keys`).
+
 Points and vectors of the plane are complex numbers x + iy: R e^{iθ} is then written as the books print it.
 """
 
@@ -7,99 +10,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from numbers import Real
 from types import MappingProxyType
-from typing import Literal
+from typing import ClassVar, Literal
 
 from dalembert.arithmetic.records import Record, record
-from dalembert.arithmetic.varied import rotation
-from virtualwork.describe import DescriptionError, hint
-
-GROUND = "ground"
-Point = complex | tuple[float, float] | Sequence[float]
-
-
-def as_point(value: Point) -> complex:
-    """Read a point of the plane, `x + iy` or `(x, y)`, as a complex number.
-
-    >>> as_point((3, 4))
-    (3+4j)
-    """
-    if isinstance(value, complex):
-        # a number that varies stays what it is
-        return complex(value) if hasattr(value, "dtype") else value
-    if isinstance(value, Real):
-        return complex(value)
-    x, y = value
-    return joined(x, y)
-
-
-def joined(x: float, y: float) -> complex:
-    """x + iy, of numbers that vary too.
-
-    >>> joined(3, 4)
-    (3+4j)
-    """
-    plain = isinstance(x, Real) and isinstance(y, Real)
-    return complex(x, y) if plain else as_number(x) + 1j * as_number(y)
-
-
-def as_number(value: float) -> float:
-    """Read a real number as a float; one that varies stays what it is.
-
-    >>> as_number(3)
-    3.0
-    """
-    return value if isinstance(value, complex) else float(value)
-
-
-def as_points(given: Mapping[str, Point]) -> Mapping[str, complex]:
-    """Read named points, and freeze them."""
-    return MappingProxyType({name: as_point(value) for name, value in given.items()})
-
-
-@dataclass(frozen=True)
-class Polar:
-    """A point of a link by its distance and direction from another point of it, in the link's axes, m and rad."""
-
-    origin: str
-    length: float
-    angle: float
-
-    @property
-    def arm(self) -> complex:
-        """From the other point to this one."""
-        return self.length * rotation(self.angle)  # type: ignore[no-any-return]
-
-
-def placed(given: Mapping[str, Point | Polar]) -> Mapping[str, complex]:
-    """Where the points of a link lie, those given by distance and direction too; frozen.
-
-    Raises
-    ------
-    DescriptionError
-        Where one hangs on no point, or on itself.
-
-    Examples
-    --------
-    >>> dict(placed({"H": Polar("G", 2, 0), "G": (1, 0)}))
-    {'H': (3+0j), 'G': (1+0j)}
-    """
-    found: dict[str, complex] = {}
-    waiting = dict(given)
-    while waiting:
-        ready = [p for p, at in waiting.items() if not isinstance(at, Polar) or at.origin in found]
-        if not ready:
-            point, at = next((p, at) for p, at in waiting.items() if isinstance(at, Polar))
-            if at.origin not in waiting:
-                raise DescriptionError(
-                    f"points.{point} from: unknown point '{at.origin}'{hint(at.origin, given)}"
-                )
-            raise DescriptionError(f"points.{point} from: '{at.origin}' hangs on '{point}' itself")
-        for point in ready:
-            z = waiting.pop(point)
-            found[point] = found[z.origin] + z.arm if isinstance(z, Polar) else as_point(z)
-    return MappingProxyType({point: found[point] for point in given})
+from virtualwork.describe import DescriptionError
+from virtualwork.describe.curves import ForceTable, Law, TorqueOrTable
+from virtualwork.describe.file import GROUND as GROUND
+from virtualwork.describe.file import Entry
+from virtualwork.describe.forms import (
+    Body,
+    Choice,
+    DrivenPoint,
+    Ends,
+    Free,
+    Pair,
+    Place,
+    PointName,
+    Quantity,
+    TwoBodies,
+)
+from virtualwork.describe.keys import Key, Part, declared
+from virtualwork.describe.points import Point as Point
+from virtualwork.describe.points import Polar as Polar
+from virtualwork.describe.points import as_number, as_points, by_name, placed
+from virtualwork.describe.points import as_point as as_point
 
 
 @record
@@ -118,13 +53,21 @@ class Link(Record):
     inertia : float
         About the centre of mass, kg·m².
     polar : mapping of name to Polar
-        The points that are given by distance and direction: they win over `points`.
+        The points in polar form: they win over `points`.
     """
 
-    points: Mapping[str, complex]
-    mass: float = 0.0
-    center: complex = 0j
-    inertia: float = 0.0
+    points: Mapping[str, complex] = declared(
+        Free("points"),
+        "named points in the link's own axes; links that share a name are pinned there",
+        needed=False,
+    )
+    mass: float = declared(Quantity("mass", negative=False), "the mass, kg", default=0.0)
+    center: complex = declared(Pair("length"), "the centre of mass in the link's own axes", default=0j)
+    inertia: float = declared(
+        Quantity("inertia", negative=False),
+        "the moment of inertia about the centre of mass, kg m2",
+        default=0.0,
+    )
     polar: Mapping[str, Polar] = field(default_factory=dict)
 
     def __init__(
@@ -135,17 +78,37 @@ class Link(Record):
         inertia: float = 0.0,
         polar: Mapping[str, Polar] | None = None,
     ) -> None:
-        given = {**points, **(polar or {})}
-        object.__setattr__(self, "points", placed(given))
+        every = {**by_name("points", points), **(polar or {})}
+        object.__setattr__(self, "points", placed(every))
         object.__setattr__(self, "mass", as_number(mass))
         object.__setattr__(self, "center", as_point(center))
         object.__setattr__(self, "inertia", as_number(inertia))
-        hung = {point: at for point, at in given.items() if isinstance(at, Polar)}
-        object.__setattr__(self, "polar", MappingProxyType(hung))
+        relative = {point: at for point, at in every.items() if isinstance(at, Polar)}
+        object.__setattr__(self, "polar", MappingProxyType(relative))
+
+
+def only_holder(entry: Entry) -> str:
+    """The body whose point is guided, where one alone can be meant: a link that does not carry the line, else the ground.
+
+    Raises
+    ------
+    DescriptionError
+        Where there is none, or more than one.
+    """
+    point, bodies = str(entry.keys["point"]), entry.file.bodies
+    carrier = entry.keys.get("on")
+    holders = [name for name in bodies if point in bodies[name] and name not in (GROUND, carrier)]
+    if not holders and point in bodies[GROUND]:
+        return GROUND
+    if len(holders) != 1:
+        raise DescriptionError(
+            f"{entry.where} link: missing; expected the link whose point {point} is guided"
+        )
+    return holders[0]
 
 
 @dataclass(frozen=True)
-class Guide:
+class Guide(Part):
     """A point of one link that stays on a straight line of another: a slot, or a slider that cannot turn in it.
 
     The line runs through `through` (a named point of `on`, or coordinates in its axes), at `angle` to its x-axis.
@@ -154,26 +117,62 @@ class Guide:
     pin in a moving slot, or a fixed block on which a rail slides.
     """
 
-    point: str
-    link: str
-    on: str = GROUND
-    through: str | complex = 0j
-    angle: float = 0.0
-    turned: float | None = None
+    tables: ClassVar = ("slots", "sliders")
+    collection: ClassVar = "guides"
+
+    point: str = declared(PointName("link"), "the point that is guided")
+    link: str = declared(
+        Body(), "the link of the point; where it is left out, the only one that has it", absent=only_holder
+    )
+    on: str = declared(Body(), "the link that carries the line", default=GROUND)
+    through: str | complex = declared(
+        Place("on"), "a point of the line: a name on that link or [x, y]", default=0j
+    )
+    angle: float = declared(
+        Quantity("angle"), "the direction of the line against the carrier's x-axis", default=0.0
+    )
+    turned: float | None = declared(
+        Quantity("angle"), "the link's x-axis against the line", default=None, absent=0.0, table="sliders"
+    )
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.through, str):
+            object.__setattr__(self, "through", as_point(self.through))
 
     @property
     def is_slider(self) -> bool:
         """True where the link cannot turn in its guide."""
         return self.turned is not None
 
+    @property
+    def table(self) -> str:
+        return self.tables[self.is_slider]
+
+    @property
+    def label(self) -> str:
+        return f" ({self.point})"
+
+    def check(self, where: str) -> None:
+        if self.link == self.on:
+            raise DescriptionError(f"{where}: link '{self.link}' cannot be guided by itself")
+
 
 @dataclass(frozen=True)
-class Gear:
+class Gear(Part):
     """Two toothed links: (ω_b − ω_arm) = ratio·(ω_a − ω_arm); an external mesh has a negative ratio."""
 
-    links: tuple[str, str]
-    ratio: float
-    arm: str = GROUND
+    tables: ClassVar = ("gears",)
+    collection: ClassVar = "gears"
+
+    links: tuple[str, str] = declared(TwoBodies(), "the two toothed links")
+    ratio: float = declared(Quantity("number"), "speed of the second over that of the first, against the arm")
+    arm: str = declared(Body(), "the link that carries both", default=GROUND)
+
+    def check(self, where: str) -> None:
+        if self.ratio == 0 or len({*self.links, self.arm}) < 3:
+            raise DescriptionError(
+                f"{where}: expected two links, an arm that is neither, and a ratio other than 0"
+            )
 
     def shares(self) -> dict[str, float]:
         """The share c of each body in Σ c·θ = const; the arm has none where the two links turn alike.
@@ -182,26 +181,72 @@ class Gear:
         {'planet': 1.0, 'sun': 0.5, 'arm': -1.5}
         """
         a, b = self.links
-        found = {b: 1.0, a: -self.ratio, self.arm: self.ratio - 1.0}
-        return {body: c for body, c in found.items() if c != 0}
+        shares = {b: 1.0, a: -self.ratio, self.arm: self.ratio - 1.0}
+        return {body: c for body, c in shares.items() if c != 0}
 
 
 @dataclass(frozen=True)
-class Input:
+class Input(Part):
     """What drives: the angle of `link` (against `on`), or the position of a `slider` along its guide.
 
     `value` is the angle (rad) or position (m) of the single pose that is meant; `speed` and its rates are its
     derivatives in time. `history` is a table (time, value) where the law of motion is data.
     """
 
-    link: str | None = None
-    on: str = GROUND
-    slider: str | None = None
-    value: float | None = None
-    speed: float | None = None
-    acceleration: float | None = None
-    jerk: float | None = None
-    history: tuple[tuple[float, float], ...] | None = None
+    tables: ClassVar = ("input",)
+    collection: ClassVar = "inputs"
+
+    link: str | None = declared(
+        Body(ground=False), "the link that is driven by its angle", default=None, unless="slider"
+    )
+    on: str = declared(Body(), "the link against which the angle is measured", default=GROUND, beside="link")
+    slider: str | None = declared(
+        DrivenPoint(), "the point of the slot or slider that is driven by its position", default=None
+    )
+    value: float | None = declared(
+        Quantity("angle"),
+        "the angle of the link in the file's own pose",
+        default=None,
+        name="angle",
+        beside="link",
+        also=(
+            Key(
+                Quantity("length"),
+                "the position of the slider in the file's own pose",
+                name="position",
+                beside="slider",
+            ),
+        ),
+    )
+    speed: float | None = declared(
+        Quantity("speed", sliding="velocity"), "the speed: rad/s of a link, m/s of a slider", default=None
+    )
+    acceleration: float | None = declared(
+        Quantity("angular acceleration", sliding="acceleration"),
+        "the acceleration: rad/s2 of a link, m/s2 of a slider",
+        default=None,
+    )
+    jerk: float | None = declared(
+        Quantity("angular jerk", sliding="jerk"),
+        "the jerk: rad/s3 of a link, m/s3 of a slider",
+        default=None,
+    )
+    history: tuple[tuple[float, float], ...] | None = declared(
+        Law(), "a table beside the file: time_s and the angle or position", default=None, name="law"
+    )
+
+    @property
+    def slides(self) -> bool:
+        return self.is_slide
+
+    def check(self, where: str) -> None:
+        if (self.link is None) == (self.slider is None):
+            raise DescriptionError(f"{where}: expected either a link or a slider")
+        if self.link == self.on:
+            raise DescriptionError(
+                f"{where} on: link '{self.link}' cannot turn against itself; name another link, "
+                "or leave `on` out for the ground"
+            )
 
     @property
     def name(self) -> str:
@@ -219,7 +264,9 @@ class Input:
 class Guess(Record):
     """Roughly how the mechanism stands when its inputs are `at`: this chooses the assembly."""
 
-    at: tuple[float, ...] | None = None
+    at: tuple[float, ...] | None = declared(
+        Free("inputs"), "the input, or every input, for which the guess holds", default=None
+    )
     angles: Mapping[str, float] = field(default_factory=dict)
     points: Mapping[str, complex] = field(default_factory=dict)
 
@@ -251,7 +298,7 @@ class Rigid:
 
 
 @dataclass(frozen=True)
-class Force:
+class Force(Part):
     """A force of fixed components in ground or link axes (N), at a point of a link.
 
     The point is given in the link's axes (m), by its name, or not at all: the link's own centre of mass.
@@ -259,63 +306,125 @@ class Force:
     span of whole turns it is `periodic`, one cycle that repeats.
     """
 
-    link: str
-    point: complex | str | None
-    force: complex = 0j
-    frame: Literal["ground", "link"] = "ground"
-    history: tuple[tuple[float, complex], ...] | None = None
+    tables: ClassVar = ("forces",)
+    collection: ClassVar = "forces"
+
+    link: str = declared(Body(ground=False), "the link it acts on")
+    point: complex | str | None = declared(
+        Place("link"),
+        "a point of the link by name or [x, y] in its axes; else its centre of mass",
+        default=None,
+    )
+    force: complex = declared(Pair("force"), "its two components, N", default=0j, unless="history")
+    frame: Literal["ground", "link"] = declared(
+        Choice(("ground", "link")), "the axes of the components", default="ground"
+    )
+    history: tuple[tuple[float, complex], ...] | None = declared(
+        ForceTable(),
+        "a table beside the file in place of force: the input, fx_N and fy_N",
+        default=None,
+        name="table",
+    )
     periodic: bool = False
 
 
 @dataclass(frozen=True)
-class Torque:
+class Torque(Part):
     """A torque on a link, N·m, counter-clockwise.
 
     `history` is a table (x, torque) in place of a constant, linear between its rows, `over` the time (s), the link's
     angle (rad) or its speed (rad/s); over an angle with a span of whole turns it is `periodic`.
     """
 
-    link: str
-    torque: float = 0.0
+    tables: ClassVar = ("torques",)
+    collection: ClassVar = "torques"
+
+    link: str = declared(Body(ground=False), "the link it acts on")
+    torque: float = declared(
+        TorqueOrTable(),
+        "counter-clockwise, N m; or a table beside the file: torque_N_m over t_s, angle_deg or speed_rad_s of the link",
+        default=0.0,
+        needed=True,
+        unless="history",
+    )
     history: tuple[tuple[float, float], ...] | None = None
     over: Literal["time", "angle", "speed"] = "time"
     periodic: bool = False
 
 
 @dataclass(frozen=True)
-class Spring:
+class Spring(Part):
     """A spring and damper between two points, each given as (link, point): its name, or its place in the link's axes."""
 
-    between: tuple[tuple[str, complex | str], tuple[str, complex | str]]
-    stiffness: float = 0.0
-    free_length: float = 0.0
-    damping: float = 0.0
+    tables: ClassVar = ("springs",)
+    collection: ClassVar = "springs"
+
+    between: tuple[tuple[str, complex | str], tuple[str, complex | str]] = declared(
+        Ends(), "its ends: two points such as crank.B and ground.D"
+    )
+    stiffness: float = declared(Quantity("stiffness"), "N/m", default=0.0)
+    free_length: float = declared(Quantity("length"), "the length without force", default=0.0)
+    damping: float = declared(Quantity("damping"), "of a damper beside the spring, N s/m", default=0.0)
 
 
 @dataclass(frozen=True)
-class TorsionSpring:
-    """A torsion spring and damper between two links; its angle is θ_second − θ_first."""
+class TorsionSpring(Part):
+    """A torsion spring and damper between two links; its angle is θ_second − θ_first.
 
-    links: tuple[str, str]
-    stiffness: float = 0.0
-    free_angle: float = 0.0
-    damping: float = 0.0
+    At the guess it is twisted by less than half a turn from free, and by so many whole `turns` besides.
+    """
+
+    tables: ClassVar = ("torsion_springs",)
+    collection: ClassVar = "torsion_springs"
+
+    links: tuple[str, str] = declared(
+        TwoBodies(), "the two links; its angle is the second's less the first's"
+    )
+    stiffness: float = declared(Quantity("torsional stiffness"), "N m/rad", default=0.0)
+    free_angle: float = declared(Quantity("angle"), "the angle without torque", default=0.0)
+    damping: float = declared(
+        Quantity("torsional damping"), "of a damper beside the spring, N m s/rad", default=0.0
+    )
+    turns: int = 0
 
 
 @dataclass(frozen=True)
-class Motor:
+class Motor(Part):
     """A motor carried by one link and driving another; its mass joins the carrier (Ibrahim §2.3)."""
 
-    carrier: str
-    drives: str
-    mass: float = 0.0
-    center: complex = 0j
+    tables: ClassVar = ("motors",)
+    collection: ClassVar = "motors"
+
+    carrier: str = declared(Body(), "the link that carries it")
+    drives: str = declared(Body(ground=False), "the link that it drives")
+    mass: float = declared(Quantity("mass"), "its mass, which joins the carrier, kg", default=0.0)
+    center: complex = declared(Pair("length"), "its centre in the carrier's axes", default=0j)
 
 
 @dataclass(frozen=True)
-class Friction:
+class Friction(Part):
     """Coulomb friction in a joint: a pin of `radius`, or a guide (radius 0)."""
 
-    joint: str
-    coefficient: float
-    radius: float = 0.0
+    tables: ClassVar = ("friction",)
+    collection: ClassVar = "friction"
+
+    joint: str = declared(PointName(), "the point of the pin or guide")
+    coefficient: float = declared(Quantity("number"), "the coefficient of friction")
+    radius: float = declared(Quantity("length"), "the radius of the pin; 0 in a guide", default=0.0)
+
+
+PARTS: tuple[type[Part], ...] = (
+    Input,
+    Guide,
+    Gear,
+    Force,
+    Torque,
+    Spring,
+    TorsionSpring,
+    Motor,
+    Friction,
+)
+"""The parts that stand in lists; a new one is added here, and its list to `Description`."""
+
+TABLES: Mapping[str, type[Part]] = {table: part for part in PARTS for table in part.tables}
+"""The tables of the file that may stand once or many times, with the part that each describes."""

@@ -1,28 +1,14 @@
-"""The JSON Schema (draft 2020-12) of a mechanism's TOML file, from the keys that its reader knows."""
+"""The JSON Schema (draft 2020-12) of a mechanism's TOML file, from the keys that its parts declare."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from virtualwork.describe.entries import ENTRIES, FILE, GUESS, LINK, POINT, UNITS, Keys
-from virtualwork.describe.units import EXPECTED
-
-Schema = dict[str, Any]
-
-# a number, perhaps with its unit behind it
-_QUANTITY = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^\s*[-+]?(\d|\.\d)"}]}
-_A_QUANTITY = {"$ref": "#/$defs/quantity"}
-_PAIR = {"type": "array", "items": _A_QUANTITY, "minItems": 2, "maxItems": 2}
-_A_PAIR = {"$ref": "#/$defs/pair"}
-_TEXT = {"type": "string"}
-# an input is an angle of a link, or a position of a slider
-_CHOICES: dict[str, Schema] = {
-    "input": {
-        "oneOf": [{"required": ["link"]}, {"required": ["slider"]}],
-        "dependentRequired": {"on": ["link"], "angle": ["link"], "position": ["slider"]},
-    },
-    "forces": {"oneOf": [{"required": ["force"]}, {"required": ["table"]}]},
-}
+from dalembert.quantities import expected
+from virtualwork.describe.description import FILE, UNITS
+from virtualwork.describe.forms import PAIR, QUANTITY, TEXT, Free, Pair, Quantity, Schema
+from virtualwork.describe.keys import Key, Keys, table_keys
+from virtualwork.describe.parts import TABLES, Guess, Link, Polar
 
 
 def schema() -> Schema:
@@ -36,70 +22,79 @@ def schema() -> Schema:
     ['carrier', 'center', 'drives', 'mass']
     """
     entries: Schema = {}
-    for name, keys in ENTRIES.items():
-        entry = _table(keys) | _CHOICES.get(name, {})
+    for name, kind in TABLES.items():
+        entry = _table(table_keys(kind, name))
         many = {"type": "array", "items": entry} | ({"minItems": 1} if name == "input" else {})
         entries[name] = {"anyOf": [entry, many]}
     file = _table(FILE)
+    # a number, perhaps with its unit behind it
+    number = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^\s*[-+]?(\d|\.\d)"}]}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "A mechanism of dalembert",
         **file,
         "properties": file["properties"] | entries,
         "required": [*file["required"], "input"],
-        "$defs": {"quantity": _QUANTITY, "pair": _PAIR},
+        "$defs": {
+            "quantity": number,
+            "pair": {"type": "array", "items": QUANTITY, "minItems": 2, "maxItems": 2},
+        },
     }
 
 
 def _table(keys: Keys) -> Schema:
     properties = {}
     for name, key in keys.items():
-        properties[name] = _form(key.kind) | {"description": _told(key.kind, key.told)}
-        if key.default is not None:
-            properties[name]["default"] = key.default
-    return {
+        properties[name] = _form(key) | {"description": _description(key)}
+        if key.shown is not None:
+            properties[name]["default"] = key.shown
+    table = {
         "type": "object",
         "properties": properties,
         "required": [name for name, key in keys.items() if key.needed],
         "additionalProperties": False,
     }
+    either = [
+        [name, other]
+        for name, key in keys.items()
+        for other in keys
+        if key.unless and keys[other].field == key.unless
+    ]
+    if either:
+        table["oneOf"] = [{"required": [name]} for pair in either for name in pair]
+    beside = {name: [key.beside] for name, key in keys.items() if key.beside}
+    return table | ({"dependentRequired": beside} if beside else {})
 
 
-def _told(kind: str, told: str) -> str:
-    quantity = EXPECTED.get(kind.removeprefix("pair of "))
-    return told if quantity is None else f"{told} ({quantity[0]})"
+def _description(key: Key) -> str:
+    if isinstance(key.form, (Quantity, Pair)):
+        return f"{key.meaning} ({expected(key.form.dimension(slides=False))})"
+    return key.meaning
 
 
-def _named(of: Schema) -> Schema:
-    return {"type": "object", "additionalProperties": of}
+def _form(key: Key) -> Schema:
+    return _free(key.form.name) if isinstance(key.form, Free) else key.form.schema()
 
 
-def _form(kind: str) -> Schema:
-    """What a value of this kind looks like."""
-    if kind in EXPECTED:
-        return _A_QUANTITY
-    return _A_PAIR if kind.startswith("pair of ") else _FORMS[kind]
+def _each(value: Schema) -> Schema:
+    """A table whose keys are names."""
+    return {"type": "object", "additionalProperties": value}
 
 
-_FORMS: dict[str, Schema] = {
-    "anything": {},
-    "text": _TEXT,
-    "texts": {"type": "object", "additionalProperties": _TEXT},
-    "name": {"type": ["string", "number"]},
-    "torque or table": {"anyOf": [_A_QUANTITY, _TEXT]},
-    "two texts": {"type": "array", "items": _TEXT, "minItems": 2, "maxItems": 2},
-    "frame": {"enum": ["ground", "link"]},
-    "point": {"anyOf": [_TEXT, _A_PAIR]},
-    "ground": _named(_A_PAIR),
-    "inputs": {"anyOf": [_A_QUANTITY, {"type": "array", "items": _A_QUANTITY}, _named(_A_QUANTITY)]},
-}
-# tables of keys whose forms stand above
-_FORMS["units"] = _table(UNITS)
-_FORMS["points"] = _named({"anyOf": [_A_PAIR, _table(POINT)]})
-_FORMS["links"] = _named(_table(LINK)) | {"minProperties": 1}
-# quoted paths, or their words as tables
-_FORMS["tolerances"] = {
-    "type": "object",
-    "additionalProperties": {"anyOf": [_A_QUANTITY, {"type": "object"}]},
-}
-_FORMS["guess"] = _table(GUESS) | _named({"anyOf": [_A_QUANTITY, _A_PAIR]})
+def _free(name: str) -> Schema:
+    """The schema of a value that the reader takes in a way of its own."""
+    forms: dict[str, Any] = {
+        "anything": dict,
+        "name": lambda: {"type": ["string", "number"]},
+        "report": lambda: _each(TEXT),
+        "units": lambda: _table(UNITS),
+        "ground": lambda: _each(PAIR),
+        "points": lambda: _each({"anyOf": [PAIR, _table(table_keys(Polar))]}),
+        "links": lambda: _each(_table(table_keys(Link))) | {"minProperties": 1},
+        "guess": lambda: _table(table_keys(Guess)) | _each({"anyOf": [QUANTITY, PAIR]}),
+        "inputs": lambda: {"anyOf": [QUANTITY, {"type": "array", "items": QUANTITY}, _each(QUANTITY)]},
+        # quoted paths, or their words as tables
+        "tolerances": lambda: _each({"anyOf": [QUANTITY, {"type": "object"}]}),
+    }
+    form: Schema = forms[name]()
+    return form

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from dalembert.arithmetic.engines import run, run_grid
 from virtualwork.branch.guess import BESIDE, informed
+from virtualwork.branch.sampling import TURNED
 from virtualwork.describe.description import Description
 from virtualwork.family.written import CHOICE, CLOSE, DIP, TOLD, Written
 from virtualwork.formulas.asked import Key
 from virtualwork.formulas.numbers import Reals
+from virtualwork.plan.steps import turns
 
 Mask = NDArray[np.bool_]
 # rad, or of the mechanism's size: how finely the way to the poses is looked through
@@ -49,8 +51,8 @@ def chosen(
         return {}, np.zeros(n, dtype=bool)
     one = len(m.inputs) == 1
     # steps of a way, each as wide as lets `CLEAR` tell that there is no dip
-    steps = -(-(_count(m, low, high) - 1) // WIDER) if one and n else 0
-    at_once, way = steps < AT_ONCE, np.empty((0, 1))
+    steps = -(-(_count(written, m, low, high) - 1) // WIDER) if one and n else 0
+    at_once, way = steps < AT_ONCE and not _levers(written), np.empty((0, 1))
     if steps and at_once:
         way = _way(m, low, high, steps + 1)
         # at the guess it is looked at anyhow
@@ -89,7 +91,7 @@ def signs(
         return {}, np.zeros(n, dtype=bool)
     with np.errstate(all="ignore"):
         found = run(written.choice, {**given, **_inputs(m)})
-        told, opens = np.ones(n, dtype=bool), {}
+        told, opens = np.broadcast_to(found["allowed"] > 0, n).copy(), {}
         for group in written.closed:
             margin, a, b, seen, _ = (np.asarray(found[f"{what} {group.name}"]) for what in CHOICE)
             stands = margin > 0
@@ -107,6 +109,13 @@ def signs(
                 depth = _sampled(written, ("margin", name), known, np.array([[m.at[0] + side]]), n)
                 told &= ~(open_ & (depth[0] >= 0))
     return chosen, told
+
+
+def at_guess(written: Written, m: Description, given: Mapping[str, Any], n: int) -> dict[str, Reals]:
+    """The radicand of each closed form of each variant at the input of the guess, (n,), by the group's name."""
+    with np.errstate(all="ignore"):
+        found = run(written.choice, {**given, **_inputs(m)})
+    return {g.name: np.broadcast_to(found[f"margin {g.name}"], n) for g in written.closed}
 
 
 def with_signs(given: Mapping[str, Any], signs: Mapping[str, Any]) -> dict[str, Any]:
@@ -129,8 +138,13 @@ def meet_on_the_way(
     found = np.zeros(n, dtype=bool)
     if not written.closed:
         return found
-    for here, some, q in _along(m, known, n, low, high):
+    for here, some, q in _along(written, m, known, n, low, high):
         count = len(found[here])
+        for lever in _levers(written):
+            # what follows from a lever that turns far between two samples is told by none of them
+            turn = np.exp(1j * _sampled(written, ("angle", lever, 0), some, q, count))
+            with np.errstate(invalid="ignore"):
+                found[here] |= (np.abs(np.diff(turn, axis=0)) > TURNED).any(axis=0)
         clear = np.empty(count, dtype=bool)
         run_grid(written.clear, _across(some) | {"q0": q.T}, (count, len(q)), [clear])
         left = np.flatnonzero(~clear)
@@ -154,21 +168,35 @@ def stays_within(
 ) -> Mask:
     """Of which variants a quantity is no larger than a bound over their inputs from low to high, (n,) or (1,)."""
     found = np.ones(n, dtype=bool)
-    for here, some, q in _along(m, known, n, low, high):
+    for here, some, q in _along(written, m, known, n, low, high):
         found[here] = (np.abs(_sampled(written, key, some, q, len(found[here]))) < bound).all(axis=0)
     return found
 
 
-def samples(m: Description, span: float) -> int:
-    """How many samples of a way are looked at, of a turn at most."""
-    return int(np.ceil(min(span / (m.size if m.inputs[0].is_slide else 1.0), 2 * np.pi) / STEP)) + 2
+def samples(written: Written, m: Description, span: float) -> int:
+    """How many samples of a way are looked at, of a turn at most; the more the faster a gear turns a body."""
+    fast = max((abs(k) for t in turns(written.plan.steps) for _, k in t.angle.inputs), default=1.0)
+    return (
+        int(np.ceil(min(span / (m.size if m.inputs[0].is_slide else 1.0), 2 * np.pi) * max(fast, 1.0) / STEP))
+        + 2
+    )
+
+
+def _levers(written: Written) -> list[str]:
+    """The bodies that a guide along them turns, however fast, where other loops follow from them."""
+    plan, found = written.plan, []
+    for group in plan.groups:
+        for later in plan.groups:
+            if later is not group and group.kind == "RPR" and group in plan.needed(plan.writes(later)):
+                found.append(group.angles[0])
+    return list(dict.fromkeys(found))
 
 
 def _along(
-    m: Description, known: Mapping[str, Any], n: int, low: Reals, high: Reals
+    written: Written, m: Description, known: Mapping[str, Any], n: int, low: Reals, high: Reals
 ) -> Iterator[tuple[slice, dict[str, Any], Reals]]:
     """Some variants at a time, what is known of them, and inputs on their way, (samples, variants or 1)."""
-    count = _count(m, low, high)
+    count = _count(written, m, low, high)
     each = max(1, LANES // count)
     for a in range(0, n, each):
         here = slice(a, min(a + each, n))
@@ -176,9 +204,9 @@ def _along(
         yield here, _of(known, here), _way(m, first, last, count)
 
 
-def _count(m: Description, low: Reals, high: Reals) -> int:
+def _count(written: Written, m: Description, low: Reals, high: Reals) -> int:
     """How many samples of the longest way are looked at."""
-    return samples(m, float(np.max(high - low, initial=0.0)))
+    return samples(written, m, float(np.max(high - low, initial=0.0)))
 
 
 def _way(m: Description, low: Reals, high: Reals, count: int) -> Reals:

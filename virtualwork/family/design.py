@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.engines import Repeated, run
+from dalembert.hints import nearest
 from virtualwork.branch.assembly import Assembly
-from virtualwork.describe import DescriptionError, MechanismError, hint
+from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed
 from virtualwork.family.branches import meet_on_the_way, samples, signs, with_signs
@@ -181,10 +182,11 @@ class Design:
 
     def _with_way(self, q: Reals) -> Reals:
         """Inputs, and behind them samples of the way from the guess over all of them, of a turn at most."""
-        m = self.mechanism
+        m, written = self.mechanism, self._first.written
+        assert written is not None
         low, high = self._ends(q)
         last = min(high, low + (np.inf if m.inputs[0].is_slide else 2 * np.pi))
-        return np.concatenate([q, np.linspace(low, last, samples(m, high - low))])
+        return np.concatenate([q, np.linspace(low, last, samples(written, m, high - low))])
 
     def _differences(self, x: Reals, q: Reals, inputs_alone: bool) -> Reals:
         """The derivatives from differences; those to all inputs from one design."""
@@ -316,7 +318,7 @@ def place_key(m: Description, name: str) -> Key:
     ):
         if kind == word or (not kind and word == "points"):
             if of not in known:
-                raise DescriptionError(f"no {what} is named '{of}'{hint(of, known)}")
+                raise DescriptionError(f"no {what} is named '{of}'{nearest(of, known)}")
             if word == "points":
                 return "point", points[of], 0j, of, 0
             return ("angle", of, 0) if word == "links" else ("slide", guides[of], 0)

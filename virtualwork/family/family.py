@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.engines import as_part
+from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.parts import in_parts
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
@@ -31,7 +32,8 @@ from virtualwork.describe.dimensions import Dimension, by_path, changed, dimensi
 from virtualwork.describe.parts import Point, as_point
 from virtualwork.family.part import ASSEMBLED, LANES, Part, answer, forget, room
 from virtualwork.formulas.asked import Key
-from virtualwork.formulas.numbers import Number, Reals, xy
+from virtualwork.formulas.numbers import Number, Reals, real_array, xy
+from virtualwork.formulas.poses import check_rate
 from virtualwork.parts_of_motion import LinkRates, PointRates, SlideRates
 from virtualwork.plan.steps import joints
 
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
 
+@guarded
 class Family:
     """Variants of a mechanism; `Mechanism.vary` makes one.
 
@@ -55,13 +58,17 @@ class Family:
     def __init__(self, mechanism: Description, numbers: Mapping[str, ArrayLike]) -> None:
         self.mechanism = mechanism
         known = dimensions(mechanism)
+        if not isinstance(numbers, Mapping) or not numbers:
+            raise ValueError(
+                f"vary: expected numbers by their paths, such as {{'{next(iter(known), 'path')}': [...]}}, found {numbers!r}"
+            )
         columns: dict[Dimension, Reals] = {}
         for path, given in numbers.items():
             found = named(mechanism, path, known)
             column = np.asarray(given)
             if np.iscomplexobj(column) and len(found) == 2:
                 column = np.stack([column.real, column.imag], axis=-1)
-            column = np.asarray(column, dtype=float)
+            column = real_array(path, column)
             if column.ndim != len(found) or (len(found) == 2 and column.shape[1:] != (2,)):
                 shape = "(v,)" if len(found) == 1 else "(v, 2)"
                 raise ValueError(f"{path}: expected shape {shape}, found {column.shape}")
@@ -76,6 +83,11 @@ class Family:
         self.dimensions = tuple(columns)
         # a column beside the other: each is in one piece
         self.values = np.array(list(columns.values())).T
+
+    @property
+    def lock(self) -> Lock:
+        """Its own."""
+        return own_lock(self)
 
     def __len__(self) -> int:
         return len(self.values)
@@ -111,7 +123,11 @@ class Family:
         FamilyMotion
             Every array has a leading axis of variants.
         """
-        inputs, rates = self.inputs(angle), self.rates(speed, acceleration)
+        inputs = self.inputs(angle)
+        for name, rate in (("speed", speed), ("acceleration", acceleration)):
+            if rate is not None:
+                check_rate(name, real_array(name, rate), *inputs.shape[1:])
+        rates = self.rates(speed, acceleration)
         return FamilyMotion(Part(self.mechanism, self.dimensions, self.values, inputs, rates), executor)
 
     def own(self, name: str) -> list[Reals]:
@@ -139,7 +155,7 @@ class Family:
         k = len(self.mechanism.inputs)
         if angle is None:
             return np.stack(self.own("value"), axis=-1)[:, None, :]
-        q = np.asarray(angle, dtype=float)
+        q = real_array("angle", angle)
         if k == 1:
             return q.reshape(1, -1, 1)
         if q.shape != (k,) and (q.ndim != 2 or q.shape[1] != k):
@@ -183,6 +199,7 @@ class LinkOfFamily(LinkRates):
         return f"LinkOfFamily({self.body}, {len(self.motion)} variants)"
 
 
+@guarded
 class FamilyMotion:
     """Position, rates and forces of all variants over given inputs, on demand; `Family.motion` makes one.
 
@@ -199,6 +216,11 @@ class FamilyMotion:
         self._known: dict[Key, Any] = {}
         self._reasons: dict[int, str] = {}
         weakref.finalize(self, forget, self._name)
+
+    @property
+    def lock(self) -> Lock:
+        """Its own: workers of an executor have that of their part's assembly."""
+        return own_lock(self)
 
     def __len__(self) -> int:
         return self.part.shape[0]

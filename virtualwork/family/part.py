@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.describe.description import Description
 from virtualwork.describe.dimensions import Dimension, by_path, changed
-from virtualwork.family.branches import chosen, stays_within, with_signs
+from virtualwork.family.branches import at_guess, chosen, stays_within, with_signs
 from virtualwork.family.written import Written
 from virtualwork.formulas.asked import COMPLEX, FORCES, Key, over_blocks, quantity
 from virtualwork.formulas.dynamics import Dynamics
@@ -29,8 +30,10 @@ from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import NAMES, NEAR
 
 Mask = NDArray[np.bool_]
+Seeds = dict[str, tuple[Reals, Reals]]
 # the key of 0 where a pose is assembled
 ASSEMBLED: Key = ("assembled",)
+RATES = ("speed", "acceleration", "jerk")
 # rad: a torsion spring that is twisted by no more all along its way counts no whole turns
 HALF = 2.6
 # lanes of a part: what is got ready for each is little beside them
@@ -77,8 +80,8 @@ class Part:
         """The i-th variant."""
         return changed(self.mechanism, by_path(self.dimensions, self.values[i].tolist()))
 
-    def poses(self, i: int) -> Poses:
-        """The i-th variant, put together alone.
+    def poses(self, i: int, seeds: Seeds) -> Poses:
+        """The i-th variant, put together alone; `seeds`: see `seeds_of`.
 
         Raises
         ------
@@ -87,7 +90,9 @@ class Part:
         one = self.some(slice(i, i + 1))
         q = one.inputs[0]
         n = len(q)
-        found = Poses(Assembly.from_guess(self.described(i)), q if q.shape[1] > 1 else q[:, 0], 0.0, 0.0, 0.0)
+        assembly = Assembly.from_guess(self.described(i))
+        assembly.seeds.update(seeds)
+        found = Poses(assembly, q if q.shape[1] > 1 else q[:, 0], 0.0, 0.0, 0.0)
         found.rates = [
             [float(np.ravel(r)[0]) if np.size(r) == 1 else np.broadcast_to(r, (1, n))[0] for r in order]
             for order in one.rates
@@ -106,8 +111,10 @@ class Solver:
     def __init__(self, part: Part, like: Solver | None = None) -> None:
         self.part = part
         if like is not None:
-            # the same formulas: another part of the same variants
-            self.assembly, self.written = like.assembly, like.written
+            # another part of the same variants: the same formulas, unless these move where those do not
+            self.assembly = like.assembly
+            if all(theirs or not mine for mine, theirs in zip(self.moves, like.moves, strict=True)):
+                self.written, self.moves = like.written, like.moves
         self.reasons: dict[int, str] = {}
         self._poses: dict[int, Poses | None] = {}
 
@@ -122,6 +129,13 @@ class Solver:
         return found
 
     @cached_property
+    def moves(self) -> tuple[bool, ...]:
+        """Whether the inputs have a speed, an acceleration, a jerk: whether one that varies is zero hangs on no variant."""
+        varied = {d.where[-1] for d in self.part.dimensions if d.where[0] == "inputs"}
+        rates = zip(RATES, self.part.rates, strict=True)
+        return tuple(name in varied or any(np.any(rate) for rate in order) for name, order in rates)
+
+    @cached_property
     def written(self) -> Written | None:
         """The formulas with the dimensions as inputs; None where the branch is more than signs."""
         m = self.part.mechanism
@@ -132,11 +146,10 @@ class Solver:
             d.where[0] == "inputs" and d.where[-1] == "value" for d in self.part.dimensions
         ):
             return None
-        moves = tuple(any(np.any(rate) for rate in order) for order in self.part.rates)
         fixed = tuple(d for d in self.part.dimensions if d.where[0] != "inputs")
-        key = "family", fixed, moves
+        key = "family", fixed, self.moves
         if key not in own.recordings:
-            own.recordings[key] = Written(own, fixed, moves, own_signs=True)
+            own.recordings[key] = Written(own, fixed, self.moves, own_signs=True)
         found: Written = own.recordings[key]
         return None if found.open_gears else found
 
@@ -152,12 +165,7 @@ class Solver:
         part, written = self.part, self.written
         if written is None:
             return {}, np.zeros(part.shape[0], dtype=bool)
-        found, told = chosen(written, part.mechanism, self._given, part.shape[0], *self._span)
-        for d in part.dimensions:
-            if d.kind in ("mass", "inertia"):
-                # what a description refuses
-                told &= self._given[d.path] >= 0
-        return found, told
+        return chosen(written, part.mechanism, self._given, part.shape[0], *self._span)
 
     @cached_property
     def _span(self) -> tuple[Reals, Reals]:
@@ -179,6 +187,14 @@ class Solver:
     def together(self) -> Mask:
         """Which variants are on the tape, (v,)."""
         return self._chosen[1]
+
+    @cached_property
+    def open_at_guess(self) -> Mask:
+        """Which variants on the tape are not assembled at the input of the guess itself, (v,)."""
+        if self.written is None or not self.written.closed:
+            return np.zeros(self.part.shape[0], dtype=bool)
+        margins = at_guess(self.written, self.part.mechanism, self._given, self.part.shape[0])
+        return np.asarray(~np.logical_and.reduce([margin > 0 for margin in margins.values()]))
 
     def values(self, keys: Sequence[Key], out: Sequence[NDArray[Any]] | None = None) -> list[Any]:
         """Quantities by their keys (`Recording.value`), each (v, n); NaN where a pose is not assembled.
@@ -204,7 +220,7 @@ class Solver:
             alone[self._on_tape(keys, rows, found)] = True
         if not whole or alone.any():
             for to in found:
-                to[alone] = np.nan
+                leave_out(to, alone)
         return found, alone
 
     def takes(self, keys: Sequence[Key]) -> bool:
@@ -230,8 +246,12 @@ class Solver:
         """Which variants' torsion springs stay within half a turn of free all the way, (v,)."""
         v, m = self.part.shape[0], self.part.mechanism
         found = np.ones(v, dtype=bool)
-        if len(m.inputs) > 1 or self.written is None:
+        if self.written is None:
             return found
+        if len(m.inputs) > 1:
+            # each counts along lines of its own
+            fixed = (not self.written.plan.angles[body].bases for s in m.torsion_springs for body in s.links)
+            return np.full(v, all(fixed))
         low, high = self._span
         for number in range(len(m.torsion_springs)):
             known = with_signs(self._given, self.signs)
@@ -320,11 +340,17 @@ class Solver:
             return float(np.ravel(value)[0])
         return value[rows] if len(value) > 1 else value
 
+    @cached_property
+    def _seeds(self) -> Seeds:
+        """Where the iterations of variants described alone begin."""
+        low, high = self._span
+        return {} if self.assembly is None else seeds_of(self.assembly, float(low.min()), float(high.max()))
+
     def _one(self, i: int, keys: Sequence[Key], out: list[Any]) -> None:
         """Describe one variant alone."""
         if i not in self._poses or self._poses[i] is None:
             try:
-                poses: Poses | None = None if i in self.reasons else self.part.poses(i)
+                poses: Poses | None = None if i in self.reasons else self.part.poses(i, self._seeds)
             except MechanismError as error:
                 poses = None
                 self.reasons[i] = str(error)
@@ -353,6 +379,8 @@ def parts(x: NDArray[Any]) -> list[Reals]:
     return [x.real, x.imag] if np.iscomplexobj(x) else [x]
 
 
+# of what a process keeps
+_lock = Lock()
 _assembled: dict[int, Assembly] = {}
 # mechanisms of which a process keeps what it has written down
 MECHANISMS = 8
@@ -365,12 +393,29 @@ def assembled(mechanism: Description) -> Assembly:
     ------
     MechanismError
     """
-    found = _assembled.get(id(mechanism))
-    if found is None or found.mechanism is not mechanism:
-        while len(_assembled) >= MECHANISMS:
-            _assembled.pop(next(iter(_assembled)), None)
-        found = _assembled[id(mechanism)] = Assembly.from_guess(mechanism)
-    return found
+    with _lock:
+        found = _assembled.get(id(mechanism))
+        if found is None or found.mechanism is not mechanism:
+            while len(_assembled) >= MECHANISMS:
+                _assembled.pop(next(iter(_assembled)), None)
+            found = _assembled[id(mechanism)] = Assembly.from_guess(mechanism)
+        return found
+
+
+_seeding = Lock()
+
+
+def seeds_of(own: Assembly, low: float, high: float) -> Seeds:
+    """The nodes of a mechanism's groups without a closed form over inputs from low to high: for mechanisms much like it."""
+    if all(group.kind != "Newton" for group in own.plan.groups):
+        return {}
+    with _seeding:
+        try:
+            own.cover(low, high)
+        except MechanismError:
+            return {}
+        ways = own.track.continuations
+        return {name: (np.array(way.q), np.array(way.x)) for name, way in ways.items()}
 
 
 _solvers: dict[tuple[str, int], Solver] = {}
@@ -389,16 +434,18 @@ def answer(
 
     `family` names what has been asked of which variants, and `number` the part; `out` is where to write them.
     """
-    solver = _solvers.get((family, number))
-    if solver is None:
-        while len(_solvers) >= PARTS:
-            _solvers.pop(next(iter(_solvers)), None)
-        before = next((s for (name, _), s in list(_solvers.items()) if name == family), None)
-        solver = _solvers[family, number] = Solver(part, before)
+    with _lock:
+        solver = _solvers.get((family, number))
+        if solver is None:
+            while len(_solvers) >= PARTS:
+                _solvers.pop(next(iter(_solvers)), None)
+            before = next((s for (name, _), s in list(_solvers.items()) if name == family), None)
+            solver = _solvers[family, number] = Solver(part, before)
     return solver.values(keys, out), solver.reasons
 
 
 def forget(family: str) -> None:
     """Let what this process keeps of a family go."""
+    # called wherever a family is collected, in the midst of `answer` too: it must not wait for the lock
     for key in [key for key in list(_solvers) if key[0] == family]:
         _solvers.pop(key, None)

@@ -7,30 +7,41 @@ its solution (the implicit function theorem).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from dalembert.arithmetic.bounds import CONSTANT
 from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.guard import guarded
+from dalembert.arithmetic.rounding import UNIT_ROUNDOFF, bounds_of_few
+from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError, MechanismError
 from virtualwork.describe.dimensions import Dimension, named, value
 from virtualwork.family.written import Written
-from virtualwork.formulas.asked import FORCES, JOINTS, Key, quantity
+from virtualwork.formulas.asked import FORCES, JOINTS, Key, names, quantity
 from virtualwork.formulas.lanes import Lanes
+from virtualwork.formulas.numbers import leave_out
 from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.recording import NAMES
 
+# so many poses are looked at for whether a quantity varies
+LOOKED_AT = 8
+GOLDEN = (5**0.5 - 1) / 2
+# relative: what is read from decimals, turned to radians, or found by iteration
+OFF = 8 * UNIT_ROUNDOFF
 # what an input's own numbers are called on the tape
 ENTERS = dict(zip(("value", "speed", "acceleration", "jerk"), NAMES, strict=True))
 
 
+@guarded
 class Sensitivities:
     """Derivatives of the quantities of some poses of an assembly."""
 
     def __init__(self, assembly: Assembly, poses: Poses) -> None:
-        self.assembly, self.poses = assembly, poses
+        self.assembly, self.poses, self.lock = assembly, poses, assembly.lock
         self._lanes = Lanes(assembly, poses)
         self._written: dict[tuple[Dimension, ...], Written] = {}
 
@@ -59,20 +70,60 @@ class Sensitivities:
         every = tuple(dimensions)
         written = self._formulas(every)
         self._refuse(keys, written)
-        # an input's own numbers enter as those of every input do
-        enters = [
-            d.path if d.where[0] != "inputs" else f"{ENTERS[str(d.where[2])]}{d.where[1]}" for d in every
-        ]
+        enters = self._entering(every)
         tape = written.slopes(tuple(keys), tuple(enters))
-        given = {
+        given = self._given(tape, every)
+        with np.errstate(all="ignore"):
+            found = run(tape, given)
+        slopes = [[quantity(found, key, self.poses.n, to=name) for name in enters] for key in keys]
+        nowhere = ~self.poses.assembled
+        if nowhere.any():
+            for slope in (slope for row in slopes for slope in row):
+                leave_out(slope, nowhere)
+        return slopes
+
+    def _entering(self, dimensions: Sequence[Dimension]) -> list[str]:
+        """What dimensions are called on the tape: an input's own numbers enter as those of every input do."""
+        return [
+            d.path if d.where[0] != "inputs" else f"{ENTERS[str(d.where[2])]}{d.where[1]}" for d in dimensions
+        ]
+
+    def _given(self, tape: Tape, dimensions: Sequence[Dimension]) -> dict[str, Any]:
+        """What enters a tape: the dimensions' own numbers, and those of the poses."""
+        own = {
             d.path: float(value(self.assembly.mechanism, d.path).real)
-            for d in every
+            for d in dimensions
             if d.where[0] != "inputs"
         }
-        rest = [name for name in tape.inputs if name not in given]
-        with np.errstate(all="ignore"):
-            found = run(tape, given | self._lanes.entering(rest))
-        return [[quantity(found, key, self.poses.n, to=name) for name in enters] for key in keys]
+        return own | self._lanes.entering([name for name in tape.inputs if name not in own])
+
+    def vary(self, keys: Sequence[Key], limits: Mapping[Dimension, float]) -> list[tuple[bool, ...]]:
+        """Which quantities vary at all with these dimensions: of each its parts, x and y of what is complex.
+
+        What is constant, as a coordinate across its slide is, has derivatives of nothing but rounding. So a quantity
+        varies if along one direction of all dimensions its derivative is anywhere larger than the bound of its own
+        rounding error.
+        """
+        there = np.flatnonzero(self.poses.assembled)
+        if not len(there):
+            # nothing is known: no number of it is shown either
+            return [(True,) * len(names(key)) for key in keys]
+        every = tuple(limits)
+        # of no simple ratio to each other: derivatives do not cancel
+        steps = [limit * (1 + GOLDEN * i % 1) for i, limit in enumerate(limits.values(), 1)]
+        tape = self._formulas(every).along(tuple(keys), tuple(zip(self._entering(every), steps, strict=True)))
+        rows = there[np.unique(np.linspace(0, len(there) - 1, LOOKED_AT).astype(int))]
+        given = {
+            name: np.asarray(value, dtype=float)[rows] if np.ndim(value) else np.full(len(rows), value)
+            for name, value in self._given(tape, every).items()
+        }
+        off = {f"off {name}": OFF * np.abs(value) for name, value in given.items()}
+        parts = [name for key in keys for name in names(key)]
+        errors = {name: f"off {name}" for name in given}
+        found = bounds_of_few(tape, given | off, errors, parts, CONSTANT)
+        with np.errstate(invalid="ignore"):
+            varies = {name: bool(np.any(np.abs(found[name]) > found[f"error({name})"])) for name in parts}
+        return [tuple(varies[name] for name in names(key)) for key in keys]
 
     def values(self, keys: Sequence[Key]) -> list[Any]:
         """The quantities themselves, (n,)."""

@@ -160,7 +160,8 @@ def summary(values: Reals, nominal: Reals, turn: float | None = None) -> Drawn:
     quantiles, errors = np.full((2, len(poses)), np.nan), np.full((2, len(poses)), np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.nansum(apart, axis=0) / count
-        sd = np.sqrt(np.nansum((apart - mean) ** 2, axis=0) / (count - 1))
+        # of none or one there is no deviation
+        sd = np.sqrt(np.nansum((apart - mean) ** 2, axis=0) / np.where(count > 1, count - 1, np.nan))
         for i, p in enumerate(QUANTILES):
             # the order statistics: NaN stands last
             last = np.maximum(count - 1, 0)

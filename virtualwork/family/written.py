@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 from dalembert.arithmetic.adjoint import derivatives
+from dalembert.arithmetic.guard import guarded, own_lock
 from dalembert.arithmetic.recorded import RECORDED, Recorder, bare
 from dalembert.arithmetic.tape import Tape
 from dalembert.arithmetic.varied import Varied
 from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.guess import distance, sign_of_angles
-from virtualwork.describe.description import Description, known_by_guess
+from virtualwork.describe.description import Description, joints_apart, known_by_guess
 from virtualwork.describe.dimensions import Dimension, changed, value
+from virtualwork.describe.keys import keys_of
+from virtualwork.describe.parts import Link
 from virtualwork.formulas.asked import FORCES, Key, names
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.numbers import WRITTEN, Number
@@ -35,6 +38,7 @@ CLEAR = 0.2
 DIP = 0.05
 
 
+@guarded
 class Written:
     """Formulas of an assembly, in which dimensions are inputs of the tape, called by their paths.
 
@@ -61,14 +65,16 @@ class Written:
         settled: bool = True,
     ) -> None:
         recorder = Recorder()
+        # that of the recording
+        self.lock = own_lock(recorder)
         m: Description = assembly.mechanism
         self.mechanism = varied(m, dimensions, recorder)
         self.plan = plan(self.mechanism)
         # whether a gear's constant is that of links which the guess has to place first
         self.open_gears = any(turn.angle.gears for step in self.plan.steps for turn in _turns(step))
-        closed = [g.name for g in self.closed]
-        signs = {name: assembly.signs.get(name, 1) for name in closed}
-        turning = closed if own_signs else assembly.turning_over
+        # two slides have one solution: their sign is that of any
+        signs = {g.name: assembly.signs.get(g.name, 1) for g in self.plan.groups if g.kind != "Newton"}
+        turning = [g.name for g in self.closed] if own_signs else assembly.turning_over
         self.recording = Recording(
             self.mechanism, self.plan, signs, moves, turning, assembly.geared, settled, recorder
         )
@@ -115,6 +121,19 @@ class Written:
         depths = [self.recording.value(key) - DIP for key in self.margins]
         return self.recording.recorder.tape({"clear": every(depths)})
 
+    def _allowed(self) -> Iterator[Number]:
+        """What is positive where a description is not refused for its numbers (`describe.description.refuse`)."""
+        m = self.mechanism
+        least = CLOSE * bare(m.size)
+        for name, earlier, later in joints_apart(m):
+            points = m.links[name].points
+            yield abs(bare(points[earlier] - points[later])) - least
+        for link in m.links.values():
+            # zero is allowed
+            bounded = (getattr(link, key.field) for key in keys_of(Link) if key.form.restricts)
+            yield from (RECORDED.select(-bare(x), -1.0, 1.0) for x in bounded)
+        yield from (abs(bare(gear.ratio)) for gear in m.gears)
+
     def told(self, samples: int) -> Tape:
         """The tape of how all closed forms close at the inputs of the guess, and whether that is told plainly.
 
@@ -139,8 +158,8 @@ class Written:
         return recorder.tape(signs | {"told": told})
 
     def _plain(self, found: Mapping[str, Number]) -> list[Number]:
-        """What is positive where a choice is told plainly."""
-        plain = []
+        """What is positive where a choice is told plainly, and the description is no other than that of all."""
+        plain = [found["allowed"]]
         for name in (group.name for group in self.closed):
             plus, minus = found[f"plus {name}"], found[f"minus {name}"]
             plain.append(found[f"margin {name}"] - CLOSE)
@@ -184,23 +203,41 @@ class Written:
         tape = self.tape(keys)
         return derivatives(tape, [name for name in enters if name in tape.inputs])
 
+    def along(self, keys: tuple[Key, ...], steps: tuple[tuple[str, float], ...]) -> Tape:
+        """The tape of quantities' derivatives along one direction: `steps` of what enters, taken together."""
+        return self._once(self._along, keys, steps)
+
+    def _along(self, keys: tuple[Key, ...], steps: tuple[tuple[str, float], ...]) -> Tape:
+        recorder = Recorder()
+        found = _again(self.slopes(keys, tuple(name for name, _ in steps)), recorder, {})
+        parts = [part for key in keys for part in names(key)]
+        return recorder.tape(
+            {
+                part: sum(step * found.get(f"d({part})/d({name})", 0.0) for name, step in steps)
+                for part in parts
+            }
+        )
+
     @cached_property
     def choice(self) -> Tape:
         """The tape of how each closed form's branch is chosen at the inputs of the guess, in the order of solution.
 
         Of each group: its radicand (`margin`), the distance of both assemblies from what the guess says (`plus`,
         `minus`), the sign that the guessed angles have (`guessed`), and what follows from these (`sign`): the nearer
-        assembly, or where there is none the guessed angles' sign.
+        assembly, or where there is none the guessed angles' sign. And `allowed`: positive where no description is refused.
         """
         recorder, m = self.recording.recorder, self.mechanism
         st = State([recorder.input(f"q{j}") for j in range(len(m.inputs))], kind=WRITTEN)
         angles, points = known_by_guess(m)
         outputs: dict[str, Number] = {}
+        allowed = list(self._allowed())
 
         def close(group: Group, st: State) -> None:
             case, size, name = Case(group, bare), bare(m.size), group.name
             if group not in self.closed:
                 case.solve(st, 1, size)
+                # guides that are parallel at the guess are refused
+                allowed.append(bare(st.margin[name]) - CLOSE)
                 return
             apart = []
             for sign in (1.0, -1.0):
@@ -209,7 +246,7 @@ class Written:
                 apart.append(distance(group, trial, self.plan, m, angles, points))
             guessed = sign_of_angles(group, case, st, angles)
             guessed = 1.0 if guessed is None else guessed
-            margin = trial.margin[name]
+            margin = bare(trial.margin[name])
             # at zero the guess is taken as positive; what is not a number is not
             beyond = RECORDED.select(1.0 + guessed, 1.0, -1.0)
             beyond = RECORDED.select(guessed, 1.0, RECORDED.select(-guessed, -1.0, beyond))
@@ -219,12 +256,13 @@ class Written:
             outputs.update(zip((f"{what} {name}" for what in CHOICE), values, strict=True))
 
         run(self.plan.steps, st, close)
+        outputs["allowed"] = every(allowed)
         return recorder.tape(outputs)
 
 
-def every(conditions: Sequence[Number], found: Number = 1.0, otherwise: float = -1.0) -> Number:
+def every(conditions: Iterable[Number], found: Number = 1.0, otherwise: float = -1.0) -> Number:
     """A number where all of these are positive, and another one where they are not."""
-    for condition in reversed(conditions):
+    for condition in reversed(list(conditions)):
         found = RECORDED.select(condition, found, otherwise)
     return found
 

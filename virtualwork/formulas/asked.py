@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from dalembert.arithmetic.choice import wanted
 from virtualwork.formulas.poses import Poses
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def pays(asked: dict[Any, int], n: int, keys: Sequence[Key]) -> Literal["blocks"
     Very many: where compiled code may run, and what it takes to make it is less than what it saves. `asked` counts for an
     assembly.
     """
-    if os.environ.get("DALEMBERT_ENGINE"):
+    if wanted():
         return "lanes"
     key = n == 1, *keys
     asked[key] = asked.get(key, 0) + n

@@ -6,8 +6,8 @@ asked for.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from functools import cached_property, partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,10 +15,11 @@ import numpy as np
 from dalembert.arithmetic.varied import rotation
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND, TorsionSpring
-from virtualwork.formulas.numbers import Number, Reals, plus, times
+from virtualwork.formulas.numbers import Complexes, Number, Reals, plus, times
 from virtualwork.formulas.poses import Poses, part
-from virtualwork.formulas.positions import Samples, State, follow, whole
+from virtualwork.formulas.positions import Samples, State, follow, unwound, whole
 from virtualwork.formulas.rates import Rates
+from virtualwork.formulas.winding import counted
 from virtualwork.plan.steps import Path, Plan
 
 
@@ -53,15 +54,15 @@ class Shared:
     def twist(self, st: State, spring: TorsionSpring) -> Number:
         """θ_second − θ_first − free angle: within half a turn at the guess, and from there on followed continuously.
 
-        Where the inputs alone fix both angles they are taken as they are, whole turns included. With several inputs
-        the angle lies within half a turn of free.
+        Where the inputs alone fix both angles they are taken as they are, whole turns included. The spring's own `turns`
+        are added.
         """
         a, b = spring.links
         known = [self.plan.angles[body] for body in (a, b)]
         if all(not angle.bases for angle in known):
-            return (st.affine(known[1]) - spring.free_angle) - st.affine(known[0])
-        within = self.within(st, spring)
-        return within if len(st.inputs) > 1 else self.wound(spring, st, within)
+            twist = (st.affine(known[1]) - spring.free_angle) - st.affine(known[0])
+            return twist + 2 * np.pi * spring.turns if spring.turns else twist
+        return self.wound(spring, st, self.within(st, spring))
 
     @staticmethod
     def within(st: State, spring: TorsionSpring) -> Number:
@@ -96,9 +97,35 @@ class Setting(Shared):
         return None if time is None else time[rows] if many else float(time[0])
 
     def wound(self, spring: TorsionSpring, st: State, within: Number) -> Number:
-        """A torsion spring's twist with its whole turns, from what lies within half a turn of free."""
-        found = whole(self._counted(spring), st.inputs[0], within)
-        return found if st.many else float(found)
+        """A torsion spring's twist with its whole turns, from what lies within half a turn of free.
+
+        With one input followed along it, with several along a straight line of inputs from the guess: NaN where that
+        leads through places that cannot be assembled.
+        """
+        if len(st.inputs) > 1:
+            found = self.along_lines(spring, st.inputs, within)
+        else:
+            found = whole(self._counted(spring), st.inputs[0], within)
+        found = found + 2 * np.pi * spring.turns
+        return found if st.many else float(np.ravel(found)[0])
+
+    def along_lines(
+        self,
+        spring: TorsionSpring,
+        inputs: Sequence[Number],
+        within: Number,
+        start: Sequence[float] | None = None,
+    ) -> Reals:
+        """A twist with its whole turns along straight lines, from the guess or from `start`, where it is `principal`."""
+        turns, reached = counted(partial(self._twists, spring), self.mechanism, inputs, start)
+        return np.where(reached, unwound(within, turns[0]), np.nan)
+
+    def _twists(self, spring: TorsionSpring, inputs: Sequence[Reals]) -> Complexes:
+        """e^{iφ} of a torsion spring's twist at inputs, (1, n); NaN where it is not assembled."""
+        along = self.poses.again(np.stack(inputs, axis=1))
+        a, b = (along.angle(body) if body != GROUND else 0.0 for body in spring.links)
+        turns: Complexes = np.exp(1j * (b - a - spring.free_angle))
+        return np.broadcast_to(turns, (1, along.n))
 
     def _counted(self, spring: TorsionSpring) -> Samples:
         """The twist of a torsion spring followed from the guess over all poses asked for."""
@@ -111,10 +138,8 @@ class Setting(Shared):
             samples = int(min(720.0, max(24.0, 20000 * turn / max(high - low, turn))) * (high - low) / turn)
 
             def angle(q: Reals) -> Reals:
-                along = self.poses.again(q[:, None])
-                a, b = (along.angle(body) if body != GROUND else np.zeros(len(q)) for body in spring.links)
-                relative: Reals = np.angle(np.exp(1j * (b - a - spring.free_angle)))
-                return relative
+                twist: Reals = np.angle(self._twists(spring, [q])[0])
+                return twist
 
             self._followed[spring] = follow(angle, np.linspace(low, high, 2 + samples), at, turn)
         return self._followed[spring]

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.guard import guarded
 from virtualwork.describe import DescriptionError
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
@@ -22,6 +23,7 @@ from virtualwork.formulas.statics import Statics
 from virtualwork.plan.steps import Joint
 
 
+@guarded
 class Dynamics:
     """The forces of poses; each is formed when first asked for. `Motion.dynamics` is one.
 
@@ -34,7 +36,7 @@ class Dynamics:
     """
 
     def __init__(self, poses: Poses) -> None:
-        self.poses = poses
+        self.poses, self.lock = poses, poses.lock
         self.scene = Scene(poses)
         self._effort: Reals | None = None
         self._euler: Reals | None = None

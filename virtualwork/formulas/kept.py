@@ -39,8 +39,9 @@ class Later:
 
 def later(recording: Recording, keys: Sequence[Key], known: Container[int]) -> Later:
     """The tape of quantities from the values of operations that are known, and what it leaves besides."""
-    outputs = recording.recorder.numbers(recording.outputs(keys))
-    operations = recording.recorder.operations
+    with recording.lock:
+        outputs = recording.recorder.numbers(recording.outputs(keys))
+        operations = recording.recorder.operations
     below = reached(operations, (number for _, number in outputs), known)
     takes = {number: f"kept {k}" for k, number in enumerate(number for number in below if number in known)}
     worth = _worth_keeping(recording, operations) if len(operations) <= LONGEST else set()

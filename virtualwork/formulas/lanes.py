@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from threading import Lock
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dalembert.arithmetic.engines import floats, run
+from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.asked import COMPLEX, FORCES, Key, names, over_blocks, quantity
 from virtualwork.formulas.dynamics import Dynamics
@@ -29,8 +29,6 @@ from virtualwork.formulas.scene import Scene
 
 # tapes of later requests that an assembly keeps
 MANY = 256
-# two threads that ask one assembly at once
-_writing = Lock()
 
 # a function of floats, the places of its arguments among the input and its rates, and whether each result is a vector
 Ready = tuple[Callable[..., tuple[float, ...]], tuple[int, ...], tuple[bool, ...]]
@@ -74,11 +72,12 @@ class Turning(Branch, Protocol):
         """Which inputs are close to a change point."""
 
 
+@guarded
 class Lanes:
     """Quantities of the poses of one assembly over given inputs and rates, by their keys (`Recording.value`)."""
 
     def __init__(self, branch: Turning, poses: Poses) -> None:
-        self.branch, self.poses = branch, poses
+        self.branch, self.poses, self.lock = branch, poses, branch.lock
         self.known: dict[Key, Any] = {}
         # values of operations for later requests, by their numbers; and where doubts are right
         self._kept: dict[int, Any] = {}
@@ -197,7 +196,7 @@ class Lanes:
     def _nowhere(self) -> NDArray[np.bool_] | None:
         """The poses whose input is no number; None where there are none."""
         finite = np.isfinite(self.poses.inputs)
-        return None if finite.all() else ~finite.all(axis=1)
+        return None if finite.all() else np.asarray(~finite.all(axis=1))
 
     @cached_property
     def _careful(self) -> NDArray[np.bool_]:
@@ -222,7 +221,7 @@ class Lanes:
                 force = self._table(int(number))
                 found[name] = force.real if part == "x" else force.imag
             elif of.startswith("spring "):
-                found[name] = self._spring(int(of.removeprefix("spring ")))
+                found[name] = self.twist(int(of.removeprefix("spring ")))
             else:
                 found[name] = self._angle(of)
         if poses.n == 1:
@@ -240,8 +239,8 @@ class Lanes:
         self.poses.solve((f"angle:{body}",), 0)
         return self.poses.over(lambda _, st: st.angle[body])  # type: ignore[no-any-return]
 
-    def _spring(self, number: int) -> Reals:
-        """A torsion spring's twist."""
+    def twist(self, number: int) -> Reals:
+        """A torsion spring's twist with its whole turns, (n,)."""
         spring = self.branch.mechanism.torsion_springs[number]
         setting = Scene(self.poses).setting
         self.poses.solve(tuple(f"angle:{body}" for body in spring.links if body != "ground"), 0)
@@ -271,10 +270,11 @@ class Lanes:
 def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
     """The formulas of a branch, written down once for rates that are zero or not."""
     key = moves, branch.turning_over
-    if key not in branch.recordings:
-        branch.recordings[key] = Recording(
-            branch.mechanism, branch.plan, branch.signs, moves, branch.turning_over, branch.geared
-        )
+    with branch.lock:
+        if key not in branch.recordings:
+            branch.recordings[key] = Recording(
+                branch.mechanism, branch.plan, branch.signs, moves, branch.turning_over, branch.geared
+            )
     found: Recording = branch.recordings[key]
     return found
 
@@ -282,7 +282,7 @@ def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
 def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
     """The tape of quantities, pruned once."""
     key = recording, keys
-    with _writing:
+    with branch.lock:
         if key not in branch.recordings:
             branch.recordings[key] = recording.tape(keys)
     found: Tape = branch.recordings[key]
@@ -293,7 +293,7 @@ def _cut(branch: Turning, recording: Recording, keys: tuple[Key, ...], known: fr
     """The tape of quantities, from what is known on; None where nothing is, nor to be left."""
     if known is None:
         return Later(taped(branch, recording, keys), {}, {})
-    with _writing:
+    with branch.lock:
         made = branch.recordings.setdefault("later", {})
         key = recording, keys, known
         if key not in made:
@@ -312,7 +312,8 @@ def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Re
     known = branch.recordings
     name = "ready", moves, keys
     if name not in known:
-        known[name] = _made(branch, moves, keys)
+        with branch.lock:
+            known[name] = _made(branch, moves, keys)
     found: Ready | None = known[name]
     return found
 

@@ -50,7 +50,7 @@ class LoadPaths:
         self.case, self.quantities = case, case.quantities
         self.mechanism, self.plan = case.mechanism, case.plan
         self.order = Order(self.mechanism, self.plan)
-        self._deep = len(self.plan.groups) > DEEP
+        self._deep = max(len(self.plan.groups), len(self.mechanism.links)) > DEEP
         self._known: dict[Any, Combination] = {}
         self._on_group: dict[str, list[Combination]] = {}
         self._first: dict[Quantity, list[Quantity]] = {}

@@ -206,6 +206,6 @@ def settle(group: Group, st: State, x: Reals, size: float) -> Reals:
 
 def singular(group: Group, st: State, n: int) -> bool:
     """Whether J is singular at all of the state's poses that are assembled."""
-    s = singular_values(columns(group, st), len(group.angles), n)
+    s = singular_values(columns(group, st), n)
     s = s[np.isfinite(s).all(axis=1)]
     return len(s) > 4 and bool((s[:, -1] < SINGULAR * s[:, 0]).all())

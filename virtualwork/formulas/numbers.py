@@ -11,7 +11,7 @@ import math
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.recorded import RECORDED, bare
 from dalembert.arithmetic.systems import solved
@@ -74,6 +74,21 @@ def leave_out(values: NDArray[Any], which: NDArray[np.bool_]) -> None:
     values[which] = complex(np.nan, np.nan) if values.dtype.kind == "c" else np.nan
 
 
+def real_array(name: str, value: ArrayLike) -> Reals:
+    """Read real numbers as an array; ValueError names what holds something else.
+
+    >>> real_array("angle", "abc")
+    Traceback (most recent call last):
+    ValueError: angle: expected real numbers, found 'abc'
+    """
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        found = repr(value)
+        found = found if len(found) <= 60 else f"{found[:60]} …"
+        raise ValueError(f"{name}: expected real numbers, found {found}") from None
+
+
 def xy(z: Complexes) -> Reals:
     """x + iy (..., n) as rows (x, y), (..., n, 2), without a copy.
 
@@ -90,9 +105,12 @@ def xy(z: Complexes) -> Reals:
 def stack(cols: list[list[Number]], n: int) -> Reals:
     """The real Jacobian (n, 2·loops, unknowns) from complex columns."""
     loops, unknowns = len(cols), len(cols[0])
-    out = np.empty((n, 2 * loops, unknowns))
+    out = np.zeros((n, 2 * loops, unknowns))
     for i, row in enumerate(cols):
         for j, c in enumerate(row):
+            # of many loops each holds few of the unknowns
+            if type(c) is complex and c == 0:
+                continue
             out[:, 2 * i, j] = np.real(c)
             out[:, 2 * i + 1, j] = np.imag(c)
     return out
@@ -152,21 +170,35 @@ def condition(cols: list[list[Number]], angles: int, size: Number, n: int) -> Re
         return inverse_norm(jacobian)
 
 
-def singular_values(cols: list[list[Number]], angles: int, n: int) -> Reals:
-    """The singular values of the Jacobian (lengths scaled) at each pose; NaN where it is not assembled."""
+def equilibrated(jacobian: Reals) -> tuple[Reals, Reals]:
+    """Each pose's Jacobian (n, rows, unknowns) with columns of length 1, and the lengths that they had, (n, unknowns).
+
+    So no pose and no unknown hides another: a link a million times shorter than the others, a slide that runs far out.
+    It is within √unknowns of the least condition that any scale of the unknowns gives (A. van der Sluis, Numer. Math. 14,
+    1969). A column that vanishes but for rounding of its pose stays so.
+
+    >>> scaled, lengths = equilibrated(np.array([[[3e9, 0.0], [4e9, 1e-9]]]))
+    >>> scaled[0].tolist(), lengths.tolist()
+    ([[0.6, 0.0], [0.8, 1.0]], [[5000000000.0, 1e-09]])
+    """
+    lengths = np.linalg.norm(jacobian, axis=1)
+    nothing = ~(lengths > 0)
+    lengths = np.where(nothing, 1.0, lengths)
+    return jacobian / lengths[:, None, :], lengths
+
+
+def singular_values(cols: list[list[Number]], n: int) -> Reals:
+    """The singular values of the Jacobian (`equilibrated`) at each pose; NaN where it is not assembled."""
     jacobian = stack(cols, n)
     good = np.isfinite(jacobian).all(axis=(1, 2))
-    size = np.abs(jacobian[good][:, :, :angles]).max(initial=0.0)
-    if angles and size > 0:
-        jacobian[:, :, :angles] /= size
     out = np.full((n, min(jacobian.shape[1:])), np.nan)
-    out[good] = np.linalg.svd(jacobian[good], compute_uv=False)
+    out[good] = np.linalg.svd(equilibrated(jacobian[good])[0], compute_uv=False)
     return out
 
 
-def singular_poses(cols: list[list[Number]], angles: int, n: int) -> NDArray[np.bool_]:
+def singular_poses(cols: list[list[Number]], n: int) -> NDArray[np.bool_]:
     """Which poses have a Jacobian whose smallest singular value is below 1e-6 of its largest."""
-    s = singular_values(cols, angles, n)
+    s = singular_values(cols, n)
     return np.asarray(s[:, -1] < SINGULAR * s[:, 0])
 
 
@@ -178,7 +210,7 @@ def solve_columns(cols: list[list[Number]], right: list[Number]) -> list[Number]
     return [x[:, j] if shape else float(x[0, j]) for j in range(x.shape[1])]
 
 
-def solve_determined(cols: list[list[Number]], right: list[Number], angles: int) -> list[Number]:
+def solve_determined(cols: list[list[Number]], right: list[Number]) -> list[Number]:
     """The same where J is singular in every pose: what a null vector of J moves is not determined, and NaN."""
     shape = np.broadcast_shapes(*(np.shape(c) for row in cols for c in row), *(np.shape(w) for w in right))
     n = int(np.prod(shape))
@@ -186,14 +218,12 @@ def solve_determined(cols: list[list[Number]], right: list[Number], angles: int)
     good = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(w).all(axis=1)
     out = np.full((n, jacobian.shape[2]), np.nan)
     if good.any():
-        size = np.abs(jacobian[good][:, :, :angles]).max(initial=0.0) or 1.0
-        scale = np.array([1.0] * angles + [size] * (jacobian.shape[2] - angles))
-        jacobian = jacobian[good] * scale / size
+        jacobian, lengths = equilibrated(jacobian[good])
         _, s, null = np.linalg.svd(jacobian)
         loose = (s < SINGULAR * s[:, :1]).astype(float)
         free = np.einsum("nk,nkj->nj", loose, np.abs(null[:, : s.shape[1]])) > SINGULAR
-        least = -(np.linalg.pinv(jacobian, rcond=SINGULAR) @ (w[good] / size)[..., None])[..., 0]
-        out[good] = np.where(free, np.nan, least * scale)
+        least = -(np.linalg.pinv(jacobian, rcond=SINGULAR) @ w[good][..., None])[..., 0]
+        out[good] = np.where(free, np.nan, least / lengths)
     return [out[:, j] if shape else float(out[0, j]) for j in range(out.shape[1])]
 
 

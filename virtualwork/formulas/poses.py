@@ -14,9 +14,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.describe.description import Description
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.numbers import Complexes, Number, Reals, condition
+from virtualwork.formulas.numbers import Complexes, Number, Reals, condition, real_array
 from virtualwork.formulas.positions import BLOCK, SWEEP, EvenSweep, State, columns, run
 from virtualwork.formulas.rates import Passage, Rates
 from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
@@ -24,6 +25,10 @@ from virtualwork.plan.steps import Group, Plan, Step, Term, path_reads
 
 class Branch(Protocol):
     """One assembly of a mechanism, as its poses need it: what to solve, and which way every loop closes."""
+
+    @property
+    def lock(self) -> Lock:
+        """Of all that is worked out of it."""
 
     @property
     def mechanism(self) -> Description:
@@ -78,6 +83,21 @@ class _Asked(NamedTuple):
     rate: Callable[[Rates, int], Number]
 
 
+def check_rate(name: str, rate: Reals, n: int, k: int) -> None:
+    """Refuse a rate of k inputs that does not go with n poses.
+
+    Raises
+    ------
+    ValueError
+    """
+    shapes = [(n, k), (k,), (1, k)] if k > 1 else [(n,), (n, 1)]
+    if rate.size != 1 and rate.shape not in shapes:
+        raise ValueError(
+            f"{name}: expected a number or shape {shapes[0]}, as the angle has, found {rate.shape}"
+        )
+
+
+@guarded
 class Poses:
     """Poses of an assembly over given inputs and their rates.
 
@@ -103,14 +123,14 @@ class Poses:
     ) -> None:
         self.block_of = block_of
         self._known_steps, self._plain, self._close = branch.known_steps, branch.plain, branch.close
-        self.branch, self.plan = branch, branch.plan
+        self.branch, self.plan, self.lock = branch, branch.plan, branch.lock
         self.mechanism = m = branch.mechanism
         k = len(m.inputs)
         if angle is None:
             given = [e.value for e in m.inputs]
             angle = [a if v is None else v for v, a in zip(given, m.at, strict=True)]
             angle = angle if k == 1 else [angle]
-        q = np.asarray(angle, dtype=float)
+        q = real_array("angle", angle)
         if k == 1:
             q = q.reshape(-1, 1)
         elif q.ndim == 1 and q.shape == (k,):
@@ -120,7 +140,7 @@ class Poses:
         self.inputs = q
         self.n = len(q)
         self.rates = [
-            self._given(value, [getattr(e, name) for e in m.inputs])
+            self._given(name, value, [getattr(e, name) for e in m.inputs])
             for name, value in (("speed", speed), ("acceleration", acceleration), ("jerk", jerk))
         ]
         self.input_error: ArrayLike = 0.0
@@ -131,14 +151,15 @@ class Poses:
         self._blocks: list[State] | None = None
         self._along: dict[int, list[Rates]] = {}
 
-    def _given(self, value: ArrayLike | None, own: list[float | None]) -> list[Number]:
+    def _given(self, name: str, value: ArrayLike | None, own: list[float | None]) -> list[Number]:
         """One rate of the inputs, a scalar or (n,) array for each input."""
         k = len(own)
         if value is None:
             return [v or 0.0 for v in own]
-        v = np.asarray(value, dtype=float)
+        v = real_array(name, value)
         if v.ndim == 0:
             return [float(v)] * k
+        check_rate(name, v, self.n, k)
         if k == 1:
             v = v.reshape(-1)
             return [float(v[0])] if len(v) == 1 else [v]

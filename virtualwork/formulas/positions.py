@@ -246,37 +246,25 @@ def columns(group: Group, st: State) -> list[list[Number]]:
 
     A loop's derivative is Σ column·(unknown's derivative); the real and imaginary parts are its two equations.
     """
+    count, places = len(group.angles), {g: len(group.angles) + j for j, g in enumerate(group.slides)}
     rows = []
     for closure in group.closures:
-        row: list[Number] = []
-        for angle in group.angles:
-            c: Number = None
-            for t in closure.terms:
-                r = ratio(group, t.body, angle)
-                if r:
-                    v = (1j * r * t.z) * st.turn[t.body]
-                    v = v if t.slide is None else v * st.slide[t.slide]
-                    c = v if c is None else c + v
-            row.append(0j if c is None else c)
-        for g in group.slides:
-            c = None
-            for t in closure.terms:
-                if t.slide == g:
-                    v = t.z * st.turn[t.body]
-                    c = v if c is None else c + v
-            row.append(0j if c is None else c)
-        rows.append(row)
+        row: dict[int, Number] = {}
+        for t in closure.terms:
+            for j, r in group.shares.get(t.body, {}).items():
+                v = (1j * r * t.z) * st.turn[t.body]
+                v = v if t.slide is None else v * st.slide[t.slide]
+                row[j] = row[j] + v if j in row else v
+            if t.slide in places:
+                j, v = places[t.slide], t.z * st.turn[t.body]
+                row[j] = row[j] + v if j in row else v
+        rows.append([row.get(j, 0j) for j in range(count + len(places))])
     return rows
 
 
 def ratio(group: Group, body: str, angle: str) -> float:
     """∂θ_body/∂θ_angle inside a group."""
-    if body == angle:
-        return 1.0
-    for tie in group.ties:
-        if tie.body == body:
-            return dict(tie.angle.bases).get(angle, 0.0)
-    return 0.0
+    return group.shares.get(body, {}).get(group.angles.index(angle), 0.0)
 
 
 # --- angles with their whole turns, counted along the one input from the guess outwards --------------------------------

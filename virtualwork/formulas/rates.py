@@ -8,7 +8,7 @@ formula.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from math import comb
 from typing import Any, Protocol
 
@@ -23,7 +23,9 @@ from virtualwork.plan.steps import Angle, Group, Path, Place, Plan, Step, Term, 
 class Passage(Protocol):
     """How the derivatives go on where a Jacobian vanishes though the branch does not end."""
 
-    changes: dict[str, list[Any]]
+    @property
+    def changes(self) -> Mapping[str, tuple[Any, ...]]:
+        """The change points of each group in what was covered."""
 
     def bridge_rates(self, group: Group, q: Number, k: int, x: list[Number], singular: Any) -> list[Number]:
         """The k-th derivatives of a group's unknowns with those at singular poses replaced."""
@@ -177,7 +179,7 @@ class Rates:
         right = self.right_side(group, k)
         cols = self.columns(group)
         if group.name in self.st.folded:
-            self.write(group, k, solve_determined(cols, right, len(group.angles)))
+            self.write(group, k, solve_determined(cols, right))
             return
         if group.kind != "Newton":
             (c1, c2), w = cols[0], right[0]
@@ -186,7 +188,7 @@ class Rates:
         else:
             x = self.st.kind.solve(cols, right)
             if self.passage is not None:
-                bad = singular_poses(cols, len(group.angles), np.size(self.st.inputs[0]))
+                bad = singular_poses(cols, np.size(self.st.inputs[0]))
                 if bad.any():
                     x = self.passage.bridge_rates(group, self.st.inputs[0], k, x, bad)
         if self.passage is not None and self.passage.changes:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.effort import effort
@@ -117,12 +118,13 @@ class JointForces:
         return None if value is None else dot(value, self.rail(block, guide))
 
 
+@guarded
 class Reactions(JointForces):
     """The joint forces over all poses of a scene, each formed when it is first asked for."""
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene.paths, scene.formed)
-        self.scene = scene
+        self.scene, self.lock = scene, scene.lock
 
     def blocks(self) -> list[Block]:
         """The scene's blocks, with what all joints' places hang on."""

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 
+from dalembert.arithmetic.guard import Lock, guarded, own_lock
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
 from dalembert.arithmetic.systems import regularity, solved
 from dalembert.arithmetic.tape import Tape
@@ -46,6 +47,7 @@ NEAR = 1e-18
 NAMES = ("q", "v", "a", "j")
 
 
+@guarded
 class Recording:
     """The formulas of an assembly, written down as far as they are asked for.
 
@@ -96,6 +98,11 @@ class Recording:
         self._done: set[tuple[int, int, int]] = set()
         self._values: dict[Key, Number] = {}
         self._forces: tuple[LoadPaths, JointForces, Block] | None = None
+
+    @property
+    def lock(self) -> Lock:
+        """That of the recorder, into which motions of one assembly, and variants, write."""
+        return own_lock(self.recorder)
 
     # --- solving ------------------------------------------------------------------------------------------------
     def enters(self, group: Group) -> bool:

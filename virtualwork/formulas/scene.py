@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.parts import Rigid
 from virtualwork.formulas.block import Block, Setting
 from virtualwork.formulas.load_case import LoadCase
@@ -18,6 +19,7 @@ from virtualwork.formulas.positions import BLOCK
 from virtualwork.formulas.rates import Rates
 
 
+@guarded
 class Scene:
     """The loads of a mechanism over its poses.
 
@@ -33,13 +35,14 @@ class Scene:
     """
 
     def __init__(self, poses: Poses, *, at_rest: bool = False) -> None:
-        self.poses = poses
+        self.poses, self.lock = poses, poses.lock
         self.mechanism, self.plan = poses.mechanism, poses.plan
         self.setting = Setting(poses, at_rest)
         self.moves, self.formed = self.setting.moves, self.setting.formed
         known = poses.branch.prepared
-        if self.moves not in known:
-            known[self.moves] = LoadCase(self.mechanism, self.plan, self.moves)
+        with self.lock:
+            if self.moves not in known:
+                known[self.moves] = LoadCase(self.mechanism, self.plan, self.moves)
         self.case: LoadCase = known[self.moves]
         self._blocks: dict[tuple[str, ...], list[Block]] = {}
 

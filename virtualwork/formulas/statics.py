@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.guard import guarded
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Number, Reals, cross, imaginary_part, real_part
@@ -112,6 +113,7 @@ def _free_pins(of: JointForces) -> list[Joint]:
     return [joint for joint in of.joints if joint.guide is None and GROUND not in joint.bodies]
 
 
+@guarded
 class Statics:
     """The equations of all links over all poses, solved where they can be.
 
@@ -124,7 +126,7 @@ class Statics:
     """
 
     def __init__(self, reactions: Reactions) -> None:
-        self.reactions = reactions
+        self.reactions, self.lock = reactions, reactions.lock
         self.mechanism = reactions.scene.mechanism
         self.n = reactions.scene.poses.n
         self.unknowns = unknowns(reactions)

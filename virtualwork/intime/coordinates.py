@@ -8,7 +8,8 @@ follow from the pose.
 from __future__ import annotations
 
 import cmath
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -170,9 +171,14 @@ class Coordinates:
         if best is None:
             return None
         assembly, entries, at = best
+        if m.torsion_springs:
+            assembly = wound(assembly, at, twists(motion))
         for known in self.made:
             # what lies along the branch is known of it
-            if known.equations.mechanism.inputs == entries and known.stands_at(at, angles):
+            there = known.equations.mechanism
+            if (there.inputs, there.torsion_springs) == (entries, assembly.mechanism.torsion_springs) and (
+                known.stands_at(at, angles)
+            ):
                 return known, at
         other = Coordinates(type(self.equations)(assembly).sharing(self.equations.share), self.inputs)
         other.made = self.made
@@ -184,6 +190,21 @@ class Coordinates:
         motion = self.motion(np.array([q]))
         apart = [cmath.exp(1j * (motion.link(name).angle[0] - a)) - 1 for name, a in angles.items()]
         return all(abs(x) < SAME for x in apart)
+
+
+def twists(motion: Motion) -> list[float]:
+    """The twists of all torsion springs in one pose, with their whole turns."""
+    return [float(motion.lanes.twist(i)[0]) for i in range(len(motion.mechanism.torsion_springs))]
+
+
+def wound(assembly: Assembly, at: Floats, twisted: Sequence[float]) -> Assembly:
+    """The same assembly with torsion springs that have so much twist at inputs: whole turns are their own."""
+    m, here = assembly.mechanism, twists(Motion(assembly, np.array([at])))
+    turned = [round((x - y) / (2 * math.pi)) for x, y in zip(twisted, here, strict=True)]
+    if not any(turned):
+        return assembly
+    springs = [replace(s, turns=s.turns + n) for s, n in zip(m.torsion_springs, turned, strict=True)]
+    return Assembly.from_guess(replace(m, torsion_springs=tuple(springs)))
 
 
 def measured(motion: Motion, entry: Input, order: int) -> Reals:
@@ -246,8 +267,19 @@ class Monitor:
         state = [np.array([x]) for x in (q, v, v, self.near)]
         return self.coordinates.states(*state)[0][0].tolist()  # type: ignore[no-any-return]
 
-    def until(self, j: int, level: float) -> Watch:
-        """The end where input j has a value."""
+    def until(self, j: int, level: float, side: int, noise: float, touch: float) -> Watch:
+        """The end where input j has a value; see `Watch`."""
         if self.coordinates.own:
-            return Watch("until", lambda t, q, v: q[j], lambda t, q, v, a: v[j], [level], ends=True)
-        return Watch("until", lambda t, q, v: self.inputs(q, v)[j], None, [level], ends=True)
+            return Watch(
+                f"until {j}",
+                lambda t, q, v: q[j],
+                lambda t, q, v, a: v[j],
+                [level],
+                ends=True,
+                side=side,
+                linear=True,
+                touch=touch,
+                noise=noise,
+            )
+        value = lambda t, q, v: self.inputs(q, v)[j]  # noqa: E731
+        return Watch(f"until {j}", value, None, [level], ends=True, side=side, touch=touch, noise=noise)

@@ -21,6 +21,11 @@ REACH, INNER = 0.6, 0.2
 NODES = 8
 # of how far off as many others are tried, until one misses by no more than rounding does anyway
 NARROWER, NARROWINGS, ENOUGH = 0.75, 12, 1e-12
+# of the gap of poses farther off, what that of nearer ones must come to: a gap of truncation falls so, one of rounding
+# does not, and the nearer the poses are the more of their digits are lost
+BETTER = 0.1
+# the gap of a pole is the same from all poses, and larger
+SMOOTH = 1e-3
 
 
 class Crossing:
@@ -37,6 +42,8 @@ class Crossing:
 
     def __init__(self, at: float, reach: float) -> None:
         self.at, self.inner = at, INNER * reach
+        # how far it has been seen to miss each quantity
+        self.missed: Floats = []
         # Chebyshev's points in the square of the distance: the extrapolation inwards makes least of what is rounded
         middle, half = 0.5 * (1 + INNER**2), 0.5 * (1 - INNER**2)
         turns = (math.pi * (i + 0.5) / NODES for i in range(NODES))
@@ -56,35 +63,43 @@ class Crossing:
         total = sum(shares)
         return [sum(map(mul, shares, of)) / total for of in zip(*values, strict=True)]
 
-    def gap(self, f: Callable[[float], Floats]) -> float:
-        """How far interpolation lies from quantities at the ends of what it replaces, relative to their size at the nodes.
+    def gaps(self, f: Callable[[float], Floats], least: Floats) -> Floats:
+        """How far interpolation lies from each quantity at the ends of what it replaces, relative to its size; noted as `missed`.
 
-        From poses too far off it misses them, for what is smooth here has an end (a limit, a fast turn) not far away;
+        That is the largest at the nodes, or the `least` that it is relative to: what vanishes is rounding there. From
+        poses too far off interpolation misses, for what is smooth here has an end (a limit, a fast turn) not far away;
         from poses too near they have lost their digits.
         """
         known, ends = [f(x) for x in self.nodes], (self.at - self.inner, self.at + self.inner)
-        found = {q: f(q) for q in ends}
-        sizes = [max(map(abs, of)) for of in zip(*known, *found.values(), strict=True)]
-        gaps = [
-            abs(x - y) / size if size else 0.0
-            for q in ends
-            for x, y, size in zip(found[q], self.interpolated(known, q), sizes, strict=True)
+        found = [(f(q), self.interpolated(known, q)) for q in ends]
+        sizes = [
+            max(map(abs, of)) for of in zip(least, *known, *(values for values, _ in found), strict=True)
         ]
+        apart = [[abs(x - y) for x, y in zip(*pair, strict=True)] for pair in found]
         # NaN is the worst
-        return max(x if x == x else math.inf for x in gaps)
+        self.missed = [max(x if x == x else math.inf for x in of) for of in zip(*apart, strict=True)]
+        return [x / size if size else 0.0 for x, size in zip(self.missed, sizes, strict=True)]
 
 
-def narrowed(f: Callable[[float], Floats], at: float, widest: float) -> Crossing:
-    """The crossing at an input whose poses tell most of quantities close to it; from no farther off than `widest`."""
-    best, least = Crossing(at, widest), math.inf
+def narrowed(f: Callable[[float], Floats], at: float, widest: float, least: Floats) -> Crossing:
+    """The crossing at an input whose poses tell most of quantities close to it; from no farther off than `widest`.
+
+    Gaps are relative to at least `least` of each quantity; where that is 0, what vanishes cannot be told from rounding.
+    """
+    best, lowest, told = Crossing(at, widest), math.inf, False
     for j in range(NARROWINGS):
         found = Crossing(at, widest * NARROWER**j)
-        gap = found.gap(f)
-        if gap < least:
-            best, least = found, gap
-        if least <= ENOUGH:
+        gaps = found.gaps(f, least)
+        told = told or all(gap < SMOOTH for gap, size in zip(gaps, least, strict=True) if size)
+        if max(gaps) < BETTER * lowest:
+            best, lowest = found, max(gaps)
+        if lowest <= ENOUGH:
             break
-    return best
+    if told:
+        return best
+    # what is not smooth there is left as it is, but for the nearest poses; how far it misses says nothing
+    found.missed = [0.0] * len(least)
+    return found
 
 
 def crossings(

@@ -1,6 +1,7 @@
 """Where lanes end: the step in which an input first passes a level, and its time to rounding.
 
-`path.Walk` asks the same of one motion's watches, step by step.
+`meeting` asks the same of one motion's watches, step by step. A lane whose input turns close to the level is left to
+it: there the polynomial of a step is not exact enough to say whether the level is met.
 """
 
 from __future__ import annotations
@@ -14,41 +15,83 @@ from numpy.typing import NDArray
 from dalembert.arithmetic.tape import Tape
 from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.marching import Nodes, over
-from virtualwork.intime.watch import APART, HALVINGS, NEWTONS, QUARTERS, SMALL, Levels, between
+from virtualwork.intime.meeting import NEAR, NEWTONS
+from virtualwork.intime.passing import at, offsets, turns, zero
+from virtualwork.intime.watch import Levels, noise
+
+Mask = NDArray[np.bool_]
 
 
-def _place(before: Nodes, after: Nodes, j: int, share: Any) -> Reals:
-    """An input within steps of lanes, roughly."""
-    q, v, rate = (of[..., j] for of in (before.q, before.v, before.rates))
-    dq, dv, there = after.q[..., j] - q, after.v[..., j] - v, after.rates[..., j]
-    with np.errstate(all="ignore"):
-        return np.asarray(between([q], [v], [rate], after.t - before.t, [dq], [dv], [there], share)[0][0])
+def sides(node: Nodes, levels: Levels, scale: Reals) -> dict[int, Reals]:
+    """On which side of its level each input lies until it meets it, (lanes,): 1 above, −1 below; 0 where it rests there.
 
-
-def _quarters(nodes: Nodes, j: int, level: float) -> NDArray[np.intp]:
-    """In which quarter of each step input j first passes a level, 1 to 4; 0 where it does not."""
-    steps = nodes.at(np.s_[:-1]), nodes.at(np.s_[1:])
-    before = steps[0].q[..., j]
-    found = np.zeros(before.shape, dtype=np.intp)
-    for i, share in enumerate(QUARTERS, 1):
-        after = _place(*steps, j, share)
-        low, high = np.minimum(before, after), np.maximum(before, after)
-        size = np.maximum(np.maximum(np.abs(low), np.abs(high)), SMALL)
-        hit = (low <= level) & (level <= high) & (np.abs(level - before) > APART * size)
-        found[hit & (found == 0)] = i
+    Parameters
+    ----------
+    node : Nodes (lanes,)
+        Where lanes begin.
+    levels : mapping of an input's number to its level
+    scale : array (lanes, k)
+        What an error of each input is relative to.
+    """
+    found = {}
+    for j, level in levels.items():
+        gap = node.q[:, j] - level
+        gap = np.where(np.abs(gap) <= noise(level, scale[:, j]), 0.0, gap)
+        speed, rate = node.v[:, j], node.rates[:, j]
+        found[j] = np.sign(np.where(gap != 0, gap, np.where(speed != 0, speed, rate)))
     return found
 
 
-def passed(nodes: Nodes, levels: Levels) -> NDArray[np.bool_]:
-    """Which steps pass a level, (rounds − 1, lanes)."""
+def _gaps(nodes: Nodes, j: int, level: float, side: Reals) -> Reals:
+    """Control values of how far input j lies from a level over each step, (rounds − 1, lanes, 6): positive on its side."""
+    before, after = nodes.at(np.s_[:-1]), nodes.at(np.s_[1:])
+    q, v, a = (of[..., j] for of in (before.q, before.v, before.rates))
+    with np.errstate(all="ignore"):
+        changes = offsets(v, a, after.t - before.t, after.q[..., j] - q, after.v[..., j], after.rates[..., j])
+        return np.asarray(side[:, None] * (np.stack(changes, axis=-1) + (q - level)[..., None]))
+
+
+def passed(nodes: Nodes, levels: Levels, sides: Mapping[int, Reals]) -> Mask:
+    """Which steps pass a level, or come so near one that it is not sure, (rounds − 1, lanes)."""
     found = np.zeros(nodes.t[1:].shape, dtype=bool)
     for j, level in levels.items():
-        found |= _quarters(nodes, j, level) > 0
+        rounds, lanes, *_ = _pieces(_gaps(nodes, j, level, sides[j]))
+        found[rounds, lanes] = True
     return found
 
 
-def events(rates: Tape, given: Mapping[str, Any], nodes: Nodes, levels: Levels) -> Reals:
-    """When each lane first meets a level, (lanes,) s; NaN where it does not.
+def _pieces(g: Reals) -> tuple[Any, ...]:
+    """Steps whose polynomials may come to zero inside: round, lane, whether it is not sure, and between which shares."""
+    with np.errstate(all="ignore"):
+        low, high = g.min(axis=-1), g.max(axis=-1)
+        rounds, lanes = np.nonzero((low <= NEAR * (high - low)) & (high > low) & np.isfinite(high - low))
+    b = g[rounds, lanes]
+    if not len(b):
+        none = np.empty(0)
+        return rounds, lanes, none.astype(bool), none, none
+    shares = turns(b)
+    values, spread = at(b, shares), NEAR * (high - low)[rounds, lanes]
+    # what begins at its level is on its own side of it until its first turn
+    inner = (shares > 0) & (shares < 1)
+    doubtful, beyond = inner & (np.abs(values) < spread[:, None]), (values <= 0) & (shares > 0)
+    some = doubtful | beyond
+    first = np.argmax(some, axis=1)
+    rows = np.flatnonzero(some.any(axis=1))
+    first = first[rows]
+    # rounds, lanes and the shares between which it passes
+    return (
+        rounds[rows],
+        lanes[rows],
+        doubtful[rows, first],
+        shares[rows, first - 1],
+        shares[rows, first],
+    )
+
+
+def events(
+    rates: Tape, given: Mapping[str, Any], nodes: Nodes, levels: Levels, sides: Mapping[int, Reals]
+) -> tuple[Reals, Mask]:
+    """When each lane first meets a level, (lanes,) s, NaN where it does not; and in which lanes that is not sure.
 
     Parameters
     ----------
@@ -58,32 +101,34 @@ def events(rates: Tape, given: Mapping[str, Any], nodes: Nodes, levels: Levels) 
         What further enters them.
     nodes : Nodes (rounds, lanes)
     levels : mapping of an input's number to its level
+    sides : mapping of an input's number to array (lanes,)
+        See `sides`.
     """
-    found = np.full(nodes.t.shape[1], np.nan)
+    found, doubt = np.full(nodes.t.shape[1], np.nan), np.zeros(nodes.t.shape[1], dtype=bool)
     for j, level in levels.items():
-        quarter = _quarters(nodes, j, level)
-        lanes = np.flatnonzero(quarter.any(axis=0))
-        if not len(lanes):
+        g = _gaps(nodes, j, level, sides[j])
+        rounds, lanes, doubtful, low, high = _pieces(g)
+        # the first of each lane; they come round by round
+        lane, first = np.unique(lanes, return_index=True)
+        doubt[lane] |= doubtful[first]
+        doubt |= sides[j] == 0
+        if not len(lane):
             continue
-        at = np.argmax(quarter[:, lanes] > 0, axis=0)
-        here, after = nodes.at((at, lanes)), nodes.at((at + 1, lanes))
-        high = 0.25 * quarter[at, lanes]
-        low, up = high - 0.25, _place(here, after, j, high) > level
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            beyond = (_place(here, after, j, middle) > level) == up
-            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-        t, h = here.t, 0.5 * (low + high) * (after.t - here.t)
-        some = {name: x[lanes] for name, x in given.items()}
+        begin = rounds[first]
+        here, after = nodes.at((begin, lane)), nodes.at((begin + 1, lane))
+        whole = after.t - here.t
+        h = guess = zero(g[begin, lane], low[first], high[first]) * whole
+        some = {name: x[lane] for name, x in given.items()}
         # Newton's method over the method's own steps
         for _ in range(NEWTONS):
             dq, dv, _ = over(rates, some, here, h)
             rate = here.v[:, j] + dv[:, j]
             with np.errstate(all="ignore"):
                 change = np.where(rate == 0, 0.0, (level - here.q[:, j] - dq[:, j]) / rate)
-            going = (np.abs(change) > 2 * EPS * np.maximum(np.abs(t), np.abs(h))) & (h + change > 0)
+            going = (np.abs(change) > 2 * EPS * np.maximum(np.abs(here.t), np.abs(h))) & (h + change > 0)
+            h = np.where(h + change > 0, h + change, h)
             if not going.any():
                 break
-            h = np.where(going, h + change, h)
-        found[lanes] = np.fmin(found[lanes], t + h)
-    return found
+        doubt[lane] |= going | ~(np.abs(h - guess) <= NEAR * whole)
+        found[lane] = np.fmin(found[lane], here.t + h)
+    return found, doubt

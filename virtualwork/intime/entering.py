@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -13,7 +14,8 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.formulas.block import Setting
 from virtualwork.formulas.newton import unknowns
 from virtualwork.formulas.poses import Poses
-from virtualwork.formulas.positions import State
+from virtualwork.formulas.positions import State, principal, unwound
+from virtualwork.formulas.winding import NODES
 from virtualwork.intime.watch import Floats, Value
 
 # Newton's steps from one pose to the next; rad or sizes: a change from which one more step leaves rounding alone, and
@@ -58,6 +60,8 @@ class Placed:
         self._state: tuple[Floats, State] = [], State([])
         # springs' twists, followed from the guess over all inputs met
         self._wound: tuple[float, float, Setting] | None = None
+        # with several inputs: of each spring poses that were met, and its twist there
+        self._twists: dict[int, list[tuple[Floats, float]]] = {}
 
     def state(self, q: Floats) -> State:
         """The pose at the inputs; NaN where it cannot be assembled."""
@@ -109,9 +113,30 @@ class Placed:
         return lambda t, q, v: _one(self.state(q).angle[body])
 
     def twist(self, number: int) -> Value:
-        """The twist of a torsion spring: with one input followed from the guess, with several within half a turn of free."""
+        """The twist of a torsion spring, followed from the guess."""
         spring = self.assembly.mechanism.torsion_springs[number]
+        if len(self.assembly.mechanism.inputs) > 1:
+            return lambda t, q, v: self._near(number, q)
         return lambda t, q, v: _one(self._setting(q[0]).twist(self.state(q), spring))
+
+    def _near(self, number: int, q: Floats) -> float:
+        """The twist with several inputs: along a straight line from the nearest pose met before, at first the guess."""
+        m = self.assembly.mechanism
+        spring, met = m.torsion_springs[number], self._twists.setdefault(number, [])
+        units = np.array([m.size if e.is_slide else 2 * math.pi for e in m.inputs])
+        state, setting = self.state(q), self._setting(q[0])
+        if not met:
+            met.append((list(m.at), _one(setting.twist(self.assembly.state(m.at), spring))))
+        apart = np.abs((np.array([at for at, _ in met]) - q) / units).max(axis=1)
+        at, twist = met[int(np.argmin(apart))]
+        within = Setting.within(state, spring)
+        if apart.min() * NODES <= 1:
+            return _one(unwound(within, twist))
+        own = _one(Setting.within(self.assembly.state(tuple(at)), spring))
+        found = _one(setting.along_lines(spring, state.inputs, within, at) + twist - principal(own))
+        if math.isfinite(found):
+            met.append((list(q), found))
+        return found
 
     def _setting(self, q: float) -> Setting:
         """Poses over all inputs met so far, and a turn further."""

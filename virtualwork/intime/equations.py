@@ -51,6 +51,8 @@ NEAR = 0.1
 NEXT = 1e-6
 # a speed of the input, rad/s or m/s, beside whose forces all others are small
 FAST = 1e4
+# of what an interpolation has been seen to miss at two poses, what it may miss
+SEEN = 8.0
 TURN = 2 * math.pi
 EVERYWHERE, NOWHERE = (-math.inf, math.inf), (math.inf, -math.inf)
 
@@ -355,7 +357,9 @@ class Equations:
     def _settled(self, at: float, widest: float) -> Crossing:
         """The crossing at a change point, found once."""
         if (at, widest) not in self._known:
-            self._known[at, widest] = narrowed(self._samples, at, widest)
+            # of an input that moves fast a change of its speed by itself within a radian, or a size
+            least = [0.0, FAST**2 / self.scale[0]]
+            self._known[at, widest] = narrowed(self._samples, at, widest, least)
         return self._known[at, widest]
 
     def _samples(self, q: float) -> Floats:
@@ -369,6 +373,23 @@ class Equations:
         """The change point that an input is close to."""
         found = nearest(self._crossings, q) if self._crossings else None
         return found if found is not None and abs(q - found.at) < found.inner else None
+
+    def blur(self, q: Reals, v: Reals) -> Reals:
+        """How far the acceleration may be wrong over each step between nodes (n,), for interpolation near change points, (n − 1,).
+
+        What an interpolation has been seen to miss counts for the share of the step that lies on its inner part.
+        """
+        low, high = np.minimum(q[1:], q[:-1]), np.maximum(q[1:], q[:-1])
+        speed = np.maximum(np.abs(v[1:]), np.abs(v[:-1])) / FAST
+        found = np.zeros(len(low))
+        for crossing in self._crossings:
+            begin, end = crossing.at - crossing.inner, crossing.at + crossing.inner
+            inside = np.minimum(high, end) - np.maximum(low, begin)
+            whole = np.maximum(high - low, np.finfo(float).tiny)
+            on = np.flatnonzero(inside > 0)
+            still, fast = crossing.missed
+            found[on] += np.minimum(inside[on] / whole[on], 1.0) * (still + fast * speed[on] ** 2)
+        return SEEN * found
 
     def otherwise(self) -> Equations:
         """The same equations, interpolated from other poses near change points."""

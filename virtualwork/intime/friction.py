@@ -19,7 +19,7 @@ from copy import copy
 from functools import cached_property
 from itertools import islice
 from operator import mul
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +31,19 @@ from virtualwork.formulas.block import Block
 from virtualwork.formulas.numbers import Reals, dot, minus
 from virtualwork.intime.equations import Equations, Lost
 from virtualwork.intime.powers import motion_of
-from virtualwork.intime.watch import Floats, Rate, Value, Watch
+from virtualwork.intime.watch import Floats, Rate, Value, Watch, sign
 
 # iterations of friction and joint forces; each gains a factor of some μ r / l
 LIMIT = 400
-CLOSE = 1e-15
+CLOSE, NEARLY = 1e-15, 1e-12
 # rad, sizes, or of the largest rate: joints that turn back so near each other do so together
 TOGETHER = 1e-9
+# of the largest rate, or of a joint's largest friction: what rounding may make of zero
+NOISE = 1e-12
+# states of which is remembered what the tape says
+RECENT = 64
+# ways in which a sticking joint may break away
+WAYS = (" +1", " -1")
 Mode = tuple[int, ...]
 """For each joint that rubs: the sign of its rate, 0 where it sticks."""
 
@@ -61,7 +67,7 @@ class Values(NamedTuple):
     @property
     def signs(self) -> Mode:
         """Which way each joint slides."""
-        return tuple(_sign(rate) for rate in self.rate)
+        return tuple(sign(rate) for rate in self.rate)
 
     def force(self, n: int, phi: Floats) -> float:
         """A joint's force with friction, in size."""
@@ -83,8 +89,12 @@ class Rubbing(Equations):
     """The equations of motion of an assembly with friction, in one mode."""
 
     mode: Mode = ()
+    # which way the one input moves; 0 where it rests, and of several inputs
+    direction = 0.0
     # whether nothing moves in this mode
     locked = False
+    # what rounding may make of zero, in each joint's watch
+    noise: Sequence[float] = ()
 
     def refuse(self, t: float, q: Floats, v: Floats) -> None:
         super().refuse(t, q, v)
@@ -94,26 +104,43 @@ class Rubbing(Equations):
                 "hangs on"
             )
 
-    def in_mode(self, mode: Mode) -> Rubbing:
-        """The same equations in another mode."""
+    def in_mode(self, mode: Mode, direction: float = 0.0) -> Rubbing:
+        """The same equations in another mode, and with another direction of the one input."""
         other = copy(self)
-        other.mode, other.locked = mode, False
+        other.mode, other.direction, other.locked = mode, direction, False
+        other.noise = [0.0] * len(mode)
         return other
 
     # --- the tape ---------------------------------------------------------------------------------------------
     @cached_property
-    def _contacts(self) -> tuple[bool, list[float]]:
-        """Whether joint forces are not determined; μ r of each pair that rubs, or μ in a guide."""
+    def _contacts(self) -> tuple[bool, list[Any]]:
+        """Whether joint forces are not determined, and the pairs that rub."""
         paths, of, _ = self.recording(True, True, False).forces
-        return of.redundant, [
-            coefficient * (radius if joint.guide is None else 1.0)
-            for joint, _, _, coefficient, radius in paths.case.contacts
-        ]
+        return of.redundant, paths.case.contacts
 
-    @property
+    @cached_property
     def arms(self) -> list[float]:
         """The friction of each joint over its force: μ r of a pin, μ of a guide."""
-        return self._contacts[1]
+        return [
+            coefficient * (radius if joint.guide is None else 1.0)
+            for joint, _, _, coefficient, radius in self._contacts[1]
+        ]
+
+    @cached_property
+    def sizes(self) -> list[float]:
+        """What the rate of each joint is relative to: 1 in a pin, the mechanism's size in a guide."""
+        return [1.0 if joint.guide is None else self.mechanism.size for joint, *_ in self._contacts[1]]
+
+    def slid_at(self, t: Reals, q: Reals, v: Reals) -> Reals:
+        """The rates of the joints over what they are relative to, in many states: (joints, n)."""
+        found = self._run(self.rates, t, q, v)
+        rates = np.array([found[f"rate {n}"] for n in range(len(self.sizes))])
+        return np.asarray(rates / np.array(self.sizes)[:, None])
+
+    @property
+    def names(self) -> list[str]:
+        """The joints that rub."""
+        return [joint.name for joint, *_ in self._contacts[1]]
 
     @cached_property
     def _recorded(self) -> tuple[Tape, Tape]:
@@ -144,6 +171,21 @@ class Rubbing(Equations):
         ------
         Lost
         """
+        state = t, *q, *v
+        values = self._recent.get(state)
+        if values is None:
+            values = self._values(t, q, v)
+            if len(self._recent) >= RECENT:
+                self._recent.clear()
+            self._recent[state] = values
+        return values
+
+    @cached_property
+    def _recent(self) -> dict[tuple[float, ...], Values]:
+        """What several watches ask of the same states."""
+        return {}
+
+    def _values(self, t: float, q: Floats, v: Floats) -> Values:
         self._cover(q[0])
         try:
             found = self._function(*self._filled(self.rates, t, q, v))
@@ -191,7 +233,8 @@ class Rubbing(Equations):
             Where the joints lock: no force balances its own friction.
         """
         c, mode = len(self.arms), self.mode
-        stuck = [n for n in range(c) if not mode[n]]
+        # where one input moves a joint of mode 0 does not move with it: nothing rubs
+        stuck = [n for n in range(c) if not mode[n]] if self.k > 1 else []
         inverse = np.linalg.pinv([[values.slips[n][m] for m in stuck] for n in stuck]) if stuck else None
         phi = [0.0] * c
         for _ in range(LIMIT):
@@ -211,15 +254,15 @@ class Rubbing(Equations):
             phi = after
             if change <= CLOSE * max(map(abs, phi)):
                 return phi
-        if change <= 1e-12 * max(map(abs, phi)):
+        if change <= NEARLY * max(map(abs, phi)):
             return phi
         raise Lost
 
     # --- modes ----------------------------------------------------------------------------------------------------
     def tendency(self, t: float, q: Floats, direction: float) -> float:
         """The acceleration of the one input, at rest, if it began to move in a direction; 0 where friction locks it."""
-        mode = self.values(t, q, [direction]).signs
         try:
+            mode = self._along(t, q, direction)
             values = self.values(t, q, [0.0])
             return values.moved(self.in_mode(mode).friction(values))[0]
         except Lost:
@@ -237,14 +280,18 @@ class Rubbing(Equations):
         if self.k == 1:
             if of.startswith("away"):
                 direction = float(of.removeprefix("away"))
-                return self.in_mode(self.values(t, q, [direction]).signs), v
-            if ended and of != "rest":
-                return self.in_mode(self._turned_back(t, q, v[0])), v
-            if ended:
-                v = [0.0]
-            found = self.in_mode(self._decided_alone(t, q, v))
-            found.locked = not any(found.mode)
+            elif ended and of != "rest":
+                direction = self.direction
+            else:
+                v = [0.0] if ended else v
+                direction = self._decided_alone(t, q, v)
+            found = self.in_mode(self._along(t, q, direction), direction)
+            found.locked = not direction
+            if direction:
+                _, _, size = self._coefficients(t, q, direction)
+                found.noise = [NOISE * size] * len(self.arms)
             return found, v
+        of, _, broken = of.partition(" ")
         rates = self.values(t, q, v).rate
         still = TOGETHER * max(map(abs, rates))
         resting = (
@@ -252,42 +299,78 @@ class Rubbing(Equations):
             if ended
             else [n for n, rate in enumerate(rates) if not rate]
         )
-        found = self.in_mode(self._decided(t, q, v, resting))
-        stuck = [n for n, s in enumerate(found.mode) if not s]
+        mode = self._decided(t, q, v, resting)
+        if broken:
+            # friction is at its largest and can hold the joint no longer, though it does not yet move
+            mode = tuple(int(broken) if str(n) == of else s for n, s in enumerate(mode))
+        found = self.in_mode(mode)
+        v = found._held(t, q, v)
+        values = found.values(t, q, v)
+        fastest, phi = max(map(abs, values.rate)), found.friction(values)
+        found.noise = [
+            NOISE * (fastest if s else arm * values.force(n, phi))
+            for n, (s, arm) in enumerate(zip(mode, self.arms, strict=True))
+        ]
+        return found, v
+
+    def _held(self, t: float, q: Floats, v: Floats) -> Floats:
+        """The speeds at the beginning of this mode, without what rounding leaves in joints that stick."""
+        stuck = [n for n, s in enumerate(self.mode) if not s]
         if not stuck:
-            return found, v
+            return v
         by_input = np.array([self.values(t, q, row).rate for row in np.eye(self.k).tolist()]).T[stuck]
         inverse = np.linalg.pinv(by_input)
-        found.locked = not any(found.mode) and np.linalg.matrix_rank(by_input) == self.k
-        # without what rounding leaves in joints that stick
+        self.locked = not any(self.mode) and np.linalg.matrix_rank(by_input) == self.k
         slowed = np.array(v) - inverse @ (by_input @ np.array(v))
-        return found, [0.0] * self.k if found.locked else slowed.tolist()
+        return [0.0] * self.k if self.locked else slowed.tolist()
 
-    def _turned_back(self, t: float, q: Floats, v: float) -> Mode:
-        """The mode after a joint turns back while the one input goes on.
+    def _along(self, t: float, q: Floats, direction: float) -> Mode:
+        """The mode while the one input moves in a direction, just beyond a pose.
 
-        Others may do so at the same pose: a chain that another link drives turns back as a whole.
+        At a dead point of a joint its rate is zero: what counts is its sign after it. Where that of a joint is zero
+        beyond it too, the joint does not move.
         """
-        beside = math.copysign(TOGETHER * self.scale[0], v)
-        before, after = (self.values(t, [q[0] + x], [v]).rate for x in (-beside, beside))
-        changed = (_sign(b) if a * b < 0 else s for a, b, s in zip(before, after, self.mode, strict=True))
-        return tuple(changed)
+        if not direction:
+            return (0,) * len(self.arms)
+        here, after, size = self._coefficients(t, q, direction)
+        still = TOGETHER * size
+        signs = (sign(a if abs(a) > 1000 * still else b) for a, b in zip(here, after, strict=True))
+        moves = (max(abs(a), abs(b)) > 1e-4 * still for a, b in zip(here, after, strict=True))
+        return tuple(s if m else 0 for s, m in zip(signs, moves, strict=True))
+
+    def _coefficients(self, t: float, q: Floats, direction: float) -> tuple[Floats, Floats, float]:
+        """The joints' rates as the one input moves, at a pose and just beyond it, and what they come to.
+
+        At a dead point of the coordinate all joints may rest: there they grow with the way.
+        """
+        beside = math.copysign(TOGETHER * self.scale[0], direction)
+        states = ((t, [x], [math.copysign(1.0, direction)]) for x in (q[0], q[0] + beside))
+        here, after = (
+            [rate / size for rate, size in zip(self.values(*state).rate, self.sizes, strict=True)]
+            for state in states
+        )
+        return (
+            here,
+            after,
+            max([*map(abs, here), *(abs(b - a) / TOGETHER for a, b in zip(here, after, strict=True))]),
+        )
 
     def left(self, ended: str, before: Mode) -> dict[str, float]:
-        """The levels at which a path in this mode begins: what the end of the last one, in another mode, has met."""
+        """The levels at which a path in this mode begins: those of joints that have changed theirs."""
         if not ended.startswith("friction"):
             return {}
-        both = enumerate(zip(before, self.mode, strict=True))
-        return {ended: 0.0} | {f"friction {n}": 0.0 for n, (a, b) in both if a == -b}
+        changed = (n for n, (a, b) in enumerate(zip(before, self.mode, strict=False)) if a != b)
+        joints = [f"friction {n}{way}" for n in changed for way in ("", *WAYS)]
+        return dict.fromkeys((ended, *joints), 0.0)
 
-    def _decided_alone(self, t: float, q: Floats, v: Floats) -> Mode:
-        """The mode of one degree of freedom: it moves, begins to move one way, or sticks."""
+    def _decided_alone(self, t: float, q: Floats, v: Floats) -> float:
+        """Which way the one input goes on: it moves, begins to move one way, or stays, 0."""
         if v[0]:
-            return self.values(t, q, v).signs
+            return math.copysign(1.0, v[0])
         for direction in (1.0, -1.0):
             if self.tendency(t, q, direction) * direction > 0:
-                return self.values(t, q, [direction]).signs
-        return (0,) * len(self.arms)
+                return direction
+        return 0.0
 
     def _decided(self, t: float, q: Floats, v: Floats, resting: Sequence[int]) -> Mode:
         """The mode of several degrees of freedom in which the motion goes on where some joints rest.
@@ -305,12 +388,16 @@ class Rubbing(Equations):
                     phi[n] = -signs[n] * most
                 elif values.slips[n][n] > 0:
                     phi[n] = min(most, max(-most, phi[n] - values.slid(n, phi) / values.slips[n][n]))
-            if max(abs(x - y) for x, y in zip(phi, before, strict=True)) <= CLOSE * max(map(abs, phi)):
+            change = max(abs(x - y) for x, y in zip(phi, before, strict=True))
+            if change <= CLOSE * max(map(abs, phi)):
                 break
+        else:
+            if resting and not change <= NEARLY * max(map(abs, phi)):
+                raise Lost
         for n in resting:
             most, slip = self.arms[n] * values.force(n, phi), values.slid(n, phi)
             slides = abs(phi[n]) >= most * (1 - 1e-9) and abs(slip) > 1e-9 * abs(values.slip[n])
-            signs[n] = _sign(slip) if slides else 0
+            signs[n] = sign(slip) if slides else 0
         return tuple(signs)
 
     def watches(self) -> list[Watch]:
@@ -318,42 +405,55 @@ class Rubbing(Equations):
         if self.locked and self.k == 1:
             return [self._breaking_away(1), self._breaking_away(-1)]
         found = super().watches()
+        every = range(len(self.mode))
         if self.k > 1:
-            return found + [self._sliding(n) if s else self._sticking(n) for n, s in enumerate(self.mode)]
-        rest = _watch("rest", lambda t, q, v: v[0], lambda t, q, v, a: a[0])
-        return [*found, rest, *(self._turning_back(n) for n in range(len(self.mode)))]
+            for n, s in enumerate(self.mode):
+                found += [self._sliding(n)] if s else [self._sticking(n, way) for way in WAYS]
+            return found
+        rest = _watch(
+            "rest", lambda t, q, v: self.direction * v[0], lambda t, q, v, a: self.direction * a[0], True
+        )
+        return [*found, rest, *(self._turning_back(n) for n in every if self.mode[n])]
 
     def _breaking_away(self, direction: int) -> Watch:
         """A mechanism that stands, and would begin to move one way."""
-        return _watch(f"away {direction}", lambda t, q, v: self.tendency(t, q, float(direction)))
+        return _watch(f"away {direction}", lambda t, q, v: -direction * self.tendency(t, q, float(direction)))
 
     def _turning_back(self, n: int) -> Watch:
         """A joint whose rate changes its sign while the one input goes on: its coefficient does."""
-        return _watch(str(n), lambda t, q, v: self.values(t, q, [1.0]).rate[n])
+        return _watch(
+            str(n),
+            lambda t, q, v: self.mode[n] * self.values(t, q, [self.direction]).rate[n],
+            noise=self.noise[n],
+        )
 
     def _sliding(self, n: int) -> Watch:
+        """A joint that slides comes to rest."""
+        way = self.mode[n]
+
         def slip(t: float, q: Floats, v: Floats, rates: Floats) -> float:
             values = self.values(t, q, v)
-            return values.slid(n, self.friction(values))
+            return way * values.slid(n, self.friction(values))
 
-        return _watch(str(n), lambda t, q, v: self.values(t, q, v).rate[n], slip)
+        return _watch(str(n), lambda t, q, v: way * self.values(t, q, v).rate[n], slip, noise=self.noise[n])
 
-    def _sticking(self, n: int) -> Watch:
+    def _sticking(self, n: int, way: str) -> Watch:
+        """A joint that sticks breaks away, one way: the friction against it is as large as it can be."""
+        side = int(way)
+
         def spare(t: float, q: Floats, v: Floats) -> float:
             values = self.values(t, q, v)
             phi = self.friction(values)
-            return self.arms[n] * values.force(n, phi) - abs(phi[n])
+            return self.arms[n] * values.force(n, phi) + side * phi[n]
 
-        return _watch(str(n), spare)
-
-
-def _watch(name: str, value: Value, rate: Rate | None = None) -> Watch:
-    """What ends a path, in a mode, where it is zero."""
-    return Watch(f"friction {name}", value, rate, [0.0], ends=True)
+        return _watch(f"{n}{way}", spare, noise=self.noise[n])
 
 
-def _sign(x: float) -> int:
-    return (x > 0) - (x < 0)
+def _watch(
+    name: str, value: Value, rate: Rate | None = None, linear: bool = False, noise: float = 0.0
+) -> Watch:
+    """What ends a path, in a mode, where it is no longer positive."""
+    return Watch(f"friction {name}", value, rate, [0.0], ends=True, side=1, linear=linear, noise=noise)
 
 
 def _second(block: Block, guide: int) -> Number:

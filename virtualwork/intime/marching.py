@@ -60,7 +60,10 @@ def body(k: int, passed: tuple[str, ...]) -> Tape:
         written.several(f"{x}{j}" for j in range(k)) for x in ("lq", "lv", "f", "scale")
     )
     whole = end - t
-    length = tried(h, whole)
+    part = tried(h, whole)
+    there = RECORDED.select(part - whole, end, RECORDED.select(whole - part, t + part, end))
+    # as long as the times at its ends say, whatever their rounding
+    length = there - t
     done = written.step(length)
     error = size(done.third, done.fifth, allowed(tolerance, scale, q, fastest, v, done.dv))
     # the eighth root, by three; NaN where the error is
@@ -82,11 +85,10 @@ def body(k: int, passed: tuple[str, ...]) -> Tape:
     for j in range(k):
         out[f"f{j}"] = most(fastest[j], abs(out[f"v{j}"]))
     out |= {name: taken(x, y) for name, x, y in zip(rates, done.rates, a, strict=True)}
-    there = RECORDED.select(length - whole, end, RECORDED.select(whole - length, t + length, end))
     out["t"] = taken(there, t)
     out["work"] = taken(work + done.work, work)
     out["stiff"] = taken(stiffer(stiff, stiffness, DormandPrince.stable), stiff)
-    after = taken(longer(length, wanted, h, grow), shorter(length, wanted))
+    after = taken(longer(part, wanted, h, grow), shorter(part, wanted))
     out["h"] = RECORDED.select(left, after, h)
     out["grow"] = RECORDED.select(left, taken(GROW, 1.0), grow)
     # it goes on where the end is not reached, the next step is not too short, and nothing is stiff

@@ -32,7 +32,14 @@ def motion_of(
     accelerations and quantities (`more`) are those without them, and beside each stands how it changes with each:
     `NAME FRICTION`.
     """
-    again, more = recording.recorder, more or {}
+    with recording.lock:
+        return _motion_of(recording, k, frictions, more or {})
+
+
+def _motion_of(
+    recording: Recording, k: int, frictions: Sequence[str], more: Mapping[str, Number]
+) -> tuple[Tape, Tape]:
+    again = recording.recorder
     paths, _, block = recording.forces
     efforts, accelerations = [f"effort {j}" for j in range(k)], names(k)[2][:-1]
     motion = recording.tape([("effort", j) for j in range(k)], more)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
 from virtualwork.describe.parts import Input
@@ -22,7 +23,7 @@ from virtualwork.intime.friction import Rubbing
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.travel import UNDECIDED, Travel, travel
 from virtualwork.intime.walk import MOST
-from virtualwork.intime.watch import Floats
+from virtualwork.intime.watch import Floats, Levels
 from virtualwork.motion import Motion
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from virtualwork.animation import JointForce, Series
 
 
+@guarded
 @dataclass(frozen=True, eq=False)
 class Run:
     """What `Mechanism.simulate` has found.
@@ -62,6 +64,11 @@ class Run:
     coarse: Travel = field(repr=False)
     share: float = field(repr=False)
     warnings: tuple[str, ...] = ()
+
+    @property
+    def lock(self) -> Lock:
+        """That of the assembly, whose equations of motion it has."""
+        return self.assembly.lock
 
     @property
     def ended(self) -> str:
@@ -183,6 +190,18 @@ def simulate(
     until: Mapping[str, float] | None = None,
 ) -> Run:
     """Let go of the inputs; see `Mechanism.simulate`."""
+    with assembly.lock:
+        return _simulated(assembly, times, angle, speed, accuracy, until)
+
+
+def _simulated(
+    assembly: Assembly,
+    times: ArrayLike,
+    angle: ArrayLike | None,
+    speed: ArrayLike | None,
+    accuracy: float,
+    until: Mapping[str, float] | None,
+) -> Run:
     m, t = assembly.mechanism, rising(times)
     k = len(m.inputs)
     q = _state("angle", angle, [e.value for e in m.inputs], list(m.at), k)
@@ -206,7 +225,9 @@ def simulate(
         ways = own if tries % 2 else own.otherwise()
         # no farther than both go
         last = coarse.end if coarse.ended == UNDECIDED else end
-        fine = travel(ways, start, last, tolerance / (GAIN + 1), levels, method, accuracy, coarse)
+        # nothing is asked below rounding
+        finer = max(LEAST, tolerance / (GAIN + 1))
+        fine = travel(ways, start, last, finer, levels, method, accuracy, coarse)
         if last < end and fine.ended == "end":
             fine.ended = coarse.ended
         coarse.backwards()
@@ -214,9 +235,12 @@ def simulate(
         found = reached(t, fine.end)
         error = _error(fine, coarse, found, part)
         worst = float((error / scale).max())
-        if worst <= accuracy or tolerance <= LEAST or tries == TRIES - 1 or fine.steps > MOST / 2:
+        least = float((_least(fine, fine.nodes) / scale).max())
+        if worst <= accuracy or least > accuracy or tolerance <= LEAST or fine.steps > MOST / 2:
             break
-        tolerance /= GAIN + 1
+        tolerance = finer
+    if fine.ended == "end" and _arrives(fine, coarse, levels, part):
+        fine.ended = "until"
     _refuse_lost_energy(fine, max(accuracy, worst))
     run = Run(assembly, found, *fine.at(found), error, fine, coarse, part)
     return replace(run, warnings=(*equations.warnings, *_said(run, accuracy, worst, until, t)))
@@ -225,10 +249,28 @@ def simulate(
 def _error(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
     """How far the inputs may be from the truth at times, (n, k)."""
     nodes = coarse.nodes[coarse.nodes <= fine.end]
-    q, v, a, _ = fine.at(nodes)
-    found = spread(q, coarse.at(nodes)[0], part) + rounding(nodes, q, v, a)
+    found = spread(fine.at(nodes)[0], coarse.at(nodes)[0], part) + _least(fine, nodes)
     # between two nodes that of the later one
     return np.asarray(found[np.minimum(np.searchsorted(nodes, t), len(nodes) - 1)])
+
+
+def _least(fine: Travel, t: Reals) -> Reals:
+    """What no shorter steps make smaller: rounding, and interpolation near change points, (n, k)."""
+    q, v, a, _ = fine.at(t)
+    return np.asarray(rounding(t, q, v, a) + fine.blur(t)[:, None])
+
+
+def _arrives(fine: Travel, coarse: Travel, levels: Levels, part: float) -> bool:
+    """Whether an input comes to its level at the last time, but for the error of the motion."""
+    if not levels:
+        return False
+    t = fine.nodes
+    gap, error = fine.at(t)[0], _error(fine, coarse, t, part)
+    for j, level in levels.items():
+        beside = np.abs(gap[:, j] - level) <= error[:, j]
+        if beside[-1] and not beside.all():
+            return True
+    return False
 
 
 def _refuse_lost_energy(fine: Travel, error: float) -> None:

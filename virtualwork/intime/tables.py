@@ -63,7 +63,7 @@ def kinks(load: Tabled, plan: Plan, name: str) -> Watch | None:
         return None
     rows = [x for x, _ in load.table]
     period = rows[-1] - rows[0] if load.periodic else None
-    return Watch(name, *of, rows[:-1] if period else rows, period)
+    return Watch(name, *of, rows[:-1] if period else rows, period, linear=True)
 
 
 def ends(load: Tabled, plan: Plan, t: float, q: Floats, v: Floats) -> str:

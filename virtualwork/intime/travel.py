@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -13,14 +14,19 @@ from virtualwork.formulas.numbers import EPS, Reals
 from virtualwork.intime.coordinates import BETTER, FOLDING, Coordinates, Monitor, measured
 from virtualwork.intime.equations import TURN, Lost
 from virtualwork.intime.friction import Rubbing
+from virtualwork.intime.gains import gains
 from virtualwork.intime.implicit import Radau
 from virtualwork.intime.joined import Joined
 from virtualwork.intime.path import Method, Path, followed
 from virtualwork.intime.walk import MOST, Walk
-from virtualwork.intime.watch import Floats
+from virtualwork.intime.watch import Floats, noise
 
 # changes of coordinates in one simulation
 CHANGES = 10_000
+# changes of the mode of friction at one time, for each joint that rubs
+MODES = 3
+CHATTERS = "friction does not settle there which joints stick and which slide"
+GAINS = "friction would drive joint {} there: which way it slides is not settled"
 UNDECIDED = "it comes so near a change point that rounding decides how it goes on"
 NO_FURTHER = "it can go no further: a limit, or a pose where its motion is not determined"
 
@@ -87,6 +93,18 @@ class Travel:
         """The times between steps."""
         return np.unique(np.concatenate([leg.nodes.t for leg in self.legs]))
 
+    def blur(self, times: Reals) -> Reals:
+        """How far the coordinate may be wrong for interpolation near change points, at times between nodes too, (n,)."""
+        t, places, speed, place = [self.legs[0].nodes.t[:1]], [np.zeros(1)], 0.0, 0.0
+        for leg in self.legs:
+            if leg.steps and leg.equations.crosses:
+                nodes, h = leg.nodes, np.diff(leg.nodes.t)
+                speeds = speed + np.cumsum(leg.equations.blur(nodes.q[:, 0], nodes.v[:, 0]) * h)
+                way = place + np.cumsum(speeds * h)
+                t, places = [*t, nodes.t[1:]], [*places, way]
+                speed, place = float(speeds[-1]), float(way[-1])
+        return np.interp(times, np.concatenate(t), np.concatenate(places))
+
     @property
     def halves(self) -> Floats:
         """The times of the nodes, and in the middle between them."""
@@ -150,7 +168,7 @@ def travel(
     tolerance: float,
     until: Mapping[int, float],
     method: Method,
-    undecided: float,
+    accuracy: float,
     like: Travel | None = None,
 ) -> Travel:
     """Go from a state of the inputs to a time, or until an input has a value.
@@ -162,17 +180,18 @@ def travel(
     until : mapping of an input's number to its value
     method : Method
         Where it is found to be stiff, the implicit one goes on.
-    undecided : float
-        The accuracy wanted: where a loop is so nearly folded, and no other coordinate leads on, that rounding of the rates
+    accuracy : float
+        What is wanted: a level that ends the motion is met so nearly, where the motion turns back there; where a loop is so nearly folded, and no other coordinate leads on, that rounding of the rates
         is more than it, rounding decides how the motion goes on.
     like : Travel, optional
         Each of its steps is done in two halves.
     """
-    found = Travel()
+    found, scale = Travel(), coordinates.equations.scale
+    sides = dict.fromkeys(until, 0)
     plan = [] if like is None else like.halves
     t, q, v = start
     inputs, work = q, 0.0
-    ended = ""
+    ended, idle, fastest = "", 0, 0.0
     while True:
         equations = coordinates.equations
         left: dict[str, float] = {}
@@ -185,16 +204,41 @@ def travel(
                 return found
             # in the mode of this leg, out of which the next one comes
             coordinates, left = coordinates.of(equations), equations.left(ended, before)
+            idle = idle + 1 if found.legs and not found.legs[-1].steps else 0
+            if idle > MODES * (1 + len(equations.mode)):
+                found.ended = CHATTERS
+                return found
         below = FOLDING if not coordinates.folds(q) else coordinates.margin(q) / BETTER
         monitor = Monitor(coordinates, inputs, below, bool(until) and not coordinates.own, q[0])
-        watches = [*(monitor.until(j, level) for j, level in until.items()), *equations.watches()]
+        ends = [
+            monitor.until(j, level, sides[j], float(noise(level, scale[j])), accuracy * scale[j])
+            for j, level in until.items()
+        ]
+        if not found.legs:
+            # levels at which the motion begins
+            left |= {
+                watch.name: level
+                for watch, (j, level) in zip(ends, until.items(), strict=True)
+                if abs(q[j] - level) <= watch.noise
+            }
+        watches = [*ends, *equations.watches()]
         most = MOST if like is None else MOST + 2 * like.steps
         path = Path(coordinates, method, inputs)
         way = path, end, tolerance, watches, equations.stops, monitor, most - found.steps, left, plan
         Walk(*way).go(t, q, v, work)
         found.legs.append(path)
         found.ended = path.ended
-        if path.ended in ("end", "until", "budget") or len(found.legs) > CHANGES:
+        if isinstance(equations, Rubbing):
+            fastest, gain = gains(equations, path.nodes, fastest)
+            if gain is not None:
+                del path.rows[max(1, gain[0]) :]
+                found.ended = path.ended = GAINS.format(gain[1])
+                return found
+        if path.ended.startswith("until"):
+            found.ended = "until"
+            return found
+        sides = {j: watch.side for j, watch in zip(until, ends, strict=True)}
+        if path.ended in ("end", "budget") or len(found.legs) > CHANGES:
             return found
         if path.ended == "undecided":
             # the last node lies where that has been
@@ -213,7 +257,7 @@ def travel(
         other = None if found.ended else coordinates.better(q, inputs)
         if (
             other is None
-            and coordinates.margin(q) * undecided < EPS
+            and coordinates.margin(q) * accuracy < EPS
             and not coordinates.equations.passes(q[0])
         ):
             path.ended = "undecided" if path.ended == "folding" else path.ended
@@ -228,4 +272,7 @@ def travel(
             coordinates, q = other
             v = [float(measured(motion, entry, 1)[0]) for entry in coordinates.equations.mechanism.inputs]
             if isinstance(equations, Rubbing) and isinstance(coordinates.equations, Rubbing):
-                coordinates = coordinates.of(coordinates.equations.in_mode(equations.mode))
+                direction = math.copysign(1.0, v[0]) if v[0] else 0.0
+                coordinates = coordinates.of(coordinates.equations.in_mode(equations.mode, direction))
+                # from rest it is decided again
+                ended = ended if any(v) else ""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dalembert.arithmetic.engines import run
+from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.tape import Tape
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import MechanismError
@@ -25,7 +26,7 @@ from virtualwork.family.written import Written
 from virtualwork.formulas.numbers import Reals
 from virtualwork.intime.control import first_steps
 from virtualwork.intime.coordinates import FOLDING
-from virtualwork.intime.ends import events, passed
+from virtualwork.intime.ends import events, passed, sides
 from virtualwork.intime.estimate import FIRST, GAIN, LEAST, TRIES, rounding, share, spread
 from virtualwork.intime.marching import Nodes, beginning, follow, march, over
 from virtualwork.intime.powers import motion_of, names
@@ -108,6 +109,7 @@ class Runs:
             of[rows, :n] = values
 
 
+@guarded
 class Variants(Family):
     """Variants of a mechanism that can be let go; `Mechanism.vary` makes them."""
 
@@ -271,12 +273,15 @@ class _Lanes:
             past = np.isnan(times)
             error = self._error(coarse, nodes, times, share(tolerance))
             error[past] = np.nan
+            for j, level in self.levels.items():
+                beside = np.abs(nodes.q[-1, :, j] - level) <= error[:, -1, j]
+                alone[rows[self.late[rows] & beside]] = True
             worst = np.where(past[..., None], 0.0, error / self.scale[rows, None]).max(
                 axis=(1, 2), initial=0.0
             )
             holds = worst <= accuracy
             self._put(runs, rows, np.flatnonzero(holds), nodes, times[holds], error[holds])
-            tolerance /= GAIN + 1
+            tolerance = max(LEAST, tolerance / (GAIN + 1))
             last = tolerance <= LEAST or tries == TRIES - 1 or len(nodes.t) > MOST
             # what does not hold is tried again, and at last left to say itself why not
             again = ~holds & ~alone[rows] & np.isfinite(worst) & (not last)
@@ -298,6 +303,7 @@ class _Lanes:
         q, v, scale = self.q[rows], self.v[rows], self.scale[rows].T
         slopes = self._run(self.rates, rows, q, v)
         first = Nodes(np.column_stack([np.full(n, t[0]), q, v, slopes, np.zeros(n)]), self.k)
+        ways = sides(first, self.levels, scale.T)
         fastest, h = first_steps(span, tolerance, scale, q.T, v.T, slopes.T)
         state = beginning(first, h, fastest)
         state["left"] = np.where(np.isfinite(slopes).all(axis=1) & (span > 0), 1.0, 0.0)
@@ -309,10 +315,10 @@ class _Lanes:
             taken += len(found.t)
             if self.levels:
                 # one step beyond the event is enough
-                hits = passed(parts[-2].then(found), self.levels)[:-1].any(axis=0)
+                hits = passed(parts[-2].then(found), self.levels, ways)[:-1].any(axis=0)
                 state["left"] = np.where(hits, 0.0, state["left"])
         whole = parts[0].then(*parts[1:])
-        hits = passed(whole, self.levels)
+        hits = passed(whole, self.levels, ways)
         ended = (whole.t[-1] >= end) | hits.any(axis=0)
         if self.levels:
             beyond = np.where(hits.any(axis=0), np.argmax(hits, axis=0) + 2, len(whole.t))
@@ -332,7 +338,9 @@ class _Lanes:
         """The times up to each lane's event, it the last, (lanes, n); then NaN."""
         found = np.tile(self.t, (len(rows), 1))
         if self.levels:
-            ends = events(self.rates, self.some(rows), nodes, self.levels)
+            ways = sides(nodes.at(0), self.levels, self.scale[rows])
+            ends, doubt = events(self.rates, self.some(rows), nodes, self.levels, ways)
+            alone[rows[doubt]] = True
             self.late[rows] = np.isnan(ends)
             # the level that the coarser way passed at its very end
             alone[rows[np.isnan(ends) & (nodes.t[-1] < self.t[-1])]] = True

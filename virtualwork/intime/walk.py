@@ -6,12 +6,10 @@ import math
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from dalembert.arithmetic.engines import rounds
-from virtualwork.formulas.numbers import EPS
 from virtualwork.intime.control import (
     GROW,
     SAFETY,
@@ -30,25 +28,19 @@ from virtualwork.intime.coordinates import Monitor
 from virtualwork.intime.equations import Lost
 from virtualwork.intime.explicit import DormandPrince
 from virtualwork.intime.marching import ROUNDS, Nodes, beginning, follow, loop, march
+from virtualwork.intime.meeting import Meeting, Stretch
 from virtualwork.intime.path import Path, compiled
 from virtualwork.intime.powers import state_names
-from virtualwork.intime.watch import HALVINGS, NEWTONS, QUARTERS, Floats, Step, Watch, between
+from virtualwork.intime.watch import Floats, Step, Watch
 
 # steps of one simulation
 MOST = 200_000
 # of a planned step's error over the one allowed: halves of what a tolerance chose may be so much rougher than this one's
 ROUGH = 256.0
+# of a planned step: one so short is left out
+SLIVER = 1e-3
 # what a step raises that cannot be done
 UNDONE = (Lost, ZeroDivisionError, ValueError, OverflowError)
-
-
-class Meeting(NamedTuple):
-    """A watch, the level it has met, the length of the step that ends there, and that step."""
-
-    watch: Watch
-    level: float
-    h: float
-    done: Step
 
 
 @dataclass
@@ -103,6 +95,7 @@ class Walk:
         self.fastest, self.h = [float(x) for x in fastest], float(h)
         # what rounding leaves over
         self.low_q, self.low_v = [0.0] * equations.k, [0.0] * equations.k
+        self.still: Mapping[str, float] = {}
         by_code = not self.stops or bool(self.plan)
         while not path.ended:
             if not path.end < self.end:
@@ -126,26 +119,32 @@ class Walk:
             return
         least = shortest(t, self.span)
         stop = min(_next(self.stops, t), self.end)
-        before, whole, mark = self.h, stop - t, _next(self.plan, t + least)
+        before, whole, mark = self.h, stop - t, self._mark(t + least)
         planned = mark < math.inf
         # where a step of the plan could not be done it is shorter
         h = min(mark - t, whole, before if self.cut else math.inf) if planned else tried(before, whole)
-        if h < least:
+        if h < min(least, whole):
             path.ended = "lost"
             return
-        taken, wanted = self._tried(h, ROUGH if planned else 1.0)
+        # as long as the times at its ends say, whatever their rounding
+        there = stop if h == whole else mark if h == mark - t else t + h
+        length = there - t
+        taken, wanted = self._tried(length, ROUGH if planned else 1.0)
         if taken is None:
             path.rejected += 1
             self.h, self.grow, self.cut = shorter(h, wanted), 1.0, True
             return
         done, found = taken
         following = longer(h, wanted, before, self.grow)
-        self.left, self.grow, self.cut, self.h = {}, GROW, False, following
+        self.left, self.grow, self.cut, self.h = self.still, GROW, False, following
         if found is not None:
-            _, _, h, done = found
             self.left = {found.watch.name: found.level}
+            if found.done is None or t + found.h == t:
+                path.ended = found.watch.name if found.watch.ends else ""
+                return
+            there, done = t + found.h if found.h < length else there, found.done
         self.stiff = stiffer(self.stiff, done.stiffness, path.method.stable)
-        t = stop if h == whole else mark if h == mark - t else t + h
+        t = there
         q, self.low_q = _added(q, self.low_q, done.dq)
         v, self.low_v = _added(v, self.low_v, done.dv)
         self.fastest = [max(f, abs(x)) for f, x in zip(self.fastest, v, strict=True)]
@@ -156,6 +155,12 @@ class Walk:
             path.ended = self.monitor(t, q, v)
         if not path.ended and self.stiff >= STIFF:
             path.ended = "stiff"
+
+    def _mark(self, after: float) -> float:
+        """Where the plan ends the next step; a mark that is almost reached is left out."""
+        mark = _next(self.plan, after)
+        following = _next(self.plan, mark)
+        return following if mark - after < SLIVER * (following - mark) < math.inf else mark
 
     def _tried(self, h: float, most: float) -> tuple[tuple[Step, Meeting | None] | None, float]:
         """A step and what it meets, None where its error is too large or it cannot be done; the length wanted, over its own."""
@@ -172,7 +177,7 @@ class Walk:
             return None, wanted
         try:
             return (done, self._met(h, done) if self.watches else None), wanted
-        except Lost:
+        except UNDONE:
             # within the step it cannot be assembled
             return None, SHRINK
 
@@ -230,74 +235,24 @@ class Walk:
             if self.watches:
                 before, place, speed, _, _ = path.last
                 dq, dv = ([x - y for x, y in zip(*of, strict=True)] for of in ((q, place), (v, speed)))
-                if self._met(t - before, Step(dq, dv, 0.0, rates, (), 0.0)):
+                try:
+                    met = self._met(t - before, Step(dq, dv, 0.0, rates, (), 0.0)) is not None
+                except UNDONE:
+                    met = True
+                if met:
                     return float(t - before)
-                self.left = {}
+                self.left = self.still
             path.rows.append(row)
             path.ended = self.monitor(t, q, v)
             if path.ended:
                 break
         return None
 
-    # --- watches --------------------------------------------------------------------------------------------------
     def _met(self, h: float, done: Step) -> Meeting | None:
         """The first watch that a step passes a level of."""
-        t, q, v, _, _ = self.path.last
-        first: Meeting | None = None
-        for watch in self.watches:
-            before = watch.value(t, q, v)
-            for share in QUARTERS:
-                value = self._within(watch, h, done, share)
-                level = watch.passed(before, value, self.left.get(watch.name))
-                if level is not None:
-                    found = self._sharpened(watch, level, self._bisected(watch, level, h, done, share) * h)
-                    if found is not None and (first is None or found[0] < first.h):
-                        first = Meeting(watch, level, *found)
-                    break
-        return first
-
-    def _within(self, watch: Watch, h: float, done: Step, share: float) -> float:
-        """What is watched within a step, roughly."""
-        t, q, v, rates, _ = self.path.last
-        return watch.value(t + share * h, *between(q, v, rates, h, done.dq, done.dv, done.rates, share))
-
-    def _bisected(self, watch: Watch, level: float, h: float, done: Step, high: float) -> float:
-        """Where in a step a level lies, to seven digits."""
-        low, up = high - 0.25, self._within(watch, h, done, high) > level
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            if (self._within(watch, h, done, middle) > level) == up:
-                high = middle
-            else:
-                low = middle
-        return 0.5 * (low + high)
-
-    def _sharpened(self, watch: Watch, level: float, h: float) -> tuple[float, Step] | None:
-        """The length of a step that ends at a level, by Newton's method over the method's own steps."""
-        t, q, v, rates, _ = self.path.last
-        enough = 2 * EPS * max(abs(t), abs(h)) if watch.ends else 1e-7 * h
-        # of the secant, where no derivative is known
-        before: tuple[float, float] | None = None
-        try:
-            for _ in range(NEWTONS):
-                done = self.path.method.step(self.path.equations, t, q, v, rates, h)
-                there = [x + d for x, d in zip(q, done.dq, strict=True)]
-                speeds = [x + d for x, d in zip(v, done.dv, strict=True)]
-                gap = level - watch.value(t + h, there, speeds)
-                if watch.rate is not None:
-                    rate = watch.rate(t + h, there, speeds, done.rates)
-                    change = gap / rate if rate else 0.0
-                elif before is None:
-                    change = 1e-6 * h
-                else:
-                    change = gap * (h - before[0]) / (before[1] - gap) if before[1] != gap else 0.0
-                before = h, gap
-                if not abs(change) > enough or h + change <= 0:
-                    break
-                h += change
-        except UNDONE:
-            return None
-        return h, done
+        stretch = Stretch(self.path, h, done, self.left)
+        meeting, self.still = stretch.first(self.watches), stretch.still
+        return meeting
 
 
 def _next(times: Sequence[float], after: float) -> float:

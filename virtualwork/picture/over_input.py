@@ -14,7 +14,7 @@ from dalembert.drawing.sheet import plain, sheet
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
-from virtualwork.picture.quantities import quantities
+from virtualwork.picture.quantities import Quantity, quantities
 from virtualwork.plan.steps import Joint
 
 if TYPE_CHECKING:
@@ -27,8 +27,12 @@ Row = tuple[Joint, str, str]
 
 
 def curves(poses: Poses, names: Sequence[str], figure: FigureBase | None = None) -> Panels:
+    """Draw quantities of these names against the input, a panel for each unit; return their axes."""
+    return curves_of(poses, quantities(poses, names), figure)
+
+
+def curves_of(poses: Poses, found: Sequence[Quantity], figure: FigureBase | None = None) -> Panels:
     """Draw quantities against the input, a panel for each unit; return their axes."""
-    found = quantities(poses, names)
     units = list(dict.fromkeys(q.unit for q in found))
     figure = sheet(7.6, 1.0 + 2.3 * len(units), figure)
     rows: Panels = figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0]

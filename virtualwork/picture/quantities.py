@@ -1,20 +1,20 @@
-"""Quantities of a motion by name: `H.x`, `coupler.omega`, `B.slide`; and how large one of a kind is."""
+"""Quantities of a motion by name: `H.x`, `coupler.omega`, `B.position`; and how large one of a kind is."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 from typing import NamedTuple
 
 import numpy as np
 
+from dalembert.hints import nearest
 from virtualwork.describe import DescriptionError
 from virtualwork.formulas.numbers import Reals
 from virtualwork.formulas.poses import Poses
 
 POINTS = {f"{rate}{part}": (order, part) for order, rate in enumerate(("", "v", "a", "j")) for part in "xy"}
 LINKS = {"angle": 0, "omega": 1, "alpha": 2, "jerk": 3}
-SLIDES = {"slide": 0, "speed": 1, "acceleration": 2}
+SLIDES = {"position": 0, "speed": 1, "acceleration": 2}
 LENGTHS = ("m", "m/s", "m/s²", "m/s³")
 ANGLES = ("deg", "rad/s", "rad/s²", "rad/s³")
 
@@ -45,9 +45,7 @@ def _quantity(poses: Poses, word: str) -> Quantity:
     guides = {g.point: i for i, g in enumerate(m.guides)}
     known = {*m.points, *m.links}
     if name not in known:
-        close = get_close_matches(name, known, n=1)
-        hint = f"; did you mean '{close[0]}'?" if close else ""
-        raise DescriptionError(f"'{word}': no link or point is named '{name}'{hint}")
+        raise DescriptionError(f"'{word}': no link or point is named '{name}'{nearest(name, known)}")
     if name in m.points and what in POINTS:
         order, part = POINTS[what]
         body, place = m.points[name]

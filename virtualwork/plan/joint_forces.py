@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +15,17 @@ from virtualwork.plan.steps import Group, Joint, Plan, joints, relations
 Side = tuple[str, str]
 
 
+def pairs(every: Iterable[Joint]) -> list[tuple[Joint, str, str]]:
+    """Every joint force once, as (joint, on, from): of two bodies on the later, of more on each from the pin."""
+    found: list[tuple[Joint, str, str]] = []
+    for joint in every:
+        if len(joint.bodies) == 2:
+            found.append((joint, joint.bodies[1], joint.bodies[0]))
+        else:
+            found += [(joint, body, "pin") for body in joint.bodies if body != GROUND]
+    return found
+
+
 class Order:
     """How each joint force is found: as a multiplier of a loop, or from the balance of a body or a pin."""
 
@@ -24,14 +36,8 @@ class Order:
 
     @cached_property
     def pairs(self) -> list[tuple[Joint, str, str]]:
-        """Every joint force once, as (joint, on, from): of two bodies on the later, of more on each from the pin."""
-        found: list[tuple[Joint, str, str]] = []
-        for joint in self.joints:
-            if len(joint.bodies) == 2:
-                found.append((joint, joint.bodies[1], joint.bodies[0]))
-            else:
-                found += [(joint, body, "pin") for body in joint.bodies if body != GROUND]
-        return found
+        """Every joint force once; see `pairs`."""
+        return pairs(self.joints)
 
     @cached_property
     def multipliers(self) -> dict[Side, tuple[Group, int]]:

@@ -154,6 +154,13 @@ class Group:
         """The bodies whose angle is an unknown of the group or tied to one."""
         return (*self.angles, *(t.body for t in self.ties))
 
+    @cached_property
+    def shares(self) -> dict[str, dict[int, float]]:
+        """Of each body how many times as fast as each of the group's own angles it turns: ∂θ_body/∂θ_j ≠ 0 by j."""
+        places = {angle: j for j, angle in enumerate(self.angles)}
+        tied = {t.body: {places[b]: r for b, r in t.angle.bases if r and b in places} for t in self.ties}
+        return tied | {angle: {j: 1.0} for angle, j in places.items()}
+
 
 Step = Turn | Slide | Place | Group
 

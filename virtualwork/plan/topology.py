@@ -227,17 +227,24 @@ def _match(rows: list[Equation]) -> dict[Variable, int]:
     """A maximum matching by augmenting paths (H. W. Kuhn, 1955); earlier equations stay matched."""
     of_variable: dict[Variable, int] = {}
 
-    def augment(i: int, seen: set[Variable]) -> bool:
-        for v in rows[i].variables:
-            if v not in seen:
-                seen.add(v)
-                if v not in of_variable or augment(of_variable[v], seen):
-                    of_variable[v] = i
-                    return True
-        return False
-
-    for i in range(len(rows)):
-        augment(i, set())
+    for first in range(len(rows)):
+        # the equations on the way, each with the variables it has not tried; a chain of links makes it long
+        way = [(first, iter(rows[first].variables))]
+        through: list[Variable] = []
+        seen: set[Variable] = set()
+        while way:
+            v = next((v for v in way[-1][1] if v not in seen), None)
+            if v is None:
+                way.pop()
+                del through[-1:]
+                continue
+            seen.add(v)
+            through.append(v)
+            if v not in of_variable:
+                of_variable.update(zip(through, (i for i, _ in way), strict=True))
+                break
+            i = of_variable[v]
+            way.append((i, iter(rows[i].variables)))
     return of_variable
 
 

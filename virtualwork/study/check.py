@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dalembert.arithmetic.guard import Lock, guarded
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import AssemblyError
 from virtualwork.describe.description import Description
@@ -37,6 +38,7 @@ class FourBar:
     transmission: tuple[float, float]
 
 
+@guarded
 @dataclass(frozen=True)
 class Check:
     """A mechanism's character; every part is worked out when first read.
@@ -56,6 +58,11 @@ class Check:
     """
 
     assembly: Assembly
+
+    @property
+    def lock(self) -> Lock:
+        """That of the assembly."""
+        return self.assembly.lock
 
     def __repr__(self) -> str:
         four_bars = ", ".join(f"{'-'.join(f.links)}: {f.grashof}" for f in self.four_bars) or "no four-bar"
@@ -173,9 +180,9 @@ class Check:
             return tuple(sorted(found))
         unique: list[float] = []
         for q in sorted(map(self._turned_back, found)):
-            if all(abs(q - other) > 1e-8 for other in unique):
+            if not unique or q - unique[-1] > 1e-8:
                 unique.append(q)
-        return tuple(sorted(unique))
+        return tuple(unique)
 
     @property
     def singular(self) -> tuple[str, ...]:

@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from virtualwork.bounds.forces import ForceErrors
+from virtualwork.branch.assembly import Assembly
 from virtualwork.describe.parts import GROUND
 from virtualwork.formulas.dynamics import Dynamics
 from virtualwork.formulas.numbers import EPS, Number, Reals
-from virtualwork.formulas.poses import Branch, Poses
+from virtualwork.formulas.poses import Poses
 from virtualwork.formulas.scene import Scene
 from virtualwork.plan.steps import path_reads
 
@@ -40,7 +41,7 @@ class Equilibrium:
     stable: bool | None
     stiffness: float
     potential: float | None
-    assembly: Branch | None = field(default=None, repr=False, compare=False)
+    assembly: Assembly | None = field(default=None, repr=False, compare=False)
 
     def error_estimate(self) -> tuple[float, ...]:
         """Return a bound of the rounding error of each input, rad or m: the error of Q over its slope, |V″⁻¹|·δQ.
@@ -92,7 +93,7 @@ class Equilibria:
 class Rest:
     """Generalized forces, their derivative and the potential of a mechanism at rest at given inputs (n, k)."""
 
-    def __init__(self, assembly: Branch, inputs: Reals) -> None:
+    def __init__(self, assembly: Assembly, inputs: Reals) -> None:
         self.assembly, self.inputs, self.k = assembly, inputs, inputs.shape[1]
         self.poses = Poses(assembly, inputs if self.k > 1 else inputs[:, 0], 0.0, 0.0)
         self.scene = Scene(self.poses, at_rest=True)
@@ -151,7 +152,7 @@ class Rest:
         return total
 
 
-def equilibria(assembly: Branch, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:
+def equilibria(assembly: Assembly, spans: ArrayLike | None = None, samples: int = SAMPLES) -> Equilibria:
     """Return every position in which a mechanism rests under its loads without effort, each stable or not.
 
     Parameters
@@ -159,9 +160,11 @@ def equilibria(assembly: Branch, spans: ArrayLike | None = None, samples: int = 
     assembly : Description
         With its gravity, constant and follower forces, torques, springs. Dampers and friction do not act at rest.
     spans : array (k, 2), optional
-        The range of each input, rad or m. Default: a whole turn; for a slide, two sizes of the mechanism either way.
+        The range of each input, rad or m. Default: a whole turn; for a slide, two sizes of the mechanism either way,
+        where its loops are no farther from their ends.
     samples : int
-        How finely the range of one input is looked through for sign changes; every root is then found to rounding.
+        How finely the range of one input is looked through for sign changes, more finely where a body turns faster;
+        every root is then found to rounding.
 
     Returns
     -------
@@ -181,17 +184,20 @@ def equilibria(assembly: Branch, spans: ArrayLike | None = None, samples: int = 
     at = np.asarray(assembly.mechanism.at, dtype=float)
     if spans is None:
         slide = np.array([e.is_slide for e in assembly.mechanism.inputs])
-        low = np.where(slide, at - 2 * assembly.mechanism.size, 0.0)
-        high = np.where(slide, at + 2 * assembly.mechanism.size, 2 * np.pi)
+        size = assembly.track.length if k == 1 else assembly.mechanism.size
+        low = np.where(slide, at - 2 * size, 0.0)
+        high = np.where(slide, at + 2 * size, 2 * np.pi)
         ranges = np.stack([low, high], axis=1)
     else:
         ranges = np.asarray(spans, dtype=float).reshape(k, 2)
-    return _one(assembly, ranges[0], samples) if k == 1 else _many(assembly, ranges)
+    # at a limit, and beyond it, a loop has no rates
+    with np.errstate(all="ignore"):
+        return _one(assembly, ranges[0], samples) if k == 1 else _many(assembly, ranges)
 
 
-def _one(assembly: Branch, span: Reals, samples: int) -> Equilibria:
+def _one(assembly: Assembly, span: Reals, samples: int) -> Equilibria:
     whole = not assembly.mechanism.inputs[0].is_slide and abs(span[1] - span[0] - 2 * np.pi) < 1e-12
-    q = np.linspace(span[0], span[1], samples + 1)
+    q = assembly.track.samples(float(span[0]), float(span[1]), samples)
     rest = Rest(assembly, q[:, None])
     force, size = (values[:, 0] for values in rest.force())
     good = np.isfinite(force)
@@ -233,12 +239,12 @@ def _one(assembly: Branch, span: Reals, samples: int) -> Equilibria:
     roots = sorted(roots)
     if whole and len(roots) > 1 and roots[-1] - roots[0] > 2 * np.pi - 1e-9:
         roots.pop()
-    unit = 1.0 if not assembly.mechanism.inputs[0].is_slide else assembly.mechanism.size
+    unit = 1.0 if not assembly.mechanism.inputs[0].is_slide else assembly.track.length
     distinct = [root for i, root in enumerate(roots) if i == 0 or root - roots[i - 1] > 1e-8 * unit]
     return _judged(assembly, np.array(distinct)[:, None], scale)
 
 
-def _towards_limits(assembly: Branch, q: Reals, good: NDArray[np.bool_]) -> Reals:
+def _towards_limits(assembly: Assembly, q: Reals, good: NDArray[np.bool_]) -> Reals:
     """Inputs ever nearer to where the mechanism ends: the force grows there like 1/√distance, and may change its sign."""
     gap = np.flatnonzero(good[:-1] != good[1:])
     found: list[Reals] = []
@@ -252,7 +258,7 @@ def _towards_limits(assembly: Branch, q: Reals, good: NDArray[np.bool_]) -> Real
     return np.concatenate(found) if found else np.empty(0)
 
 
-def _refine(assembly: Branch, low: Reals, high: Reals, at_low: Reals, order: int = 0) -> Reals:
+def _refine(assembly: Assembly, low: Reals, high: Reals, at_low: Reals, order: int = 0) -> Reals:
     """Roots of Q (order 0) or of ∂Q/∂q (order 1) in brackets, all at once: Newton's step where it stays inside."""
     a, b, below = low.copy(), high.copy(), np.sign(at_low)
     x = (a + b) / 2
@@ -267,28 +273,32 @@ def _refine(assembly: Branch, low: Reals, high: Reals, at_low: Reals, order: int
                 newton = x - value / rest.along(np.ones(1))
             step = np.where((newton > a) & (newton < b), newton, step)
             step = np.where(value == 0, x, step)
-        if (np.abs(step - x) <= 2 * EPS * np.maximum(np.abs(x), np.abs(high - low))).all():
-            break
+        near = (np.abs(step - x) <= 2 * EPS * np.maximum(np.abs(x), np.abs(high - low))).all()
         x = step
+        if near:
+            break
     return np.asarray(x)
 
 
-def _judged(assembly: Branch, inputs: Reals, scale: float) -> Equilibria:
+def _judged(assembly: Assembly, inputs: Reals, scale: float) -> Equilibria:
     """Stability and potential of the positions found; those that are none (a pole between two signs) are dropped."""
     if not len(inputs):
         return Equilibria(())
     rest = Rest(assembly, inputs)
     force, size = rest.force()
-    true = (np.abs(force) <= 1e-8 * np.maximum(size, 1e-3 * scale)).all(axis=1)
     hessian, potential = rest.hessian(), rest.potential()
+    # what the input's own last digits make of zero, far from where it is measured from
+    shift = np.einsum("nij,nj->ni", np.abs(np.nan_to_num(hessian)), 4 * EPS * np.abs(inputs))
+    small = np.maximum(1e-8 * np.maximum(size, 1e-3 * scale), np.minimum(shift, 1e-3 * scale))
+    true = (np.abs(force) <= small).all(axis=1)
     found = []
     for i in np.flatnonzero(true):
         low = float(np.linalg.eigvalsh(hessian[i])[0])
-        small = 1e-9 * max(float(np.abs(hessian[i]).max()), scale * 1e-3)
+        least = 1e-9 * max(float(np.abs(hessian[i]).max()), scale * 1e-3)
         found.append(
             Equilibrium(
                 tuple(float(v) for v in inputs[i]),
-                None if abs(low) <= small else low > 0,
+                None if abs(low) <= least else low > 0,
                 low,
                 float(potential[i]) if np.isfinite(potential[i]) else None,
                 assembly,
@@ -297,7 +307,7 @@ def _judged(assembly: Branch, inputs: Reals, scale: float) -> Equilibria:
     return Equilibria(tuple(found))
 
 
-def _many(assembly: Branch, ranges: Reals) -> Equilibria:
+def _many(assembly: Assembly, ranges: Reals) -> Equilibria:
     """Several inputs: Newton on Q from a grid of starts, all at once."""
     k = len(ranges)
     per = max(4, round(4000 ** (1 / k)))

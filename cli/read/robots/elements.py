@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, ParseError
+from xml.parsers.expat import errors
+from xml.parsers.expat.errors import codes
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cli.errors import DataError, quote
 from cli.read.robots.robot import Array, quaternion
+from dalembert.errors import DataError, quote
 
 LARGEST_FILE = 10_000_000  # bytes
 LARGEST = 1e60
 DEEPEST = 100
+UNBOUND_PREFIX = codes[errors.XML_ERROR_UNBOUND_PREFIX]
 
 
 def parse(file: str, data: bytes) -> Element:
@@ -26,7 +30,13 @@ def parse(file: str, data: bytes) -> Element:
     if len(data) > LARGEST_FILE:
         raise DataError(f"{file}: {len(data)} bytes: expected at most {LARGEST_FILE} (10 MB)")
     try:
-        root: Element = fromstring(data, forbid_dtd=True, forbid_entities=True, forbid_external=True)
+        try:
+            root: Element = fromstring(data, forbid_dtd=True, forbid_entities=True, forbid_external=True)
+        except ParseError as error:
+            if error.code != UNBOUND_PREFIX:
+                raise
+            declared = _with_prefixes(data)
+            root = fromstring(declared, forbid_dtd=True, forbid_entities=True, forbid_external=True)
     except DefusedXmlException:
         raise DataError(f"{file}: declarations and entities of XML are refused") from None
     except ParseError as error:
@@ -39,6 +49,23 @@ def parse(file: str, data: bytes) -> Element:
         raise DataError(f"{file}: no valid XML: {error}") from None
     _shallow(file, root)
     return root
+
+
+def _with_prefixes(data: bytes) -> bytes:
+    """Return a file with the prefixes of its elements and attributes declared in its outermost element.
+
+    Robot files name their extensions so, `<drake:joint>`, and often do not declare the prefix.
+
+    >>> _with_prefixes(b'<sdf><drake:joint/></sdf>')
+    b'<sdf xmlns:drake="drake"><drake:joint/></sdf>'
+    """
+    used = dict.fromkeys(re.findall(rb"</?([A-Za-z_][\w.-]*):[A-Za-z_]", data))
+    used |= dict.fromkeys(re.findall(rb"\s([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*\s*=", data))
+    new = [p for p in used if p not in (b"xml", b"xmlns") and b"xmlns:" + p not in data]
+    declared = b"".join(b' xmlns:%b="%b"' % (p, p) for p in new)
+    blank = re.sub(rb"<!--.*?-->|<\?.*?\?>", lambda m: b" " * len(m[0]), data, flags=re.DOTALL)
+    root = re.search(rb"<[A-Za-z_][\w.:-]*", blank)
+    return data if root is None else data[: root.end()] + declared + data[root.end() :]
 
 
 def _shallow(file: str, root: Element) -> None:

@@ -8,8 +8,6 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cli.errors import DataError, quote
-from cli.read.files import load
 from cli.read.robots.elements import At, child, children, named, parse
 from cli.read.robots.robot import (
     DIAGONAL_FIRST,
@@ -28,6 +26,8 @@ from cli.read.robots.robot import (
     quaternion,
 )
 from cli.read.robots.shapes import DENSITY, SIZES, together, unit_mass
+from dalembert.errors import DataError, quote
+from dalembert.tables.files import load
 
 KINDS: dict[str, Kind] = {"hinge": "turn", "slide": "slide", "ball": "ball"}
 INCLUDES = 20

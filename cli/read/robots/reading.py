@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cli.errors import DataError
 from cli.read.robots import mjcf, sdf, urdf
 from cli.read.robots.elements import parse, plain
 from cli.read.robots.robot import Robot
+from dalembert.errors import DataError
 
 # outermost element -> what the format is called
 ROOTS = {"robot": "urdf", "sdf": "sdf", "mujoco": "mjcf"}

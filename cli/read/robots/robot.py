@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cli.errors import DataError
+from dalembert.errors import DataError
 
 Array = NDArray[np.float64]
 Kind = Literal["turn", "slide", "ball", "fixed", "other"]

@@ -6,7 +6,6 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cli.errors import DataError
 from cli.read.robots.elements import At, child, children, named, placed, plain, stated, text
 from cli.read.robots.robot import (
     ROWS,
@@ -22,6 +21,7 @@ from cli.read.robots.robot import (
     printed,
     rpy,
 )
+from dalembert.errors import DataError
 
 KINDS: dict[str, Kind] = {
     "revolute": "turn",

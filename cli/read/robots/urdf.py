@@ -7,7 +7,6 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from cli.errors import DataError
 from cli.read.robots import sdf
 from cli.read.robots.elements import At, child, children, named, placed, plain, stated
 from cli.read.robots.robot import (
@@ -24,6 +23,7 @@ from cli.read.robots.robot import (
     rpy,
     sphere_around,
 )
+from dalembert.errors import DataError
 
 KINDS: dict[str, Kind] = {**sdf.KINDS, "spherical": "ball"}
 

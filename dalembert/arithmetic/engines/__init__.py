@@ -6,7 +6,6 @@ overrides. All agree to rounding.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from typing import Any, TypeVar
@@ -14,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.choice import checked, wanted
 from dalembert.arithmetic.engines import blocks, floats
 from dalembert.arithmetic.tape import Tape
 
@@ -21,7 +21,6 @@ R = TypeVar("R")
 Reals = NDArray[np.float64]
 Rows = Sequence[Reals] | Reals
 Tables = Sequence[NDArray[Any]] | NDArray[Any]
-ENGINES = ("python", "numpy", "llvm")
 NARROW = 32  # columns from which on a grid is worked on as one
 WIDEST = 8  # columns from which on compiled code takes a grid: its longest vector
 FEW = 4  # lanes up to which Python's floats are faster than numpy's calls
@@ -101,7 +100,7 @@ def run(
     array([2.   , 1.081])
     """
     values = [inputs[name] for name in tape.inputs]
-    engine = engine or os.environ.get("DALEMBERT_ENGINE")
+    engine = engine or wanted()
     one = all(isinstance(value, float) for value in values)
     if one and engine in (None, "python") and floats.takes(tape):
         # one pose: nothing of numpy on the way, but at a singular place, where its numbers go on with infinity and NaN
@@ -114,9 +113,7 @@ def run(
     if len(lengths) > 1:
         raise ValueError(f"inputs of different lengths: {', '.join(map(str, sorted(lengths)))}")
     n = lengths.pop() if lengths else 1
-    engine = engine or chosen(tape, n)
-    if engine not in ENGINES:
-        raise ValueError(f"engine '{engine}': expected {', '.join(ENGINES)}")
+    engine = checked(engine or chosen(tape, n))
     table = _table(len(tape.outputs), n, frozenset(tape.rows[name] for name in pairs))
     _lanes(tape, columns, table, n, engine)
     return Outputs(
@@ -161,18 +158,18 @@ def run_grid(
     """
     r, c = shape
     table: Tables = np.empty((len(tape.outputs), r, c)) if out is None else out
-    given = [np.asarray(inputs[name], dtype=float) for name in tape.inputs]
-    given = [x.reshape(()) if x.size == 1 else x for x in given]
-    engine = os.environ.get("DALEMBERT_ENGINE") or chosen(tape, r * c)
-    if r > 1 and engine == "llvm" and c >= WIDEST and _on_llvm(tape, given, table, shape):
+    arrays = [np.asarray(inputs[name], dtype=float) for name in tape.inputs]
+    arrays = [x.reshape(()) if x.size == 1 else x for x in arrays]
+    engine = wanted() or chosen(tape, r * c)
+    if r > 1 and engine == "llvm" and c >= WIDEST and _on_llvm(tape, arrays, table, shape):
         return table
     if r > 1 and engine != "python" and c >= NARROW:
         from dalembert.arithmetic.engines import grids
 
-        grids.run(tape, given, shape, table)
+        grids.run(tape, arrays, shape, table)
         return table
     # every lane by itself
-    flat = [(x if x.shape == shape else np.broadcast_to(x, shape)).ravel() if x.ndim else x for x in given]
+    flat = [(x if x.shape == shape else np.broadcast_to(x, shape)).ravel() if x.ndim else x for x in arrays]
     tests = {k: np.empty((r, c)) for k, x in enumerate(table) if x.dtype == bool}
     rows = [tests.get(k, x).reshape(r * c) for k, x in enumerate(table)]
     _lanes(tape, flat, rows, r * c, engine)
@@ -214,7 +211,7 @@ class Repeated:
 
     def __call__(self, numbers: Mapping[str, float]) -> tuple[Reals, bool]:
         """The outputs, (outputs, n), without the test; and whether it holds."""
-        engine = os.environ.get("DALEMBERT_ENGINE") or chosen(self.tape, self.n)
+        engine = wanted() or chosen(self.tape, self.n)
         if engine == "llvm" and self.n >= WIDEST:
             from dalembert.arithmetic.engines import llvm
 
@@ -241,14 +238,14 @@ def chosen(tape: Tape, n: int) -> str:
     return "llvm" if _done[tape] > PAYS else "numpy"
 
 
-def as_part(lanes: int, function: Callable[..., R], *given: Any) -> R:
+def as_part(lanes: int, function: Callable[..., R], *arguments: Any) -> R:
     """Call a function on a part of work of so many lanes in all: the engine is chosen by these alone.
 
     Then no digit hangs on what else a process has done, and on how many processes there are.
     """
     before = _whole.set(lanes)
     try:
-        return function(*given)
+        return function(*arguments)
     finally:
         _whole.reset(before)
 
@@ -278,7 +275,9 @@ def _lanes(tape: Tape, columns: list[Reals], table: Rows, n: int, engine: str) -
 
 def _on_floats(tape: Tape, columns: list[Reals], table: Rows, n: int) -> None:
     function = floats.compiled(tape)
-    for lane, values in enumerate(zip(*(np.broadcast_to(c, n).tolist() for c in columns), strict=True)):
+    # a tape without inputs has its lanes too
+    lanes = zip(*(np.broadcast_to(c, n).tolist() for c in columns), strict=True) if columns else [()] * n
+    for lane, values in enumerate(lanes):
         try:
             for row, value in zip(table, function(*values), strict=True):
                 row[lane] = value

@@ -86,18 +86,18 @@ class Blocks:
             else:
                 place[number] = f"s{slots}"
                 slots += 1
-            target, given = place[number], [place[a] for a in arguments]
+            target, operands = place[number], [place[a] for a in arguments]
             if kind == "select":
                 lines += [
-                    f"greater({given[0]}, 0.0, mask)",
-                    f"copyto({target}, {given[2]})",
-                    f"copyto({target}, {given[1]}, where=mask)",
+                    f"greater({operands[0]}, 0.0, mask)",
+                    f"copyto({target}, {operands[2]})",
+                    f"copyto({target}, {operands[1]}, where=mask)",
                 ]
                 free += sorted(ends)
             elif kind == "binade":
-                lines.append(f"bitwise_and({given[0]}.view(int64), {EXPONENT}, {target}.view(int64))")
+                lines.append(f"bitwise_and({operands[0]}.view(int64), {EXPONENT}, {target}.view(int64))")
             else:
-                lines.append(f"{UFUNCS[kind]}({', '.join(given)}, {target})")
+                lines.append(f"{UFUNCS[kind]}({', '.join(operands)}, {target})")
         self.slots = slots
         self.block = min(MOST, max(LEAST, ROOM // (8 * max(slots, 1)) // LEAST * LEAST))
         self.parts = self._compiled(lines)
@@ -159,13 +159,13 @@ class Blocks:
 
     def _common(self, inputs: Mapping[str, Reals | float]) -> Mapping[str, Any]:
         """The values that are the same for all lanes, as floats where those go on."""
-        given = [float(inputs[name]) for name in self.same.inputs]
+        values = [float(inputs[name]) for name in self.same.inputs]
         if floats.takes(self.same):
             try:
-                return dict(zip(self.same.names, floats.compiled(self.same)(*given), strict=True))
+                return dict(zip(self.same.names, floats.compiled(self.same)(*values), strict=True))
             except (ZeroDivisionError, ValueError, OverflowError):
                 pass
-        return self.same.on(dict(zip(self.same.inputs, map(np.float64, given), strict=True)), NUMPY)
+        return self.same.on(dict(zip(self.same.inputs, map(np.float64, values), strict=True)), NUMPY)
 
 
 @lru_cache(maxsize=128)

@@ -26,8 +26,9 @@ def compiled(
     ----------
     tape : Tape
     passed, found : names, optional
-        Of the body of a `loop.Loop`: what each call is given and finds. The function that is called comes first among
-        the arguments then, and what calls are given is no output.
+        Of the body of a `loop.Loop`: what each call is given, which may be nothing, and what it finds. Where `found`
+        is not empty the function that is called comes first among the arguments, and what calls are given is no
+        output. A call whose results nothing uses is left out.
     """
     inputs = [name for name in tape.inputs if called(name) is None]
     places = dict(tape.outputs)
@@ -42,7 +43,7 @@ def compiled(
     text: list[str] = []
     depth: list[int] = []
     lines: list[str] = []
-    calls = 0
+    done: set[int] = set()
     for number, (kind, *arguments) in enumerate(tape.operations):
         if kind == "const":
             text.append(repr(arguments[0]) if math.isfinite(arguments[0]) else f"float('{arguments[0]}')")
@@ -53,11 +54,11 @@ def compiled(
                 text.append(f"x{inputs.index(arguments[0])}")
             else:
                 text.append(f"c{of[0]}_{found.index(of[1])}")
-                if of[0] == calls:
-                    given = ", ".join(text[places[f"call {calls} {name}"]] for name in passed)
-                    to = "".join(f"c{calls}_{i}, " for i in range(len(found)))
-                    lines.append(f"{to}= f({given})")
-                    calls += 1
+                if of[0] not in done:
+                    passed_text = ", ".join(text[places[f"call {of[0]} {name}"]] for name in passed)
+                    to = "".join(f"c{of[0]}_{i}, " for i in range(len(found)))
+                    lines.append(f"{to}= f({passed_text})")
+                    done.add(of[0])
             depth.append(0)
         else:
             expression = SIGNS[kind].format(*(text[a] for a in arguments))
@@ -69,7 +70,7 @@ def compiled(
                 lines.append(f"v{number} = {expression}")
                 text.append(f"v{number}")
                 depth.append(0)
-    names = ", ".join([*(["f"] if passed else []), *(f"x{k}" for k in range(len(inputs)))])
+    names = ", ".join([*(["f"] if found else []), *(f"x{k}" for k in range(len(inputs)))])
     results = "".join(f"{text[number]}, " for name, number in tape.outputs if called(name) is None)
     source = (
         f"def tape({names}):\n" + "".join(f"    {line}\n" for line in lines) + f"    return ({results})\n"

@@ -45,7 +45,9 @@ class Grid(Blocks):
                 values.append(None)
             else:
                 values.append(performed(kind, [values[a] for a in arguments], NUMPY))
-        known = [inputs[name] for name in self.varying] + [np.asarray(values[number]) for number in self.read]
+        operands = [inputs[name] for name in self.varying] + [
+            np.asarray(values[number]) for number in self.read
+        ]
         tests = [k for k, row in enumerate(self.written) if out[row].ndim == 1]
         tall, wide = max(1, BLOCK // c), min(c, BLOCK)
         room = np.empty((self.slots + len(tests), tall * wide + 8))
@@ -54,7 +56,7 @@ class Grid(Blocks):
             for j in range(0, c, wide):
                 high, broad = min(tall, r - i), min(wide, c - j)
                 rows, columns = slice(i, i + high), slice(j, j + broad)
-                here = [_cut(x, rows, columns) for x in known]
+                here = [_cut(x, rows, columns) for x in operands]
                 slots = [slot[: high * broad].reshape(high, broad) for slot in room]
                 tried = dict(zip(tests, slots[self.slots :], strict=True))
                 tables = [
@@ -112,10 +114,12 @@ def run(
            [ 2., -2.,  2.]])
     """
     r, c = shape
-    given = dict(zip(tape.inputs, inputs, strict=True))
+    arrays = dict(zip(tape.inputs, inputs, strict=True))
     # a grid of one row or one column has both kinds all the same
-    rows = frozenset(name for name, x in given.items() if x.ndim and len(x) == r and (r > 1 or c > 1))
-    columns = frozenset(name for name, x in given.items() if x.ndim and (name not in rows or x.shape[1] == c))
+    rows = frozenset(name for name, x in arrays.items() if x.ndim and len(x) == r and (r > 1 or c > 1))
+    columns = frozenset(
+        name for name, x in arrays.items() if x.ndim and (name not in rows or x.shape[1] == c)
+    )
     grid = compiled(tape, rows, columns)
     for table in out:
         if table.ndim == 1:
@@ -123,7 +127,7 @@ def run(
     with np.errstate(all="ignore"):
         for j in range(0, c, WIDE):
             wide = min(WIDE, c - j)
-            part = {name: x[:, j : j + wide] if name in columns else x for name, x in given.items()}
+            part = {name: x[:, j : j + wide] if name in columns else x for name, x in arrays.items()}
             grid.over(
                 part, [table[:, j : j + wide] if table.ndim == 2 else table for table in out], (r, wide)
             )

@@ -65,13 +65,13 @@ class Code:
         # numbers that all lanes share stand side by side: an address of each array's own costs more than the work
         shared = np.array([x.item() for x in inputs if not x.ndim])
         places = count(address(shared), shared.itemsize)
-        given = np.array([address(x) if x.ndim else next(places) for x in inputs], dtype=np.uintp)
+        addresses = np.array([address(x) if x.ndim else next(places) for x in inputs], dtype=np.uintp)
         results = np.array([address(x) for x in out], dtype=np.uintp)
-        self.at(rows, columns, given, results)
+        self.at(rows, columns, addresses, results)
 
-    def at(self, rows: int, columns: int, given: NDArray[np.uintp], results: NDArray[np.uintp]) -> None:
+    def at(self, rows: int, columns: int, addresses: NDArray[np.uintp], results: NDArray[np.uintp]) -> None:
         """Run on what lies at the addresses of inputs and outputs."""
-        self._call(rows, columns, address(given), address(results))
+        self._call(rows, columns, address(addresses), address(results))
 
 
 class Steady:
@@ -98,8 +98,8 @@ class Steady:
     def __call__(self, numbers: Sequence[float]) -> tuple[Reals, bool]:
         """The outputs (outputs, n), and whether the test is positive in all lanes."""
         shared, table = np.array(numbers), np.empty((len(self._rows), self.n))
-        given = self._given + self._open * np.uintp(address(shared))
-        self.code.at(1, self.n, given, self._rows + np.uintp(address(table)))
+        addresses = self._given + self._open * np.uintp(address(shared))
+        self.code.at(1, self.n, addresses, self._rows + np.uintp(address(table)))
         return (table[:-1], bool(table[-1].view(bool)[0])) if self.tested else (table, True)
 
 
@@ -110,12 +110,12 @@ def address(x: NDArray[Any]) -> int:
 
 def _pairs(out: Sequence[Reals] | Reals) -> list[int]:
     """The outputs that lie in turn with the next one."""
-    found: list[int] = []
+    pairs: list[int] = []
     if not isinstance(out, np.ndarray):
         for k, x in enumerate(out):
-            if x.strides[-1] == 16 and k - 1 not in found:
-                found.append(k)
-    return found
+            if x.strides[-1] == 16 and k - 1 not in pairs:
+                pairs.append(k)
+    return pairs
 
 
 def run(tape: Tape, inputs: Sequence[Reals], out: Sequence[Any] | Reals, shape: tuple[int, int]) -> bool:
@@ -174,10 +174,10 @@ def _kind(x: Reals, rows: int, columns: int) -> str:
 def _code(tape: Tape, inputs: str, outputs: str) -> Code | None:
     from dalembert.arithmetic.engines.lowered import lowered
 
-    found = loaded(
+    code = loaded(
         f"{tape.key}|{inputs}|{outputs}", "tape", lambda width: lowered(tape, inputs, outputs, width)
     )
-    return None if found is None else Code(*found)
+    return None if code is None else Code(*code)
 
 
 def loaded(name: str, symbol: str, written: Callable[[int], Any]) -> tuple[int, Any, int] | None:
@@ -212,11 +212,13 @@ def loaded(name: str, symbol: str, written: Callable[[int], Any]) -> tuple[int, 
         cpu, features = binding.get_host_cpu_name(), binding.get_host_cpu_features()
         width = 8 if features.get("avx512f") else 4 if features.get("avx2") else 2
         # whole vectors of 512 bits where the processor has them
-        told = ",".join([features.flatten(), "-prefer-256-bit"]) if width == 8 else features.flatten()
-        machine = binding.Target.from_default_triple().create_target_machine(
-            cpu=cpu, features=told, opt=2, jit=True
+        features_text = (
+            ",".join([features.flatten(), "-prefer-256-bit"]) if width == 8 else features.flatten()
         )
-        whole = "|".join([FORMAT, llvmlite.__version__, cpu, told, sys.platform, name])
+        machine = binding.Target.from_default_triple().create_target_machine(
+            cpu=cpu, features=features_text, opt=2, jit=True
+        )
+        whole = "|".join([FORMAT, llvmlite.__version__, cpu, features_text, sys.platform, name])
         path = folder() / (sha256(whole.encode()).hexdigest() + ".o")
         code = _read(path)
         if code is None:
@@ -265,9 +267,9 @@ def _made(binding: Any, machine: Any, written: Any) -> bytes:
 
 def folder() -> Path:
     """Where compiled code is kept: `DALEMBERT_CACHE`, else the platform's cache folder."""
-    given = os.environ.get("DALEMBERT_CACHE")
-    if given:
-        return Path(given)
+    chosen = os.environ.get("DALEMBERT_CACHE")
+    if chosen:
+        return Path(chosen)
     home = Path.home()
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local"))

@@ -92,8 +92,8 @@ def _inner(loop: Loop, v: Vectors) -> ir.Function:
     function.linkage = "internal"
     function.attributes.add("noinline")
     b = ir.IRBuilder(function.append_basic_block())
-    given = dict(zip(tape.inputs, function.args, strict=True))
-    values = body(tape, v, [b] * len(tape.operations), lambda name, _: given[name])
+    inputs = dict(zip(tape.inputs, function.args, strict=True))
+    values = body(tape, v, [b] * len(tape.operations), lambda name, _: inputs[name])
     whole: ir.Value = ir.Constant(result, ir.Undefined)
     for i, (_, number) in enumerate(tape.outputs):
         whole = b.insert_value(whole, values[number], i)
@@ -102,23 +102,23 @@ def _inner(loop: Loop, v: Vectors) -> ir.Function:
 
 
 def _round(
-    loop: Loop, v: Vectors, b: ir.IRBuilder, inner: ir.Function, given: dict[str, ir.Value]
+    loop: Loop, v: Vectors, b: ir.IRBuilder, inner: ir.Function, inputs: dict[str, ir.Value]
 ) -> list[ir.Value]:
     """The values of all operations of the body."""
     places = dict(loop.body.outputs)
-    found: dict[int, ir.Value] = {}
+    results: dict[int, ir.Value] = {}
 
     def enter(name: str, values: list[ir.Value]) -> ir.Value:
         of = called(name)
         if of is None:
-            return given[name]
+            return inputs[name]
         number, what = of
-        if number not in found:
+        if number not in results:
             arguments = [
-                values[places[f"call {number} {x}"]] if x in loop.passed else given[x]
+                values[places[f"call {number} {x}"]] if x in loop.passed else inputs[x]
                 for x in loop.inner.inputs
             ]
-            found[number] = b.call(inner, arguments)
-        return b.extract_value(found[number], loop.inner.rows[what])
+            results[number] = b.call(inner, arguments)
+        return b.extract_value(results[number], loop.inner.rows[what])
 
     return body(loop.body, v, [b] * len(loop.body.operations), enter)

@@ -136,36 +136,36 @@ def body(
         if kind == "input":
             values.append(enter(arguments[0], values))
             continue
-        given = [values[a] for a in arguments]
+        operands = [values[a] for a in arguments]
         if kind in ("add", "sub"):
             first, second = (contracted(a) for a in arguments)
             if second is not None:
                 factor = second[0] if kind == "add" else b.fneg(second[0])
-                value = v.intrinsic(b, "fmuladd", factor, second[1], given[0])
+                value = v.intrinsic(b, "fmuladd", factor, second[1], operands[0])
             elif first is not None:
-                added = given[1] if kind == "add" else b.fneg(given[1])
+                added = operands[1] if kind == "add" else b.fneg(operands[1])
                 value = v.intrinsic(b, "fmuladd", *first, added)
             else:
-                value = b.fadd(*given) if kind == "add" else b.fsub(*given)
+                value = b.fadd(*operands) if kind == "add" else b.fsub(*operands)
         elif kind == "mul":
-            value = b.fmul(*given)
+            value = b.fmul(*operands)
         elif kind == "div":
-            value = b.fdiv(*given)
+            value = b.fdiv(*operands)
         elif kind == "neg":
-            value = b.fneg(*given)
+            value = b.fneg(*operands)
         elif kind == "abs":
-            value = v.intrinsic(b, "fabs", *given)
+            value = v.intrinsic(b, "fabs", *operands)
         elif kind == "binade":
-            value = b.bitcast(b.and_(b.bitcast(given[0], v.longs), v.integer(EXPONENT)), v.vector)
+            value = b.bitcast(b.and_(b.bitcast(operands[0], v.longs), v.integer(EXPONENT)), v.vector)
         elif kind == "sqrt":
-            value = v.intrinsic(b, "sqrt", *given)
+            value = v.intrinsic(b, "sqrt", *operands)
         elif kind == "select":
-            value = b.select(b.fcmp_ordered(">", given[0], v.constant(0.0)), given[1], given[2])
+            value = b.select(b.fcmp_ordered(">", operands[0], v.constant(0.0)), operands[1], operands[2])
         elif kind == "atan2":
-            value = v.atan2(b, *given)
+            value = v.atan2(b, *operands)
         else:
             if arguments[0] not in circular:
-                circular[arguments[0]] = v.sincos(b, given[0])
+                circular[arguments[0]] = v.sincos(b, operands[0])
             value = circular[arguments[0]][kind == "cos"]
         values.append(value)
     return values

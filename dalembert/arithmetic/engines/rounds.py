@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import os
 import threading
 from collections.abc import Mapping
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dalembert.arithmetic.choice import wanted
 from dalembert.arithmetic.engines import blocks, llvm
 from dalembert.arithmetic.loop import Loop
 
@@ -35,17 +35,17 @@ class Code:
         kind = ctypes.CFUNCTYPE(None, long, *[ctypes.c_void_p] * 5, long)
         self._call = kind(address)
 
-    def __call__(self, given: Reals, state: Reals, fed: Reals, capacity: int) -> tuple[Reals, Reals]:
+    def __call__(self, constants: Reals, state: Reals, fed: Reals, capacity: int) -> tuple[Reals, Reals]:
         """The state (s, n) after as many rounds as `capacity` at most, and what is kept of each, (rounds, kept, n)."""
         loop, width, n = self.loop, self.width, state.shape[1]
         groups = -(-n // width)
         # lanes that fill the last vector do the last lane's work again
         lanes = np.minimum(np.arange(groups * width), n - 1)
-        given, state = (self._vectors(of, lanes) for of in (given, state))
+        constants, state = (self._vectors(of, lanes) for of in (constants, state))
         food = self._vectors(fed.reshape(-1, n), lanes)
         nodes = np.empty((groups, capacity, len(loop.kept), width))
         counts = np.empty(groups, dtype=np.int64)
-        self._call(groups, *(of.ctypes.data for of in (given, state, food, nodes, counts)), capacity)
+        self._call(groups, *(of.ctypes.data for of in (constants, state, food, nodes, counts)), capacity)
         rounds = int(counts.max())
         kept = nodes[:, :rounds].transpose(1, 2, 0, 3).reshape(rounds, len(loop.kept), -1)[:, :, :n]
         if counts.min() < rounds:
@@ -64,7 +64,7 @@ class Code:
 
 def run(
     loop: Loop,
-    given: Mapping[str, Any],
+    inputs: Mapping[str, Any],
     state: Mapping[str, Any],
     capacity: int,
     engine: str | None = None,
@@ -101,28 +101,28 @@ def run(
     >>> run(Loop(body, inner, ("x",)), given, state, 100)[0]["x"].round(6)
     array([1.414214, 3.      ])
     """
-    n = max(np.size(x) for x in (*given.values(), *state.values()))
-    constants = _rows(loop.constants, given, n)
-    found = _rows(loop.states, state, n)
+    n = max(np.size(x) for x in (*inputs.values(), *state.values()))
+    constants = _rows(loop.constants, inputs, n)
+    states = _rows(loop.states, state, n)
     food = np.empty((capacity, len(loop.fed), n))
     for i, name in enumerate(loop.fed):
         food[:, i] = (fed or {})[name]
     # compiled code does a round before it looks whether there is one
     code = ready(loop, engine) if capacity else None
     if code is not None:
-        found, kept = code(constants, found, food, capacity)
+        states, kept = code(constants, states, food, capacity)
     else:
-        found, kept = _on_blocks(loop, constants, found, food)
+        states, kept = _on_blocks(loop, constants, states, food)
         _spent(loop, len(kept) * (CALL + LANE * n))
     return (
-        dict(zip(loop.states, found, strict=True)),
+        dict(zip(loop.states, states, strict=True)),
         {name: kept[:, i] for i, name in enumerate(loop.kept)},
     )
 
 
 def ready(loop: Loop, engine: str | None = None) -> Code | None:
     """The compiled code of a loop, once so much time has gone into it that its making pays, and where it can be."""
-    engine = engine or os.environ.get("DALEMBERT_ENGINE")
+    engine = engine or wanted()
     if engine == "llvm" or (engine is None and _time.get(loop, 0.0) > PAYS):
         return compiled(loop)
     return None
@@ -159,8 +159,8 @@ def _code(loop: Loop) -> Code | None:
         return looped(loop, width)
 
     name = "|".join([f"rounds {FORMAT}", loop.body.key, loop.inner.key, *loop.kept, "fed", *loop.fed])
-    found = llvm.loaded(name, "rounds", written)
-    return None if found is None else Code(loop, *found)
+    library = llvm.loaded(name, "rounds", written)
+    return None if library is None else Code(loop, *library)
 
 
 def _rows(names: tuple[str, ...], of: Mapping[str, Any], n: int) -> Reals:
@@ -170,7 +170,7 @@ def _rows(names: tuple[str, ...], of: Mapping[str, Any], n: int) -> Reals:
     return rows
 
 
-def _on_blocks(loop: Loop, given: Reals, state: Reals, fed: Reals) -> tuple[Reals, Reals]:
+def _on_blocks(loop: Loop, constants: Reals, state: Reals, fed: Reals) -> tuple[Reals, Reals]:
     """The same by numpy, on the lanes that still go on."""
     tape, state = loop.whole, state.copy()
     places = {name: i for i, name in enumerate(loop.states)}
@@ -179,12 +179,12 @@ def _on_blocks(loop: Loop, given: Reals, state: Reals, fed: Reals) -> tuple[Real
     going = np.arange(state.shape[1])
     kept = []
     for food in fed:
-        found = np.empty((len(places), len(going)))
-        whole = (*state, *given, *food)
-        blocks.run(tape, [whole[i][going] for i in rows], found)
-        state[:, going] = found
+        results = np.empty((len(places), len(going)))
+        whole = (*state, *constants, *food)
+        blocks.run(tape, [whole[i][going] for i in rows], results)
+        state[:, going] = results
         kept.append(state[[places[name] for name in loop.kept]])
-        going = going[found[places["left"]] > 0]
+        going = going[results[places["left"]] > 0]
         if not len(going):
             break
     return state, np.reshape(kept, (-1, len(loop.kept), state.shape[1]))

@@ -131,8 +131,8 @@ class Vectors:
             signed(b.select(odd, cosine, sine), quadrant),
             signed(b.select(odd, sine, cosine), b.add(quadrant, self.integer(1))),
         )
-        found = self._or_else(b, served, fast, "sincos", [x], ["sin", "cos"])
-        return found[0], found[1]
+        pair = self._or_else(b, served, fast, "sincos", [x], ["sin", "cos"])
+        return pair[0], pair[1]
 
     def atan2(self, b: ir.IRBuilder, y: ir.Value, x: ir.Value) -> ir.Value:
         """The angle of x + iy."""
@@ -195,13 +195,13 @@ class Vectors:
             slow = b.call(self._slow(name, len(arguments), functions), arguments)
             slowly = [b.extract_value(slow, i) for i in range(len(functions))]
             there = b.block
-        found = []
+        results = []
         for value, other in zip(fast, slowly, strict=True):
             phi = b.phi(self.vector)
             phi.add_incoming(value, before)
             phi.add_incoming(other, there)
-            found.append(phi)
-        return found
+            results.append(phi)
+        return results
 
     def _slow(self, name: str, count: int, functions: list[str]) -> ir.Function:
         """A function that goes through the lanes one by one."""
@@ -217,10 +217,10 @@ class Vectors:
                 vector: ir.Value = ir.Constant(self.vector, ir.Undefined)
                 for lane in range(self.width):
                     place = ir.Constant(ir.IntType(32), lane)
-                    given = [b.extract_element(argument, place) for argument in slow.args]
-                    value = b.call(own, given)
+                    elements = [b.extract_element(argument, place) for argument in slow.args]
+                    value = b.call(own, elements)
                     if name == "sincos":
-                        value = self._large(b, function, given[0], value)
+                        value = self._large(b, function, elements[0], value)
                     vector = b.insert_element(vector, value, place)
                 whole = b.insert_value(whole, vector, i)
             b.ret(whole)

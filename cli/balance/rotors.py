@@ -1,0 +1,272 @@
+"""From a table of eccentric masses to the corrections of each rotor, as they are made, and what these leave; in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing import CoincidentPlanes, Correction, by_size, correct
+from cli.read.planes import Planes
+from cli.read.rounding import EPS, vector_error
+from cli.read.tolerance import Tolerance, Verdict
+from dalembert.angles import degrees, phasor
+from dalembert.errors import DataError, quote
+from dalembert.tables.table import Table, read
+from dalembert.units import Scaled, from_si, to_si
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rotors:
+    """The masses of a table, in SI, and the units the table is written in."""
+
+    table: Table
+    names: list[str]
+    rotor: NDArray[np.intp]
+    moment: Complex
+    z: Real | None
+    mass_unit: str
+    unbalance_unit: str
+    radius_unit: str | None
+    weights: bool
+
+
+def read_rotors(path: str, gravity: float, *, needs_z: bool) -> Rotors:
+    """Read masses or weights with their radii, or unbalances, with angles and, if needed, axial positions."""
+    known = {
+        "mass": "mass",
+        "weight": "force",
+        "unbalance": "unbalance",
+        "radius": "length",
+        "angle": "angle",
+        "z": "length",
+    }
+    table = read(path, numbers=known, texts=["rotor", "name"])
+    amounts = [name for name in ("mass", "weight", "unbalance") if name in table.numbers]
+    if len(amounts) > 1:
+        both = " and ".join(table.numbers[name].header for name in amounts)
+        raise DataError(
+            f"{table.file}: mixed columns {both}: expected masses, weights or unbalances, one of them"
+        )
+    if not amounts:
+        raise DataError(
+            f"{table.file}: no column mass_kg (or mass_g, weight_N, unbalance_g_mm …): expected a mass or weight with "
+            f"a radius, or an unbalance {table.told}"
+        )
+    (amount,) = amounts
+    given = table.numbers[amount]
+    table.reject(given.values < 0, amount, f"a {amount} that is not negative")
+    size = given.si
+    radius = None
+    if amount != "unbalance":
+        radius = table.require("radius", "length")
+        table.reject(radius.values < 0, "radius", "a radius that is not negative")
+        table.reject(
+            (radius.values == 0) & (given.values > 0), "radius", "a positive radius, for there is a mass"
+        )
+        size = size * radius.si
+        if amount == "weight":
+            size = size / gravity
+    angle = table.require("angle", "angle")
+    z = table.require("z", "length") if needs_z else table.numbers.get("z")
+    names, rotor = table.numbered("rotor", "1")
+    radius_unit = radius.unit if radius is not None else None
+    return Rotors(
+        table,
+        names,
+        rotor,
+        phasor(size, angle.values, angle.unit),
+        None if z is None else z.si,
+        given.unit if amount == "mass" else "kg" if amount == "weight" else given.unit.split("_")[0],
+        given.unit if amount == "unbalance" else {"in": "oz_in", "m": "kg_m"}.get(radius_unit or "", "g_mm"),
+        radius_unit,
+        amount == "weight",
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Request:
+    """What the options ask for."""
+
+    gravity: float
+    remove: bool
+    mass_step: tuple[float, str] | None
+    angle_step: tuple[float, str] | None
+    center: float | None
+    tolerance: Tolerance | None
+
+
+@dataclass(eq=False, repr=False)
+class Balancing:
+    """The corrections as given out, one row per rotor and plane, and what they leave; all in SI."""
+
+    rotors: Rotors
+    planes: Planes
+    request: Request
+    executor: Executor | None = None
+    solved: list[tuple[NDArray[np.intp], NDArray[np.intp], Correction]] = field(default_factory=list)
+    """Of rotors of like size their numbers, the rows of their planes, their corrections."""
+
+    def __post_init__(self) -> None:
+        rotors, planes, request = self.rotors, self.planes, self.request
+        n = len(rotors.names)
+        first, self.count = planes.rows(rotors.names, rotors.table.file)
+        self.start = np.cumsum(self.count) - self.count
+        self.rotor_of_row = np.repeat(np.arange(n), self.count)
+        self.plane_of_row = np.arange(self.count.sum()) - np.repeat(self.start - first, self.count)
+        plane_z = planes.z if planes.z is not None else np.zeros(len(planes.name))
+        z = rotors.z if rotors.z is not None else np.zeros(len(rotors.moment))
+        # the couple needs axial positions of the masses and a plane to refer to
+        self.has_couple = rotors.z is not None and (planes.z is not None or request.center is not None)
+        self.about = np.full(n, request.center) if request.center is not None else plane_z[first]
+        self.static, self.couple, self.residual_static, self.residual_couple = np.empty((4, n), dtype=complex)
+        self.growth = np.ones(n)
+        self.ideal = np.empty(len(self.rotor_of_row), dtype=complex)
+        for group, masses, rows in self._groups():
+            u = np.where(masses >= 0, rotors.moment[masses], 0)
+            at = np.where(masses >= 0, z[masses], 0)
+            try:
+                fix = correct(u, at, plane_z[self.plane_of_row[rows]], self.executor)
+            except CoincidentPlanes as error:
+                name = rotors.names[group[int(np.argmax(error.rotors))]]
+                raise DataError(f"rotor {quote(name)}: {error}") from None
+            self.static[group] = fix.static
+            self.couple[group] = fix.couple(self.about[group])
+            self.ideal[rows] = fix.unbalance
+            self.growth[group] = fix.amplification
+            self.solved.append((group, rows, fix))
+        self.mass, self.angle, self.made = self._given_out()
+        for group, rows, fix in self.solved:
+            left = fix.residual_of(self.made[rows], self.about[group])
+            self.residual_static[group], self.residual_couple[group] = left
+        self.before, self.after = self._in_tolerance_planes()
+
+    def _groups(self) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]]:
+        """Yield rotors of like size: their numbers, the places of their masses, the rows of their planes."""
+        for group, masses in by_size(self.rotors.rotor):
+            for planes in np.flatnonzero(np.bincount(self.count[group])):
+                same = self.count[group] == planes
+                yield group[same], masses[same], self.start[group[same], None] + np.arange(planes)
+
+    def _given_out(self) -> tuple[Real, Real, Complex]:
+        """Return the corrections as printed, mass in the table's unit and angle in degrees, and their unbalance."""
+        request, unit, radius = self.request, self.rotors.mass_unit, self.radius
+        angle = degrees(-self.ideal if request.remove else self.ideal)
+        mass = from_si(np.abs(self.ideal) / radius, "mass", unit)
+        if request.mass_step is None and request.angle_step is None:
+            return mass, angle, self.ideal
+        if request.mass_step is not None:
+            step, step_unit = request.mass_step
+            if step_unit != unit:
+                step = from_si(to_si(step, "mass", step_unit), "mass", unit)
+            mass = _to_step(mass, step)
+        if request.angle_step is not None:
+            step, step_unit = request.angle_step
+            step = step if step_unit == "deg" else float(np.degrees(step))
+            angle = _to_step(angle, step) % 360.0
+        given = phasor(to_si(mass, "mass", unit) * radius, angle, "deg")
+        return mass, angle, -given if request.remove else given
+
+    def _in_tolerance_planes(self) -> tuple[Complex, Complex]:
+        """Return the unbalances before and after: (rotors, 2) in the bearings, else a row for each correction plane."""
+        tolerance = self.request.tolerance
+        if tolerance is None or tolerance.bearings is None:
+            return -self.ideal, self.made - self.ideal
+        bearings = tolerance.bearings
+        self.rotors.table.require("z", "length")
+        if self.planes.z is None:
+            raise DataError(
+                "--bearings: the tolerance in the bearings needs the place of the plane: --plane NAME:Z:RADIUS"
+            )
+        before, after = np.empty((2, len(self.rotors.names), 2), dtype=complex)
+        for group, rows, fix in self.solved:
+            before[group] = -correct(fix.moment, fix.z, bearings).unbalance
+            corrected = np.concatenate([fix.moment, self.made[rows]], axis=-1)
+            places = np.concatenate([fix.z, fix.planes], axis=-1)
+            after[group] = -correct(corrected, places, bearings).unbalance
+        return before, after
+
+    @property
+    def radius(self) -> Real:
+        """The radius of each row's plane."""
+        return np.asarray(self.planes.radius[self.plane_of_row])
+
+    @property
+    def mass_kg(self) -> Real:
+        """The masses as given out."""
+        return to_si(self.mass, "mass", self.rotors.mass_unit)
+
+    @property
+    def length_unit(self) -> str:
+        """The unit in which lengths are said."""
+        return self.rotors.radius_unit or self.planes.z_unit or "mm"
+
+    def couple_size(self, couple: Scaled) -> Scaled:
+        """Return a couple unbalance in the unit of unbalances times that of lengths."""
+        return from_si(from_si(couple, "unbalance", self.rotors.unbalance_unit), "length", self.length_unit)
+
+    def rows_of(self, rotor: int) -> slice:
+        """Return the rows of a rotor's planes."""
+        return slice(self.start[rotor], self.start[rotor] + self.count[rotor])
+
+    def verdicts(self, rotor: int) -> list[Verdict]:
+        """Return the tolerance planes of a rotor; none where no tolerance is asked for."""
+        tolerance = self.request.tolerance
+        if tolerance is None:
+            return []
+        rows: slice | int = rotor
+        if tolerance.bearings is not None:
+            names, places = ["bearing 1", "bearing 2"], list(tolerance.bearings)
+        else:
+            rows = self.rows_of(rotor)
+            here = self.plane_of_row[rows]
+            names = [self.planes.name[p] for p in here]
+            places = self.planes.z[here].tolist() if self.planes.z is not None else []
+        shares = tolerance.shares(len(names), self.request.center, places)
+        before, after = np.abs(self.before[rows]), np.abs(self.after[rows])
+        return list(map(Verdict, names, shares.tolist(), before.tolist(), after.tolist()))
+
+    @cached_property
+    def bound(self) -> Real:
+        """Bounds of the rounding errors of the ideal corrections: of the solution, and of the masses' own vectors."""
+        rotors, row = self.rotors, self.rotor_of_row
+        angle = rotors.table.numbers["angle"]
+        wrong = np.bincount(rotors.rotor, vector_error(np.abs(rotors.moment), angle.values, angle.unit))
+        rounding = np.empty(len(row))
+        for _, rows, fix in self.solved:
+            rounding[rows] = fix.error_estimate()
+        return np.asarray(rounding + (wrong * self.growth)[row] + self._of_places()[row])
+
+    def _of_places(self) -> Real:
+        """Bounds of what the rounding of axial positions as written does to the corrections, for each rotor."""
+        rotors, n = self.rotors, len(self.rotors.names)
+        if rotors.z is None or self.planes.z is None:
+            return np.zeros(n)
+        z = self.planes.z[self.plane_of_row]
+        apart = np.maximum.reduceat(z, self.start) - np.minimum.reduceat(z, self.start)
+        # masses at one place are misplaced together
+        place = np.lexsort((rotors.z, rotors.rotor))
+        new = (np.diff(rotors.rotor[place]) != 0) | (np.diff(rotors.z[place]) != 0)
+        first = np.concatenate([[0], np.flatnonzero(new) + 1])
+        there = np.abs(np.add.reduceat(rotors.moment[place], first)) * np.abs(rotors.z[place[first]])
+        turned = np.bincount(rotors.rotor[place[first]], there, minlength=n)
+        turned += np.add.reduceat(np.abs(self.ideal) * np.abs(z), self.start)
+        return np.asarray(np.divide(2 * EPS * turned, apart, out=np.zeros(n), where=apart > 0))
+
+
+def _to_step(value: Real, step: float) -> Real:
+    """Round to a multiple of a step; a step such as 0.1 divides by 10, which prints as it should."""
+    inverse = round(1 / step) if step < 1 else 0
+    if inverse and abs(inverse * step - 1) < 4e-16:
+        return np.asarray(np.rint(value * inverse) / inverse)
+    return np.asarray(np.rint(value / step) * step)

@@ -1,0 +1,163 @@
+"""What is computed of rotors: corrections, their states before and after, the tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from balancing import GRADES
+from cli.balance.rotors import Balancing
+from cli.read.rounding import angle_error, size_error
+from cli.show.verdicts import verdict_table
+from dalembert.angles import degrees
+from dalembert.results.columns import Column, Table, names, number, read_number
+from dalembert.units import from_si
+
+if TYPE_CHECKING:
+    from cli.balance.rotors import Complex, Real
+
+NEAR = 20.0  # from this growth of errors on the planes are named as near each other
+
+METHOD = (
+    "Each mass is an unbalance U = m·r·e^{iθ}. The corrections are those with the least sum of squares whose resultant and "
+    "moment about the planes are opposite to ΣU and ΣU·z (J. A. Riul, Dinâmica das Máquinas, unit II, eqs. 6–21); "
+    "tolerance after ISO 21940-11, API (4W/N) or MIL-STD-167-1. Angles are counter-clockwise as seen against +z."
+)
+
+
+def tables(b: Balancing) -> dict[str, Callable[[], Table]]:
+    """The tables of a result, the CSV's first."""
+    found: dict[str, Callable[[], Table]] = {
+        "corrections": cache(lambda: corrections(b)),
+        "rotors": lambda: states(b),
+    }
+    return found | ({} if b.request.tolerance is None else {"tolerance": lambda: verdicts(b)})
+
+
+def corrections(b: Balancing) -> Table:
+    """One row per rotor and plane, in the input's own units."""
+    rotors, planes, row = b.rotors, b.planes, b.plane_of_row
+    read = rotors.table.numbers
+    z_unit = read["z"].unit if "z" in read else planes.z_unit
+    radius, gravity = b.radius, b.request.gravity
+
+    @cache
+    def size() -> Real:
+        return size_error(b.ideal, b.bound)
+
+    weight = number("weight", "force", b.mass_kg * gravity, error=lambda: size() / radius * gravity)
+    mass = read_number("mass", "mass", b.mass, rotors.mass_unit)
+    mass.error = lambda: from_si(size() / radius, "mass", rotors.mass_unit)
+    at = np.full(len(row), np.nan) if planes.z is None else planes.z[row]
+    z = number("z", "length", at, z_unit)
+    columns = [
+        names("rotor", [rotors.names[r] for r in b.rotor_of_row]),
+        names("plane", [planes.name[p] for p in row]),
+        *([] if planes.z is None else [z]),
+        number("radius", "length", radius, rotors.radius_unit or planes.radius_unit),
+        number("unbalance", "unbalance", np.abs(b.made), rotors.unbalance_unit, size),
+        mass,
+        *([weight] if rotors.weights else []),
+        number("angle", "angle", b.angle, error=lambda: angle_error(b.ideal, b.bound, b.angle)),
+    ]
+    return Table(
+        columns,
+        keys=("rotor", "plane"),
+        place="rotors[].corrections[]",
+        above=f"material to {'remove' if b.request.remove else 'add'}:",
+        documented=[*([z] if planes.z is None else []), *([] if rotors.weights else [weight])],
+    )
+
+
+def states(b: Balancing) -> Table:
+    """One row per rotor: its unbalance before and after the corrections."""
+    rotors, length = b.rotors, b.length_unit
+    masses = np.bincount(rotors.rotor, minlength=len(rotors.names))
+    couple_unit = f"{rotors.unbalance_unit}_{length}".replace(f"{length}_{length}", f"{length}2")
+
+    def residual(name: str, dimension: str, before: Complex, after: Complex, unit: str) -> Column:
+        # rounding of nothing is shown as nothing
+        shown = np.where(np.abs(after) > 1e-12 * np.abs(before), np.abs(after), 0.0)
+        column = number(f"residual_{name}", dimension, shown, unit, place=f"residual.{name}")
+        column.stored = np.abs(after)
+        return column
+
+    unbalance = rotors.unbalance_unit
+    # a couple unbalance has the dimension of a moment of inertia; without axial positions there is none
+    couple, left = (np.where(b.has_couple, of, np.nan) for of in (b.couple, b.residual_couple))
+    about = np.where(b.has_couple, b.about, np.nan)
+    angle = np.where(b.has_couple, degrees(b.couple), np.nan)
+    couples = [
+        number("couple_unbalance", "inertia", np.abs(couple), couple_unit, place="initial.couple_unbalance"),
+        number("couple_angle", "angle", angle, place="initial.couple_angle"),
+        number("couple_about_z", "length", about, length, place="initial.couple_about_z"),
+        residual("couple_unbalance", "inertia", couple, left, couple_unit),
+    ]
+    columns = [
+        names("rotor", rotors.names),
+        names("unbalances", masses.tolist(), place=None),
+        number(
+            "static_unbalance", "unbalance", np.abs(b.static), unbalance, place="initial.static_unbalance"
+        ),
+        number("static_angle", "angle", degrees(b.static), place="initial.static_angle"),
+        residual("static_unbalance", "unbalance", b.static, b.residual_static, unbalance),
+        *(couples if b.has_couple else []),
+    ]
+    limit = b.request.tolerance
+    grades = [] if limit is None else [
+        names("grade", [limit.grade] * len(rotors.names), "tolerance.grade"),
+        number("permissible", "unbalance", [limit.permissible] * len(rotors.names), place="tolerance.permissible"),
+    ]  # fmt: skip
+    return Table(
+        columns, keys=("rotor",), place="rotors[]", documented=[*([] if b.has_couple else couples), *grades]
+    )
+
+
+def verdicts(b: Balancing) -> Table:
+    """One row per rotor and tolerance plane: what is permissible, what it was and is."""
+    limit, unit = b.request.tolerance, b.rotors.unbalance_unit
+    assert limit is not None
+    rows = [(name, v) for r, name in enumerate(b.rotors.names) for v in b.verdicts(r)]
+    whole = from_si(limit.permissible, "unbalance", unit)
+    named = f"{limit.grade}: " if limit.grade else ""
+    each = " in each plane" if limit.whole_in_each_plane else ""
+    above = f"{named}U_per = {whole:.6g} {unit.replace('_', '·')}{each}"
+    beyond = [name for name, v in rows if v.residual > v.permissible]
+    below = ""
+    if beyond or len(b.rotors.names) > 1:
+        every, bad = len(b.rotors.names), list(dict.fromkeys(beyond))
+        more = " …" if len(bad) > 10 else ""
+        below = f"all {every} rotors: residual within the tolerance"
+        if bad:
+            below = (
+                f"{len(bad)} of {every} rotors: residual beyond the tolerance: {', '.join(bad[:10])}{more}"
+            )
+    return replace(verdict_table(rows, unit), above=above, below=below)
+
+
+def warnings(b: Balancing) -> list[str]:
+    """What a reader of the corrections has to know."""
+    near = np.flatnonzero(b.growth > NEAR)
+    lines = [
+        f"rotor {b.rotors.names[r]}: the correction planes are close to each other and far from the masses: "
+        f"errors grow by a factor of {b.growth[r]:.3g}"
+        for r in near[:5]
+    ]
+    if len(near) > 5:
+        lines.append(f"… and of {len(near) - 5} further rotors")
+    limit = b.request.tolerance
+    if limit is None:
+        return lines
+    if limit.grade is not None and limit.iso and float(limit.grade[1:]) not in GRADES:
+        lines.append(f"{limit.grade} is not a grade of ISO 21940-11; its value is used")
+    if limit.grade == "API" and b.request.center is not None and limit.bearings is None:
+        lines.append("no --bearings: half of the rotor's mass is taken as the load of each journal")
+    if limit.whole_in_each_plane:
+        return lines
+    if b.request.center is None and (limit.bearings is not None or (b.count == 2).any()):
+        lines.append("no --center-z: the permissible residual unbalance is shared equally between the planes")
+    return lines

@@ -1,0 +1,297 @@
+"""What is computed of a body and its motion: one list of quantities, of which table, terminal and JSON are made; the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cli.body.moving import Array, MovingBody
+from cli.read.parts import READ
+from cli.show.picture import blank
+from dalembert.angles import degrees
+from dalembert.results.columns import Column, Table, document_unit, names, number
+from dalembert.units import G0
+from rigidbody3d.inertia import Principal
+from rigidbody3d.picture import views
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+METHOD = (
+    "Tensors of the parts moved by Steiner's theorem, turned and added; principal moments by the eigenvalues; angular momentum "
+    "H = I·ω and its true rate in any axes; d'Alembert's inertia wrench (J. A. Riul, Dinâmica das Máquinas, unit II, eqs. "
+    "22–47; F. P. Beer, E. R. Johnston, Vector Mechanics for Engineers: Dynamics, ch. 18)."
+)
+
+
+class Entry(NamedTuple):
+    """A scalar or a vector, the errors of its components, and its place in JSON (None: nowhere)."""
+
+    name: str
+    dimension: str
+    value: ArrayLike
+    error: Callable[[], ArrayLike]
+    place: str | None = ""
+
+    def column(self, lay: Callable[[list[float]], list[float | None]]) -> Column:
+        """Return it as a column in which its numbers, and their errors, are laid so."""
+
+        def error() -> list[float]:
+            return [bound or 0.0 for bound in lay(_numbers(self.error()))]
+
+        return Column(self.name, document_unit(self.dimension), lay(_numbers(self.value)), error)
+
+    @property
+    def documented(self) -> Column | None:
+        """Its place in the document, as a column of one row."""
+        if self.place is None:
+            return None
+        head, dot, index = (self.place or self.name).partition(".")
+        unit = document_unit(self.dimension)
+        value = (np.asarray(self.value, dtype=float) + 0.0).tolist()
+        return Column(
+            self.name, unit, [None], place=f"{head}_{unit}".rstrip("_") + dot + index, stored=[value]
+        )
+
+
+def _of_body(b: MovingBody) -> Iterator[Entry]:
+    body, moments = b.parts.whole, b.parts.whole.principal
+
+    def tensor_error(row: int) -> Array:
+        return np.asarray(b.body_error.inertia[row])
+
+    def principal_error() -> Principal:
+        return moments.error_estimate(b.body_error.inertia)
+
+    def axis_error(axis: int) -> Array:
+        return np.asarray(principal_error().axes[axis])
+
+    yield Entry("mass", "mass", body.mass, lambda: b.body_error.mass)
+    yield Entry("center", "length", body.center, lambda: b.body_error.center)
+    for i, axis in enumerate("xyz"):
+        yield Entry(f"inertia_{axis}", "inertia", body.inertia[i], partial(tensor_error, i), f"inertia.{i}")
+    yield Entry("principal", "inertia", moments.moments, lambda: principal_error().moments)
+    for i in range(3):
+        place = f"principal_axes.{i}"
+        yield Entry(f"principal_axis_{i + 1}", "number", moments.axes[i], partial(axis_error, i), place)
+
+
+def _of_motion(b: MovingBody) -> Iterator[Entry]:
+    motion, point = b.motion, b.point
+
+    def error(of: str) -> ArrayLike:
+        return motion.error_estimate(of, point, b.body_error, READ)
+
+    def entry(name: str, dimension: str, value: ArrayLike, of: str = "", place: str = "") -> Entry:
+        return Entry(name, dimension, value, partial(error, of or name), place)
+
+    yield entry("momentum", "angular momentum", motion.momentum)
+    yield entry("momentum_about", "angular momentum", motion.momentum_about(point))
+    yield entry("momentum_rate", "torque", motion.rate, "rate")
+    yield entry("rate_relative", "torque", motion.relative, "relative", "rate_terms.relative")
+    yield entry("rate_transport", "torque", motion.transport, "transport", "rate_terms.transport")
+    yield entry("momentum_rate_about", "torque", motion.rate_about(point), "rate_about")
+    yield entry("inertia_force", "force", motion.inertia_force)
+    yield entry("inertia_moment", "torque", motion.inertia_wrench.moment)
+    yield entry("energy", "energy", motion.energy)
+
+
+def _of_shaft(b: MovingBody) -> Iterator[Entry]:
+    """Forces of the bearings across the axis; the first takes the axial force."""
+    shaft = b.shaft
+
+    def error(of: str, i: int) -> list[float]:
+        axial = float(shaft.error_estimate("axial", READ)) if of == "static" and i == 0 else 0.0
+        return [*shaft.error_estimate(of, READ)[i], axial]
+
+    def corrected_error(i: int) -> list[float]:
+        return [*b.corrected_error[[i, i]], 0.0]
+
+    for i in range(2):
+        name = f"bearing{i + 1}"
+        static = [*shaft.static[i], float(shaft.axial) if i == 0 else 0.0]
+        yield Entry(f"{name}_static", "force", static, partial(error, "static", i), None)
+        dynamic = [*shaft.dynamic[i], 0.0]
+        yield Entry(f"{name}_dynamic", "force", dynamic, partial(error, "dynamic", i), None)
+        if b.correction is not None:
+            corrected = [*b.corrected[i], 0.0]
+            yield Entry(f"{name}_corrected", "force", corrected, partial(corrected_error, i), None)
+    torque_error = partial(shaft.error_estimate, "drive_torque", READ)
+    yield Entry("drive_torque", "torque", shaft.drive_torque, torque_error, "shaft.drive_torque")
+
+
+def _entries(b: MovingBody) -> list[Entry]:
+    """Return what is shown, in the order in which it is shown."""
+    return [
+        *_of_body(b),
+        *(_of_motion(b) if b.moving else ()),
+        *(_of_shaft(b) if b.request.shaft is not None else ()),
+    ]
+
+
+def tables(b: MovingBody) -> dict[str, Callable[[], Table]]:
+    """The tables of a result, the CSV's first."""
+    made = {"body": lambda: axes(b), "document": lambda: of_document(b)}
+    if b.request.shaft is not None:
+        made |= {"bearings": lambda: bearings(b), "corrections": lambda: corrections(b)}
+    return made
+
+
+def axes(b: MovingBody) -> Table:
+    """A row for each axis, then one for each correction plane; scalars stand in the first row."""
+    masses = b.corrections
+    below = len(masses)
+
+    def in_rows(numbers: list[float]) -> list[float | None]:
+        return [*numbers, *[None] * (3 - len(numbers) + below)]
+
+    def of_correction(name: str) -> list[float]:
+        return [0.0, 0.0, 0.0, *(getattr(bound, name) for bound in b.correction_errors)]
+
+    columns = [Column("axis", "", [*"xyz", *(c.plane for c in masses)])]
+    columns += [entry.column(in_rows) for entry in _entries(b)]
+    units = {"z": "m", "radius": "m", "unbalance": "kg_m", "mass": "kg", "angle": "deg"}
+    for name, unit in units.items() if masses else ():
+        values = [None, None, None, *(getattr(c, name) for c in masses)]
+        error = None if unit == "m" else partial(of_correction, name)
+        columns.append(Column(f"correction_{name}", unit, values, error))
+    return Table(columns, keys=("axis",))
+
+
+def quantities(b: MovingBody) -> Table:
+    """The terminal's table: a row for each quantity, then mass and angle of each correction."""
+
+    def in_cells(numbers: list[float]) -> list[float | None]:
+        return [*numbers, None, None, None] if len(numbers) == 1 else [None, *numbers]
+
+    def of_correction(i: int, name: str) -> float:
+        return float(getattr(b.correction_errors[i], name))
+
+    entries = _entries(b)
+    for i, c in enumerate(b.corrections):
+        for name in ("mass", "angle"):
+            entries.append(
+                Entry(f"plane {c.plane}: {name}", name, getattr(c, name), partial(of_correction, i, name))
+            )
+    rows = [entry.column(in_cells) for entry in entries]
+
+    def bounds(k: int) -> list[float]:
+        return [in_cells(_numbers(entry.error()))[k] or 0.0 for entry in entries]
+
+    columns = [Column("quantity", "", [row.header for row in rows])]
+    columns += [
+        Column(name, "", [row.values[k] for row in rows], partial(bounds, k))
+        for k, name in enumerate(("value", "x", "y", "z"))
+    ]
+    return Table(columns, above=conventions(b))
+
+
+def of_document(b: MovingBody) -> Table:
+    """The document without the lists of the shaft: every quantity, of a motion that is none too."""
+    entries = [*_of_body(b), *_of_motion(b)]
+    columns = [each for entry in entries if (each := entry.documented) is not None]
+    columns.insert(8, _one("about", "length", b.point))
+    columns.append(names("products", ["+∫xy dm; the matrix carries -I_xy"]))
+    if b.request.shaft is not None:
+        shaft = b.shaft
+        columns += [
+            _one("axial", "force", float(shaft.axial), "shaft.axial"),
+            _one("drive_torque", "torque", float(shaft.drive_torque), "shaft.drive_torque"),
+            _one("static", "unbalance", float(np.abs(shaft.static_unbalance)), "shaft.static_unbalance"),
+            _one("static_angle", "angle", float(degrees(shaft.static_unbalance)), "shaft.static_angle"),
+        ]
+    return Table([], place="", documented=columns)
+
+
+def _one(name: str, dimension: str, value: ArrayLike, place: str = "") -> Column:
+    """A quantity of the document alone."""
+    unit = document_unit(dimension)
+    return Column(
+        name, unit, [None], place=f"{place or name}_{unit}", stored=[np.asarray(value, float).tolist()]
+    )
+
+
+def bearings(b: MovingBody) -> Table:
+    """The bearings' forces across the axis, of the document alone."""
+    shaft, request = b.shaft, b.request.shaft
+    assert request is not None
+    forces = {"static": shaft.static, "dynamic": shaft.dynamic}
+    if b.correction is not None:
+        forces["corrected_dynamic"] = b.corrected
+    columns = [number("z", "length", request.bearings)]
+    for name, of in forces.items():
+        values = (np.asarray(of) + 0.0).tolist()
+        columns.append(Column(name, "N", values, place=f"{name}_N", stored=values))
+    return Table([], place="shaft.bearings[]", documented=columns)
+
+
+def corrections(b: MovingBody) -> Table:
+    """A row for each correction plane of the shaft, of the document alone."""
+    masses = b.corrections
+    columns = [
+        names("plane", [c.plane for c in masses]),
+        number("z", "length", [c.z for c in masses]),
+        number("radius", "length", [c.radius for c in masses]),
+        number("unbalance", "unbalance", [c.unbalance for c in masses]),
+        number("mass", "mass", [c.mass for c in masses]),
+        number("weight", "force", [c.mass * G0 for c in masses]),
+        number("angle", "angle", [c.angle for c in masses]),
+    ]
+    return Table([], place="shaft.corrections[]", documented=columns)
+
+
+def warnings(b: MovingBody) -> list[str]:
+    """Warn where eq. 44 with a constant tensor would go wrong, and of a couple that stays."""
+    lines = []
+    motion = b.motion
+    if motion.frame_omega is not None:
+        size = np.abs(motion.momentum).max() * max(
+            np.abs(motion.omega).max(), np.abs(motion.frame_omega).max()
+        )
+        if np.abs(motion.tensor_rate).max() > 1e-12 * size:
+            wrong = motion.rate - motion.tensor_rate
+            lines.append(
+                "the inertia tensor is not constant in the axes of --frame-omega: the relative rate contains its change too; "
+                f"eq. 44 with a constant tensor would give {', '.join(f'{x:.6g}' for x in wrong)} N·m"
+            )
+    if len(b.corrections) == 1:
+        lines.append("one correction plane balances the static unbalance only: the couple stays")
+    return lines
+
+
+def conventions(b: MovingBody) -> str:
+    """Say which conventions hold."""
+    lines = [
+        f"{len(b.parts.name)} parts; inertia at the centre of mass, products as +∫xy dm (the matrix carries -I_xy)"
+    ]
+    if b.moving:
+        about = ", ".join(f"{x:g}" for x in b.point)
+        lines.append(f"momentum at the centre of mass, and about {about} m; rates are true ones")
+    if b.request.shaft is not None:
+        lines.append("bearing forces act on the shaft; dynamic ones leave the static part out")
+    return "\n".join(lines)
+
+
+def draw(b: MovingBody) -> Figure:
+    """Draw the body in two views; below them, for a shaft, the forces of the bearings."""
+    figure, parts, motion = blank(), b.parts, b.motion
+    solids, whole = parts.each.solids(), parts.whole.whole()
+    vectors = {"angular velocity": motion.omega, "angular momentum": motion.momentum, "its rate": motion.rate}
+    if b.request.shaft is None:
+        views.body(solids, parts.name, whole, vectors, figure)
+        return figure
+    forces = {"static": b.shaft.static} if any(b.request.shaft.gravity) else {}
+    forces["dynamic"] = b.shaft.dynamic
+    if b.correction is not None:
+        forces["dynamic, after correction"] = b.corrected
+    views.shaft(solids, parts.name, whole, b.shaft.bearings, forces, vectors, figure)
+    return figure
+
+
+def _numbers(value: ArrayLike) -> list[float]:
+    numbers: list[float] = np.atleast_1d(np.asarray(value, dtype=float) + 0.0).tolist()
+    return numbers

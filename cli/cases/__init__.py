@@ -1,0 +1,1 @@
+"""What every command on a mechanism shares: its file, its cases, its quantities."""

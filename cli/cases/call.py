@@ -1,0 +1,188 @@
+"""A call of a command on a mechanism: its file and its options become the cases, and these the result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from cli.cases.analysis import Analysis, Request
+from cli.cases.axes import Grid, grids
+from cli.cases.description import load, naming
+from cli.cases.loop import Loop, Study
+from cli.cases.values import Driven, Varied, assigned, with_numbers
+from cli.read.options import bad
+from cli.show.result import Result
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from cli.cases.loop import Case
+    from cli.cases.options import Asked
+    from cli.show.commands import ShowOptions
+    from virtualwork import Mechanism
+
+
+@dataclass(eq=False, repr=False)
+class Call:
+    """One call: which mechanism, which cases of it, in which form.
+
+    Attributes
+    ----------
+    varied, moved : Grid, optional
+        What makes variants, and the inputs that all of them go through.
+    """
+
+    request: Request
+    show: ShowOptions
+    mechanism: Mechanism
+    bare: dict[str, str]
+    remarks: list[str]
+    about: dict[str, str]
+    varied: Grid | None
+    moved: Grid | None
+    workers: int
+
+    @classmethod
+    def of(cls, asked: Asked, show: ShowOptions, request: Request) -> Call:
+        """Read the file, change its numbers, and lay out the cases."""
+        with naming(request.file):
+            mechanism, bare, remarks, about = load(asked.file)
+            if asked.set:
+                mechanism = assigned(mechanism, bare, asked.set)
+            varied, moved = grids(mechanism, asked.at, asked.over, asked.cases, bare, remarks)
+        workers = getattr(asked, "workers", None) or 1
+        return cls(request, show, mechanism, bare, remarks, about, varied, moved, workers)
+
+    def refuse_inputs(self, message: str) -> None:
+        """Refuse options that move inputs, where these mean nothing."""
+        for grid in (self.varied, self.moved):
+            for axis in () if grid is None else grid.axes:
+                if axis.option.startswith("--") and any(isinstance(name, Driven) for name in axis.names):
+                    raise bad(axis.option, message)
+
+    def started(self) -> Call:
+        """The same call, its inputs as numbers of the file: where a motion starts."""
+        from virtualwork.describe.dimensions import dimensions
+
+        every = {d.where: Varied(d) for d in dimensions(self.mechanism).values()}
+        grids = [grid for grid in (self.varied, self.moved) if grid is not None]
+        # a law of motion in the file gives no start
+        axes = [axis for grid in grids for axis in grid.axes if axis.option.startswith("--")]
+        kinds = ("value", "speed", "acceleration")
+        axes = [
+            replace(
+                axis,
+                names=tuple(
+                    every["inputs", name.j, kinds[name.order]] if isinstance(name, Driven) else name
+                    for name in axis.names
+                ),
+            )
+            for axis in axes
+        ]
+        varied = Grid(tuple(axes)) if axes else None
+        if varied is None or varied.n > 1:
+            return replace(self, varied=varied, moved=None)
+        with naming(self.request.file):
+            row = varied.part(0, 1).shown[0].tolist()
+            numbers = [name.of for name in varied.names if isinstance(name, Varied)]
+            m = with_numbers(self.mechanism, numbers, row)
+        return replace(self, mechanism=m, varied=None, moved=None)
+
+    def check_names(self) -> None:
+        """Refuse names that --only cannot find."""
+        with naming(self.request.file):
+            self.analysis().check_names()
+
+    def analysis(self) -> Analysis:
+        """The mechanism itself over the inputs of the call."""
+        from cli.cases.inputs import of_one
+
+        return Analysis(self.request, self.mechanism, of_one(self.mechanism, self.moved))
+
+    def study(self, kind: type[Study], **more: Any) -> Study:
+        """What is done with every case."""
+        names = () if self.varied is None else self.varied.names
+        return kind(
+            self.request,
+            self.mechanism,
+            self.bare,
+            self.show.digits,
+            self.show.as_json,
+            names,
+            self.moved,
+            **more,
+        )
+
+    @property
+    def poses(self) -> int:
+        """How many poses a variant has."""
+        return 1 if self.moved is None else self.moved.n
+
+    def result(
+        self,
+        study: Study,
+        page: Path | None = None,
+        drawn: Callable[[list[tuple[str, Case]]], bytes] | None = None,
+        states: int | None = None,
+    ) -> Result:
+        """The result of all cases, in the forms that are requested.
+
+        `page`: where the page that moves goes, of so many states a variant; `drawn` makes it of the cases.
+        """
+        with naming(self.request.file):
+            loop = Loop(study, self.varied, self.workers)
+            self.remarks += study.warnings()
+            if page is not None:
+                from cli.show.page import refuse_long
+
+                refuse_long((self.poses if states is None else states) * loop.count)
+            result = self._alone(study, loop) if self.varied is None else self._of_variants(loop)
+        if page is not None and drawn is not None:
+            result = replace(result, beside={**result.beside, page: lambda: drawn(loop.every_case())})
+        title = {"title": self.mechanism.name or "Mechanism"}
+        return replace(result, about=title | self.about, within=lambda: naming(self.request.file))
+
+    def _alone(self, study: Study, loop: Loop) -> Result:
+        """The mechanism itself: as one table, written part by part, or in every form."""
+        if study.in_blocks(self.show):
+            return Result(
+                blocks=loop.blocks,
+                beside=study.beside_table(),
+                warnings=self.remarks,
+                late_warnings=lambda: loop.remarks.lines(),
+                failed=lambda: not loop.remarks.any_assembled,
+            )
+        study.check_size(self.show, 1)
+        case = study.case()
+        result = study.result(case)
+        return replace(result, warnings=[*self.remarks, *result.warnings])
+
+    def _of_variants(self, loop: Loop) -> Result:
+        """All variants: as one table or document, written part by part, or in the forms that are requested, at once."""
+        name, show = self.mechanism.name, self.show
+        result = Result(
+            document=lambda: {"name": name},
+            warnings=self.remarks,
+            failed=lambda: not loop.remarks.any_assembled,
+            method=loop.study.method,
+        )
+        if show.streams or show.streams_json:
+            return replace(
+                result,
+                blocks=partial(loop.blocks, json=show.streams_json),
+                blocks_name="variants",
+                shared=self.workers > 1,
+                late_warnings=lambda: loop.remarks.lines(),
+            )
+        loop.study.check_size(show, loop.count)
+        # what there is to remark on stands in the document too
+        _ = (show.as_json and loop.documents), (show.needs_table and loop.table)
+        return replace(
+            result,
+            document=lambda: {"name": name, "variants": loop.documents},
+            tables={"variants": lambda: loop.table},
+            notes=lambda: name,
+            warnings=[*self.remarks, *loop.remarks.lines()],
+        )

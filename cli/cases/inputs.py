@@ -1,0 +1,193 @@
+"""The inputs of the poses of one mechanism: formed when they are needed, a part at a time where they are many."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cli.cases.axes import Grid, Values
+from cli.cases.values import Driven
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from virtualwork import Mechanism
+
+    Reals = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The inputs of every pose, in SI and as they are shown (degrees or metres), and their rates where a table gives them."""
+
+    values: Reals
+    """(n, k)."""
+    shown: Reals
+    """(n, k), deg or m."""
+    speed: Reals | None = None
+    acceleration: Reals | None = None
+    steps: list[str] = field(default_factory=list)
+    time: Reals | None = None
+    """(n,) s, of a law of motion over time."""
+
+    # whether the values are listed one by one
+    listed = True
+
+    @property
+    def n(self) -> int:
+        """How many poses."""
+        return len(self.shown)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The least and the largest value of the first input."""
+        return float(self.values[:, 0].min()), float(self.values[:, 0].max())
+
+    def part(self, low: int, high: int) -> Inputs:
+        """The poses from low to high."""
+        speed, acceleration = (None if r is None else r[low:high] for r in (self.speed, self.acceleration))
+        time = None if self.time is None else self.time[low:high]
+        return Inputs(
+            self.values[low:high], self.shown[low:high], speed, acceleration, self.steps[low:high], time
+        )
+
+
+@dataclass(frozen=True)
+class InputGrid:
+    """The inputs of a grid of axes; the other inputs stay where they are.
+
+    Attributes
+    ----------
+    names : tuple of Driven
+        The inputs.
+    held : array (k,), array (k,)
+        What the grid does not move, as it is shown and in SI.
+    rates : dict of Driven to float
+        Rates that a row of a table gives all poses.
+    """
+
+    grid: Grid
+    names: tuple[Driven, ...]
+    held: Values
+    rates: dict[Driven, float] = field(default_factory=dict)
+
+    @property
+    def n(self) -> int:
+        """How many poses."""
+        return self.grid.n
+
+    @property
+    def listed(self) -> bool:
+        """Whether the values are listed one by one."""
+        return not (len(self.grid.axes) == 1 and self.grid.axes[0].steps is not None)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The least and the largest value of the first input."""
+        if self.listed:
+            return self._whole.span
+        ends = [float(self.part(i, i + 1).values[0, 0]) for i in (0, self.n - 1)]
+        return min(ends), max(ends)
+
+    def part(self, low: int, high: int) -> Inputs:
+        """The poses from low to high, or to the last."""
+        high = min(high, self.n)
+        moved = self.grid.part(low, high)
+        where = {name: i for i, name in enumerate(self.grid.names)}
+
+        def of(kind: Callable[[Values], Reals], j: int) -> Reals:
+            i = where.get(self.names[j])
+            return np.full(high - low, kind(self.held)[j]) if i is None else kind(moved)[:, i]
+
+        k = range(len(self.names))
+        shown, values = (np.stack([of(kind, j) for j in k], axis=1) for kind in (_shown, _si))
+        rates: list[Reals | None] = []
+        for order in (1, 2):
+            its = [name.rate(order) for name in self.names]
+            if not any(name in where or name in self.rates for name in its):
+                rates.append(None)
+                continue
+            columns = [
+                moved.si[:, where[name]] if name in where else np.full(high - low, self.rates.get(name, 0.0))
+                for name in its
+            ]
+            rates.append(np.stack(columns, axis=1))
+        labels, time = self.grid.labels(low, high), self.grid.times(low, high)
+        return Inputs(values, shown, rates[0], rates[1], labels, time)
+
+    @cached_property
+    def _whole(self) -> Inputs:
+        return self.part(0, self.n)
+
+    @property
+    def values(self) -> Reals:
+        """The inputs in SI, (n, k)."""
+        return self._whole.values
+
+    @property
+    def shown(self) -> Reals:
+        """The inputs as they are shown, degrees or metres, (n, k)."""
+        return self._whole.shown
+
+    @property
+    def steps(self) -> list[str]:
+        """The poses' names."""
+        return self._whole.steps
+
+    @property
+    def speed(self) -> Reals | None:
+        """Their speeds, (n, k), where a table gives them."""
+        return self._whole.speed if self._has(1) else None
+
+    @property
+    def acceleration(self) -> Reals | None:
+        """Their accelerations, (n, k), where a table gives them."""
+        return self._whole.acceleration if self._has(2) else None
+
+    @property
+    def time(self) -> Reals | None:
+        """The times of a law of motion, s."""
+        return self.grid.times(0, self.n)
+
+    def _has(self, order: int) -> bool:
+        named = [name for name in (*self.grid.names, *self.rates) if isinstance(name, Driven)]
+        return any(name.order == order for name in named)
+
+
+def _shown(values: Values) -> Reals:
+    return values.shown
+
+
+def _si(values: Values) -> Reals:
+    return values.si
+
+
+def of_one(
+    m: Mechanism, grid: Grid | None, row: Sequence[tuple[Driven, float, float]] = ()
+) -> Inputs | InputGrid:
+    """The inputs of a mechanism: those of a grid, held at its own pose where the grid moves none.
+
+    `row`: inputs and rates that a row of variants sets, as they are shown and in SI.
+    """
+    names = tuple(Driven.of(m, j) for j in range(len(m.inputs)))
+    own = [m.at[j] if e.value is None else e.value for j, e in enumerate(m.inputs)]
+    shown = [name.shown(value) for name, value in zip(names, own, strict=True)]
+    rates = {}
+    for name, value, si in row:
+        if name.order:
+            rates[name] = si
+        else:
+            shown[name.j], own[name.j] = value, si
+    held = Values(np.array(shown, dtype=float), np.array(own, dtype=float))
+    if grid is not None:
+        return InputGrid(grid, names, held, rates)
+    listed = {
+        order: np.array([[rates.get(name.rate(order), 0.0) for name in names]])
+        for order in (1, 2)
+        if any(name.order == order for name in rates)
+    }
+    return Inputs(held.si[None], held.shown[None], listed.get(1), listed.get(2), ["1"])

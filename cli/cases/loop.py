@@ -1,0 +1,526 @@
+"""The one loop over cases: a mechanism or its variants, at one input or many, in parts of a fixed number of rows.
+
+A part is some variants at all their inputs, or one variant at a block of them. No number, no refusal and no warning
+depends on how many cases there are, nor on which option made them; parts are worked out here, or by processes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from uuid import uuid4
+
+import numpy as np
+
+from cli.cases.axes import Grid
+from cli.cases.inputs import of_one
+from cli.cases.rows import Remarks, blank, emptied, joined, length, like, without_bounds
+from cli.cases.values import Driven, Varied, with_numbers
+from cli.read.options import processes
+from cli.show.progress import progress
+from cli.show.result import Written
+from dalembert.errors import DataError
+from dalembert.results.columns import Column, Table
+from virtualwork import MechanismError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cli.cases.analysis import Request
+    from cli.cases.inputs import InputGrid, Inputs
+    from cli.cases.together import Together
+    from cli.show.commands import ShowOptions
+    from cli.show.result import Form, Part, Result
+    from dalembert.results.columns import Document
+    from virtualwork import Mechanism
+    from virtualwork.describe.dimensions import Dimension
+
+    Rows = NDArray[np.float64]
+    Mask = NDArray[np.bool_]
+
+# rows of a part that is solved together; variants and rows of one that is solved one by one; of a table and of
+# documents, where a row takes some kilobytes
+TOGETHER, ONE_BY_ONE = (1 << 16, 1 << 12), (64, (1 << 14, 1 << 12))
+
+
+class Case:
+    """One mechanism with its inputs, and what a command tells of it."""
+
+    def tables(self) -> Iterator[Table]:
+        """Its rows, a block of poses at a time."""
+        raise NotImplementedError
+
+    def pattern(self) -> Table:
+        """A table with the columns that the tables of all variants have."""
+        return joined(list(self.tables()))
+
+    def document(self) -> Document:
+        """What the JSON document has of it."""
+        raise NotImplementedError
+
+    def warnings(self) -> list[str]:
+        """What there is to warn of, once all is worked out."""
+        return []
+
+    def assembled(self, table: Table) -> list[bool] | bool:
+        """Whether the pose of each row of its table is assembled; or whether anything is."""
+        return True
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a command does with every case: all that another process needs to know.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        What the variants are variants of.
+    bare : mapping
+        The file's units of bare numbers.
+    digits : bool
+        Whether bounds of the errors are needed.
+    json : bool
+        Whether the JSON document is formed.
+    names : tuple of Driven or Varied
+        What a row of variants sets.
+    moved : Grid, optional
+        The inputs that all variants go through.
+    key : str
+        By which a process finds what it has prepared for it.
+    """
+
+    request: Request
+    mechanism: Mechanism
+    bare: dict[str, str]
+    digits: bool
+    json: bool
+    names: tuple[Driven | Varied, ...] = ()
+    moved: Grid | None = None
+    key: str = field(default_factory=lambda: uuid4().hex)
+
+    method = ""
+    blank: ClassVar[Mapping[str, Any]] = {}
+    """What JSON has of a variant that cannot be assembled, where that is not the form of others."""
+    one_blank_row = False
+    """Whether a variant that cannot be assembled has one row; else as many as others have."""
+
+    def case(self, row: Rows | None = None) -> Case:
+        """The case of a row of variants, or of the mechanism itself.
+
+        Raises
+        ------
+        MechanismError
+        """
+        raise NotImplementedError
+
+    def cases(self, part: Variants) -> Iterator[tuple[Case | None, list[str]]]:
+        """The cases of some variants, each with its remarks; None where one cannot be assembled."""
+        for row in part.shown:
+            try:
+                yield self.case(row), []
+            except MechanismError as error:
+                yield None, [str(error)]
+
+    def result(self, case: Case) -> Result:
+        """The result of a mechanism alone, in every form."""
+        raise NotImplementedError
+
+    def warnings(self) -> list[str]:
+        """What there is to remark on the request itself, whatever the variant."""
+        return []
+
+    def together(self, row: Rows, json: bool) -> Together | None:
+        """How variants are solved at once; None where they are not.
+
+        `row`: of one that can be assembled, which has all that is varied.
+        """
+        return None
+
+    def in_blocks(self, show: ShowOptions) -> bool:
+        """Whether the table of the mechanism itself is written a block at a time."""
+        return False
+
+    def beside_table(self) -> Mapping[Path, Callable[[], Iterable[bytes]]]:
+        """Files that stand beside the table of the mechanism itself."""
+        return {}
+
+    def check_size(self, show: ShowOptions, times: int) -> None:
+        """Of so many variants refuse what would take more memory than there is, before it is begun."""
+
+    def size(self, json: bool, together: bool) -> int:
+        """How many variants a part has."""
+        poses = 1 if self.moved is None else self.moved.n
+        rows = TOGETHER[json] if together else ONE_BY_ONE[1][json]
+        most = rows if together else ONE_BY_ONE[0]
+        return max(1, min(most, rows // poses))
+
+    # --- variants -------------------------------------------------------------------------------------------------
+    @property
+    def dimensions(self) -> list[Dimension]:
+        """The dimensions that vary."""
+        return [name.of for name in self.names if isinstance(name, Varied)]
+
+    def numbers(self, shown: Rows) -> Rows:
+        """Of rows of variants the dimensions alone."""
+        return shown[:, [isinstance(name, Varied) for name in self.names]]
+
+    def variant(self, row: Rows) -> Mechanism:
+        """The mechanism with a variant's numbers.
+
+        Raises
+        ------
+        MechanismError
+        """
+        return with_numbers(self.mechanism, self.dimensions, self.numbers(row[None])[0].tolist())
+
+    def in_si(self, shown: Rows) -> dict[str, list[float]]:
+        """The numbers of variants by path, SI."""
+        return {
+            d.path: [Varied(d).si(x) for x in column]
+            for d, column in zip(self.dimensions, self.numbers(shown).T.tolist(), strict=True)
+        }
+
+    def inputs(self, m: Mechanism, row: Rows | None) -> Inputs | InputGrid:
+        """The inputs of a variant."""
+        if row is None:
+            return of_one(m, self.moved)
+        its = [
+            (name, float(x), float(np.radians(x)) if name.unit == "deg" else float(x))
+            for name, x in zip(self.names, row, strict=True)
+            if isinstance(name, Driven)
+        ]
+        return of_one(m, self.moved, its)
+
+
+class Home(NamedTuple):
+    """What all parts of the work have in common.
+
+    Attributes
+    ----------
+    each : int
+        How many variants a part has.
+    pattern : Table
+        With the columns that all tables have.
+    row : array (d,), optional
+        The numbers of a variant that can be assembled.
+    together : bool
+        Whether variants are solved at once.
+    lanes : int
+        How large the whole is, which the choice of an engine depends on.
+    """
+
+    each: int
+    pattern: Table = Table([])
+    row: Rows | None = None
+    together: bool = False
+    lanes: int = 0
+
+
+@dataclass
+class Loop:
+    """The cases of a call, worked out when they are needed.
+
+    Attributes
+    ----------
+    varied : Grid, optional
+        The variants; None where there is the mechanism alone.
+    workers : int
+        How many processes.
+    """
+
+    study: Study
+    varied: Grid | None = None
+    workers: int = 1
+    remarks: Remarks = field(default_factory=Remarks)
+
+    @property
+    def count(self) -> int:
+        """How many mechanisms there are."""
+        return 1 if self.varied is None else self.varied.n
+
+    def rows(self, low: int, high: int) -> Rows:
+        """The numbers of the variants from low to high, as they are shown."""
+        assert self.varied is not None
+        return self.varied.part(low, high).shown
+
+    def blocks(self, form: Form, json: bool = False) -> Iterator[Written]:
+        """What is written of the table, or of the documents, part by part, in their order."""
+        self.remarks = Remarks()
+        if self.varied is None:
+            yield from self._alone(form)
+            return
+        from dalembert.arithmetic.engines import as_part
+        from dalembert.arithmetic.parts import LostPart, in_parts
+
+        count, home = self.count, self.home(json)
+        work: Any = partial(_solved, self.study, home, form, json)
+        if home.lanes:
+            work = partial(as_part, home.lanes, work)
+        each = home.each
+        starts = range(0, count, each)
+        some = ((a + 1, self.rows(a, a + each)) for a in starts)
+        workers = min(self.workers, len(starts))
+        with processes(workers) as pool:
+            try:
+                with closing(in_parts(work, some, pool, 2 * workers)) as parts:
+                    for written, its in progress(parts, count, "variants", each):
+                        self.remarks.join(its)
+                        yield written
+            except LostPart as lost:
+                first, last = (lost.number - 1) * each + 1, min(lost.number * each, count)
+                raise DataError(
+                    f"variants {first} to {last}: the process that solved them died, and died again when it was done once more"
+                ) from None
+
+    def _alone(self, form: Form) -> Iterator[Written]:
+        """The rows of the mechanism itself, a block of poses at a time."""
+        case = self.study.case()
+        for i, table in enumerate(case.tables()):
+            yield form(table, i)
+        there = case.assembled(Table([]))
+        self.remarks.any_assembled = there if isinstance(there, bool) else any(there)
+        self.remarks.add("", case.warnings())
+
+    def home(self, json: bool) -> Home:
+        """The first variant that can be assembled, and whether and how many are solved at once."""
+        study = self.study
+        lanes = self.count * (1 if study.moved is None else study.moved.n)
+        for i in range(self.count):
+            with suppress(MechanismError):
+                row = self.rows(i, i + 1)[0]
+                pattern = without_bounds(study.case(row).pattern())
+                break
+        else:
+            return Home(study.size(json, together=False), lanes=lanes)
+        # however few they are: what is refused, and what is remarked, does not depend on how many others there are
+        together = study.together(row, json) is not None
+        return Home(study.size(json, together), pattern, row, together, lanes)
+
+    @cached_property
+    def table(self) -> Table:
+        """All of them, one below the other."""
+        # bounds of errors are worked out when they are needed, and cannot be sent
+        here = replace(self, workers=1) if self.study.digits else self
+        tables = [written.data for written in here.blocks(as_it_is)]
+        self.remarks = here.remarks
+        return joined([table for table in tables if isinstance(table, Table)])
+
+    @cached_property
+    def documents(self) -> list[Document]:
+        """What the JSON document has of each variant."""
+        parts = (written.data for written in self.blocks(as_it_is, json=True))
+        return [document for part in parts if isinstance(part, list) for document in part]
+
+    def every_case(self) -> list[tuple[str, Case]]:
+        """Each variant that can be assembled, by its name."""
+        if self.varied is None:
+            return [("", self.study.case())]
+        found = []
+        for i in range(self.count):
+            with suppress(MechanismError):
+                found.append((str(i + 1), self.study.case(self.rows(i, i + 1)[0])))
+        return found
+
+
+class Solved(NamedTuple):
+    """What a part gives: what is written of it, and the remarks."""
+
+    written: Written
+    remarks: Remarks
+
+
+def _solved(study: Study, home: Home, form: Form, json: bool, first: int, shown: Rows) -> Solved:
+    """Work out a part: some variants, which are called from `first` on."""
+    part = Variants(study, home, first, shown)
+    return Solved(form(part.documents() if json else part.table(), first - 1), part.remarks)
+
+
+def as_it_is(part: Part, number: int) -> Written:
+    """The form of a part that stays a table, or documents."""
+    return Written(part, 0)
+
+
+@dataclass
+class Variants:
+    """Some variants, which are called from `first` on."""
+
+    study: Study
+    home: Home
+    first: int
+    shown: Rows
+    remarks: Remarks = field(default_factory=Remarks)
+
+    def one(self, i: int, json: bool, case: Case | None = None, lines: Sequence[str] = ()) -> Any:
+        """A variant's document, or its table with which rows are assembled; None where it cannot be assembled."""
+        answer: Any = None
+        try:
+            case = self.study.case(self.shown[i]) if case is None else case
+            if json:
+                document = case.document()
+                answer, there = document, case.assembled(Table([]))
+            else:
+                table = joined(list(case.tables()))
+                there = case.assembled(table)
+                answer = table, there
+            self.remarks.any_assembled |= there if isinstance(there, bool) else any(there)
+            lines = [*lines, *case.warnings()]
+        except MechanismError as error:
+            answer, lines = None, [*lines, str(error)]
+        self.remarks.add(str(self.first + i), lines)
+        return answer
+
+    def each(self, json: bool) -> Iterator[Any]:
+        """What `one` gives of all of them, one by one."""
+        for i, (case, lines) in enumerate(self.study.cases(self)):
+            if case is None:
+                self.remarks.add(str(self.first + i), lines)
+                yield None
+            else:
+                yield self.one(i, json, case, lines)
+
+    # --- as JSON --------------------------------------------------------------------------------------------------
+    def documents(self) -> list[Document]:
+        """What JSON has of each; poses of one that cannot be assembled are not assembled."""
+        listed: list[Any]
+        if self.home.together:
+            poses, assembled, alone = _prepared(self.study, self.home, True).of(
+                *part_of(self.study, self.shown)
+            )
+            v, n = assembled.shape
+            listed = [{"poses": poses[i * n : (i + 1) * n]} for i in range(v)]
+            for i, document in self._left(assembled, alone, True):
+                listed[i] = document
+            self.remarks.any_assembled |= bool(assembled[~alone].any())
+        else:
+            listed = list(self.each(True))
+        if any(document is None for document in listed):
+            empty: Document = dict(self.study.blank)
+            if self.home.row is not None and not self.study.one_blank_row:
+                like_it = Variants(self.study, self.home, 0, self.home.row[None]).one(0, True)
+                empty = {key: blank(value) for key, value in like_it.items()}
+            listed = [empty if document is None else document for document in listed]
+        headers = [d.header for d in self.study.dimensions]
+        return [
+            {"variant": str(self.first + i), "set": dict(zip(headers, row, strict=True)), **document}
+            for i, (row, document) in enumerate(
+                zip(self.study.numbers(self.shown).tolist(), listed, strict=True)
+            )
+        ]
+
+    # --- as a table -----------------------------------------------------------------------------------------------
+    def table(self) -> Table:
+        """The rows of all of them, which tell whether the pose is assembled."""
+        pattern = self.home.pattern
+        if self.home.together:
+            return self._table_together()
+        tables, rows = [], []
+        for answer in self.each(False):
+            of, there = self._rows(answer)
+            tables.append(of)
+            rows.append(there)
+        lengths = np.array([length(of) for of in tables])
+        below = joined(tables)
+        lead = self._lead(lengths, [each for there in rows for each in there])
+        table = Table([*lead, *below.columns], self._keys(pattern))
+        return table if self.study.digits else without_bounds(table)
+
+    def _rows(self, answer: Any) -> tuple[Table, list[Any]]:
+        """The rows of what `one` gives, and of each whether its pose is assembled."""
+        pattern = self.home.pattern
+        if not pattern.columns or (answer is None and self.study.one_blank_row):
+            columns = pattern.columns or [Column("step", "", [None])]
+            pattern = Table([Column(c.name, c.unit, [None]) for c in columns], pattern.keys)
+        table, there = (emptied(pattern), False) if answer is None else (like(pattern, answer[0]), answer[1])
+        return table, there if isinstance(there, list) else [there] * length(table)
+
+    def _table_together(self) -> Table:
+        pattern = self.home.pattern
+        table, assembled, alone = _prepared(self.study, self.home, False).of(*part_of(self.study, self.shown))
+        v, n = assembled.shape
+        columns: list[list[Any]] = [list(c.values) for c in like(pattern, table).columns]
+        whole = assembled.ravel().tolist()
+        for i, answer in self._left(assembled, alone, False):
+            here = slice(i * n, (i + 1) * n)
+            its, whole[here] = self._rows(answer)
+            for values, column in zip(columns, its.columns, strict=True):
+                values[here] = list(column.values)
+        self.remarks.any_assembled |= any(whole)
+        made = [replace(c, values=values) for c, values in zip(pattern.columns, columns, strict=True)]
+        return Table([*self._lead(np.full(v, n), whole), *made], self._keys(pattern))
+
+    def _lead(self, lengths: NDArray[np.intp], assembled: list[Any]) -> list[Column]:
+        """The first columns: the variant, its numbers, whether the pose is assembled."""
+        every = [str(self.first + i) for i in range(len(self.shown))]
+        names = [name for name, n in zip(every, lengths.tolist(), strict=True) for _ in range(n)]
+        columns = np.repeat(self.study.numbers(self.shown), lengths, axis=0).T
+        lead = [Column("variant", "", names)]
+        lead += [Column(d.path, d.unit, x) for d, x in zip(self.study.dimensions, columns, strict=True)]
+        return [*lead, Column("assembled", "", assembled)]
+
+    def _keys(self, table: Table) -> tuple[str, ...]:
+        return ("variant", *(d.header for d in self.study.dimensions), *table.keys)
+
+    def _left(self, assembled: Mask, alone: Mask, json: bool) -> Iterator[tuple[int, Any]]:
+        """Of variants solved together those that are left, as `one` gives them; of others only why poses are missing."""
+        for i in np.flatnonzero(alone | ~assembled.all(axis=1)).tolist():
+            if not alone[i] and self.remarks.full:
+                # its rows are there: only the reason is missing
+                self.remarks.further += 1
+                continue
+            answer = self.one(i, json and bool(alone[i]))
+            if alone[i]:
+                yield i, answer
+
+
+def part_of(study: Study, shown: Rows) -> tuple[Any, Rows]:
+    """Variants as a part of a family, and their inputs as they are shown, (v or 1, n, k)."""
+    from virtualwork.family.family import Family
+    from virtualwork.family.part import Part as FamilyPart
+
+    m, v = study.mechanism, len(shown)
+    family = Family(m, study.in_si(shown))
+    own = study.inputs(m, None)
+    moved = {name.j for axis in study.moved.axes for name in axis.names} if study.moved is not None else set()  # type: ignore[union-attr]
+    si, seen = own.values[None], own.shown[None]
+    rates = family.rates(own.speed, own.acceleration)
+    # what each variant has of its own: a column of inputs, or another position in its file
+    for name, column in zip(study.names, shown.T, strict=True):
+        j = (
+            name.j
+            if isinstance(name, Driven)
+            else int(name.of.where[1])
+            if name.of.where[0] == "inputs"
+            else -1
+        )
+        if j < 0 or (j in moved and not isinstance(name, Driven)):
+            continue
+        numbers = np.radians(column) if name.unit == "deg" else np.asarray(column, dtype=float)
+        if isinstance(name, Driven) and name.order:
+            rates[name.order - 1][j] = numbers[:, None]
+        elif isinstance(name, Driven) or name.of.where[-1] == "value":
+            if len(si) == 1:
+                si, seen = (np.repeat(x, v, axis=0) for x in (si, seen))
+            value = Driven.of(m, j)
+            si[:, :, j] = numbers[:, None]
+            as_shown = column if isinstance(name, Driven) else [value.shown(x) for x in numbers.tolist()]
+            seen[:, :, j] = np.asarray(as_shown)[:, None]
+    return FamilyPart(m, family.dimensions, family.values, si, rates), seen
+
+
+_known: dict[tuple[str, bool], Together] = {}
+
+
+def _prepared(study: Study, home: Home, json: bool) -> Together:
+    """The formulas of a study, which a process writes down once."""
+    name = study.key, json
+    if name not in _known:
+        assert home.row is not None
+        made = study.together(home.row, json)
+        assert made is not None
+        _known.clear()
+        _known[name] = made
+    return _known[name]

@@ -1,0 +1,225 @@
+"""What is said of a mechanism as warnings: limits, branches, forces that have no value."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cli.cases.analysis import Analysis
+from cli.cases.values import Driven, Varied
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from virtualwork.branch.assembly import Assembly
+    from virtualwork.describe.description import Description
+
+GROUND = "ground"
+# of many change points or limits a warning names so many, and how many there are
+NAMED = 10
+
+
+def _on_branch(analysis: Analysis, assembly: Assembly, found: list[float], digits: int) -> list[float]:
+    """Inputs as they are shown, each once, deg in [0, period of the branch) or m."""
+    if analysis.mechanism.inputs[0].is_slide:
+        return sorted({round(v, digits) for v in found})
+    turns = assembly.reach.turns
+    if turns is None:
+        return sorted({round(math.degrees(v), digits) for v in found})
+    full = 360.0 * turns
+    return sorted({round(math.degrees(v) % full, digits) % full for v in found})
+
+
+def _listed(values: list[float], digits: int) -> str:
+    """Name numbers, of very many the first ones.
+
+    >>> _listed([0.5, 90.0], 10), _listed([float(v) for v in range(2000)], 10)
+    ('0.5, 90', '0, 1, 2, 3, 4, 5, 6, 7, 8, 9 … (2000 in all)')
+    """
+    first = ", ".join(f"{v:.{digits}g}" for v in values[:NAMED])
+    return first if len(values) <= NAMED else f"{first} … ({len(values)} in all)"
+
+
+def limits(analysis: Analysis, counted: list[tuple[int, int]] | None = None) -> list[str]:
+    """One line for the poses that cannot be assembled, with the limit of the input that is near them; and branches.
+
+    `counted`: how many these are of each assembly, and the first, where blocks of poses have told it.
+    """
+    lines = []
+    if counted is None:
+        gaps = [~analysis.assembled(motion) for motion in analysis.motions]
+        counted = [(int(gap.sum()), int(np.argmax(gap))) for gap in gaps]
+    for assembly, (missing, first) in zip(analysis.assemblies, counted, strict=True):
+        track = assembly.track
+        name = analysis.mechanism.inputs[0].name
+        if missing:
+            text = f"{missing} of {analysis.inputs.n} poses cannot be assembled"
+            if track.active:
+                shown = _on_branch(analysis, assembly, [v.input for v in assembly.reach.limits()], 12)
+                if shown:
+                    several = "s" * (len(shown) > 1)
+                    text += f": the input {name} has the limit{several} {_listed(shown, 13)} {analysis.unit}"
+            lines.append(text + _shortfall(analysis, assembly, first))
+        lines += _branch_lines(analysis, assembly)
+        lines += track.warnings()
+    return list(dict.fromkeys(lines))
+
+
+def _shortfall(analysis: Analysis, assembly: Assembly, i: int) -> str:
+    """By how much a pose does not close, and the nearest input where it would."""
+    pose = analysis.inputs.part(i, i + 1)
+    found = assembly.reach.shortfall(tuple(pose.values[0].tolist()))
+    if found is None:
+        return ""
+    factor, unit = (1e3, "mm") if analysis.mechanism.size < 2 else (1.0, "m")
+    shown = ", ".join(
+        f"{v:.10g} {'m' if e.is_slide else 'deg'}"
+        for e, v in zip(analysis.mechanism.inputs, pose.shown[0], strict=True)
+    )
+    text = f"; at {shown}: {found.text(lambda v: f'{v * factor:.6g} {unit}')}"
+    if found.nearest is not None:
+        there = found.nearest if analysis.unit == "m" else math.degrees(found.nearest)
+        text += f"; it would close at {there:.10g} {analysis.unit}"
+    return text
+
+
+def _branch_lines(analysis: Analysis, assembly: Assembly) -> list[str]:
+    """Change points on the way from the guess to the poses: which branch was taken, and the other."""
+    track = assembly.track
+    if not track.active:
+        return []
+    least, largest = analysis.inputs.span
+    low, high = min(least, track.start), max(largest, track.start)
+    lines = []
+    for changes in track.changes.values():
+        inside = [c for c in changes if low - 1e-12 <= c.input <= high + 1e-12]
+        if not inside:
+            continue
+        at = _on_branch(analysis, assembly, [c.input for c in inside], 9)
+        c = inside[0]
+        group = next(g for g in assembly.plan.groups if g.name == c.group)
+        names = [*group.angles, *(analysis.mechanism.guides[g].point for g in group.slides)]
+
+        def rates(values: Iterable[float], names: list[str] = names) -> str:
+            return ", ".join(
+                f"d{n}/dq = {round(float(v), 12) + 0.0:.6g}" for n, v in zip(names, values, strict=True)
+            )
+
+        text = f"change point at {_listed(at, 10)} {analysis.unit}: the branches of {c.group} cross; "
+        text += f"the motion goes on along its tangent ({rates(c.rates[0])})"
+        if c.other is not None:
+            text += f", the other branch would go with {rates(c.other)}"
+        lines.append(text)
+    return lines
+
+
+def of_forces(analysis: Analysis) -> list[str]:
+    """What the forces cannot say, pose by pose: dead points, change points, locked friction, redundant joints."""
+    found = [listed(analysis, what, places, len(places)) for what, places in troubles(analysis)]
+    return list(dict.fromkeys([*found, *statements(analysis)]))
+
+
+def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
+    """What the forces cannot say, and the inputs where they cannot."""
+    found: list[tuple[str, list[float]]] = []
+
+    def note(bad: NDArray[np.bool_], what: str) -> None:
+        if bad.any():
+            found.append((what, analysis.inputs.shown[bad, 0].tolist()))
+
+    for motion in analysis.motions:
+        d = motion.dynamics
+        there = motion.assembled
+        for number, meet in d.without_length.items():
+            note(
+                there & meet,
+                f"the ends of [[springs]] {number} meet, so that its pull has no direction: the forces that hang "
+                "on it have no value",
+            )
+            there = there & ~meet
+        for values, what in (
+            (
+                d.effort,
+                "the effort by virtual work has no finite value: a dead point, where the input cannot move the rest",
+            ),
+            (
+                d.newton_euler if d.statics is None else d.effort,
+                "the joint forces have no finite value: loads in line with the links at a dead or change point",
+            ),
+        ):
+            if not motion.assembly.track.folded:  # singular in every pose: that is said once
+                note(there & ~np.isfinite(values).all(axis=1) & ~d.locked, what)
+        if d.scene.friction:
+            note(there & d.locked, "friction locks the mechanism: no reaction balances its own friction")
+    return found
+
+
+def statements(analysis: Analysis) -> list[str]:
+    """What is to be said of the forces whatever the pose."""
+    found: list[str] = []
+    for motion in analysis.motions:
+        d = motion.dynamics
+        if d.statics is not None:
+            found += d.statics.undetermined()
+    for motion in analysis.motions[:1]:
+        for body, r in motion.mechanism.rigid.items():
+            if (
+                r.inertia
+                and not r.mass
+                and motion.dynamics.scene.moves
+                and not pinned(analysis.mechanism, body, r.center)
+            ):
+                found.append(
+                    f"[links.{body}]: an inertia and no mass, though its centre moves: no inertia force from it"
+                )
+    if analysis.mechanism.friction and not any(motion.dynamics.scene.moves for motion in analysis.motions):
+        found.append(
+            "friction: nothing moves (speed zero), so that its direction and size are not determined: left out"
+        )
+    return list(dict.fromkeys(found))
+
+
+def pinned(m: Description, body: str, center: complex) -> bool:
+    """Whether a link turns about its centre, pinned to the ground there."""
+    points = m.links[body].points
+    return any(GROUND in bodies and points.get(name) == center for name, bodies in m.pins.items())
+
+
+def without_meaning(analysis: Analysis, varied: Sequence[Driven | Varied] = ()) -> list[str]:
+    """What cannot mean anything: rates without a speed, forces without a mass or a load.
+
+    `varied` is what variants set: a speed, a mass or a load among it gives the others their meaning.
+    """
+    m, request, lines = analysis.mechanism, analysis.request, []
+    paths = [name.of.where for name in varied if isinstance(name, Varied)]
+    moves = (
+        analysis.own_order > 0
+        or any(isinstance(name, Driven) and name.order for name in varied)
+        or any(where[0] == "inputs" and where[-1] != "value" for where in paths)
+    )
+    if not moves and (request.order or request.only) and any(each.order for each in analysis.places):
+        lines.append(
+            "no input has a speed: all rates are zero; add speed to [input], or --set input.speed=10rad/s"
+        )
+    if not request.forces or any((m.forces, m.torques, m.springs, m.torsion_springs, m.motors)):
+        return lines
+    if not any(each.mass or each.inertia for each in m.rigid.values()):
+        if not any(where[0] == "links" and where[-1] in ("mass", "inertia") for where in paths):
+            lines.append(
+                "no mass and no load: all forces are zero; add mass to a link, or a load such as [[forces]]"
+            )
+    elif not m.gravity and not moves and not any(where[0] == "gravity" for where in paths):
+        lines.append(
+            "masses at rest without gravity or a load: all forces are zero; add gravity, or speed to [input]"
+        )
+    return lines
+
+
+def listed(analysis: Analysis, what: str, places: list[float], count: int) -> str:
+    """One line for what happens at some inputs: the first five of them, and how many more there are."""
+    named = ", ".join(f"{place:g} {analysis.unit}" for place in places[:5])
+    more = f" and {count - 5} further poses" if count > 5 else ""
+    return f"at input {named}{more}: {what}"

@@ -1,0 +1,248 @@
+"""Poses, with their rates or their forces: what `dalembert mechanism` and `dalembert forces` do with every case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cli.cases import poses, remarks
+from cli.cases.analysis import Analysis
+from cli.cases.description import naming
+from cli.cases.loop import Case, Study
+from cli.cases.rows import like
+from cli.show.progress import progress
+from cli.show.result import Result, Section, Sheet
+from dalembert.results.columns import Table
+from dalembert.results.text import heading
+from virtualwork.formulas.positions import BLOCK, EvenSweep
+from virtualwork.motion import Motion
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from cli.cases.loop import Rows
+    from cli.cases.together import Together
+    from cli.show.commands import ShowOptions
+    from dalembert.results.columns import Document
+
+METHOD = (
+    "Assur groups one after the other, two-link groups in closed form (Chace), larger ones by Newton-Raphson; rates by the "
+    "derivatives of the loop equations along the input; effort by virtual work and by Newton and Euler, joint forces by "
+    "d'Alembert's principle (R. Ibrahim, Mecanismos, PMR/EPUSP; J. A. Riul, Dinâmica das Máquinas; R. Nicoletti, SEM 104). "
+    "Angles are counter-clockwise, reactions are what the link `from` exerts on the link `on`."
+)
+
+
+@dataclass(frozen=True)
+class Further:
+    """What a command shows beside the poses of one mechanism.
+
+    Attributes
+    ----------
+    document : dict
+        Beside `poses` in JSON.
+    tables : dict of name to a function
+    words : str
+        Below the table on a terminal.
+    """
+
+    document: dict[str, Any] = field(default_factory=dict)
+    tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
+    words: str = ""
+
+
+@dataclass
+class PoseCase(Case):
+    """The poses of one mechanism.
+
+    Attributes
+    ----------
+    missing : list of (int, int)
+        How many poses of each assembly cannot be assembled, and the first; filled by `tables`.
+    troubles : dict
+        What the forces cannot tell -> the first inputs where, and at how many poses.
+    """
+
+    study: PoseStudy
+    analysis: Analysis
+    missing: list[tuple[int, int]] = field(default_factory=list)
+    troubles: dict[str, tuple[list[float], int]] = field(default_factory=dict)
+    statements: dict[str, None] = field(default_factory=dict)
+    there: list[NDArray[np.bool_]] = field(default_factory=list)
+
+    def tables(self, form: Callable[[Analysis], Table] = poses.table) -> Iterator[Table]:
+        """The rows of all poses, every assembly after the other; more than a block of them block by block."""
+        a = self.analysis
+        if not a.is_long:
+            yield form(a)
+            return
+        pattern: Table | None = None
+        for block in self._in_blocks():
+            table = form(block)
+            if pattern is None:
+                # of the block and of the guess's own pose the one that is assembled
+                pattern = max(table, form(self._at_guess(block)), key=lambda each: len(each.columns))
+            yield like(pattern, table)
+
+    def pattern(self) -> Table:
+        """The columns of all variants, from the first block of poses."""
+        return next(self.tables())
+
+    def _in_blocks(self) -> Iterator[Analysis]:
+        """An analysis for each block of poses, with the digits of the sweep solved whole."""
+        a, q = self.analysis, self.analysis.inputs
+        starts = range(0, q.n, BLOCK)
+        sweep = EvenSweep(0.0, 0.0, q.n, even=False)
+        if len(a.mechanism.inputs) == 1:
+            first, last = (float(q.part(i, i + 1).values[0, 0]) for i in (0, q.n - 1))
+            sweep = EvenSweep(first, last, q.n)
+            looked = starts if q.listed else sorted({0, *starts[-2:]})
+            sweep.even = all(sweep.off(q.part(i, i + BLOCK).values[:, 0]) is not None for i in looked)
+        self.missing.clear()
+        self.there.clear()
+        work = ((assembly, i) for assembly in a.assemblies for i in starts)
+        for assembly, i in progress(work, len(starts) * len(a.assemblies), f"blocks of {BLOCK} poses"):
+            if not i:
+                self.missing.append((0, 0))
+                if len(a.mechanism.inputs) == 1:
+                    assembly.track.cover(*q.span)
+            block = replace(a, inputs=q.part(i, i + BLOCK), warnings=[], block_of=a)
+            block.assemblies = (assembly,)
+            its = block.inputs
+            motion = Motion(assembly, its.values, its.speed, its.acceleration, block_of=sweep)
+            motion.input_error = float(np.finfo(float).eps) * np.abs(motion.inputs)
+            motion.poses.time = its.time
+            block.motions = (motion,)
+            yield block
+            gap = ~block.assembled(motion)
+            count, at = self.missing[-1]
+            self.missing[-1] = count + int(gap.sum()), at if count else i + int(np.argmax(gap))
+            if self.study.names:
+                # the rows of a variant tell it one by one
+                self.there.append(~gap)
+            if a.forces:
+                for what, places in remarks.troubles(block):
+                    listed, number = self.troubles.get(what, ([], 0))
+                    self.troubles[what] = [*listed, *places[: 5 - len(listed)]], number + len(places)
+                self.statements |= dict.fromkeys(remarks.statements(block))
+
+    def _at_guess(self, block: Analysis) -> Analysis:
+        """The block's first pose, with the inputs where the guess has them: there the mechanism is assembled."""
+        first = block.inputs.part(0, 1)
+        home = replace(block, inputs=replace(first, values=np.array([self.analysis.mechanism.at])))
+        home.assemblies = block.assemblies
+        return home
+
+    @cached_property
+    def further(self) -> Further:
+        """What stands beside the poses."""
+        return self.study.further(self.analysis)
+
+    def document(self) -> Document:
+        """The poses, and what stands beside them."""
+        return {"poses": poses.documents(self.analysis), **self.further.document}
+
+    def warnings(self) -> list[str]:
+        """Limits, branches, forces that have no value."""
+        a = self.analysis
+        lines = [*a.warnings, *remarks.limits(a, self.missing or None)]
+        if a.forces and self.missing:
+            lines += [remarks.listed(a, what, *at) for what, at in self.troubles.items()]
+            lines += self.statements
+        elif a.forces:
+            lines += remarks.of_forces(a)
+        return lines
+
+    def assembled(self, table: Table) -> list[bool] | bool:
+        """Of each row of a table whether its pose is assembled, or whether any is."""
+        a, rows = self.analysis, len(table.columns[0].values) if table.columns else 0
+        if self.missing:
+            there = np.concatenate(self.there) if self.there else np.array([], bool)
+            return (
+                there.tolist()
+                if rows and rows == len(there)
+                else any(n < a.inputs.n for n, _ in self.missing)
+            )
+        listed = [pose for motion in a.motions for pose in a.assembled(motion).tolist()]
+        return listed if rows == len(listed) else any(listed)
+
+
+@dataclass(frozen=True)
+class PoseStudy(Study):
+    """What is done with the poses of every case."""
+
+    method = METHOD
+
+    def further(self, analysis: Analysis) -> Further:
+        """What stands beside the poses of one mechanism."""
+        return Further()
+
+    def figure(self, analysis: Analysis) -> Figure:
+        """The picture."""
+        raise NotImplementedError
+
+    def warnings(self) -> list[str]:
+        """Rates without a speed, forces without a mass or a load."""
+        whole = Analysis(self.request, self.mechanism, self.inputs(self.mechanism, None))
+        return remarks.without_meaning(whole, self.names)
+
+    def case(self, row: Rows | None = None) -> PoseCase:
+        """A variant, or the mechanism itself."""
+        m = self.mechanism if row is None else self.variant(row)
+        return PoseCase(self, Analysis(self.request, m, self.inputs(m, row)))
+
+    def together(self, row: Rows, json: bool) -> Together | None:
+        """How variants are solved at once."""
+        from cli.cases.loop import part_of
+        from cli.cases.together import Together
+        from virtualwork.family.part import Solver
+
+        if self.request.branch is not None or self.digits or (json and self.beside_each):
+            return None
+        m = self.mechanism
+        # a rate that only the variants have makes for more columns
+        request = self.request._replace(order=self.case(row).analysis.order)
+        made = Together(Analysis(request, m, self.inputs(m, None)), Solver(part_of(self, row[None])[0]), json)
+        return made if made.pays else None
+
+    def in_blocks(self, show: ShowOptions) -> bool:
+        """Whether the table alone is written: a block of poses at a time."""
+        return show.streams and (show.holds_one or self.case().analysis.is_long)
+
+    def check_size(self, show: ShowOptions, times: int) -> None:
+        """Refuse more poses than the memory holds."""
+        whole = Analysis(self.request, self.mechanism, self.inputs(self.mechanism, None))
+        whole.check_size(json=show.as_json, table=show.needs_table, times=times)
+
+    @property
+    def beside_each(self) -> bool:
+        """Whether something stands beside the poses of each variant."""
+        return False
+
+    def result(self, case: Case) -> Result:
+        """The poses of one mechanism, in every form."""
+        assert isinstance(case, PoseCase)
+        a, further = case.analysis, case.further
+        tables = {"poses": lambda: poses.table(a), **further.tables}
+        return Result(
+            document=lambda: {"name": a.mechanism.name, **case.document()},
+            tables=tables,
+            expected=(*further.tables.values(), lambda: poses.by_link(a)),
+            notes=lambda: a.mechanism.name,
+            afterword=lambda: further.words,
+            figure=lambda: self.figure(a),
+            method=self.method,
+            sheets=lambda: [Sheet("", self.sections(a, tables), lambda: self.figure(a))],
+            warnings=case.warnings(),
+            failed=lambda: not any(a.assembled(motion).any() for motion in a.motions),
+            within=lambda: naming(a.file),
+        )
+
+    def sections(self, analysis: Analysis, tables: Mapping[str, Callable[[], Table]]) -> list[Section]:
+        """What a report shows: every table."""
+        return [Section(heading(name), [table()]) for name, table in tables.items()]

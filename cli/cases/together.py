@@ -1,0 +1,166 @@
+"""The poses of many variants at once, from the formulas with the dimensions as inputs: each as if described alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cli.cases import poses
+from cli.cases.analysis import Analysis
+from cli.cases.inputs import Inputs
+from cli.cases.quantities import keys_of
+from cli.cases.remarks import pinned
+from virtualwork.family.part import ASSEMBLED, Part, Solver
+from virtualwork.formulas.asked import Key
+from virtualwork.formulas.numbers import condition
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Rows = NDArray[np.float64]
+
+# a radicand below which a pose may be a limit: such a variant is described alone, for the marks of its poses
+MARKED = 1e-4
+
+
+class Solved(NamedTuple):
+    """The variants of a part.
+
+    Attributes
+    ----------
+    answer : Table or list of documents
+        One variant after the other, a row or a document for each pose; of no meaning where a variant is left alone.
+    assembled : array (v, n)
+    alone : array (v,)
+        Which variants are to be described alone.
+    """
+
+    answer: Any
+    assembled: NDArray[np.bool_]
+    alone: NDArray[np.bool_]
+
+
+SIZE: Key = ("size",)
+
+
+@dataclass(frozen=True)
+class Together:
+    """The quantities of an analysis, of many variants at once.
+
+    Attributes
+    ----------
+    analysis : Analysis
+        Of the mechanism that they are variants of.
+    solver : Solver
+        Of some variants: its formulas are those of all.
+    json : bool
+        Whether the poses' documents are formed, and no table.
+    """
+
+    analysis: Analysis
+    solver: Solver
+    json: bool
+
+    @property
+    def loops(self) -> list[list[Key]]:
+        """The entries of the Jacobian of all loops."""
+        written = self.solver.written
+        if written is None or written.recording.loops is None:
+            return []
+        loops = written.recording.loops
+        unknowns = range(len(loops.angles) + len(loops.slides))
+        return [[("column", i, j) for j in unknowns] for i in range(len(loops.closures))]
+
+    @cached_property
+    def keys(self) -> list[Key]:
+        """The quantities that the table or the documents are of."""
+        a = self.analysis
+        wanted = keys_of(poses.in_json(a) if self.json else a.tabled)
+        if self.json:
+            assert self.solver.written is not None
+            wanted += [("margin", group.name) for group in self.solver.written.closed]
+            wanted += (
+                [] if a.request.only is not None else [SIZE, *(key for row in self.loops for key in row)]
+            )
+        # whether a pose is assembled is a matter of the names alone
+        wanted += [] if a.whole else a.named
+        return list(dict.fromkeys(wanted))
+
+    @property
+    def pays(self) -> bool:
+        """Whether the formulas take all that is requested."""
+        if self.solver.written is None:
+            return False
+        if self.analysis.forces and not self.solver.takes([("effort", 0), ("newton-euler", 0)]):
+            return False
+        return self.solver.takes(self.keys)
+
+    def of(self, part: Part, shown: Rows) -> Solved:
+        """Some variants; `shown`: their inputs as they are shown, (v or 1, n, k)."""
+        solver = Solver(part, self.solver)
+        v, n = part.shape
+        (there, *values), alone = solver.lanes([ASSEMBLED, *self.keys])
+        assembled = np.isfinite(there)
+        # a remark is due on them
+        alone |= solver.open_at_guess
+        forces = bool(self.analysis.forces)
+        if forces:
+            alone |= self._without_mass(part)
+        for key, lanes in zip(self.keys, values, strict=True):
+            if self.json and key[0] == "margin":
+                alone |= (np.abs(lanes) < MARKED).any(axis=1)
+            if forces:
+                alone |= (assembled & ~np.isfinite(lanes)).any(axis=1)
+        flat = {key: lanes.ravel() for key, lanes in zip(self.keys, values, strict=True)}
+        analysis = replace(self.analysis, inputs=self._inputs(part, shown), warnings=[])
+        analysis.assemblies = self.analysis.assemblies
+        whole = assembled.ravel()
+        if not analysis.whole:
+            whole = np.logical_and.reduce([np.isfinite(flat[key]) for key in analysis.named], initial=True)
+        whole = np.broadcast_to(whole, v * n)
+        if not self.json:
+            return Solved(poses.table(analysis, [flat]), whole.reshape(v, n), alone)
+        conditions = self._condition(flat, assembled.ravel()) if analysis.request.only is None else None
+        # no marks: variants that may have one are described alone
+        marks: list[list[str]] = [[]] * (v * n)
+        branch = analysis.assemblies[0].number
+        listed = poses.poses_of(analysis, branch, flat, whole, conditions, marks)
+        return Solved(list(listed), whole.reshape(v, n), alone)
+
+    def _condition(self, lanes: Mapping[Key, Any], assembled: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """(v n,): see `Motion.condition`."""
+        assert self.solver.written is not None
+        loops = self.solver.written.recording.loops
+        if loops is None:
+            return np.where(assembled, 1.0, np.nan)
+        entries = [[lanes[key] for key in row] for row in self.loops]
+        return condition(entries, len(loops.angles), lanes[SIZE], len(assembled))
+
+    def _without_mass(self, part: Part) -> NDArray[np.bool_]:
+        """Which variants have a link with an inertia and no mass whose centre may move, (v,)."""
+        m, varied = part.mechanism, {d.where: i for i, d in enumerate(part.dimensions)}
+        bodies = np.zeros(part.shape[0], dtype=bool)
+        for name, link in m.links.items():
+            mass, inertia = (
+                part.values[:, varied[where]] if where in varied else np.full(len(bodies), number)
+                for where, number in (
+                    (("links", name, "mass"), link.mass),
+                    (("links", name, "inertia"), link.inertia),
+                )
+            )
+            stays = pinned(m, name, link.center) and not any(
+                where[:2] == ("links", name) and where[2] not in ("mass", "inertia") for where in varied
+            )
+            if not stays:
+                bodies |= (mass == 0) & (inertia != 0)
+        return bodies
+
+    def _inputs(self, part: Part, shown: Rows) -> Inputs:
+        """The inputs of all variants, one after the other."""
+        v, n = part.shape
+        si, seen = (np.broadcast_to(x, (v, n, x.shape[2])).reshape(v * n, -1) for x in (part.inputs, shown))
+        return Inputs(si, seen, steps=list(self.analysis.inputs.steps) * v)

@@ -1,0 +1,1 @@
+"""`dalembert engine`: shaking forces of engines of several cylinders."""

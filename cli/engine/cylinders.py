@@ -1,0 +1,243 @@
+"""From a table of cylinders to the orders of their forces, the counterweights and the balance shafts, in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing import correct
+from balancing.engine import LONGEST_RATIO, Forces, reciprocating_forces, shaft_unbalances, turning_force
+from cli.read import options
+from cli.read.planes import Planes
+from dalembert.angles import phasor
+from dalembert.errors import DataError, quote
+from dalembert.tables.table import Table, read
+from dalembert.units import find_unit
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Cylinders:
+    """The cylinders of a table; angles in degrees."""
+
+    table: Table
+    names: list[str]
+    crank: Real
+    bank: Real
+    z: Real
+    throw: Real
+    rod: Real
+    reciprocating: Real
+    rotating: Real
+    unbalance_unit: str
+    length_unit: str
+
+    @property
+    def horizontal(self) -> bool:
+        """Whether all axes are horizontal, as a locomotive's."""
+        return bool((self.bank % 180.0 == 0).all())
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Shaft:
+    """A balance shaft: a multiple of the crank's speed, its place, m, and its sense."""
+
+    order: int
+    z: float
+    against: bool
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Counterweights:
+    """Unbalances on the crankshaft, kg·m, and the part of each that is for the reciprocating masses."""
+
+    names: list[str]
+    z: Real
+    unbalance: Complex
+    for_reciprocating: Complex
+    radius: Real | None
+
+
+def read_cylinders(path: str) -> Cylinders:
+    """Read the table of cylinders.
+
+    Raises
+    ------
+    DataError
+        A missing column, a doubled name, a rod no longer than the throw, masses that are all zero.
+    """
+    dimensions = {
+        "crank": "angle",
+        "bank": "angle",
+        "z": "length",
+        "throw": "length",
+        "rod": "length",
+        "reciprocating": "mass",
+        "rotating": "mass",
+    }
+    table = read(path, numbers=dimensions, texts=["cylinder"])
+    names = table.texts.get("cylinder", [str(i + 1) for i in range(table.rows)])
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise table.error(i, "cylinder", name, "each cylinder once")
+    throw, rod = table.require("throw", "length"), table.require("rod", "length")
+    mass = table.require("reciprocating", "mass")
+    table.reject(~(throw.si > 1e-60), "throw", "a positive length")
+    table.reject(~(throw.si <= LONGEST_RATIO * rod.si), "rod", "a rod that is longer than the throw")
+    table.reject(mass.values < 0, "reciprocating", "a mass that is not negative")
+    nothing = np.zeros(table.rows)
+    rotating = table.numbers.get("rotating")
+    if rotating is not None:
+        table.reject(rotating.values < 0, "rotating", "a mass that is not negative")
+    rotating_mass = nothing if rotating is None else rotating.si
+    if not (mass.si.any() or rotating_mass.any()):
+        raise DataError(
+            f"{table.file}: column {mass.header}: every mass is zero: expected the reciprocating mass of each cylinder"
+        )
+    z = table.require("z", "length").si if table.rows > 1 or "z" in table.numbers else nothing
+    unit = f"{mass.unit}_{throw.unit}"
+    return Cylinders(
+        table,
+        names,
+        _degrees(table, "crank"),
+        _degrees(table, "bank") if "bank" in table.numbers else np.full(table.rows, 90.0),
+        z,
+        throw.si,
+        rod.si,
+        mass.si,
+        rotating_mass,
+        unit if find_unit("unbalance", unit) else "kg_m",
+        table.numbers["z"].unit if "z" in table.numbers else throw.unit,
+    )
+
+
+def _degrees(table: Table, name: str) -> Real:
+    angle = table.require(name, "angle")
+    return angle.values if angle.unit == "deg" else np.degrees(angle.si)
+
+
+def read_shafts(texts: Sequence[str], highest: int) -> list[Shaft]:
+    """Read `ORDER:Z:with` or `ORDER:Z:against`."""
+    shafts: list[Shaft] = []
+    for text in texts:
+        parts = [part.strip() for part in text.split(":")]
+        if len(parts) != 3 or parts[2] not in ("with", "against") or options.whole(parts[0]) < 1:
+            raise options.bad(
+                "--shaft", f"'{text}': expected ORDER:Z:with or ORDER:Z:against, such as 2:150mm:against"
+            )
+        shaft = Shaft(
+            options.whole(parts[0]), options.needed("--shaft", parts[1], "length"), parts[2] == "against"
+        )
+        if shaft.order > highest:
+            raise options.bad(
+                "--shaft", f"'{text}': order {parts[0]} is above the highest: expected --order {parts[0]} too"
+            )
+        if any((s.order, s.z, s.against) == (shaft.order, shaft.z, shaft.against) for s in shafts):
+            raise options.bad("--shaft", f"'{text}': two shafts of one order and sense at one place")
+        shafts.append(shaft)
+    return shafts
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Engine:
+    """An engine at a speed, and what balances it."""
+
+    cylinders: Cylinders
+    speed: float
+    highest: int
+    share: float | None
+    planes: Planes | None
+    shafts: list[Shaft]
+
+    @cached_property
+    def reciprocating(self) -> Forces:
+        """Of each cylinder."""
+        c = self.cylinders
+        return reciprocating_forces(
+            c.crank, c.bank, c.z, c.throw, c.rod, c.reciprocating, self.speed, self.highest
+        )
+
+    @cached_property
+    def rotating(self) -> Complex:
+        """The unbalance of each cylinder's rotating mass at θ = 0, kg·m."""
+        c = self.cylinders
+        return phasor(c.rotating * c.throw, c.crank, "deg")
+
+    @cached_property
+    def counterweights(self) -> Counterweights | None:
+        """Those of the rotating masses and a share of the reciprocating ones; None where none are wanted."""
+        c = self.cylinders
+        if self.share is None and self.planes is None:
+            return None
+        bob = phasor((self.share or 0.0) * c.reciprocating * c.throw, c.crank, "deg")
+        if self.planes is not None:
+            z = np.zeros(1) if self.planes.z is None else self.planes.z
+            every, of_bob = (correct(u, c.z, z).unbalance for u in (self.rotating + bob, bob))
+            return Counterweights(self.planes.name, z, every, of_bob, self.planes.radius)
+        # cylinders that share a crank pin share its counterweight
+        pins: dict[tuple[float, float], list[int]] = {}
+        for i, pin in enumerate(zip(c.z.tolist(), (c.crank % 360.0).tolist(), strict=True)):
+            pins.setdefault(pin, []).append(i)
+        each = list(pins.values())
+        return Counterweights(
+            ["+".join(c.names[i] for i in pin) for pin in each],
+            np.array([z for z, _ in pins]),
+            np.array([-(self.rotating + bob)[pin].sum() for pin in each]),
+            np.array([-bob[pin].sum() for pin in each]),
+            None,
+        )
+
+    @cached_property
+    def on_the_crank(self) -> Forces:
+        """Of the cylinders, the rotating masses and the counterweights."""
+        forces = self.reciprocating.joined(
+            turning_force(self.rotating, self.cylinders.z, self.speed, self.highest)
+        )
+        weights = self.counterweights
+        if weights is None:
+            return forces
+        return forces.joined(turning_force(weights.unbalance, weights.z, self.speed, self.highest))
+
+    @cached_property
+    def shaft_unbalances(self) -> Complex:
+        """Of each shaft at θ = 0, kg·m."""
+        found = np.zeros(len(self.shafts), dtype=complex)
+        for order, against in {(s.order, s.against) for s in self.shafts}:
+            alike = [i for i, s in enumerate(self.shafts) if (s.order, s.against) == (order, against)]
+            z = [self.shafts[i].z for i in alike]
+            found[alike] = shaft_unbalances(self.on_the_crank, z, self.speed, order, against)
+        return found
+
+    @cached_property
+    def residual(self) -> Forces:
+        """All that shakes the frame."""
+        turning = [
+            turning_force(u, s.z, self.speed, self.highest, s.order, s.against)
+            for s, u in zip(self.shafts, self.shaft_unbalances, strict=True)
+        ]
+        return self.on_the_crank.joined(*turning)
+
+    @property
+    def balanced(self) -> bool:
+        """Whether anything balances it."""
+        return self.counterweights is not None or bool(self.shafts)
+
+    def idle(self, shaft: Shaft, unbalance: complex) -> str:
+        """Say why a shaft has nothing to balance; empty where it has."""
+        limit = self.on_the_crank.rounding()[shaft.order - 1] / (shaft.order * self.speed) ** 2
+        if abs(unbalance) > limit:
+            return ""
+        couple = self.on_the_crank.largest(couple=True)[shaft.order - 1] > 0
+        named = quote(f"{shaft.order}:{shaft.z:g}m:{'against' if shaft.against else 'with'}")
+        if couple:
+            return (
+                f"--shaft {named}: order {shaft.order} has a couple and no force that turns so: one shaft cannot balance it; "
+                "add a second one at another place"
+            )
+        return f"--shaft {named}: order {shaft.order} has no force that turns so: the shaft has nothing to balance"

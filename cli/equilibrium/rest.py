@@ -1,0 +1,137 @@
+"""The positions of rest of a mechanism: as a table, as JSON, and drawn."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cli.cases.analysis import Analysis
+from cli.cases.inputs import Inputs
+from cli.cases.poses import listed
+from cli.cases.single import TableCase, TableStudy
+from dalembert.results.columns import Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cli.cases.loop import Rows
+    from virtualwork.study.equilibrium import Equilibria as Found
+
+Document = dict[str, Any]
+
+
+@dataclass
+class Rest(TableCase):
+    """Where one mechanism rests.
+
+    Attributes
+    ----------
+    ranged : bool
+        Whether the inputs are the range that is searched.
+    """
+
+    analysis: Analysis
+    ranged: bool
+    name: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.name = self.analysis.mechanism.name
+
+    @cached_property
+    def equilibria(self) -> Found:
+        """The positions."""
+        spans = None
+        if self.ranged:
+            values = self.analysis.inputs.values
+            spans = np.stack([values.min(axis=0), values.max(axis=0)], axis=1)
+            if (spans[:, 0] == spans[:, 1]).any():
+                spans = None
+        return self.analysis.mechanism.equilibria(spans)
+
+    @cached_property
+    def rows(self) -> list[Document]:
+        """As JSON has them."""
+        m = self.analysis.mechanism
+        rows: list[Document] = []
+        for e in self.equilibria.found:
+            values = {
+                entry.name: {
+                    self.analysis.input_names[entry.name]: value
+                    if entry.is_slide
+                    else math.degrees(value) % 360.0
+                }
+                for entry, value in zip(m.inputs, e.inputs, strict=True)
+            }
+            place: Document = next(iter(values.values())) if len(m.inputs) == 1 else {"inputs": values}
+            rows.append({**place, "stable": e.stable, "potential_J": e.potential})
+        return rows
+
+    def document(self) -> Document:
+        """What the JSON document has of it."""
+        return {"equilibria": self.rows}
+
+    def table(self) -> Table:
+        """A row for each position."""
+        inputs = self.analysis.input_names
+        one = len(inputs) == 1
+        rows = [
+            (
+                *((row if one else row["inputs"][name])[key] for name, key in inputs.items()),
+                row["stable"],
+                row["potential_J"],
+            )
+            for row in self.rows
+        ]
+        return listed((*self.analysis.input_columns, "stable", "potential_J"), rows)
+
+    def warnings(self) -> list[str]:
+        """What the table cannot tell."""
+        found, lines = self.equilibria, list(self.analysis.warnings)
+        if not found.loaded:
+            lines.append("nothing acts at rest: every position is one of equilibrium")
+        elif found.region:
+            lines.append("positions of rest fill a part of the range: they are not isolated, and not listed")
+        elif found.everywhere:
+            lines.append(
+                "the loads balance in every position: equilibrium everywhere, neither stable nor unstable"
+            )
+        elif not self.rows:
+            lines.append("no equilibrium: the loads balance at no position of the range")
+        if any(row["stable"] is None for row in self.rows):
+            lines.append(
+                "stable null: the second variation of the potential vanishes there and does not decide"
+            )
+        return lines
+
+    def figure(self) -> Figure:
+        """The mechanism in its positions of rest; in its own pose where there is none."""
+        from cli.cases.picture import drawn
+
+        a = self.analysis
+        q = np.array([e.inputs for e in self.equilibria.found]).reshape(-1, len(a.mechanism.inputs))
+        if not len(q):
+            return drawn(replace(a, inputs=a.inputs.part(0, 1)))
+        steps = [str(i) for i in range(1, len(q) + 1)]
+        return drawn(replace(a, inputs=Inputs(q, np.degrees(q), steps=steps)))
+
+
+@dataclass(frozen=True)
+class Equilibria(TableStudy):
+    """Find the positions of rest of every case."""
+
+    title = "equilibria"
+    method = (
+        "Positions where the generalized force of the loads vanishes; stable where the second variation of the potential "
+        "is positive (Lagrange and Dirichlet)."
+    )
+
+    def case(self, row: Rows | None = None) -> Rest:
+        """A variant, or the mechanism itself."""
+        m = self.mechanism if row is None else self.variant(row)
+        _ = m.assembly
+        ranged = self.moved is not None and self.moved.axes[0].option != "[input] law"
+        return Rest(Analysis(self.request, m, self.inputs(m, row)), ranged)

@@ -1,0 +1,442 @@
+"""From measured runs to corrections, with their uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from balancing import (
+    AmplitudeFit,
+    Balance,
+    DependentPlanes,
+    DependentTrials,
+    Infeasible,
+    JointFit,
+    LogBalance,
+    NotConverged,
+    Readings,
+    condition_number,
+    influence_coefficients,
+    influence_from_amplitudes,
+    initial_unbalance,
+    least_squares,
+    place,
+    spread,
+    unseen,
+)
+from cli.field.one_rotor import Sought, confidence, least_maximum, limited_samples, within_limits
+from cli.field.request import Request, ceiling_in, limits_in, masses_at
+from cli.field.runs import SHOWN, Complex, Group, Real, Runs
+from cli.field.solution import Problem, Solved
+from cli.field.stored import Stored
+from cli.read.options import bad
+from dalembert.angles import degrees
+from dalembert.arithmetic.parts import in_parts
+from dalembert.errors import DataError
+from dalembert.units import Scaled, from_si
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+Result = TypeVar("Result")
+
+SINGULAR = 1e12  # a condition number beyond which the planes count as dependent
+MANY = 200  # rotors whose uncertainties are worked out unasked
+
+
+class FieldBalancing:
+    """The corrections of every rotor of a table of runs."""
+
+    def __init__(
+        self, runs: Runs, request: Request, stored: Stored | None = None, executor: Executor | None = None
+    ) -> None:
+        self.runs, self.request, self.stored, self.executor = runs, request, stored, executor
+        if request.tolerance is not None and runs.per == "mass" and request.radius is None:
+            raise bad("--radius", "the tolerance is of unbalances: expected the radius of the trial masses")
+        self.max_mass = limits_in(request.max_mass, runs) or runs.max_mass
+        """Limit of each plane, SI; the key "" is for all."""
+        self.ceiling = ceiling_in(request.max_residual, runs)
+        """Of the residuals, in the table's amplitude unit."""
+        self.predict = masses_at(request.predict, runs)
+        """Plane -> mass of a run to be predicted, SI; the key "" is the only plane."""
+        self.limited = bool(request.objective == "minimax" or self.max_mass or self.ceiling is not None)
+        """Whether the corrections are others than those by plain least squares."""
+        self.warnings: list[str] = []
+        self.solved = [self._solve(group) for group in runs.groups]
+        self.place: list[tuple[int, int]] = [(0, 0)] * len(runs.rotors)
+        for k, group in enumerate(runs.groups):
+            for i, rotor in enumerate(group.rotors.tolist()):
+                self.place[rotor] = (k, i)
+
+    # -- solving -------------------------------------------------------------------------------------------
+
+    def of(self, group: Group, i: int = 0) -> str:
+        """Return what a sentence about a rotor begins with, where there are several."""
+        return self.runs.of(group.rotors[i])
+
+    def runout(self, group: Group) -> Complex:
+        """Return the run-out of each channel, (s,)."""
+        return np.array(
+            [self.runs.runout.get(channel.sensor, 0) for channel in group.channels], dtype=complex
+        )
+
+    def _solve(self, group: Group) -> Solved:
+        request = self.request
+        planes, alpha, fits = self._coefficients(group)
+        standing = self._standing(group, planes)
+        start = standing if request.from_here else np.zeros_like(standing)
+        if request.from_here and not standing.any():
+            self.warnings.append(
+                "--from-here: the last run has no mass on the rotor, so that it stands as in the initial run"
+            )
+        initial = group.initial - self.runout(group)
+        problem = Problem(group, planes, alpha, fits, initial, standing, start, self._limits(planes))
+        corrections, bound, condition = self._corrections(problem)
+        if request.view is not None and len(planes) != 2:
+            raise bad(
+                "--view", f"static and couple parts need two planes, found {len(planes)}: {', '.join(planes)}"
+            )
+        residual = problem.here + np.matvec(alpha, corrections)
+        # below the rounding of its terms a residual is zero
+        noise = np.abs(initial) + np.matvec(np.abs(alpha), np.abs(corrections) + np.abs(start))
+        residual = np.where(np.abs(residual) > 1e-15 * noise, residual, 0)
+        unbalance = None
+        if request.tolerance is not None:
+            unbalance = initial_unbalance(alpha, initial, group.weights, singular=SINGULAR)
+        given = (group, planes, alpha, fits, initial, standing, start, problem.limit)
+        solved = Solved(*given, corrections, residual, condition, bound, unbalance)
+        if group.fit is not None:
+            self._doubt(solved, group.fit)
+        elif request.reading_error is not None or self._repeats_tell(group):
+            self._confidence(solved)
+        return solved
+
+    def _standing(self, group: Group, planes: list[str]) -> Complex:
+        """Return what is on the rotors in their last run in these planes, (g, p)."""
+        named = group.planes
+        if named == planes:
+            return group.standing
+        if len(planes) == 1 and "trial_plane" not in self.runs.table.texts:
+            named = planes[: len(named)]
+        standing = np.zeros((len(group.rotors), len(planes)), dtype=complex)
+        for p, plane in enumerate(named):
+            if plane in planes:
+                standing[:, planes.index(plane)] = group.standing[:, p]
+            elif group.standing[:, p].any():
+                self.warnings.append(
+                    f"{self.of(group)}the last run has a mass in plane {plane}, of which no coefficient is stored: the trim "
+                    "leaves it out"
+                )
+        return standing
+
+    def _coefficients(self, group: Group) -> tuple[list[str], Complex, list[AmplitudeFit]]:
+        """Return the planes and their coefficients, (g, s, p): stored, of a fit, from amplitudes or from trial runs."""
+        planes = group.planes
+        if self.stored is not None:
+            matrices = []
+            for rotor in group.rotors:
+                planes, matrix = self.stored.matrix(self.runs.rotors[rotor], group.channels, self.runs)
+                matrices.append(matrix)
+                if "rotor" not in self.stored.table.texts:
+                    break
+            alpha = np.broadcast_to(np.stack(matrices), (len(group.rotors), *matrices[0].shape))
+            return planes, alpha, []
+        if group.fit is not None:
+            return planes, group.fit.influence, []
+        if self.request.four_run:
+            fits = self._amplitudes(group)
+            return planes, np.stack([fit.influence for fit in fits])[..., None], fits
+        try:
+            return planes, influence_coefficients(group.initial, group.runs, group.on), []
+        except DependentTrials as error:
+            raise DataError(self.of(group, *error.case) + trials_say(group, error)) from None
+
+    def _repeats_tell(self, group: Group) -> bool:
+        """Whether the scatter of repeats is to give uncertainties that nobody asked for."""
+        if self.request.four_run or not group.reading_sd.any():
+            return False
+        if len(group.rotors) <= (SHOWN if self.limited else MANY):
+            return True
+        self.warnings.append("uncertainties of so many rotors are worked out with --reading-error alone")
+        return False
+
+    def _limits(self, planes: list[str]) -> Real | None:
+        given = self.max_mass
+        for name in given:
+            if name and name not in planes:
+                raise bad("--max-mass", f"no plane {name}: expected one of {', '.join(planes)}")
+        limit = np.array([given.get(plane, given.get("", np.inf)) for plane in planes])
+        return limit if np.isfinite(limit).any() else None
+
+    def _corrections(self, problem: Problem) -> tuple[Complex, Real | None, Real]:
+        """Return the corrections, for minimax the proven bounds, and the condition numbers."""
+        request, weights = self.request, problem.group.weights
+        alpha, here, limit, ceiling = problem.alpha, problem.here, problem.limit, self.ceiling
+        minimax = request.objective == "minimax"
+        fix = None
+        if not minimax and limit is None and ceiling is None:
+            fix = self._one(
+                problem,
+                lambda: least_squares(alpha, here, weights, ridge=request.ridge),
+            )
+        condition = condition_number(alpha, weights) if fix is None else fix.condition_number
+        if limit is None and not request.ridge:
+            # the coefficients are differences of readings: what lies in their rounding is no information
+            beyond = np.flatnonzero(~(condition < SINGULAR))
+            if len(beyond):
+                i = int(beyond[0])
+                hidden = unseen(alpha[i], problem.group.own_weights(i))[0]
+                raise DataError(self.of(problem.group, i) + planes_say(problem.planes, hidden))
+        if fix is not None:
+            return fix.corrections, None, condition
+        if minimax:
+            proven = self._one_by_one(least_maximum, problem, range(len(here)))
+            return (
+                np.stack([fix.corrections for fix in proven]),
+                np.array([fix.bound for fix in proven], dtype=float),
+                np.array([fix.condition_number for fix in proven]),
+            )
+        # rotors that keep the limits by themselves all at once, the others one by one
+        corrections = np.zeros((len(here), len(problem.planes)), dtype=complex)
+        beyond = np.ones(len(here), dtype=bool)
+        try:
+            free = least_squares(alpha, here, weights)
+            corrections[:] = free.corrections
+            beyond[:] = False
+            if limit is not None:
+                beyond |= (np.abs(free.corrections) > limit).any(axis=1)
+            if ceiling is not None:
+                beyond |= (np.abs(free.residual) > ceiling).any(axis=1)
+        except DependentPlanes:
+            pass
+        rest = np.flatnonzero(beyond).tolist()
+        for i, one in zip(rest, self._one_by_one(within_limits, problem, rest), strict=True):
+            corrections[i] = one.corrections
+        return corrections, None, condition
+
+    def _one_by_one(
+        self, solve: Callable[..., tuple[Balance, bool]], problem: Problem, rotors: Sequence[int]
+    ) -> list[Balance]:
+        """Solve for rotors, each by itself."""
+        ceiling, group = self.ceiling, problem.group
+        parts = (
+            (problem.alpha[i], problem.here[i], problem.limit, ceiling, group.own_weights(i)) for i in rotors
+        )
+        results, found = in_parts(solve, parts, self.executor), []
+        for i in rotors:
+            fix, beyond = self._one(problem, lambda: next(results), i)
+            if beyond:
+                self.warnings.append(
+                    "with these weights a residual is beyond --max-residual, which without them could be met"
+                )
+            if fix.status != "optimal":
+                self.warnings.append(f"{self.of(group, i)}{fix.status}")
+            found.append(fix)
+        return found
+
+    def _one(self, problem: Problem, solve: Callable[[], Result], i: int | None = None) -> Result:
+        """Solve for one rotor, or for all; what cannot be done is said with the rotor's name."""
+        try:
+            return solve()
+        except DependentPlanes as error:
+            of = self.of(problem.group, *(error.case[:1] if i is None else [i]))
+            raise DataError(of + planes_say(problem.planes, error.combination)) from None
+        except Infeasible as error:
+            unit = self.runs.amplitude_unit
+            with_limits = " with the limits of the masses" if self.max_mass else ""
+            raise DataError(
+                f"{self.of(problem.group, i or 0)}no corrections{with_limits} leave every residual within "
+                f"{self.ceiling:g} {unit}: infeasible; the smallest limit that can be met is {error.rounded_up} {unit}"
+            ) from None
+        except NotConverged as error:
+            raise DataError(f"{self.of(problem.group, i or 0)}{error}") from None
+
+    def _amplitudes(self, group: Group) -> list[AmplitudeFit]:
+        """The four-run method, rotor by rotor."""
+        if len(group.planes) != 1:
+            raise DataError(
+                f"{self.of(group)}the four-run method is for one plane, found {', '.join(group.planes)}: with more planes "
+                "the phase must be measured"
+            )
+        fits = []
+        for i in range(len(group.rotors)):
+            try:
+                fit = influence_from_amplitudes(group.initial[i].real, group.runs[i].real, group.on[i, :, 0])
+            except ValueError as error:
+                raise DataError(f"{self.runs.table.file}: {self.of(group, i)}{error}") from None
+            fits.append(fit)
+            unit = self.runs.amplitude_unit
+            for channel, misfit, first in zip(group.channels, fit.misfit, group.initial[i].real, strict=True):
+                text = (
+                    f"{self.of(group, i)}sensor {channel}: the readings are inconsistent: no influence coefficient fits them "
+                    f"better than {misfit:.3g} {unit} (r.m.s.), {misfit / first:.0%} of the initial reading"
+                )
+                if misfit > 0.25 * first:
+                    raise DataError(
+                        f"{self.runs.table.file}: {text}: expected four readings that fit one plane's effect"
+                    )
+                if misfit > 0.05 * first:
+                    self.warnings.append(text)
+        return fits
+
+    def _confidence(self, solved: Solved) -> None:
+        """Propagate the reading errors, rotor by rotor."""
+        relative, angle = self.request.reading_error or (0.0, 0.0)
+        group, sought, runout = solved.group, self._sought(solved), self.runout(solved.group)
+
+        def task(i: int) -> tuple[object, ...]:
+            readings = Readings(
+                group.initial[i],
+                relative,
+                angle,
+                trials=None if self.stored is not None else group.runs[i],
+                trial_masses=None if self.stored is not None else group.on[i],
+                influence=solved.alpha[i],
+                runout=runout,
+                scatter=group.mean_error[i] if group.reading_sd[i] else None,
+                degrees_of_freedom=group.repeats,
+            )
+            own = group.own_weights(i)
+            return readings, solved.corrections[i], solved.start[i], own, sought, self.limited
+
+        found = list(in_parts(confidence, map(task, range(len(group.rotors))), self.executor))
+        solved.covariance = np.stack([covariance for covariance, _ in found])
+        self._unknown(solved)
+        solved.residual_95 = np.array([left for _, left in found])
+
+    def _sought(self, solved: Solved) -> Sought:
+        request = self.request
+        return Sought(request.objective, solved.limit, self.ceiling, request.ridge, request.monte_carlo)
+
+    def _doubt(self, solved: Solved, fit: JointFit) -> None:
+        """Carry the errors of a fit of all runs to the corrections."""
+        request, group = self.request, solved.group
+        before = group.before
+        if request.reading_error is not None:
+            errors = fit.stated(*request.reading_error)
+        elif before is not None and before.reading is not None:
+            # where the runs leave nothing over, the readings scatter as those of the sisters did
+            told = fit.degrees_of_freedom > 0
+            errors = fit.known(
+                np.where(told, fit.residual_sd, before.reading[0]),
+                np.where(told, fit.degrees_of_freedom, before.reading[1]),
+            )
+        else:
+            errors = fit.scatter()
+        still = fit.without(self.runout(group))
+        balance = LogBalance(still, solved.total, errors, group.weights, solved.corrections, request.ridge)
+        solved.balance = balance
+        if not np.isfinite(errors.along).any():
+            return
+        many = len(solved.corrections) > MANY
+        if not many:
+            left = [np.abs(balance.residual_samples(i)).max(axis=1) for i in range(len(solved.corrections))]
+            solved.residual_95 = np.quantile(left, 0.95, axis=1)
+        if not self.limited:
+            solved.covariance = balance.covariance
+        elif many:
+            self.warnings.append(
+                "uncertainties of so many rotors are not worked out under limits or with minimax"
+            )
+        else:
+            spreads = []
+            for i, corrections in enumerate(solved.corrections):
+                draws = balance.problem_samples(i, min(request.monte_carlo or 200, 1000))
+                own = group.own_weights(i)
+                try:
+                    samples = limited_samples(draws, solved.start[i], own, self._sought(solved))
+                    spreads.append(spread(samples, corrections))
+                except (DependentPlanes, NotConverged):
+                    spreads.append(np.full((len(corrections), 2, 2), np.nan))
+            solved.covariance = np.stack(spreads)
+            self._unknown(solved)
+
+    def _unknown(self, solved: Solved) -> None:
+        """Warn where the uncertainties of the corrections cannot be determined."""
+        assert solved.covariance is not None
+        for i in np.flatnonzero(np.isnan(solved.covariance).any(axis=(1, 2, 3)))[:SHOWN]:
+            self.warnings.append(
+                f"{self.of(solved.group, int(i))}the uncertainties of the corrections cannot be determined: from some of the "
+                "drawn readings no corrections can be found"
+            )
+
+    # -- in the units and by the names of the table ------------------------------------------------------
+
+    @property
+    def against(self) -> bool:
+        """Whether phases were turned round, for the instrument counts them against the sense of the mass angles."""
+        return self.request.against or self.runs.lags
+
+    def in_kg_m(self, corrections: Complex) -> Real:
+        """Return the unbalances of masses at the trial radius, or of unbalances as they are."""
+        arm = 1.0 if self.runs.per == "unbalance" else self.request.radius or 1.0
+        return np.asarray(np.abs(corrections) * arm)
+
+    @property
+    def unit(self) -> str:
+        """The unit of a correction as people write it."""
+        return self.runs.mass_unit.replace("_", "·")
+
+    def amount(self, value: Scaled) -> Scaled:
+        """Return a correction in the unit of the trial masses."""
+        return from_si(value, self.runs.per, self.runs.mass_unit)
+
+    def split(self, w: complex) -> list[tuple[str, float, float]]:
+        """Split a correction onto the places: name, angle in degrees, amount in SI of each that is used."""
+        if self.request.places is None or w == 0:
+            return []
+        masses = place(complex(w), np.radians(self.request.places)).masses.tolist()
+        return [
+            (str(k + 1), self.request.places[k] % 360.0, mass) for k, mass in enumerate(masses) if mass > 0
+        ]
+
+    # -- rotor by rotor --------------------------------------------------------------------------------------
+
+    def each(self, most: int | None = None) -> Iterator[tuple[str, Solved, int]]:
+        """Yield of each rotor its name as it is shown, its group's result, and its place in that."""
+        for rotor, (k, i) in zip(self.runs.rotors[:most], self.place, strict=False):
+            yield rotor if self.runs.several else "", self.solved[k], i
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether reading errors are known, stated or from repeats."""
+        return any(solved.covariance is not None for solved in self.solved)
+
+
+def _combination(names: list[str], combination: Complex) -> str:
+    terms = []
+    for name, share in zip(names, combination, strict=True):
+        if abs(share) > 1e-6:
+            terms.append(f"{abs(share):.3g} at {float(degrees(share)):.0f}° in {name}")
+    return ", ".join(terms)
+
+
+def planes_say(planes: list[str], combination: Complex) -> str:
+    """Say which planes the readings cannot tell apart."""
+    told = [name for name, share in zip(planes, combination, strict=True) if abs(share) > 1e-6]
+    if len(told) == 1:
+        return (
+            f"plane {told[0]} has no effect on any reading: its correction cannot be found; expected sensors that "
+            "respond to it, or the plane left out"
+        )
+    return (
+        f"the readings cannot tell the planes {' and '.join(told)} apart (singular): masses in the ratio "
+        f"{_combination(planes, combination)} leave no trace; leave one of these planes out, or damp with --ridge"
+    )
+
+
+def trials_say(group: Group, error: DependentTrials) -> str:
+    """Say which planes the trial runs do not tell apart."""
+    told = [name for name, share in zip(group.planes, error.combination, strict=True) if abs(share) > 1e-6]
+    runs = len(group.trials)
+    if runs < len(group.planes):
+        return (
+            f"{len(group.planes)} planes ({', '.join(group.planes)}) and {runs} trial run{'s' * (runs != 1)}: expected a "
+            "trial run for every plane"
+        )
+    return (
+        f"the trial runs do not tell the planes {' and '.join(told)} apart: expected each plane tried by itself, "
+        "or in different proportions"
+    )

@@ -1,0 +1,92 @@
+"""What the corrections of rotors are found from, and what was found: corrections, trim, their uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from balancing import AmplitudeFit, LogBalance
+from balancing.dependence import directions
+from cli.field.runs import Complex, Group, Real
+from cli.read.rounding import EPS
+
+UNKNOWN_ANGLE = 60.0  # an angle that is uncertain by more (degrees) is not known
+
+
+@dataclass(eq=False, repr=False)
+class Problem:
+    """What the corrections of a group are found from."""
+
+    group: Group
+    planes: list[str]
+    alpha: Complex
+    fits: list[AmplitudeFit]
+    """Of the four-run method, rotor by rotor."""
+    initial: Complex
+    """(g, s), run-out off."""
+    standing: Complex
+    """(g, p): what is on the rotor in its last run."""
+    start: Complex
+    """(g, p): what is on the rotor where the corrections start from: that, or nothing."""
+    limit: Real | None
+    """Of each plane, SI; None where there is none."""
+
+    @cached_property
+    def here(self) -> Complex:
+        """The vibration where the corrections start from, (g, s)."""
+        return self.initial + np.matvec(self.alpha, self.start) if self.start.any() else self.initial
+
+
+@dataclass(eq=False, repr=False)
+class Solved(Problem):
+    """A group's result."""
+
+    corrections: Complex
+    """(g, p), as given out (from here, where that was asked for)."""
+    residual: Complex
+    condition: Real
+    bound: Real | None
+    """Of the largest residual, as the dual problem proves it."""
+    unbalance: Complex | None
+    """(g, p): the rotor's own in its initial state; NaN where the readings do not determine it."""
+    covariance: Real | None = None
+    residual_95: Real | None = None
+    balance: LogBalance | None = None
+    """Where all runs were fitted at once: what the corrections leave, and how sure it is."""
+
+    @property
+    def fitted(self) -> LogBalance:
+        """The balance of a log whose runs were all fitted at once."""
+        assert self.balance is not None
+        return self.balance
+
+    @property
+    def total(self) -> Complex:
+        """What is added to the rotor in its initial state, (g, p)."""
+        return self.corrections + self.start
+
+    @cached_property
+    def trim(self) -> Complex:
+        """What is added to the rotor as it stands in its last run, (g, p)."""
+        trim = self.corrections + (self.start - self.standing)
+        terms = np.abs(self.total) + np.abs(self.standing)
+        return np.where(np.abs(trim) > 4 * EPS * terms, trim, 0)
+
+    @cached_property
+    def uncertainty(self) -> tuple[Real, Real]:
+        """The standard deviations of size (SI) and angle (degrees), (g, p) each; NaN where they are not known."""
+        return self.uncertainty_of(self.corrections)
+
+    def uncertainty_of(self, masses: Complex) -> tuple[Real, Real]:
+        """Return the same of what differs from the corrections by masses that are known, (g, p)."""
+        size = np.abs(masses)
+        if self.covariance is None:
+            return np.full(size.shape, np.nan), np.full(size.shape, np.nan)
+        turn = directions(self.corrections) * directions(masses).conj()
+        axes = np.moveaxis(np.array([[turn.real, -turn.imag], [turn.imag, turn.real]]), (0, 1), (-2, -1))
+        covariance = axes @ self.covariance @ np.swapaxes(axes, -1, -2)
+        along, across = (np.sqrt(covariance[..., k, k]) for k in (0, 1))
+        angle = np.where(size > 0, np.degrees(across / np.where(size > 0, size, 1.0)), np.nan)
+        return along, np.where(angle <= UNKNOWN_ANGLE, angle, np.nan)

@@ -1,0 +1,239 @@
+"""The files beside a table of runs: run-out vectors and stored influence coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.field.layouts import Alpha, alpha_of
+from cli.field.runs import Channel, Rows, Runs, apart
+from dalembert.angles import phasor
+from dalembert.errors import DataError, quote
+from dalembert.quantities import parse_number
+from dalembert.tables.table import Numbers, Table, read
+from dalembert.units import UNITS, from_si
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def read_runout(path: str, runs: Runs, *, lagging: bool) -> dict[str, complex]:
+    """Read the run-out vector of each sensor, in the runs' amplitude unit."""
+    table = read(path, numbers={"amplitude": "amplitude", "phase": "angle"}, texts=["sensor"])
+    amplitude, phase = table.require("amplitude", "amplitude"), table.require("phase", "angle")
+    table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
+    size = runs.in_unit(amplitude.values, amplitude.unit, f"{table.file}: the run-out")
+    vectors = phasor(size, -phase.values if lagging else phase.values, phase.unit).tolist()
+    sensors = table.named("sensor")
+    known = {channel.sensor for group in runs.groups for channel in group.channels}
+    out: dict[str, complex] = {}
+    for i, (sensor, vector) in enumerate(zip(sensors, vectors, strict=True)):
+        if sensor in out:
+            raise table.error(i, "sensor", sensor, "each sensor once")
+        if sensor not in known:
+            raise table.error(i, "sensor", sensor, f"a sensor of the runs ({', '.join(sorted(known))})")
+        out[sensor] = vector
+    runs.warnings += table.warnings
+    for sensor in sorted(known - set(out)):
+        runs.warnings.append(f"{table.file}: no run-out of sensor {sensor}: taken as zero")
+    return out
+
+
+class Coefficients(NamedTuple):
+    """The stored coefficients of a machine, and how well they are known."""
+
+    alpha: Complex
+    """(s, p)."""
+    covariance: Complex | None
+    """E δδᴴ of each channel, (s, p, p); None where the file states none."""
+    reading_sd: float
+    """Of the readings that they come from, as vectors; NaN where the file does not say."""
+    degrees_of_freedom: float
+    """Complex, of that and of the covariance; inf where the file does not say."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stored:
+    """Stored influence coefficients."""
+
+    table: Table
+    unit: str
+    values: Complex
+    """Amplitude (of `amplitude_unit`, or of the runs) per kg or kg·m."""
+    speed: Real
+    amplitude_unit: str | None
+    along: Real | None = None
+    """Standard deviations of the coefficients along themselves and across, where the file states them; NaN where it leaves
+    some out."""
+    across: Real | None = None
+
+    @property
+    def rotors(self) -> list[str]:
+        """The machines that the file names."""
+        return list(dict.fromkeys(self.table.texts.get("rotor", ())))
+
+    def _column(self, name: str) -> list[str]:
+        return self.table.named(name)
+
+    def _rows(self, rotor: str) -> list[int]:
+        texts = self.table.texts
+        mine = [
+            i
+            for i in range(self.table.rows)
+            if not rotor or "rotor" not in texts or texts["rotor"][i] == rotor
+        ]
+        if not mine:
+            raise DataError(f"{self.table.file}: no coefficients of rotor {quote(rotor)}")
+        return mine
+
+    def planes(self, rotor: str) -> list[str]:
+        """Return the planes of a machine, in order."""
+        plane = self._column("plane")
+        return list(dict.fromkeys(plane[i] for i in self._rows(rotor)))
+
+    def matrix(self, rotor: str, channels: Sequence[Channel], runs: Runs) -> tuple[list[str], Complex]:
+        """Return the planes and α (s, p) of a rotor."""
+        planes = self.planes(rotor)
+        return planes, self.coefficients(rotor, channels, planes, runs).alpha
+
+    def coefficients(
+        self, rotor: str, channels: Sequence[Channel], planes: list[str], runs: Runs
+    ) -> Coefficients:
+        """Return what the file knows of a machine in these channels."""
+        mine, sensor, plane = self._rows(rotor), self._column("sensor"), self._column("plane")
+        state = self.table.texts.get("state")
+        speeds = {channel.speed for channel in channels}
+        if len(speeds) > 1 and np.isnan(self.speed[list(mine)]).any():
+            runs.warnings.append(
+                f"{self.table.file}: coefficients without a speed are used at each of {len(speeds)} speeds"
+            )
+        at = np.zeros((len(channels), len(planes)), dtype=np.intp)
+        for s, channel in enumerate(channels):
+            for p, name in enumerate(planes):
+                rows = [
+                    i
+                    for i in mine
+                    if sensor[i] == channel.sensor
+                    and plane[i] == name
+                    and (state is None or state[i] == (channel.state or ""))
+                ]
+                off = [0.0 if channel.speed is None else apart(channel.speed, self.speed[i]) for i in rows]
+                least = min(off, default=np.inf)
+                best = [i for i, far in zip(rows, off, strict=True) if far == least and far <= 0.01]
+                if not best:
+                    raise DataError(f"{self.table.file}: no coefficient of sensor {channel} for plane {name}")
+                if len(best) > 1:
+                    raise self.table.error(
+                        best[1],
+                        "sensor",
+                        sensor[best[1]],
+                        f"one coefficient for sensor {channel} and plane {name}",
+                    )
+                at[s, p] = best[0]
+        factor = 1.0
+        if self.amplitude_unit:
+            factor = runs.in_unit(1.0, self.amplitude_unit, self.table.file)
+        sd, nu = np.nan, np.inf
+        if "reading_sd" in self.table.numbers:
+            sd = factor * float(self.table.numbers["reading_sd"].values[at[0, 0]])
+        if "degrees_of_freedom" in self.table.numbers:
+            nu = float(self.table.numbers["degrees_of_freedom"].values[at[0, 0]])
+            nu = nu if nu > 0 else np.inf
+        covariance = self._covariance(at)
+        return Coefficients(
+            self.values[at] * factor, None if covariance is None else covariance * factor**2, sd, nu
+        )
+
+    def _covariance(self, at: Rows) -> Complex | None:
+        """Return E δδᴴ of each channel, (s, p, p), out of deviations and correlations."""
+        if self.along is None or self.across is None or np.isnan(self.along[at]).all():
+            return None
+        along, across = (np.nan_to_num(part[at]) for part in (self.along, self.across))
+        size = np.sqrt(np.square(along) + np.square(across))
+        planes = at.shape[1]
+        share = np.zeros((*at.shape, planes), dtype=complex) + np.eye(planes)
+        for s, p in np.argwhere(np.ones(at.shape)).tolist():
+            cell = self.table.texts["correlation"][at[s, p]] if "correlation" in self.table.texts else ""
+            given = cell.split(";") if cell else []
+            try:
+                if given and len(given) != p:
+                    raise ValueError
+                for q, one in enumerate(given):
+                    part, turn = (parse_number(number) for number in one.split("@"))
+                    share[s, p, q] = complex(phasor(np.array([part]), np.array([turn]), "deg")[0])
+                    share[s, q, p] = share[s, p, q].conjugate()
+            except ValueError:
+                raise self.table.error(
+                    int(at[s, p]),
+                    "correlation",
+                    cell,
+                    f"{p} correlations with the planes before, joined by ';', such as 0.5@0",
+                ) from None
+        return np.asarray(size[:, :, None] * size[:, None, :] * share)
+
+
+def read_stored(path: str) -> Stored:
+    """Read stored coefficients: sensor, speed_*, plane, magnitude_per_*, phase_deg, and how well they are known."""
+    given = alpha_of(path)
+    if given is not None:
+        return stored_alpha(given)
+    table = read(
+        path,
+        numbers={
+            "speed": "speed",
+            "magnitude_per": "per",
+            "phase": "angle",
+            "magnitude_uncertainty_per": "per",
+            "phase_uncertainty": "angle",
+            "reading_sd": "amplitude",
+            "degrees_of_freedom": "number",
+        },
+        texts=["rotor", "sensor", "state", "plane", "amplitude_unit", "correlation"],
+        blank=["speed", "magnitude_uncertainty_per", "phase_uncertainty", "reading_sd", "degrees_of_freedom"],
+    )
+    size, phase = table.require("magnitude_per", "per"), table.require("phase", "angle")
+    table.reject(size.values < 0, "magnitude_per", "a magnitude that is not negative")
+    speed = table.numbers.get("speed")
+    units = set(table.texts.get("amplitude_unit", [])) - {""}
+    if len(units) > 1 or not units <= set(UNITS["amplitude"]):
+        raise DataError(f"{table.file}: amplitude_unit {', '.join(sorted(units))}: expected one known unit")
+    values = phasor(from_si(size.values, "per", size.unit), phase.values, phase.unit)
+    along = across = None
+    if "magnitude_uncertainty_per" in table.numbers:
+        of_size, of_phase = table.numbers["magnitude_uncertainty_per"], table.numbers.get("phase_uncertainty")
+        for name in ("magnitude_uncertainty_per", "phase_uncertainty", "reading_sd"):
+            if name in table.numbers:
+                table.reject(table.numbers[name].values < 0, name, "an uncertainty that is not negative")
+        along = np.asarray(from_si(of_size.values, "per", of_size.unit))
+        # an uncertainty in all directions, where none of the phase is stated
+        across = along
+        if of_phase is not None:
+            turn = of_phase.si
+            across = np.where(np.isnan(turn), along, np.abs(values) * turn)
+    return Stored(
+        table,
+        size.unit,
+        values,
+        speed.si if speed is not None else np.full(table.rows, np.nan),
+        units.pop() if units else None,
+        along,
+        across,
+    )
+
+
+def stored_alpha(given: Alpha) -> Stored:
+    """Return the coefficients `ALPHA` of a file of vectors, per kg."""
+    file, rows, _ = given
+    table = Table(file, ["ALPHA"], sum(map(len, rows)))
+    places = [(s, p) for s, row in enumerate(rows) for p in range(len(row))]
+    table.texts = {"sensor": [str(s + 1) for s, _ in places], "plane": [str(p + 1) for _, p in places]}
+    size, turn = (np.array([cell[k] for row in rows for cell in row]) for k in (0, 1))
+    table.numbers = {
+        "magnitude_per": Numbers("ALPHA", "kg", size, "per"),
+        "phase": Numbers("ALPHA", "deg", turn, "angle"),
+    }
+    return Stored(table, "kg", phasor(size, turn, "deg"), np.full(table.rows, np.nan), None)

@@ -1,0 +1,222 @@
+"""Sheets with a row a run and a column pair for each sensor, in English or German, brought to a row for each reading."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from dalembert.errors import DataError, quote
+from dalembert.quantities import parse_number
+from dalembert.tables.headers import Heading, plain_word, quantity_meant
+from dalembert.tables.sources import Source
+from dalembert.units import find_unit, parted
+
+AMPLITUDE = (
+    "amplitude",
+    "amp",
+    "schwinggeschwindigkeit",
+    "schwingweg",
+    "schwingung",
+    "schwingungen",
+    "vibration",
+)
+PHASE = ("phase", "phasenwinkel", "phasenlage")
+ANGLE = ("angle", "winkel", "winkellage")
+MASS = ("mass", "masse", "gewicht", "weight", "testmasse", "probemasse", "testgewicht", "probegewicht")
+UNBALANCE = ("unbalance", "unwucht")
+PLACE = ("sensor", "lager", "messstelle", "messpunkt", "messebene", "aufnehmer", "bearing", "at", "am", "an")
+PLANE = ("plane", "ebene", "in", "der", "trial", "test", "probe", "ausgleichsebene")
+KEPT = ("bleibt", "kept", "trial_kept", "bleibt_drauf")
+WHOLE = ("rotor", "run", "state", "speed", "weight", "ref", "use", "date", "trial_plane", "trial_kept")
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A column, and what it was taken for."""
+
+    place: int
+    heading: Heading
+    kind: str
+    """`amplitude`, `phase`, `trial_mass`, `trial_unbalance`, `trial_angle`, or a column of every row."""
+    of: str
+    """The sensor, or the plane; empty where the header names none."""
+    unit: str = ""
+
+
+def long_form(source: Source) -> Source:
+    """Return a table of runs with a row for each reading; one that is such a table already as it is."""
+    if not is_wide(source):
+        return source
+    columns = list(_columns(source.headings))
+    source.check_cells(column.place for column in columns)
+    for column in columns:
+        twin = next(c for c in columns if (c.kind, c.of) == (column.kind, column.of))
+        if twin is not column:
+            both = f"{twin.heading.written} and {column.heading.written}"
+            raise DataError(
+                f"{source.file}: the columns {both} are both {_taken(column)}: expected one of them"
+            )
+    unit = _one_unit(source.file, [c for c in columns if c.kind == "amplitude"])
+    for column in columns:
+        partner = {"amplitude": "phase", "phase": "amplitude"}.get(column.kind)
+        if partner and not any((c.kind, c.of) == (partner, column.of) for c in columns):
+            raise DataError(
+                f"{source.file}: the column {column.heading.written} is {_taken(column)}, and no column is the {partner} there: "
+                "expected a pair of columns for each sensor"
+            )
+    taken = "; ".join(
+        f"{quote(c.heading.written)} is {_taken(c)}" for c in columns if c.of or c.kind not in WHOLE
+    )
+    source.warnings.append(f"{source.file}: read with a row a run: {taken}")
+    used = {column.place for column in columns}
+    left = [each.written for k, each in enumerate(source.headings) if k not in used and each.written]
+    if left:
+        source.warnings.append(
+            f"{source.file}: ignored the column{'s' * (len(left) > 1)} {', '.join(map(quote, left))}"
+        )
+    return _Long(source, columns, unit).source()
+
+
+def is_wide(source: Source) -> bool:
+    """Tell by its header whether a sheet has a column pair for each sensor."""
+    columns = list(_columns(source.headings))
+    pairs = {c.of for c in columns if c.kind == "amplitude"} & {c.of for c in columns if c.kind == "phase"}
+    return bool(pairs) and not any(quantity_meant(each.base, ["sensor"]) for each in source.headings)
+
+
+def _columns(headings: Sequence[Heading]) -> Iterator[_Column]:
+    """Yield the columns that are known, with what they are taken for."""
+    before = ""
+    for place, each in enumerate(headings):
+        column = _known(place, each, before)
+        before = "" if column is None else column.kind
+        if column is not None:
+            yield column
+
+
+def _known(place: int, each: Heading, before: str) -> _Column | None:
+    stem, unit = (each.base, each.unit) if each.unit else parted(each.name)
+    words = [plain_word(word) for word in stem.split("_")]
+    meant = plain_word(stem)
+    named = [
+        word for word, plain in zip(stem.split("_"), words, strict=True) if plain not in (*PLACE, *PLANE)
+    ]
+
+    def name(*kinds: Sequence[str]) -> str:
+        drop = [word for kind in kinds for word in kind]
+        return "_".join(word for word in named if plain_word(word) not in drop)
+
+    def has(*kinds: Sequence[str]) -> bool:
+        return any(word in kind for word in words for kind in kinds)
+
+    angle, amplitude = find_unit("angle", unit), find_unit("amplitude", unit)
+    if meant in KEPT:
+        return _Column(place, each, "trial_kept", "")
+    if has(MASS) and find_unit("mass", unit):
+        return _Column(place, each, "trial_mass", name(MASS), find_unit("mass", unit) or "")
+    if has(UNBALANCE) and find_unit("unbalance", unit):
+        return _Column(place, each, "trial_unbalance", name(UNBALANCE), find_unit("unbalance", unit) or "")
+    if angle or (has(PHASE, ANGLE) and not unit):
+        of_mass = before in ("trial_mass", "trial_unbalance") or (has(ANGLE) and "trial" in words)
+        kind = "trial_angle" if of_mass and not has(PHASE) else "phase"
+        return _Column(place, each, kind, name(PHASE, ANGLE), angle or "deg")
+    if amplitude and name(AMPLITUDE):
+        return _Column(place, each, "amplitude", name(AMPLITUDE), amplitude)
+    quantity = quantity_meant(stem, WHOLE) or (meant if meant in WHOLE else "")
+    if quantity == "speed":
+        speed = find_unit("speed", unit)
+        return _Column(place, each, "speed", "", speed) if speed else None
+    return _Column(place, each, quantity, "") if quantity else None
+
+
+def _taken(column: _Column) -> str:
+    """Say what a column was taken for."""
+    words = {
+        "trial_mass": "trial mass",
+        "trial_unbalance": "trial unbalance",
+        "trial_angle": "angle of the trial mass",
+    }
+    where = "plane" if column.kind in words else "sensor"
+    return f"the {words.get(column.kind, column.kind)}{f' at {where} {column.of}' if column.of else ''}"
+
+
+def _one_unit(file: str, columns: Sequence[_Column]) -> str:
+    units = list(dict.fromkeys(column.unit for column in columns))
+    if len(units) > 1:
+        raise DataError(f"{file}: the sensors are in {' and '.join(units)}: expected one unit of vibration")
+    return units[0]
+
+
+class _Long:
+    """The rows of a wide sheet, one for each reading."""
+
+    def __init__(self, wide: Source, columns: Sequence[_Column], unit: str) -> None:
+        self.wide, self.unit = wide, unit
+        self.at = {(c.kind, c.of): c for c in columns}
+        self.sensors = [c.of for c in columns if c.kind == "amplitude"]
+        self.size = next((c for c in columns if c.kind in ("trial_mass", "trial_unbalance")), None)
+        self.planes = [c.of for c in columns if self.size and c.kind == self.size.kind and c.of]
+        self.whole = [c for c in columns if c.kind in WHOLE]
+        if not any(c.kind == "run" for c in self.whole):
+            wide.warnings.append(f"{wide.file}: no column run: each row is a run, numbered from 1")
+
+    def source(self) -> Source:
+        """Return the table of readings."""
+        names = ["sensor", f"amplitude_{self.unit}", "phase_deg"]
+        turns = {c.unit for (kind, _), c in self.at.items() if kind == "phase"}
+        if turns == {"rad"}:
+            names[-1] = "phase_rad"
+        elif "rad" in turns:
+            raise DataError(f"{self.wide.file}: phases in deg and rad: expected one unit")
+        names += [c.kind if not c.unit else f"{c.kind}_{c.unit}" for c in self.whole]
+        if not any(c.kind == "run" for c in self.whole):
+            names.append("run")
+        if self.size is not None:
+            names += [f"{self.size.kind}_{self.size.unit}", f"trial_angle_{self._angle_unit()}"]
+            names += ["trial_plane"] if self.planes else []
+        headings = [Heading(name, name) for name in names]
+        records = [(0, names), *self._records()]
+        return replace(
+            self.wide,
+            headings=headings,
+            records=records,
+            sheet=None,
+            above=0,
+            units_below=False,
+            unnamed_first=False,
+        )
+
+    def _angle_unit(self) -> str:
+        return next((c.unit for (kind, _), c in self.at.items() if kind == "trial_angle"), "deg")
+
+    def _records(self) -> Iterator[tuple[int, list[str]]]:
+        for number, (line, cells) in enumerate(self.wide.rows(), 1):
+            cells = [*cells, *[""] * (len(self.wide.headings) - len(cells))]
+            rest = [cells[c.place].strip() for c in self.whole]
+            if not any(c.kind == "run" for c in self.whole):
+                rest.append(str(number))
+            rest += self._masses(cells)
+            for sensor in self.sensors:
+                read = [cells[self.at[kind, sensor].place].strip() for kind in ("amplitude", "phase")]
+                if any(read):
+                    yield line, [sensor, *read, *rest]
+
+    def _masses(self, cells: Sequence[str]) -> list[str]:
+        """Return size, angle and plane of a row's trial masses, several joined by ';'; blank where there is none."""
+        if self.size is None:
+            return []
+        entries = []
+        for plane in self.planes or [""]:
+            size = cells[self.at[self.size.kind, plane].place].strip()
+            turn = self.at.get(("trial_angle", plane)) or self.at.get(("trial_angle", ""))
+            if size and not _is_zero(size):
+                entries.append((size, cells[turn.place].strip() if turn else "", plane))
+        joined = [";".join(part) for part in zip(*entries, strict=True)] if entries else ["", "", ""]
+        return joined if self.planes else joined[:2]
+
+
+def _is_zero(text: str) -> bool:
+    try:
+        return parse_number(text.replace(",", ".")) == 0
+    except ValueError:
+        return False

@@ -1,0 +1,1 @@
+"""`dalembert flywheel`: a flywheel from a table of torque."""

@@ -1,0 +1,53 @@
+"""`dalembert forces`: the effort at the inputs, the forces in the joints, the shaking force."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cli.cases.options import BRANCH, CASES, FILE, WORKERS, Asked
+from cli.show.output import declared_command
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cli.cases.loop import Case
+    from cli.show.commands import ShowOptions
+    from cli.show.result import Result
+
+EXAMPLE = "door-closer"
+OPTIONS = f"""
+{FILE}{CASES}{BRANCH}{WORKERS}
+What:
+  only NAME,...  Only these: crank.torque,B.coupler.fx,shaking.fx,H.x.
+  flywheel NUMBER  Flywheel inertia for this speed fluctuation: 0.02.
+  counterweights LINK,...  Counterweights on these links for the least shaking force.
+Output:
+  page FILE(.html)  Write a page on which the mechanism moves, with arrows.
+  states FILE(.csv)  Write the states of all links: what dalembert work reads.
+"""
+
+
+@declared_command(OPTIONS, Asked)
+def run(asked: Asked, show: ShowOptions) -> Result:
+    """Compute the forces of a planar mechanism: effort at the inputs, joint forces, shaking force.
+
+    The loads of FILE.toml act: gravity, forces, torques, springs, friction and the inertia of its masses. The table has
+    a row for each pose. Over a whole cycle also mean, peak, r.m.s., power and energy.
+    """
+    from cli.cases.analysis import Request, branch, names
+    from cli.cases.call import Call
+    from cli.forces.cycle import Forces, checked
+
+    weights = names(asked.counterweights, "--counterweights", "names of links, such as crank, rocker")
+    request = Request(asked.file, names(asked.only), None, branch(asked.branch), forces=True)
+    call = Call.of(asked, show, request)
+    call.check_names()
+    checked(call, asked.flywheel, weights, asked.states)
+    study = call.study(Forces, flywheel=asked.flywheel, counterweights=weights, states=asked.states)
+
+    def page(cases: Sequence[tuple[str, Case]]) -> bytes:
+        from cli.cases.page import of_poses
+
+        return of_poses(cases, show.units)
+
+    return call.result(study, asked.page, page)

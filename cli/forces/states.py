@@ -1,0 +1,255 @@
+"""The link-state table: one row for each pose and link, as `dalembert work` reads it.
+
+The unknown is the input's effort: `?` in the driven link's torque; where that cell holds a known torque, in a row of
+its own. A drive that reacts on a moving link, or along a guide, is `?NAME*factor` in each of its components. With
+several inputs every pose has as many velocity fields (column `field`): a unit of each input's virtual velocity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cli.cases.analysis import Analysis
+from cli.cases.poses import column, pose_keys
+from cli.cases.quantities import (
+    FORCE,
+    LINK,
+    POINT,
+    bound,
+    bounds_of,
+    cells,
+    cells_of,
+    keys_of,
+    links,
+    solved,
+    vector,
+)
+from dalembert.results.columns import Table
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cli.cases.quantities import Numbers
+    from dalembert.results.columns import Cell
+    from virtualwork.formulas.asked import Key
+    from virtualwork.motion import Motion
+
+    Part = dict[str, Sequence[Cell]]
+    Row = dict[str, Cell]
+
+GROUND = "ground"
+ORDER = (
+    "step", "branch", "field", "link", "x_m", "y_m", "angle_deg", "mass_kg", "inertia_kg_m2", "vx_m_s", "vy_m_s",
+    "omega_rad_s", "ax_m_s2", "ay_m_s2", "alpha_rad_s2", "fx_N", "fy_N", "fvx_m_s", "fvy_m_s", "torque_N_m",
+)  # fmt: skip
+
+EXACT = ("step", "branch", "field", "link", "mass_kg", "inertia_kg_m2")
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Where an input's unknown effort acts: cells of a link, and for a force, in a guide, its point's velocity."""
+
+    link: str
+    cells: Part
+    guide: int | None = None
+
+
+class Place(NamedTuple):
+    """What a row is of: a link at a pose of a motion, in the field of an input, or an input's mark alone."""
+
+    motion: Motion
+    pose: int
+    link: str
+    field: int | None
+    mark: Mark | None
+
+
+def table(analysis: Analysis) -> Table:
+    """Centre of mass, angle, rates and loads of every link at every pose."""
+    listed = rows(analysis)
+    keys = {key for _, row in listed for key in row}
+
+    @cache
+    def bounds(motion: Motion, link: str, field: int | None, guide: int | None, name: str) -> list[float]:
+        along = motion if field is None else motion.unit(field)
+        center = motion.mechanism.rigid[link].center
+        if name in ("fvx_m_s", "fvy_m_s"):
+            assert guide is not None
+            return bounds_of(_guided(along, guide, link))
+        key: Key = ("applied" if name in FORCE else "applied moment", link)
+        if name in LINK:
+            key = ("angle", link, LINK.index(name))
+        for k, names in enumerate(POINT):
+            if name in names:
+                key = ("point", link, center, None, k)
+        return bounds_of(bound(along if key[-1] == 1 else motion, key, analysis.set_angles))
+
+    def error(key: str) -> list[float]:
+        found = []
+        for place, row in listed:
+            guide = None if place.mark is None else place.mark.guide
+            value = row.get(key)
+            number = isinstance(value, float) and value != 0
+            found.append(
+                bounds(place.motion, place.link, place.field, guide, key)[place.pose] if number else 0.0
+            )
+        return found
+
+    columns = [
+        column(key, [row.get(key) for _, row in listed], None if key in EXACT else partial(error, key))
+        for key in ORDER
+        if key in keys
+    ]
+    return Table(columns, keys=pose_keys(analysis))
+
+
+def rows(analysis: Analysis) -> list[tuple[Place, Row]]:
+    """The table's rows, each with what it holds."""
+    found: list[tuple[Place, Row]] = []
+    several = analysis.several
+    for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
+        order = analysis.order
+        massive = any(r.mass or r.inertia for r in motion.mechanism.rigid.values())
+        if order == 1 and massive:
+            order = 2  # a speed alone already makes accelerations, and masses feel them
+        parts = {name: _part(analysis, motion, name, order) for name in analysis.links}
+        inputs = analysis.mechanism.inputs
+        # with several inputs a virtual velocity field for each of them, else the motion's own velocities
+        ways: list[int | None] = [*range(len(inputs))] if order >= 1 and len(inputs) > 1 else [None]
+        fields = [
+            (
+                of,
+                {} if of is None else {name: _virtual(motion, name, of) for name in analysis.links},
+                _marks(motion, of) if order >= 1 else [],
+            )
+            for of in ways
+        ]
+        for i, (step, assembled) in enumerate(zip(analysis.inputs.steps, motion.assembled, strict=True)):
+            head: Row = {"step": step}
+            if several:
+                head["branch"] = str(assembly.number)
+            for of, velocities, marks in fields:
+                lead = head if of is None else {**head, "field": inputs[of].name}
+                here = {
+                    name: {key: values[i] for key, values in (part | velocities.get(name, {})).items()}
+                    for name, part in parts.items()
+                }
+                extra: list[tuple[Place, Row]] = []
+                for mark in marks if assembled else ():
+                    if mark.link not in here:
+                        continue
+                    wanted = {key: values[i] for key, values in mark.cells.items() if values[i] != ""}
+                    row = here[mark.link]
+                    if any(row.get(key) for key in wanted if key != "omega_rad_s") or "fvx_m_s" in wanted:
+                        place = Place(motion, i, mark.link, of, mark)
+                        extra.append((place, {**lead, "link": mark.link, **wanted}))
+                    else:
+                        row |= wanted
+                found += [
+                    (Place(motion, i, name, of, None), {**lead, "link": name, **row})
+                    for name, row in here.items()
+                ]
+                found += extra
+    return found
+
+
+def _part(analysis: Analysis, motion: Motion, name: str, order: int) -> Part:
+    body, highest = motion.mechanism.rigid[name], min(order, 2)
+    wanted = links([name], highest)
+    for k in range(highest + 1):
+        wanted += vector((name,), "", POINT[k], ("point", name, body.center, None, k))
+    shown = cells_of(wanted, solved(motion, keys_of(wanted)), motion.n, analysis.set_angles)
+    part: Part = {"mass_kg": [body.mass] * motion.n, "inertia_kg_m2": [body.inertia] * motion.n}
+    part |= {each.path[-1]: values for each, values in shown.items()}
+    if order >= 1:
+        force, torque = motion.applied(name)
+        # a pose that cannot be assembled has no loads either
+        known = motion.assembled
+        part |= _vector(FORCE, force, known)
+        part["torque_N_m"] = cells(torque, np.isfinite(torque) & known)
+    return part
+
+
+def _vector(
+    names: Sequence[str], z: NDArray[np.complex128], known: NDArray[np.bool_] | bool = True
+) -> dict[str, Numbers]:
+    """Components of vectors by their names."""
+    there = np.isfinite(z) & known
+    return dict(zip(names, (cells(z.real, there), cells(z.imag, there)), strict=True))
+
+
+def _virtual(motion: Motion, name: str, j: int) -> Part:
+    """The virtual velocities of a link for a unit of input j."""
+    center = motion.at(name, motion.mechanism.rigid[name].center)
+    turning = cells(motion.link(name).coefficient(j))
+    return {**_vector(POINT[1], center.coefficient(j)), "omega_rad_s": turning}
+
+
+def _marks(motion: Motion, field: int | None) -> list[Mark]:
+    """The marks of every input's effort, with the velocities of one field (None: the motion's own)."""
+    m, n = motion.mechanism, motion.n
+    found: list[Mark] = []
+
+    def turning(link: str) -> NDArray[np.float64]:
+        of = motion.link(link)
+        return of.omega if field is None else of.coefficient(field)
+
+    def velocity(link: str, point: complex | str) -> NDArray[np.complex128]:
+        of = motion.at(link, point)
+        return of.complex(1) if field is None else of.coefficient(field)
+
+    for j, entry in enumerate(m.inputs):
+        name = f"?{entry.name}"
+        if not entry.is_slide:
+            reacts = m.carrier(j)
+            plain = len(m.inputs) == 1 and reacts == GROUND
+            for link, mark in ((str(entry.link), "?" if plain else name), (reacts, f"{name}*-1")):
+                if link != GROUND:
+                    its = {"torque_N_m": [mark] * n, "omega_rad_s": cells(turning(link))}
+                    found.append(Mark(link, its))
+            continue
+        i = next(i for i, g in enumerate(m.guides) if g.point == entry.slider)
+        g = m.guides[i]
+        reactions = motion.dynamics.reactions
+        (rail,) = reactions.over(partial(reactions.rail, guide=i), kind=complex)
+        through = m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
+        slide = motion.slide(g.point).position
+        for link, sign in ((g.link, 1.0), (g.on, -1.0)):
+            if link == GROUND:
+                continue
+            if sign > 0:
+                at = velocity(link, g.point)
+            else:
+                at = velocity(link, through) + 1j * turning(link) * slide * rail
+            share: Part = {**_vector(("fvx_m_s", "fvy_m_s"), at)}
+            share["fx_N"] = [_share(name, sign * float(c)) for c in rail.real]
+            share["fy_N"] = [_share(name, sign * float(c)) for c in rail.imag]
+            found.append(Mark(link, share, i))
+    return found
+
+
+def _share(name: str, factor: float) -> str:
+    """`?NAME*factor`; empty where the component is none."""
+    if not np.isfinite(factor) or factor == 0:
+        return ""
+    return name if factor == 1.0 else f"{name}*{factor!r}"
+
+
+def _guided(motion: Motion, guide: int, link: str) -> NDArray[np.float64]:
+    """The bound of the velocity of the point of a link at which a driven slider's force acts."""
+    m, r = motion.mechanism, motion.rounding
+    g = m.guides[guide]
+    if link == g.link:
+        return motion.at(link, g.point).error_estimate(1)
+    slide, omega = np.abs(motion.value(("slide", guide, 0))), np.abs(motion.link(link).omega)
+    carried = motion.at(link, m.through(g)).error_estimate(1)
+    turned = slide * (r.of(("angle", link, 1)) + omega * r.of(("turn", link))) + omega * r.of(
+        ("slide", guide, 0)
+    )
+    return np.asarray(carried + turned)

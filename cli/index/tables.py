@@ -1,0 +1,116 @@
+"""What is computed of index balancing: the two parts, and how well the readings agree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cli.read.rounding import angle_error, size_error
+from dalembert.angles import degrees
+from dalembert.results.columns import Column, Table, names, number
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from cli.index.readings import Complex, Positions
+
+NEAR = 3.0  # from this growth of errors on the positions are named as near each other
+
+METHOD = (
+    "Each reading is v = mandrel + rotor·e^{iφ}, φ the angle by which the rotor was turned on the mandrel; both parts by "
+    "least squares over all positions (ISO 21940-14:2012, index balancing)."
+)
+
+
+def tables(p: Positions) -> dict[str, Callable[[], Table]]:
+    """The tables of a result, the CSV's first."""
+    return {
+        "parts": lambda: parts(p),
+        "readings": lambda: readings(p),
+        "rotor": lambda: documented(p, "rotor", p.parts.rotor),
+        "mandrel": lambda: documented(p, "mandrel", p.parts.mounting),
+    }
+
+
+def size(p: Positions, name: str, values: ArrayLike, place: str | None, error: bool = False) -> Column:
+    """Sizes in the unit of the file; JSON has unbalances in kg·m, amplitudes in the unit of the file."""
+    found = np.asarray(values, dtype=float)
+
+    def bound() -> ArrayLike:
+        return np.broadcast_to(size_error(found, p.bound), found.shape)
+
+    bounds = bound if error else None
+    if p.quantity == "unbalance":
+        return number(name, "unbalance", found, p.unit, bounds, place)
+    return Column(name, p.unit, found, bounds, place)  # type: ignore[arg-type]
+
+
+def direction(p: Positions, values: Complex, place: str | None, error: bool = False) -> Column:
+    """Directions: of an unbalance its angle, of a vibration its phase."""
+    name = "angle" if p.quantity == "unbalance" else "phase"
+    found = degrees(values)
+    bound = (lambda: angle_error(values, p.bound, found)) if error else None
+    return number(name, "angle", found, error=bound, place=place and place.format(name))
+
+
+def parts(p: Positions) -> Table:
+    """A row for the rotor, a row for the mandrel."""
+    both = np.array([complex(p.parts.rotor), complex(p.parts.mounting)])
+    columns = [
+        names("part", ["rotor", "mandrel"], None),
+        size(p, p.quantity, np.abs(both), None, error=True),
+        direction(p, both, None, error=True),
+    ]
+    if np.isfinite(p.parts.uncertainty):
+        columns.append(size(p, "uncertainty", np.full(2, p.parts.uncertainty), None))
+    if p.quantity == "unbalance":
+        opposite = float(degrees(-both[0]))
+        amount = f"{p.shown(abs(both[0])):.6g} {p.spoken_unit}"
+        below = (
+            f"correction of the rotor: add {amount} at {opposite:.6g}°, in the rotor's position turned = 0"
+        )
+    else:
+        below = "the rotor's part alone is to be balanced; the mandrel's is in every reading"
+    return Table(columns, ("part",), None, below=below)
+
+
+def readings(p: Positions) -> Table:
+    """A row for each position: the reading, and what the two parts do not explain of it."""
+    left = p.parts.residuals
+    # two readings are met exactly
+    shown = np.where(np.abs(left) > 4 * p.bound, np.abs(left), 0.0)
+    columns = [
+        number("turned", "angle", p.turned),
+        size(p, p.quantity, np.abs(p.readings), p.quantity),
+        direction(p, p.readings, "{}"),
+        size(p, "residual", shown, "residual"),
+        number("residual_angle", "angle", np.where(shown > 0, degrees(left), np.nan)),
+    ]
+    below = ""
+    if np.isfinite(p.parts.residual_sd):
+        below = f"scatter of a reading: {p.shown(float(p.parts.residual_sd)):.3g} {p.spoken_unit} (one standard deviation)"
+    return Table(columns, ("turned_deg",), "readings[]", below=below)
+
+
+def documented(p: Positions, place: str, part: Complex) -> Table:
+    """A part as JSON has it."""
+    one = np.array([complex(part)])
+    columns = [
+        size(p, p.quantity, np.abs(one), p.quantity),
+        direction(p, one, "{}"),
+        size(p, "uncertainty", [float(p.parts.uncertainty)], "uncertainty"),
+    ]
+    return Table([], place=place, documented=columns)
+
+
+def warnings(p: Positions) -> list[str]:
+    """What a reader of the parts has to know."""
+    growth = float(p.parts.amplification)
+    if growth < NEAR:
+        return []
+    return [
+        f"the positions of the rotor are close to each other: errors of the readings grow by a factor of {growth:.3g}; "
+        "add a reading with the rotor turned by half a turn"
+    ]

@@ -1,0 +1,33 @@
+"""`dalembert inspect`: what kind of mechanism it is, and in which order it is solved."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cli.cases.options import CASES, FILE, WORKERS, Asked
+from cli.show.output import declared_command
+
+if TYPE_CHECKING:
+    from cli.show.commands import ShowOptions
+    from cli.show.result import Result
+
+EXAMPLE = "watt-six-bar"
+OPTIONS = f"{FILE}{CASES}{WORKERS}"
+
+
+@declared_command(OPTIONS, Asked)
+def run(asked: Asked, show: ShowOptions) -> Result:
+    """Inspect a planar mechanism: mobility, groups, Grashof classes, limits, dead and change points.
+
+    Speaks of the whole range of the input: --over, --cases and --set change dimensions. On a terminal also the order
+    in which the mechanism is solved.
+    """
+    from cli.cases.analysis import Request
+    from cli.cases.call import Call
+    from cli.inspect.character import Inspection
+
+    call = Call.of(asked, show, Request(asked.file))
+    call.refuse_inputs(
+        "inspect speaks of the whole range of the input: expected a dimension, links.crank.B.x=..."
+    )
+    return call.result(call.study(Inspection))

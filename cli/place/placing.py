@@ -1,0 +1,243 @@
+"""From corrections and the places where masses can go to the masses, and the holes that remove as much."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing import Placement, correct, drill_depth, place, place_from_stock, place_weights, transfer
+from cli.place.corrections import Correction, Drill, Request
+from cli.read.rounding import EPS, angle_error, size_error, vector_error
+from dalembert.angles import degrees, phasor
+from dalembert.errors import DataError
+from dalembert.units import from_si, to_si
+
+Real = NDArray[np.float64]
+HOLES = 10_000  # more at one place are refused
+ENOUGH = 0.01  # of the correction: weights from stock that come so near are enough
+FEW = 3  # weights from stock; more are named and not taken unasked
+
+
+@dataclass(frozen=True)
+class Share:
+    """What goes into one plane."""
+
+    z: float | None
+    goal: complex
+    places: list[float]
+    placed: Placement
+
+    @property
+    def error(self) -> complex:
+        """What is missed; below the rounding of the goal nothing is."""
+        error = self.placed.error
+        return error if abs(error) > 1e-14 * abs(self.goal) else 0j
+
+
+class Placed(NamedTuple):
+    """A mass on a place, and the holes that remove it."""
+
+    share: Share
+    place: int
+    mass: float
+    angle: float
+    depth: float | None
+    holes: int | None
+
+
+class Placing:
+    """Corrections combined and placed."""
+
+    def __init__(self, of: Correction, request: Request) -> None:
+        self.of, self.request = of, request
+        self.warnings: list[str] = []
+        self._sizes = [to_si(v.mass, "mass", v.mass_unit) for v in of.vectors]
+        self._largest = max(self._sizes)
+        each = zip(self._sizes, of.vectors, strict=True)
+        turned = (phasor(np.array(size), np.array(v.angle), v.angle_unit) for size, v in each)
+        self.target = sum(map(complex, turned), 0j)
+        if abs(self.target) <= 1e-15 * self._largest:
+            self.target = 0j  # what rounding leaves of corrections that cancel
+        opposite = request.drill is not None and not request.remove
+        self._goal = -self.target * request.ratio if opposite else self.target * request.ratio
+        if self.target == 0:
+            self.warnings.append("the corrections add up to nothing: there is nothing to place")
+        goals: list[tuple[float | None, complex]] = [(None, self._goal)]
+        if request.planes is not None:
+            at, planes = request.planes
+            goals = list(zip(planes, transfer([self._goal], [at], planes).tolist(), strict=True))
+        self.shares = [Share(z, goal, *self._place(goal)) for z, goal in goals]
+        if opposite:
+            self.warnings.append("material is drilled out opposite (+180°) to the mass that would be added")
+        self.masses = [
+            Placed(share, i, float(mass), share.places[i] % 360.0, *_drilled(float(mass), request.drill))
+            for share in self.shares
+            for i, mass in enumerate(share.placed.masses)
+            if mass > 0
+        ]
+        # of several planes the largest error
+        self.error = max((share.error for share in self.shares), key=abs)
+
+    @property
+    def action(self) -> str:
+        """What is done with material on the places: `add` or `remove`."""
+        return "remove" if self.request.removes else "add"
+
+    def text(self, mass: float) -> str:
+        """Return a mass in the unit it is shown in."""
+        return f"{from_si(mass, 'mass', self.of.unit):.4g} {self.of.unit}"
+
+    def _place(self, goal: complex) -> tuple[list[float], Placement]:
+        """Place what goes into one plane: the places, and what is on them."""
+        request = self.request
+        if request.weights is not None:
+            return self._turned(goal, request.weights)
+        if request.places is None:
+            if request.limit is not None and abs(goal) > request.limit * (1 + 1e-12):
+                raise DataError(
+                    f"the correction of {self.text(abs(goal))} is beyond --max-mass {self.text(request.limit)}, and "
+                    "there is one place only: expected --positions or --blades to spread it over"
+                )
+            alone = Placement(goal, np.array([np.angle(goal)]), np.array([abs(goal)]))
+            return [degrees(goal)], alone
+        angles = np.radians(request.places)
+        if request.stock is not None:
+            return request.places, self._from_stock(goal, request.stock, angles)
+        placed = place(goal, angles, request.limit)
+        if abs(placed.error) > 1e-9 * abs(goal):
+            limited = " with this --max-mass" if request.limit else ""
+            self.warnings.append(
+                f"the correction cannot be reached from these places{limited}: an error of "
+                f"{self.text(abs(placed.error))} is left, the least there is"
+            )
+        return request.places, placed
+
+    def _from_stock(self, goal: complex, stock: list[float], angles: Real) -> Placement:
+        request = self.request
+
+        def choose(most: int) -> Placement:
+            return place_from_stock(
+                goal, angles, stock, request.limit, pieces=request.pieces, max_pieces=most
+            )
+
+        try:
+            placed = choose(request.max_pieces) if request.max_pieces is not None else self._few(goal, choose)
+        except ValueError as error:
+            raise DataError(f"--stock: {error}") from None
+        if len(angles) > 2 and placed.bound == 0 and abs(placed.error) > 1e-12 * abs(goal):
+            self.warnings.append(
+                "too many choices to search them all: the places nearest to the correction were used"
+            )
+        return placed
+
+    def _few(self, goal: complex, choose: Callable[[int], Placement]) -> Placement:
+        """Take the fewest weights that come near enough, and say what one more would leave."""
+        placed = [choose(0)]
+        while abs(placed[-1].error) > ENOUGH * abs(goal) and len(placed) <= FEW:
+            placed.append(choose(len(placed)))
+        # of those that do not come nearer the fewest
+        least = abs(placed[-1].error) + 1e-12 * abs(goal)
+        used = next(k for k, one in enumerate(placed) if abs(one.error) <= least)
+        more = len(placed)
+        error, further = (abs(one.error) for one in (placed[used], choose(more)))
+        if goal and further < least:
+            weights = f"{used} weight{'s' * (used != 1)}"
+            leave = (
+                f"{weights} leave{'s' * (used == 1)} an error of {self.text(error)} ({error / abs(goal):.2%})"
+            )
+            self.warnings.append(
+                f"{leave}; with {more} it would be {self.text(further)} (--max-pieces {more})"
+            )
+        return placed[used]
+
+    def _turned(self, goal: complex, weights: list[float]) -> tuple[list[float], Placement]:
+        """Turn weights of fixed mass: their angles, and what they are together."""
+        placed = place_weights(goal, weights)
+        if placed.bound:
+            whole = sum(weights)
+            reach = (
+                f"{self.text(whole)} at most"
+                if abs(goal) > whole
+                else f"{self.text(abs(placed.total))} at least"
+            )
+            self.warnings.append(
+                f"the weights together come to {reach}: the correction of {self.text(abs(goal))} is missed by "
+                f"{self.text(placed.bound)}"
+            )
+        return np.degrees(placed.angles).tolist(), placed
+
+    # -- bounds of rounding errors -------------------------------------------------------------------------
+
+    @cached_property
+    def goal_errors(self) -> list[float]:
+        """Of the goals, in the shares' order."""
+        request, each = self.request, zip(self._sizes, self.of.vectors, strict=True)
+        wrong = float(sum(vector_error(size, v.angle, v.angle_unit) for size, v in each))
+        of_goal = (wrong + (len(self._sizes) + 4) * EPS * self._largest) * request.ratio
+        if request.planes is None:
+            return [of_goal]
+        at, planes = request.planes
+        # positions as written, and the lever's arms, are rounded too
+        over = correct([self._goal], [at], planes)
+        reach = float(np.abs([at, *planes]).max() / np.ptp(np.array(planes)))
+        bound = over.error_estimate() + float(over.amplification) * (
+            of_goal + 4 * EPS * reach * abs(self._goal)
+        )
+        return [float(x) for x in bound]
+
+    @cached_property
+    def mass_errors(self) -> list[tuple[float, float, float]]:
+        """Of each mass, of its angle (degrees) and of the depth of its hole."""
+        request = self.request
+        of_goal = dict(zip(map(id, self.shares), self.goal_errors, strict=True))
+        errors = []
+        for share, i, mass, angle, depth, _ in self.masses:
+            placed, wrong = share.placed, of_goal[id(share)]
+            if request.weights is not None:
+                bound, turn = EPS * mass, self._turn_error(share, i, wrong)
+            elif request.places is None:
+                bound = float(size_error(share.goal, wrong))
+                turn = float(angle_error(share.goal, wrong, angle))
+            else:
+                # a place as written is rounded, as a share of a turn, and takes the whole with it
+                of_arm = EPS * (2 + np.abs(np.radians(request.places)).max())
+                terms = abs(share.goal) + float(placed.masses.sum())
+                growth = placed.condition_number if i in placed.free else 0.0
+                bound = placed.error_estimate()[i] + growth * (wrong + of_arm * terms)
+                bound = float(size_error(placed.masses[i], bound))
+                turn = 2 * EPS * (360 + abs(request.places[i]))
+            deep = 0.0
+            if depth is not None and request.drill is not None:
+                # a depth grows no faster than the mass; the point's angle as written is rounded, times the radius
+                rounded = 8 * EPS * (depth + request.drill.diameter * request.drill.point)
+                deep = depth * bound / mass + rounded
+            errors.append((bound, turn, deep))
+        return errors
+
+    def _turn_error(self, share: Share, i: int, wrong: float) -> float:
+        """Bound the error of a weight's angle, degrees: the spread of the weights goes one way with the correction's size."""
+        size, weights = abs(share.goal), self.request.weights or ()
+        spread = [place_weights(max(size + step, 0.0), weights).angles[i] for step in (-wrong, 0.0, wrong)]
+        apart = float(np.degrees(np.ptp(spread))) if wrong < size else 360.0
+        return apart + float(angle_error(share.goal, wrong, 360.0)) + 16 * EPS * 360
+
+
+def _drilled(mass: float, drill: Drill | None) -> tuple[float | None, int | None]:
+    """Return the depth of each hole and how many there are."""
+    if drill is None:
+        return None, None
+    holes = 1
+    depth = float(drill_depth(mass, drill.diameter, drill.density, drill.point))
+    while drill.deepest is not None and depth > drill.deepest * (1 + 1e-12):
+        # one hole's worth at a time; the first guess is close, the point takes a little more
+        holes = max(holes + 1, math.ceil(holes * depth / drill.deepest * (1 - 1e-9)) - 1)
+        if holes > HOLES:
+            raise DataError(f"--max-depth: more than {HOLES} holes: expected a larger drill or deeper holes")
+        depth = float(drill_depth(mass / holes, drill.diameter, drill.density, drill.point))
+    return depth, holes

@@ -1,0 +1,142 @@
+"""What is computed of a placement: the masses on their places, the corrections and their errors, the planes; the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from balancing.picture import Places, places
+from cli.place.placing import Placing
+from cli.show.picture import blank
+from dalembert.angles import degrees
+from dalembert.results.columns import Column, Table, names, number
+from dalembert.units import from_si
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+METHOD = (
+    "Without limits the two places beside the correction share it by the sine rule; with limits the places nearest to it are "
+    "filled first (least total mass, by linear programming duality); weights from stock by the choice of least error, all "
+    "choices compared; weights of fixed mass as the sides of a polygon on a circle, which the correction closes."
+)
+
+
+def tables(placings: Sequence[Placing]) -> dict[str, Callable[[], Table]]:
+    """The tables of a result, the CSV's first."""
+    parts = {"masses": lambda: masses(placings), "corrections": lambda: corrections(placings)}
+    if placings[0].request.planes is not None:
+        parts["planes"] = lambda: planes(placings)
+    return parts
+
+
+def _named(placings: Sequence[Placing], numbers: Iterable[int]) -> tuple[list[Column], list[Column]]:
+    """Rotor and plane of each row, where there are several corrections; behind them which correction it is.
+
+    A file may have two corrections for one plane of one rotor.
+    """
+    rows = list(numbers)
+    if len(placings) == 1:
+        return [], []
+    shown = [
+        names("rotor", [placings[k].of.rotor for k in rows]),
+        names("plane", [placings[k].of.plane for k in rows]),
+    ]
+    return shown, [names("correction", rows, place=None)]
+
+
+def _vector(
+    mass: str, angle: str, vectors: Sequence[complex], unit: str, at: tuple[str, str] = ("", "")
+) -> list[Column]:
+    """Masses and their angles."""
+    return [
+        number(mass, "mass", [abs(vector) for vector in vectors], unit, place=at[0]),
+        number(angle, "angle", [degrees(vector) for vector in vectors], place=at[1]),
+    ]
+
+
+def masses(placings: Sequence[Placing]) -> Table:
+    """A row for each mass of each correction; of one alone without rotor and plane."""
+    unit, request = placings[0].of.unit, placings[0].request
+    every = [(k, mass) for k, placing in enumerate(placings) for mass in placing.masses]
+    named, hidden = _named(placings, [k for k, _ in every])
+
+    def error(which: int) -> Callable[[], list[float]]:
+        return lambda: [bounds[which] for placing in placings for bounds in placing.mass_errors]
+
+    columns = [
+        *named,
+        names("position", [str(m.place + 1) for _, m in every]),
+        number("angle", "angle", [m.angle for _, m in every], error=error(1)),
+        number("mass", "mass", [m.mass for _, m in every], unit, error(0)),
+    ]
+    if request.planes is not None:
+        z = number("z", "length", [m.share.z or 0.0 for _, m in every], "mm")
+        columns.insert(len(named), z)
+    depth = number("drill_depth", "length", [m.depth or np.nan for _, m in every], "mm", error(2))
+    holes = [depth, names("holes", [m.holes for _, m in every])]
+    keys = [column.name for column in (*named, *hidden)]
+    if request.planes is None or named:
+        keys.append("position")
+    return Table(
+        columns if request.drill is None else [*columns, *holes],
+        keys,
+        f"{'placements[].' if named else ''}masses[]",
+        above=f"material to {placings[0].action}, angles counter-clockwise:",
+        documented=[*hidden, *(holes if request.drill is None else [])],
+    )
+
+
+def corrections(placings: Sequence[Placing]) -> Table:
+    """A row for each correction: what is to be placed, and what the masses miss of it."""
+    unit, request = placings[0].of.unit, placings[0].request
+    named, hidden = _named(placings, range(len(placings)))
+    target, error = [each.target for each in placings], [each.error for each in placings]
+    whole = [max(abs(share.goal) for share in placing.shares) for placing in placings]
+    missed = [abs(left) / size if size else 0.0 for left, size in zip(error, whole, strict=True)]
+    columns = [
+        *named,
+        *_vector("correction_mass", "correction_angle", target, unit, ("target.mass", "target.angle")),
+        *_vector("error", "error_angle", error, unit),
+        number("error_share", "number", missed, place=None),
+        names("action", [placing.action for placing in placings]),
+    ]
+    if request.ratio != 1:
+        there = [abs(of) * request.ratio for of in target]
+        columns.insert(len(named) + 2, number("mass_at_radius", "mass", there, unit, place=None))
+    keys = [column.name for column in (*named, *hidden)]
+    return Table(columns, keys, "placements[]" if named else "", documented=hidden)
+
+
+def planes(placings: Sequence[Placing]) -> Table:
+    """A row for each plane that a correction is carried over to: what belongs there, and what is missed."""
+    unit = placings[0].of.unit
+    every = [(k, share) for k, placing in enumerate(placings) for share in placing.shares]
+    named, _ = _named(placings, [k for k, _ in every])
+    columns = [
+        *named,
+        number("z", "length", [share.z or 0.0 for _, share in every], "mm"),
+        *_vector("correction_mass", "correction_angle", [share.goal for _, share in every], unit),
+        *_vector("error", "error_angle", [share.error for _, share in every], unit),
+    ]
+    return Table(columns, [column.name for column in named])
+
+
+def draw(placing: Placing) -> Figure:
+    """Draw for each plane its places with their masses on the rim, target and total as vectors."""
+    unit = placing.of.unit
+    panels = [
+        Places(
+            "" if share.z is None else f"z = {from_si(share.z, 'length', 'mm'):g} mm: ",
+            np.radians(share.places).tolist(),
+            from_si(share.placed.masses, "mass", unit).tolist(),
+            from_si(share.goal, "mass", unit),
+            complex(from_si(share.placed.total, "mass", unit)),
+        )
+        for share in placing.shares
+    ]
+    figure = blank()
+    places(panels, unit, remove=placing.request.removes, figure=figure)
+    return figure

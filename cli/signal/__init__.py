@@ -1,0 +1,1 @@
+"""`dalembert signal`: amplitude and phase of a recorded vibration."""

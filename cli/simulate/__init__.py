@@ -1,0 +1,1 @@
+"""`dalembert simulate`."""

@@ -1,0 +1,389 @@
+"""The motion of a mechanism in time under its loads: as a table, as JSON, drawn; of variants one by one or together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from cli.cases import quantities
+from cli.cases.analysis import Analysis
+from cli.cases.axes import input_values
+from cli.cases.loop import Case, Variants
+from cli.cases.poses import column
+from cli.cases.quantities import SLIDE, Quantity, bounds_of, cells, in_rows, keys_of, nested
+from cli.cases.single import TableCase, TableStudy
+from cli.read import options
+from cli.show.page import shown as on_page
+from dalembert.angles import read_degrees
+from dalembert.arithmetic.engines import anew
+from dalembert.errors import DataError
+from dalembert.results.columns import Table
+from virtualwork import MechanismError
+from virtualwork.describe.parts import GROUND
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from cli.cases.loop import Rows
+    from dalembert.results.columns import Column, Document
+    from virtualwork import Mechanism
+    from virtualwork.animation import Series
+    from virtualwork.intime.run import Run
+    from virtualwork.intime.travel import Travel
+
+    Reals = NDArray[np.float64]
+    Values = dict[Quantity, Reals]
+
+# an input's angle and its rates
+INPUT = ("angle_deg", "speed_rad_s", "acceleration_rad_s2")
+ENERGY = Quantity(("energy_J",), "energy_J")
+METHOD = (
+    "Motion under forces: the effort at the inputs by virtual work with d'Alembert's forces is M·q̈ + h; of released inputs "
+    "it is zero, and q̈ is integrated in the inputs. Loops are closed at every evaluation. The error is estimated from a "
+    "second solution in steps half as long."
+)
+# variants of a part that are simulated together, and one by one
+TOGETHER, ONE_BY_ONE = 512, 8
+
+
+def times_and_accuracy(time: str, accuracy: float | None) -> tuple[list[float], float]:
+    """The times and the accuracy."""
+    times = options.time_range("--time", time)
+    if len(times) > 1 and times[1] < times[0]:
+        raise options.bad("--time", f"'{time}': expected rising times")
+    value = 1e-9 if accuracy is None else accuracy
+    if not 0 < value < 1:
+        raise options.bad("--accuracy", f"{accuracy}: expected a number between 0 and 1, such as 1e-9")
+    return times, value
+
+
+@dataclass(eq=False)
+class Motion(TableCase):
+    """One mechanism released."""
+
+    study: Simulation
+    analysis: Analysis
+    name: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.name = self.analysis.mechanism.name
+
+    @cached_property
+    def run(self) -> Run:
+        """The simulation."""
+        from virtualwork.intime.run import simulate
+
+        a, study = self.analysis, self.study
+        (assembly,) = a.assemblies
+        try:
+            return simulate(assembly, study.times, accuracy=study.accuracy, until=study.levels(a.mechanism))
+        except MechanismError:
+            raise
+        except ValueError as error:
+            raise DataError(f"{a.file}: {error}") from None
+
+    @cached_property
+    def _wanted(self) -> list[Quantity]:
+        """What is requested beside the inputs and the energy."""
+        return [*(self.analysis.places if self.analysis.request.only is not None else []), *self._forces]
+
+    @property
+    def _forces(self) -> list[Quantity]:
+        """The joint forces and the shaking force, where they are requested."""
+        a = self.analysis
+        if not a.request.forces:
+            return []
+        # --forces asks for joint forces: those of the names of --only, of all joints where these have none
+        joints = [each for each in a.forces if each.path[:1] == ("reactions",)]
+        every = quantities.forces(a.mechanism, a.pairs)
+        joints = joints or [each for each in every if each.path[:1] == ("reactions",) and not each.reverse]
+        return [*joints, *(each for each in every if each.path[:1] == ("shaking",))]
+
+    def values(self, way: Travel, wanted: Sequence[Quantity]) -> Values:
+        """The inputs, the energy and some quantities, of one of the two solutions."""
+        m, t = self.analysis.mechanism, self.run.t
+        q, v, acceleration, _ = way.at(t)
+        values = inputs_of(m, q, v, acceleration, self.run.error_estimate)
+        turned = {each.path[1]: angles for each, angles in values.items() if each.path[2] == "angle_deg"}
+        driven = {e.link: turned[e.name] for e in m.inputs if not e.is_slide and e.on == GROUND}
+        values[ENERGY] = way.energy(t)
+        keys = keys_of(wanted)
+        solved = dict(zip(keys, way.motion(t).values(keys), strict=True)) if keys else {}
+        for each in wanted:
+            if each.turns:
+                # whole turns and all
+                name = each.key[1]
+                values[each] = driven[name] if name in driven else np.degrees(way.link_angle(name, t))
+            else:
+                values[each] = each.of(solved[each.key]) if each.key else np.zeros(len(t))
+        return values
+
+    @cached_property
+    def fine(self) -> Values:
+        """The answer."""
+        return self.values(self.run.fine, self._wanted)
+
+    @cached_property
+    def coarse(self) -> Values:
+        """The coarser solution, for the errors."""
+        return self.values(self.run.coarse, self._wanted)
+
+    def table(self) -> Table:
+        """A row for each time."""
+        columns = columns_of(self.run.t, self.shown, self._error if self.study.needs_errors else None)
+        return Table(columns, keys=("t_s",))
+
+    def pattern(self) -> Table:
+        """The columns, from the first time alone."""
+        first = replace(self.study, times=self.study.times[:1], until=None, digits=False)
+        return Motion(first, self.analysis).table()
+
+    @cached_property
+    def shown(self) -> Values:
+        """The answer as far as any digit of it can be trusted."""
+        return trusted(self.fine, self.run.unknown)
+
+    def _error(self, each: Quantity) -> list[float]:
+        return bounds_of(self.run.spread(self.fine[each], self.coarse[each]))
+
+    def document(self) -> Document:
+        """What the JSON document has of it."""
+        shown, request = self.shown, self.analysis.request
+        if request.only is None:
+            # in addition to the forces all points and links
+            every = self.values(self.run.fine, [*self.analysis.places, *self._forces])
+            shown = trusted(every, self.run.unknown)
+        return {
+            "time": rows_of_time(self.run.t, shown),
+            "energy_drift_J": largest(self.run.energy_drift),
+            **({} if self.study.names else {"methods": self.run.fine.methods, "steps": self.run.fine.steps}),
+        }
+
+    def warnings(self) -> list[str]:
+        """Where it ends, and what is doubtful."""
+        return [*self.analysis.warnings, *self.run.warnings]
+
+    def words(self) -> str:
+        """How it was integrated, and how exactly."""
+        run = self.run
+        drift = float(np.abs(run.energy_drift).max())
+        error = ", ".join(
+            f"{entry.name} {value:.1e} {'m' if entry.is_slide else 'rad'}"
+            for entry, value in zip(
+                self.analysis.mechanism.inputs, run.error_estimate.max(axis=0), strict=True
+            )
+        )
+        return (
+            f"{' and '.join(run.fine.methods)}: {run.fine.steps} steps\n"
+            f"error of the inputs, estimated: {error}\n"
+            f"energy that the work of the loads does not explain: {drift:.1e} J"
+        )
+
+    def figure(self) -> Figure:
+        """Inputs, speeds and energy over time, and the mechanism at instants."""
+        from cli.show.picture import blank
+
+        drawn = blank()
+        self.run.plot(drawn)
+        return drawn
+
+    def series(self, variant: str, units: str | None) -> Series:
+        """All points and links over time for a page, whatever --only names."""
+        from virtualwork.animation import JointForce
+
+        home = self.analysis
+        request = home.request._replace(only=[*home.mechanism.links, *home.mechanism.points])
+        every = replace(home, request=request)
+        every.assemblies = home.assemblies
+        whole = Motion(self.study, every)
+        whole.run = self.run
+        arrows = [JointForce.of(*row) for row in (every.pairs if request.forces else ())]
+        name = f"variant {variant}" if variant else ""
+        return self.run.series(on_page(whole.table(), units), ["t_s", *home.input_columns], arrows, name)
+
+
+@dataclass(frozen=True)
+class Simulation(TableStudy):
+    """Release every case.
+
+    Attributes
+    ----------
+    times : list of float
+        s.
+    accuracy : float
+    until : str, optional
+        The input at which it ends.
+    """
+
+    times: Sequence[float] = ()
+    accuracy: float = 1e-9
+    until: str | None = None
+
+    title = "time"
+    blank: ClassVar[Mapping[str, Any]] = {"time": [], "energy_drift_J": None}
+    method = METHOD
+
+    @property
+    def needs_errors(self) -> bool:
+        """Whether a table has the bounds of its numbers: of variants only where digits are cut by them."""
+        return self.digits or not self.names
+
+    def levels(self, m: Mechanism) -> dict[str, float] | None:
+        """The inputs at which it ends, SI."""
+        if self.until is None:
+            return None
+        shown = input_values(m, self.until, "--until", self.bare)
+        return {
+            m.inputs[j].name: value if m.inputs[j].is_slide else math.radians(value)
+            for j, value in shown.items()
+        }
+
+    def case(self, row: Rows | None = None) -> Motion:
+        """A variant, or the mechanism itself."""
+        m = self.mechanism if row is None else self.variant(row)
+        motion = Motion(self, Analysis(self.request, m, self.inputs(m, row)))
+        if len(motion.analysis.assemblies) > 1:
+            raise options.bad("--branch", "simulate follows one assembly: expected its number")
+        return motion
+
+    def size(self, json: bool, together: bool) -> int:
+        """How many variants a part has."""
+        return TOGETHER if self.at_once else ONE_BY_ONE
+
+    @property
+    def at_once(self) -> bool:
+        """Whether the inputs and the energy are all that is shown, which variants have as lanes; JSON has points and links."""
+        r = self.request
+        return r.only is None and r.branch is None and not (r.forces or self.digits or self.json)
+
+    def cases(self, part: Variants) -> Iterator[tuple[Case | None, list[str]]]:
+        """The cases of some variants, each with its remarks; None where one cannot be simulated."""
+        anew()
+        if self.at_once:
+            yield from _lanes(self, part.shown)
+            return
+        yield from super().cases(part)
+
+
+@dataclass(eq=False)
+class Lane(Case):
+    """A variant that was simulated together with others."""
+
+    t: Reals
+    values: Values
+    drift: Reals
+
+    def tables(self) -> Iterator[Table]:
+        """A row for each time."""
+        yield Table(columns_of(self.t, self.values), keys=("t_s",))
+
+    def document(self) -> Document:
+        """What the JSON document has of it."""
+        return {"time": rows_of_time(self.t, self.values), "energy_drift_J": largest(self.drift)}
+
+
+def _lanes(study: Simulation, shown: Rows) -> Iterator[tuple[Case | None, list[str]]]:
+    """Variants that are simulated together."""
+    m = study.mechanism
+    try:
+        runs = m.vary(study.in_si(shown)).simulate(
+            study.times, accuracy=study.accuracy, until=study.levels(m)
+        )
+    except ValueError as error:
+        raise DataError(f"{study.request.file}: {error}") from None
+    for i, there in enumerate(np.isfinite(runs.times)):
+        remarks = list(runs.warnings.get(i, ()))
+        if not there.any():
+            yield None, remarks
+            continue
+        of = (runs.angle, runs.speed, runs.acceleration, runs.error_estimate)
+        values = inputs_of(m, *(x[i, there] for x in of)) | {ENERGY: runs.energy[i, there]}
+        yield (
+            Lane(runs.times[i, there], trusted(values, runs.unknown[i, there]), runs.energy_drift[i, there]),
+            remarks,
+        )
+
+
+def page(cases: Sequence[tuple[str, Case]], units: str | None) -> bytes:
+    """The page of motions under forces: that which goes on for longest is drawn in full, the others as ghosts."""
+    from virtualwork.animation import moving_page
+
+    series = []
+    for name, case in cases:
+        # a variant that cannot be simulated is named by the remarks
+        with suppress(MechanismError) if name else nullcontext():
+            assert isinstance(case, Motion)
+            series.append(case.series(name, units))
+    if not series:
+        raise MechanismError("--page: no variant can be simulated, and there is nothing to draw")
+    series.sort(key=lambda one: -one.poses.n)
+    return moving_page(series[0].mechanism.name, series, time="t_s").html.encode()
+
+
+# --- numbers over time ------------------------------------------------------------------------------------------------
+def inputs_of(m: Mechanism, q: Reals, v: Reals, a: Reals, error: Reals) -> Values:
+    """The inputs, their rates and errors (n, k), as they are shown."""
+    found: Values = {}
+    for j, entry in enumerate(m.inputs):
+        lead = f"{entry.name}_input_" if len(m.inputs) > 1 else "input_"
+        values = (q[:, j], v[:, j], a[:, j], error[:, j])
+        if not entry.is_slide:
+            values = (_degrees(q[:, j]), *values[1:3], np.degrees(error[:, j]))
+        unit = "m" if entry.is_slide else "deg"
+        names = *(SLIDE if entry.is_slide else INPUT)[:3], f"error_estimate_{unit}"
+        for name, its in zip(names, values, strict=True):
+            header = f"{lead}{unit if name in (SLIDE[0], INPUT[0]) else name}"
+            found[Quantity(("inputs", entry.name, name), header)] = its
+    return found
+
+
+def _degrees(q: Reals) -> Reals:
+    """An input in degrees; where it starts, and where it may have been told to end, as it was written."""
+    angle = np.degrees(q)
+    for i in {0, len(q) - 1}:
+        angle[i] = read_degrees(float(q[i]))
+    return np.asarray(angle)
+
+
+def _is_error(each: Quantity) -> bool:
+    return str(each.path[-1]).startswith("error")
+
+
+def trusted(values: Values, unknown: NDArray[np.bool_]) -> Values:
+    """Values without those of which no digit holds: what stays are the errors, and the energy, which has its own."""
+    if not unknown.any():
+        return values
+    return {
+        each: of if each == ENERGY or _is_error(each) else np.where(unknown, np.nan, of)
+        for each, of in values.items()
+    }
+
+
+def columns_of(
+    t: Reals, values: Mapping[Quantity, Reals], error: Callable[[Quantity], list[float]] | None = None
+) -> list[Column]:
+    """The numbers at each time as columns."""
+    columns = [column("t_s", t.tolist())]
+    for each, of in values.items():
+        bounds = None if error is None or _is_error(each) else partial(error, each)
+        columns.append(column(each.header, cells(of), bounds))
+    return columns
+
+
+def rows_of_time(t: Reals, values: Values) -> list[Any]:
+    """The numbers at each time as JSON."""
+    numbers = {each: cells(of) for each, of in values.items()}
+    return list(in_rows({"t_s": t.tolist(), **nested(numbers, len(t))}, len(t)))
+
+
+def largest(drift: Reals) -> float | None:
+    """The largest of numbers by size, with its sign; None where there is none."""
+    there = drift[np.isfinite(drift)]
+    return float(there[np.argmax(np.abs(there))]) if len(there) else None

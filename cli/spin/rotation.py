@@ -1,0 +1,307 @@
+"""A body and its state from TOML, its rotation in time, and what is constant in its motion."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cli.read.about import about
+from dalembert.errors import DataError
+from dalembert.hints import nearest
+from dalembert.results.columns import finite
+from dalembert.tables.files import read_bytes, remember
+from dalembert.units import LARGEST
+from rigidbody3d import Body, FreeBody, FreeState, Top, TopState, Trajectory, check, integrate, principal
+from rigidbody3d import cones as cones_of
+from rigidbody3d import sleeping_threshold as threshold_of
+from rigidbody3d import steady_precession as steady_of
+from rigidbody3d.attitude import normalize, rotate
+from rigidbody3d.integration import MOST
+
+Array = NDArray[np.float64]
+
+KEYS = ("name", "inertia", "parts", "omega", "attitude", "top", "torque", "frame", "report")
+
+
+@dataclass(frozen=True)
+class TurningBody:
+    """The body as described."""
+
+    file: str
+    name: str
+    inertia: Array
+    omega: Array
+    attitude: Array
+    mgl: float | None
+    torque: Array | None
+    frame: str
+    warnings: list[str]
+    about: dict[str, str]
+    """What the file says for the head of a report."""
+    rounded: Callable[[], Array] | None = None
+    """Bounds of the errors of the tensor of a body made of parts, (3, 3)."""
+
+
+def read_body(path: str) -> TurningBody:
+    """Read BODY.toml."""
+    remember(path)
+    file, data = read_bytes(path)
+    try:
+        document = tomllib.loads(data.decode("utf-8-sig"))
+    except ValueError as error:
+        raise DataError(f"{file}: {error}") from None
+    except RecursionError:
+        raise DataError(f"{file}: no valid TOML: nested too deeply") from None
+    for key in document:
+        if key not in KEYS:
+            raise DataError(f"{file}: unknown key '{key}': expected {', '.join(KEYS)}{nearest(key, KEYS)}")
+    top = document.get("top")
+    mgl = None
+    if top is not None:
+        if not isinstance(top, dict) or set(top) != {"mgl"}:
+            raise DataError(f"{file}: [top] holds mgl = weight times distance, N·m, and nothing else")
+        mgl = float(_numbers(file, "top.mgl", top["mgl"], ()))
+    inertia, rounded, warnings = _inertia(file, path, document, mgl is not None)
+    try:
+        verdict = check(inertia)
+    except ValueError as error:
+        raise DataError(f"{file}: inertia: {error}") from None
+    # a body of parts has been judged by what its table prints
+    if "parts" not in document and not verdict.valid:
+        raise DataError(f"{file}: inertia: no body has it: {verdict.reason}")
+    if not verdict.moments[1] > 0:
+        raise DataError(
+            f"{file}: inertia: found no moment of inertia: expected at least two that are positive"
+        )
+    if "omega" not in document:
+        raise DataError(f"{file}: no omega: expected the angular velocity in body axes, rad/s")
+    torque = document.get("torque")
+    frame = document.get("frame", "body")
+    if frame not in ("body", "space"):
+        raise DataError(f'{file}: frame: found {frame!r}, expected "body" or "space"')
+    attitude = _numbers(file, "attitude", document.get("attitude", [1, 0, 0, 0]), (4,))
+    try:
+        attitude = normalize(attitude)
+    except ValueError as error:
+        raise DataError(f"{file}: attitude: {error}") from None
+    return TurningBody(
+        file,
+        str(document.get("name", "")),
+        inertia,
+        _numbers(file, "omega", document["omega"], (3,)),
+        attitude,
+        mgl,
+        None if torque is None else _numbers(file, "torque", torque, (3,)),
+        frame,
+        warnings,
+        about(file, document),
+        rounded,
+    )
+
+
+def _inertia(
+    file: str, path: str, document: Mapping[str, object], top: bool
+) -> tuple[Array, Callable[[], Array] | None, list[str]]:
+    """Return the tensor, what bounds its errors where it is that of parts, and warnings."""
+    if ("inertia" in document) == ("parts" in document):
+        raise DataError(f'{file}: expected inertia = [I1, I2, I3] (or a matrix) or parts = "parts.csv"')
+    if "inertia" in document:
+        return _numbers(file, "inertia", document["inertia"], (3,), (3, 3)), None, []
+    named = document["parts"]
+    if not isinstance(named, str):
+        raise DataError(f"{file}: parts: found {named!r}, expected the name of a CSV file")
+    from cli.read.parts import read_parts
+
+    parts = read_parts(str((Path() if path == "-" else Path(path).parent) / named))
+    point = [0.0, 0.0, 0.0] if top else None
+    inertia = parts.whole.inertia if point is None else parts.whole.about(point)
+    return inertia, partial(_tensor_error, parts.whole, point), parts.warnings
+
+
+def _tensor_error(body: Body, about: list[float] | None) -> Array:
+    return body.error_estimate(about).inertia
+
+
+def _numbers(file: str, key: str, value: object, *shapes: tuple[int, ...]) -> Array:
+    wanted = " or ".join("×".join(map(str, shape)) if shape else "one" for shape in shapes)
+
+    def plain(x: object) -> bool:
+        return (
+            all(map(plain, x))
+            if isinstance(x, list)
+            else isinstance(x, (int, float)) and not isinstance(x, bool)
+        )
+
+    try:
+        array = np.array(value, dtype=float) if plain(value) else np.array([np.nan])
+    except (ValueError, OverflowError):
+        array = np.array([np.nan])
+    if array.shape not in shapes or not (np.abs(array) <= LARGEST).all():
+        raise DataError(
+            f"{file}: {key}: found {value!r}, expected {wanted} finite number{'s' * (wanted != 'one')}"
+        )
+    return array
+
+
+DEFAULT_STEPS = 20_000
+"""Steps of an integration without --method integrate: some seconds."""
+EQUAL = 1e-12
+"""Two principal moments as near as this, relatively, are those of a body of revolution."""
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """A body in time; each quantity is computed when it is first asked for."""
+
+    body: TurningBody
+    time: Array
+    method: str | None
+    integrator: str
+
+    @cached_property
+    def round_moments(self) -> Array | None:
+        """(I1, I1, I3) of a top whose axis is body z; None if it is no symmetric top."""
+        I = self.body.inertia
+        size = np.abs(I).max()
+        if I.ndim == 2:
+            if np.abs(I - np.diag(np.diag(I))).max() > EQUAL * size:
+                return None
+            I = np.diag(I)
+        if abs(I[0] - I[1]) > EQUAL * size:
+            return None
+        across = I[0] if I[0] == I[1] else (I[0] + I[1]) / 2
+        return np.array([across, across, I[2]])
+
+    @cached_property
+    def exact(self) -> bool:
+        """Whether a closed form is used."""
+        g = self.body
+        closed = g.torque is None and (g.mgl is None or self.round_moments is not None)
+        if self.method == "exact" and not closed:
+            why = "a torque" if g.torque is not None else "a top whose two moments across body z differ"
+            raise DataError(f"{g.file}: there is no closed form for {why}: expected --method integrate")
+        return closed and self.method != "integrate"
+
+    @cached_property
+    def states(self) -> FreeState | TopState | Trajectory:
+        """The states at the times asked for."""
+        return self.at(self.time)
+
+    def at(self, time: Array) -> FreeState | TopState | Trajectory:
+        """Return the states at other times."""
+        g = self.body
+        try:
+            if self.exact:
+                if g.mgl is None:
+                    return FreeBody(g.inertia, g.omega, g.attitude).at(time)
+                assert self.round_moments is not None
+                return Top(self.round_moments, g.mgl, g.omega, g.attitude).at(time)
+            return integrate(
+                g.inertia,
+                g.omega,
+                g.attitude,
+                time,
+                torque=g.torque,
+                frame=g.frame,
+                mgl=g.mgl or 0.0,
+                method=self.integrator,
+                most=MOST if self.method == "integrate" else DEFAULT_STEPS,
+            )
+        except (ValueError, RuntimeError) as error:
+            wait = (
+                ", or --method integrate to wait for it"
+                if self.method is None and "steps" in str(error)
+                else ""
+            )
+            raise DataError(f"{g.file}: {error}{wait}") from None
+
+    @cached_property
+    def drift(self) -> dict[str, float | None]:
+        """How far momentum and energy stray from those at time zero, relatively; None where they are not constant."""
+        g = self.body
+        if g.torque is not None:
+            return {"momentum": None, "energy": None}
+        tensor = _tensor(g.inertia)
+        H = rotate(g.attitude, tensor @ g.omega)
+        w, x, y, z = g.attitude
+        E = g.omega @ tensor @ g.omega / 2 + (g.mgl or 0.0) * (w * w + z * z - x * x - y * y)
+        stray = self.states.momentum - H
+        if g.mgl is not None:  # about the vertical only
+            stray = stray[:, 2:]
+        size = float(np.linalg.norm(H))
+        scale = max(abs(float(E)), abs(g.mgl or 0.0))
+        energy = float(np.abs(self.states.energy - E).max())
+        momentum = float(np.linalg.norm(stray, axis=-1).max())
+        return {
+            "momentum": momentum / size if size else momentum,
+            "energy": energy / scale if scale else energy,
+        }
+
+    @cached_property
+    def period(self) -> float | None:
+        """The period of ω in body axes; None where it is constant, or not periodic."""
+        g = self.body
+        if g.torque is not None or g.mgl is not None:
+            return None
+        return finite(float(FreeBody(g.inertia, g.omega).period))
+
+    def cones(self) -> dict[str, float | None] | None:
+        """Return the cones of a free symmetric body."""
+        g = self.body
+        if g.torque is not None or g.mgl is not None:
+            return None
+        moments, axes = principal(g.inertia)
+        low, middle, high = moments.tolist()
+        oblate, prolate = middle - low <= EQUAL * high, high - middle <= EQUAL * high
+        if oblate == prolate:  # a sphere, or three different moments
+            return None
+        pole = 2 if oblate else 0
+        order = [(pole + 1) % 3, (pole + 2) % 3, pole]
+        found = cones_of(moments[order[0]], moments[pole], (axes @ g.omega)[order])
+        return {
+            "space_half_angle_deg": float(np.degrees(found.space)),
+            "body_half_angle_deg": float(np.degrees(found.body)),
+            "precession_rad_s": float(found.precession),
+            "spin_rad_s": float(found.spin),
+        }
+
+    def steady(self) -> dict[str, float | None] | None:
+        """Return the rates of steady precession of a top at its tilt at time zero."""
+        g = self.body
+        if g.mgl is None or self.round_moments is None:
+            return None
+        across, _, along = self.round_moments
+        w, x, y, z = g.attitude
+        tilt = 2 * np.arctan2(np.hypot(x, y), np.hypot(w, z))
+        rates = steady_of(across, along, g.mgl, tilt, g.omega[2])
+        return {
+            "slow_rad_s": finite(float(rates.slow)),
+            "fast_rad_s": finite(float(rates.fast)),
+            "sleeping_threshold_rad_s": finite(float(threshold_of(across, along, g.mgl))) if along else None,
+        }
+
+    @property
+    def nutation_period(self) -> float | None:
+        """The period of nutation of a top; None of any other body."""
+        return finite(float(self.states.top.nutation_period)) if isinstance(self.states, TopState) else None
+
+    @cached_property
+    def bounds(self) -> dict[str, Array]:
+        """Bounds of the rounding errors of the states, of an integration of its method too."""
+        s, rounded = self.states, self.body.rounded
+        tensor = np.zeros((3, 3)) if rounded is None else rounded()
+        if isinstance(s, TopState):
+            # two moments that differ by rounding were taken as one
+            between = np.abs(np.diff(np.diag(_tensor(self.body.inertia))[:2]))[0] / 2
+            tensor = np.diag(tensor) + [between, between, 0.0]
+        return {of: s.error_estimate(of, tensor) for of in ("omega", "attitude", "momentum", "energy")}
+
+
+def _tensor(inertia: Array) -> Array:
+    return np.diag(inertia) if inertia.ndim == 1 else inertia

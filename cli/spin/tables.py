@@ -1,0 +1,125 @@
+"""What is computed of a rotation: the states, what is constant, the picture and the page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cli.show.picture import blank
+from cli.spin.rotation import Rotation
+from dalembert.results.columns import Column, Table, names, number, vector
+from rigidbody3d.picture.rotation import rotation as draw_rotation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cli.spin.rotation import Array
+
+METHOD = (
+    "Free rotation and tops in closed form by Jacobi's elliptic functions (Landau and Lifshitz, Mechanics, §37; Goldstein, "
+    "Classical Mechanics, ch. 5), else angular momentum and a unit quaternion integrated."
+)
+
+
+def tables(r: Rotation) -> dict[str, Callable[[], Table]]:
+    """The tables of a result, the CSV's first."""
+    return {"states": lambda: states(r), "constants": lambda: constants(r)}
+
+
+def states(r: Rotation) -> Table:
+    """A row for each time."""
+    s = r.states
+
+    def error(of: str) -> Callable[[], Array]:
+        # a turn by an angle moves a quaternion by half of it
+        return lambda: r.bounds[of] / 2 if of == "attitude" else r.bounds[of]
+
+    columns = [
+        number("t", "time", r.time + 0.0),
+        *vector("omega", "speed", s.omega + 0.0, "xyz", error("omega")),
+        *vector("attitude", "number", s.attitude + 0.0, "wxyz", error("attitude")),
+        *vector("momentum", "angular momentum", s.momentum + 0.0, "xyz", error("momentum")),
+        number("energy", "energy", s.energy + 0.0, error=error("energy")),
+    ]
+    how = "closed form" if r.exact else f"integrated by {r.integrator}"
+    above = f"omega in body axes, momentum in space axes, attitude [w, x, y, z] from body to space; {how}"
+    return Table(columns, place="states[]", above=above)
+
+
+def constants(r: Rotation) -> Table:
+    """One row: drift, periods, the cones of a free symmetric body, the steady precession of a top."""
+    columns: list[Column] = []
+    absent: list[Column] = []
+
+    def one(name: str, dimension: str, value: float | None, place: str) -> None:
+        column = number(name, dimension, [np.nan if value is None else value], place=place)
+        (absent if value is None else columns).append(column)
+
+    for of, value in r.drift.items():
+        one(f"drift_of_{of}", "number", value, f"drift.{of}")
+    one("period", "time", r.period, "period")
+    one("nutation_period", "time", r.nutation_period, "nutation_period")
+    for name, rates in (("cones", r.cones()), ("steady", r.steady())):
+        for key, value in (rates or {}).items():
+            base, dimension = (key[:-4], "angle") if key.endswith("_deg") else (key[:-6], "speed")
+            one(base, dimension, value, f"{name}.{base}")
+        if rates is None:
+            absent.append(names(name, [None]))
+    return Table(columns, place="", documented=absent)
+
+
+def warnings(r: Rotation) -> list[str]:
+    """What a reader of the states has to know."""
+    lines = []
+    if r.body.mgl is not None and r.round_moments is None:
+        lines.append("a top whose moments across body z differ has no closed form: it was integrated")
+    steady = r.steady()
+    if steady is not None and steady["slow_rad_s"] is None:
+        lines.append("the spin is too slow for steady precession at this tilt")
+    return lines
+
+
+def coarse(r: Rotation) -> list[str]:
+    """Warn of a page on which the body jumps, and name steps that show it turn."""
+    if len(r.time) < 2:
+        return []
+    step = float(np.abs(np.diff(r.time)).max())
+    fastest = float(np.linalg.norm(r.states.omega, axis=-1).max())
+    if step * fastest <= np.pi / 4:
+        return []
+    smaller = float(f"{np.pi / 12 / fastest:.1g}")
+    return [
+        f"--page: the body turns up to {np.degrees(step * fastest):.0f} deg from one pose to the next: "
+        f"with steps of {smaller:g} s it turns smoothly"
+    ]
+
+
+def draw(r: Rotation) -> Figure:
+    """Draw ω(t), the polhode and the trace of the body's axis; for a single time, from zero to there."""
+    figure, body = blank(), r.body
+    time = _fine(r)
+    at = r.at(time)
+    draw_rotation(
+        time,
+        at.omega,
+        at.attitude,
+        body.inertia,
+        free=body.torque is None and body.mgl is None,
+        top=body.mgl is not None,
+        name=body.name,
+        figure=figure,
+    )
+    return figure
+
+
+def _fine(r: Rotation) -> Array:
+    ends = [min(0.0, float(r.time.min())), float(r.time.max())]
+    if len(r.time) > 1:
+        ends[0] = float(r.time.min())
+    size = float(np.linalg.norm(r.body.omega))
+    if ends[0] == ends[1]:
+        ends[1] = ends[0] + (r.period or (2 * np.pi / size if size else 1.0))
+    turns = (ends[1] - ends[0]) * size / (2 * np.pi)
+    return np.linspace(ends[0], ends[1], int(np.clip(60 * turns, 600, 6000 if r.exact else 2000)))

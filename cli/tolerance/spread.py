@@ -1,0 +1,290 @@
+"""What the tolerances of the file do to every number that is shown: to first order, and by drawn mechanisms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cli.cases import poses
+from cli.cases.analysis import Analysis
+from cli.cases.quantities import Quantity, cells, keys_of
+from cli.cases.single import TableCase, TableStudy
+from cli.cases.study import METHOD
+from cli.read.options import processes
+from dalembert.errors import DataError
+from dalembert.results.columns import Column, Table
+from virtualwork.describe.dimensions import Dimension
+from virtualwork.family.tolerance import Drawn, Spread, drawn, drawn_numbers, limits, spread, summary
+from virtualwork.formulas.asked import Key
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cli.cases.loop import Rows
+    from cli.cases.quantities import Numbers
+    from cli.show.commands import ShowOptions
+    from dalembert.results.columns import Document
+
+# how far a drawn standard deviation may be from the linear one, in its sampling errors and by its size
+SURE, APART = 5.0, 0.02
+NAMES = ("p0.135", "p99.865")
+
+
+@dataclass
+class Tolerances(TableCase):
+    """What the tolerances do to one mechanism."""
+
+    study: Spreads
+    analysis: Analysis
+    name: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.name = self.analysis.mechanism.name
+
+    @property
+    def draws(self) -> int:
+        """How many mechanisms are drawn; 0 for none."""
+        return self.study.draws
+
+    @cached_property
+    def limits(self) -> dict[Dimension, float]:
+        """The limit of each dimension, SI."""
+        given = self.analysis.mechanism.tolerances
+        if not given:
+            raise DataError(
+                f"{self.analysis.file}: [tolerances]: missing; expected limits such as "
+                '"links.crank.B.x" = "0.05 mm"'
+            )
+        return limits(self.analysis.mechanism, given)
+
+    @cached_property
+    def numbers(self) -> list[Quantity]:
+        """What is shown and varies with the tolerances."""
+        shown = [each for each in self.analysis.tabled if each.key and not each.less]
+        keys = keys_of(shown)
+        varies = dict(zip(keys, self.analysis.motions[0].sensitivities.vary(keys, self.limits), strict=True))
+        return [each for each in shown if varies[each.key][each.imaginary]]
+
+    @cached_property
+    def keys(self) -> list[Key]:
+        """The quantities that this is of."""
+        return keys_of(self.numbers)
+
+    @cached_property
+    def slopes(self) -> dict[Key, list[Any]]:
+        """Of each quantity to each dimension."""
+        found = self.analysis.motions[0].sensitivities.of(self.keys, list(self.limits))
+        return dict(zip(self.keys, found, strict=True))
+
+    @cached_property
+    def linear(self) -> dict[str, Spread]:
+        """To first order, by header."""
+        sizes = list(self.limits.values())
+        return {
+            number.header: spread([number.of(slope) for slope in self.slopes[number.key]], sizes)
+            for number in self.numbers
+        }
+
+    @cached_property
+    def drawn(self) -> tuple[dict[str, Drawn], float]:
+        """From drawn mechanisms, by header; and which share of them is assembled in every pose."""
+        m, motion, q = self.analysis.mechanism, self.analysis.motions[0], self.analysis.inputs
+        numbers = drawn_numbers(m, self.limits, self.draws, self.study.seed, self.study.distribution)
+        nominal = dict(zip(self.keys, motion.sensitivities.values(self.keys), strict=True))
+        parts: dict[str, list[Drawn]] = {number.header: [] for number in self.numbers}
+        whole = np.ones(self.draws, dtype=bool)
+        rates = q.speed, q.acceleration
+        with processes(self.study.workers) as pool:
+            for rows, values, assembled in drawn(m, numbers, motion.inputs, rates, self.keys, pool):
+                whole &= assembled.all(axis=1)
+                found = dict(zip(self.keys, values, strict=True))
+                for number in self.numbers:
+                    its, mean = number.of(found[number.key]), number.of(nominal[number.key][rows])
+                    parts[number.header].append(summary(its, mean, 360.0 if number.turns else None))
+        joined = {
+            header: Drawn(*(np.concatenate([getattr(p, name) for p in some], axis=-1) for name in _FIELDS))
+            for header, some in parts.items()
+        }
+        nowhere = ~motion.assembled
+        for each in joined.values():
+            for name in _FIELDS:
+                getattr(each, name)[..., nowhere] = np.nan
+        return joined, float(whole.mean())
+
+    def warnings(self) -> list[str]:
+        """What is remarkable about the poses, and where the first order is not enough."""
+        from cli.cases import remarks
+
+        a = self.analysis
+        lines = [*a.warnings, *remarks.limits(a), *(remarks.of_forces(a) if a.forces else [])]
+        return [*lines, *self.apart()]
+
+    def apart(self) -> list[str]:
+        """Where the first order is not enough: the drawn standard deviation is another."""
+        if not self.numbers:
+            return [
+                "none of the numbers shown varies with [tolerances]: they have none, nor a picture of them"
+            ]
+        if not self.draws:
+            return []
+        found, whole = self.drawn
+        lines = []
+        sampling = SURE / np.sqrt(2 * max(self.draws - 1, 1))
+        # a uniform distribution between the limits is wider than a normal one of a third of them
+        wider = np.sqrt(3.0) if self.study.distribution == "uniform" else 1.0
+        for header, its in found.items():
+            linear = self.linear[header].sd * wider
+            with np.errstate(invalid="ignore", divide="ignore"):
+                apart = np.abs(its.sd - linear) / linear
+            apart[~(linear > 1e-9 * np.nanmax(linear, initial=0.0))] = 0.0
+            if np.nanmax(apart, initial=0.0) > sampling + APART:
+                i = int(np.nanargmax(apart))
+                shown = self.analysis.inputs.shown[i, 0]
+                lines.append(
+                    f"{header}: linear estimate unreliable at input {shown:g} {self.analysis.unit}: standard deviation "
+                    f"{linear[i]:.6g}, but {its.sd[i]:.6g} from the drawn mechanisms"
+                )
+        if whole < 1:
+            lines.append(
+                f"{(1 - whole) * 100:.3g} % of the drawn mechanisms cannot be assembled in every pose"
+            )
+        return lines
+
+    def document(self) -> Document:
+        """What the JSON document has of it."""
+        return {"tolerance": self.spreads()}
+
+    def spreads(self) -> dict[str, Any]:
+        """What `tolerance` holds."""
+        found: dict[str, Any] = {
+            "columns": {
+                header: {"worst": cells(its.worst), "sd": cells(its.sd)}
+                for header, its in self.linear.items()
+            },
+            "shares": [
+                {"path": d.path, "column": header, "share": cells(its.shares[i])}
+                for header, its in self.linear.items()
+                for i, d in enumerate(self.limits)
+            ],
+        }
+        if self.draws:
+            drawn, whole = self.drawn
+            found["drawn"] = {
+                "columns": {
+                    header: _sample(its)
+                    | {f"{name}_error": cells(e) for name, e in zip(NAMES, its.errors, strict=True)}
+                    for header, its in drawn.items()
+                },
+                "draws": self.draws,
+                "seed": self.study.seed,
+                "distribution": self.study.distribution,
+                "assembled": whole,
+            }
+        return found
+
+    def table(self) -> Table:
+        """The table of poses, each number with its worst case and its standard deviation."""
+        base = poses.table(self.analysis)
+        found: list[Column] = []
+        for column in base.columns:
+            found.append(column)
+            if column.header not in self.linear:
+                continue
+            its = self.linear[column.header]
+            found.append(Column(f"{column.name}_worst", column.unit, cells(its.worst)))
+            found.append(Column(f"{column.name}_sd", column.unit, cells(its.sd)))
+            if self.draws:
+                sample = _sample(self.drawn[0][column.header])
+                found += [Column(f"{column.name}_drawn_{name}", column.unit, sample[name]) for name in sample]
+        return Table(found, base.keys)
+
+    def assembled(self, table: Table) -> list[bool] | bool:
+        """Of each row of a table whether its pose is assembled, or whether any is."""
+        (motion,) = self.analysis.motions
+        there: list[bool] = self.analysis.assembled(motion).tolist()
+        return there if table.columns and len(table.columns[0].values) == len(there) else any(there)
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether anything varies."""
+        return bool(self.numbers)
+
+    def figure(self) -> Figure:
+        """The band of paths, and which dimension has which share."""
+        from cli.tolerance.picture import draw
+
+        return draw(self)
+
+    def words(self) -> str:
+        """Which dimensions matter most, for the terminal."""
+        lines = []
+        for header, its in self.linear.items():
+            mean = (
+                np.nanmean(its.shares, axis=1)
+                if np.isfinite(its.shares).any()
+                else np.zeros(len(self.limits))
+            )
+            order = np.argsort(-mean, kind="stable")[:3]
+            ranked = zip(order, [list(self.limits)[i].path for i in order], strict=True)
+            told = ", ".join(f"{path} {mean[i] * 100:.3g} %" for i, path in ranked if mean[i] > 0)
+            if told:
+                lines.append(f"{header}: {told}")
+        return (
+            "shares of the variance, the largest, means over the poses:\n" + "\n".join(lines) if lines else ""
+        )
+
+
+@dataclass(frozen=True)
+class Spreads(TableStudy):
+    """What the tolerances do to every case.
+
+    Attributes
+    ----------
+    draws : int
+        How many mechanisms are drawn; 0 for none.
+    seed : int
+    distribution : str
+        `normal` or `uniform`.
+    workers : int
+        Processes that solve what is drawn.
+    """
+
+    draws: int = 0
+    seed: int = 0
+    distribution: str = "normal"
+    workers: int = 1
+
+    title = "poses"
+    method = METHOD
+    one_blank_row = False
+
+    def warnings(self) -> list[str]:
+        """Rates without a speed, forces without a mass or a load."""
+        from cli.cases import remarks
+
+        whole = Analysis(self.request, self.mechanism, self.inputs(self.mechanism, None))
+        return remarks.without_meaning(whole, self.names)
+
+    def case(self, row: Rows | None = None) -> Tolerances:
+        """A variant, or the mechanism itself."""
+        m = self.mechanism if row is None else self.variant(row)
+        analysis = Analysis(self.request, m, self.inputs(m, row))
+        _ = analysis.motions
+        return Tolerances(self, analysis)
+
+    def check_size(self, show: ShowOptions, times: int) -> None:
+        """Refuse more poses than the memory holds."""
+        whole = Analysis(self.request, self.mechanism, self.inputs(self.mechanism, None))
+        whole.check_size(json=show.as_json, table=show.needs_table, times=times)
+
+
+def _sample(its: Drawn) -> dict[str, Numbers]:
+    """Mean, standard deviation and quantiles of what was drawn, by the names that they are shown under."""
+    values = its.mean, its.sd, *its.quantiles
+    return {name: cells(each) for name, each in zip(("mean", "sd", *NAMES), values, strict=True)}
+
+
+_FIELDS = ("mean", "sd", "quantiles", "errors")

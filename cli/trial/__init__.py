@@ -1,0 +1,1 @@
+"""`dalembert trial`: a trial mass for the first run."""

@@ -1,0 +1,67 @@
+"""Angles in degrees and vectors as complex numbers, without losing what degrees say exactly."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, overload
+
+from dalembert.units import to_si
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+def cosine_sine(angle: NDArray[np.float64], unit: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return cos and sin of angles in `deg` or `rad`; degrees are reduced first, so that 90° has cosine 0.
+
+    The reduction to within 45° of a quarter turn is exact in degrees, where 360 is a number.
+    """
+    import numpy as np
+
+    angle = np.asarray(angle, dtype=float)
+    if unit != "deg":
+        angle = to_si(angle, "angle", unit)
+        return np.cos(angle), np.sin(angle)
+    turn = np.fmod(angle, 360.0)
+    quarter = np.rint(turn / 90.0)
+    rest = (turn - 90.0 * quarter) * (math.pi / 180)
+    c, s = np.cos(rest), np.sin(rest)
+    q = quarter.astype(np.int64) % 4
+    # + 0.0 turns -0.0 into 0.0
+    return np.choose(q, [c, -s, -c, s]) + 0.0, np.choose(q, [s, c, -s, -c]) + 0.0
+
+
+def phasor(magnitude: NDArray[np.float64], angle: NDArray[np.float64], unit: str) -> NDArray[np.complex128]:
+    """Return magnitude·e^{i·angle} for an angle in `deg` or `rad`."""
+    import numpy as np
+
+    c, s = cosine_sine(angle, unit)
+    z = np.empty(np.broadcast(magnitude, c).shape, dtype=complex)
+    z.real, z.imag = magnitude * c, magnitude * s
+    return z
+
+
+def read_degrees(angle: float) -> float:
+    """Return an angle that was read, rad, in degrees: one that was written in degrees comes out as it was written.
+
+    >>> math.degrees(math.radians(60.0)), read_degrees(math.radians(60.0))
+    (59.99999999999999, 60.0)
+    """
+    shown = math.degrees(angle)
+    short = float(f"{shown:.15g}")
+    return short if abs(math.radians(short) - angle) <= math.ulp(angle) else shown
+
+
+@overload
+def degrees(z: NDArray[np.complex128]) -> NDArray[np.float64]: ...
+@overload
+def degrees(z: complex) -> float: ...
+def degrees(z: complex | NDArray[np.complex128]) -> float | NDArray[np.float64]:
+    """Return the angle of a complex number, or of each in an array, in degrees in [0, 360); 0 for zero."""
+    import numpy as np
+
+    vector = np.asarray(z)
+    # + 0.0: the angle of -0 is 0, not 180; and a tiny negative angle plus 360 rounds to 360 itself
+    angle = np.degrees(np.arctan2(vector.imag + 0.0, vector.real + 0.0)) % 360.0
+    return np.where(angle >= 360.0, 0.0, angle)[()]

@@ -1,0 +1,78 @@
+"""What a caller hands in as arrays: numbers, whose shapes go together; else one sentence says which do not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Shape = tuple[int, ...]
+
+
+def as_numbers(name: str, value: ArrayLike, kind: type = float) -> NDArray[Any]:
+    """Return an array of float or complex numbers.
+
+    Raises
+    ------
+    ValueError
+        It holds other things than numbers, or rows of different lengths.
+
+    Examples
+    --------
+    >>> as_numbers("omega", [1, 2, 3])
+    array([1., 2., 3.])
+    >>> as_numbers("omega", "fast")
+    Traceback (most recent call last):
+    ...
+    ValueError: omega must be an array of numbers, found 'fast'
+    """
+    try:
+        return np.asarray(value, dtype=kind)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be an array of numbers, found {repr(value)[:60]}") from None
+
+
+def common_shape(**shapes: Shape) -> Shape:
+    """Return the shape that arrays of these shapes have together (numpy's broadcasting).
+
+    Raises
+    ------
+    ValueError
+        They do not go together; the sentence has the name and the shape of each.
+
+    Examples
+    --------
+    >>> common_shape(inertia=(4, 1), omega=(3,))
+    (4, 3)
+    >>> common_shape(inertia=(4,), omega=(3,))
+    Traceback (most recent call last):
+    ...
+    ValueError: shapes do not fit: inertia (4,), omega (3,)
+    """
+    try:
+        return np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        pairs = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise ValueError(f"shapes do not fit: {pairs}") from None
+
+
+def spread_to(name: str, value: ArrayLike, shape: Shape) -> NDArray[np.float64]:
+    """Return numbers as an array of a shape that is wanted, repeated where there are fewer (numpy's broadcasting).
+
+    Examples
+    --------
+    >>> spread_to("max_mass", 2.0, (3,))
+    array([2., 2., 2.])
+    >>> spread_to("max_mass", [1.0, 2.0], (3,))
+    Traceback (most recent call last):
+    ...
+    ValueError: max_mass must have the shape (3,), or be one number, found the shape (2,)
+    """
+    numbers = as_numbers(name, value)
+    try:
+        return np.broadcast_to(numbers, shape)
+    except ValueError:
+        raise ValueError(
+            f"{name} must have the shape {shape}, or be one number, found the shape {numbers.shape}"
+        ) from None

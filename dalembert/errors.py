@@ -1,0 +1,37 @@
+"""What a user's data can do wrong, in one line each."""
+
+from __future__ import annotations
+
+LONGEST = 1200  # characters of a message
+
+
+class DataError(Exception):
+    """Bad data: shown as one line, status 1."""
+
+
+def needs(what: str, package: str, extra: str) -> DataError:
+    """Say what is missing where a package of an extra is not installed."""
+    return DataError(f"{what} needs {package}: install dalembert with its extra, dalembert[{extra}]")
+
+
+def cell_error(file: str, row: int, line: int, column: str, found: str, expected: str) -> DataError:
+    """Name file, row, column, the value found and what was expected.
+
+    `row` counts the data rows from 1; `line` is the file's own line, header and blank lines included.
+    """
+    return DataError(
+        f"{file}: row {row} (line {line}), column {column}: found {quote(found)}, expected {expected}"
+    )
+
+
+def quote(found: str) -> str:
+    """Show a value from a file on one line, whatever it holds."""
+    text = ascii(found) if not found.isprintable() else f"'{found}'"
+    return text if len(text) <= 60 else text[:57] + "...'"
+
+
+def one_line(message: str) -> str:
+    """Put a message on one line that a terminal can show, whatever names and values of a file stand in it."""
+    line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(message.split()))
+    # what was found stands at the front, what was expected at the end
+    return line if len(line) <= LONGEST else f"{line[: LONGEST * 2 // 3]} ... {line[-LONGEST // 3 :]}"

@@ -1,0 +1,148 @@
+"""Numbers and quantities as people write them, in files, TOML and options: `120 mm`, `3000rpm`, `-1.5`."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+from dalembert.units import (
+    DIMENSIONS,
+    LARGEST,
+    LISTED,
+    MINUS,
+    Factor,
+    composed,
+    find_unit,
+    nearest_unit,
+    unit_name,
+)
+
+_SPOKEN_DIMENSION = {
+    "inertia": "moment of inertia",
+    "speed": "angular speed",
+    "velocity": "speed",
+    "torsional stiffness": "torsional stiffness",
+}
+
+
+def expected(dimension: str) -> str:
+    """Say what a value of this dimension looks like: `a length such as '120 mm'`."""
+    of = DIMENSIONS[dimension]
+    if not of.example:
+        return "a number"
+    more = " or '700 rpm'" if dimension == "speed" else ""
+    return f"{of.article} {_SPOKEN_DIMENSION.get(dimension, dimension)} such as '{of.example}'{more}"
+
+
+def decimal_to_si(number: str, factor: Factor) -> float:
+    """A decimal number times a unit's factor, with one rounding where the factor is a ratio of whole numbers.
+
+    Examples
+    --------
+    >>> decimal_to_si("0.3", (1, 1000)), decimal_to_si("120", (1, 1000))
+    (0.0003, 0.12)
+    """
+    value, (num, den) = float(number), factor
+    if den == 1 or not math.isfinite(value):
+        return value * num
+    if not (isinstance(num, int) and isinstance(den, int)):
+        return value * (num / den)
+    from fractions import Fraction
+
+    return float(Fraction(number) * Fraction(num, den))
+
+
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.ASCII | re.DOTALL)
+
+
+def quantity_in_si(text: str, dimension: str) -> float | None:
+    """A quantity with its unit in SI (an angle in radians); None where text is no quantity of that dimension.
+
+    Examples
+    --------
+    >>> quantity_in_si("120 mm", "length"), quantity_in_si("0.1rev", "angle"), quantity_in_si("3 kg", "length")
+    (0.12, 0.6283185307179586, None)
+    """
+    match = _QUANTITY.match(text.replace(MINUS, "-"))
+    unit = composed(match[2]) if match and match[2] else None
+    if match is None or unit is None:
+        return None
+    own, wanted = unit[1], DIMENSIONS[dimension].exponents
+    # rad is a pure number: a torque may be N m/rad, but a length is never an angle
+    loose = own[:3] == wanted[:3] and wanted[:3] != (0, 0, 0) and 0 in (own[3], wanted[3])
+    loose = loose and dimension not in ("speed", "angular acceleration", "angular jerk")
+    return decimal_to_si(match[1], unit[0]) if own == wanted or loose else None
+
+
+def parse_number(text: str) -> float:
+    """Read a finite decimal number; ValueError otherwise (NaN, inf, `1_000`, `0x10`, above 1e60)."""
+    text = text.strip().replace(MINUS, "-")
+    if not text.isascii() or "_" in text:
+        raise ValueError(text)
+    value = float(text)
+    if not abs(value) <= LARGEST:
+        raise ValueError(text)
+    return value
+
+
+def number_expected(text: str) -> str:
+    """Say what was expected in place of a text that `parse_number` refuses: a number, or a smaller one.
+
+    >>> number_expected("five"), number_expected("1e300")
+    ('a number', 'a number of at most 1e+60')
+    """
+    try:
+        large = abs(float(text)) > LARGEST and any(map(str.isdigit, text))
+    except ValueError:
+        large = False
+    return f"a number of at most {LARGEST:g}" if large else "a number"
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number and nothing else."""
+    try:
+        parse_number(text)
+    except ValueError:
+        return False
+    return True
+
+
+def parse_quantity(text: str, dimension: str) -> tuple[float, str]:
+    """Read an option's value such as `3000rpm` or `30 g_mm`: the number and the unit behind it.
+
+    Raises ValueError with a sentence that says what is wrong and which units there are.
+    """
+    names = ", ".join(LISTED[dimension])
+    match = _QUANTITY.match(text.replace(MINUS, "-"))
+    if match is None:
+        raise ValueError(f"'{text}' is not a number with a unit (units: {names})")
+    number, suffix = match.groups()
+    suffix = unit_name(suffix)
+    unit = find_unit(dimension, suffix)
+    if unit is None:
+        if not suffix:
+            raise ValueError(f"'{text}' has no unit (units: {names})")
+        raise ValueError(
+            f"'{text}' has the unknown {dimension} unit '{suffix}' (units: {names}){nearest_unit(suffix, dimension)}"
+        )
+    value = float(number)
+    if not abs(value) <= LARGEST:
+        raise ValueError(f"'{text}' is too large a number")
+    return value, unit
+
+
+def number_in_si(value: Any, dimension: str, factor: Factor = (1, 1)) -> float | None:
+    """Read a value of a TOML file: a bare number in the unit with this factor, or a text with its unit.
+
+    None where it is neither, infinity where it is too large.
+    """
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        # a whole number of TOML has no bound
+        return decimal_to_si(repr(value), factor) if abs(value) <= LARGEST else math.inf
+    if not isinstance(value, str):
+        return None
+    number = quantity_in_si(value, dimension)
+    if number is None and is_number(value):
+        return decimal_to_si(value.strip().replace(MINUS, "-"), factor)
+    return number

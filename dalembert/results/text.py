@@ -1,0 +1,135 @@
+"""Columns as text: CSV with every digit, an aligned table with six."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from dalembert.results.columns import Column, Table
+from dalembert.units import written
+
+if TYPE_CHECKING:
+    from dalembert.results.columns import Cell, Values
+
+GOOD, BAD = ("ok", "within", "stable"), ("WRONG", "beyond", "unstable")
+"""Verdicts, as they stand in cells and sentences."""
+
+
+class Grid(NamedTuple):
+    """A table as it is printed: a header and rows of text, and which columns are numbers, to the right."""
+
+    header: list[str]
+    rows: list[list[str]]
+    numbers: list[bool]
+
+
+def csv_text(columns: Mapping[str, Values], header: bool = True) -> str:
+    """Return CSV with every digit of every number; without its header for a further part of a table."""
+    import csv
+
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    if header:
+        writer.writerow(columns)
+    writer.writerows(zip(*map(_plain_column, columns.values()), strict=True))
+    return stream.getvalue()
+
+
+def _plain_column(column: Values) -> Sequence[object]:
+    """Return a column's cells as CSV writes them: a numpy array of numbers, or names alone, in one step."""
+    if not isinstance(column, Sequence) and column.dtype.kind == "f":
+        numbers: list[float] = column.tolist()
+        return numbers if (column == column).all() else ["" if x != x else x for x in numbers]
+    if isinstance(column, list) and set(map(type, column)) == {str}:
+        return column
+    return [plain(value) for value in column]
+
+
+def plain(value: object) -> str | float:
+    """Return a cell as CSV writes it: numpy's numbers as Python's, yes and no as JSON spells them."""
+    value = value.item() if hasattr(value, "item") else value
+    if value is None or value != value:
+        return ""
+    return str(value).lower() if isinstance(value, bool) else value  # type: ignore[return-value]
+
+
+def printed(name: str, column: Values) -> list[str]:
+    """Return a column's cells as they are shown: numbers to 6 significant digits."""
+    values = [plain(value) for value in column]
+    return [_six_digits(name, value) if isinstance(value, float) else str(value) for value in values]
+
+
+def table_text(columns: Mapping[str, Values], keys: Sequence[str] = (), width: int | None = None) -> str:
+    """Return an aligned table, numbers to the right, names to the left.
+
+    What is wider than `width` is laid out in blocks one below the other, each with the key columns in front.
+    """
+    laid: dict[str, list[str]] = {}
+    for name, column in columns.items():
+        cells = [name, *printed(name, column)]
+        longest = max(map(len, cells))
+        laid[name] = [cell.ljust(longest) if has_names(column) else cell.rjust(longest) for cell in cells]
+    return "\n".join(
+        "".join("  ".join(row).rstrip() + "\n" for row in zip(*(laid[name] for name in block), strict=True))
+        for block in in_blocks({name: len(cells[0]) for name, cells in laid.items()}, keys, width)
+    )
+
+
+def as_list(table: Table) -> Table:
+    """Return a table of one row as a list: a row for each quantity, its value and unit."""
+    texts = [printed(column.header, column.values)[0] for column in table.columns]
+    return Table(
+        [
+            Column("quantity", "", [column.name.replace("_", " ") for column in table.columns]),
+            Column("value", "", texts),
+            Column("unit", "", [written(column.unit) for column in table.columns]),
+        ],
+        above=table.above,
+        below=table.below,
+    )
+
+
+def has_names(column: Values) -> bool:
+    """Whether a column holds names, which stand to the left."""
+    return any(isinstance(value, str) and value for value in map(plain, column))
+
+
+def in_blocks(widths: Mapping[str, int], keys: Sequence[str], width: int | None) -> list[list[str]]:
+    """Part columns into blocks that are no wider than `width`, each with the key columns in front."""
+    front = [name for name in widths if name in keys]
+    blocks: list[list[str]] = [[]]
+    for name in widths:
+        last = blocks[-1]
+        wide = sum(widths[other] + 2 for other in last) + widths[name]
+        if width is not None and wide > width and len(last) > len(front) and name not in keys:
+            blocks.append(list(front))
+        blocks[-1].append(name)
+    return blocks
+
+
+def _six_digits(name: str, value: float) -> str:
+    cell = f"{value:.6g}"
+    return "0" if cell == "360" and value < 360 and name.endswith("_deg") else cell
+
+
+def heading(name: str) -> str:
+    """Return a table's name as a heading."""
+    text = name.strip("-").replace("_", " ")
+    return text[:1].upper() + text[1:]
+
+
+def angle_text(degrees: float, spec: str) -> str:
+    """Format an angle in [0, 360); what rounds to a full turn is 0."""
+    text = format(float(degrees), spec)
+    return format(0.0, spec) if float(text) == 360.0 else text
+
+
+def paragraphs(*parts: str) -> str:
+    """Join what is not empty with a blank line between."""
+    return "\n".join(part.rstrip("\n") + "\n" for part in parts if part)
+
+
+def transposed(rows: Sequence[Mapping[str, Cell]]) -> dict[str, list[Cell]]:
+    """Return rows as columns."""
+    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}

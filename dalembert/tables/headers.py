@@ -1,0 +1,276 @@
+"""A header of a table: the quantity and its unit, as `mass_kg`, `mass [kg]`, `mass (kg)` or `Mass, kg`; foreign names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from dalembert.errors import DataError
+from dalembert.tables.files import load
+from dalembert.units import AMPLITUDES, TAGS, UNITS, dimensions, find_unit, nearest_unit, parted, unit_name
+
+# compiled where a header is so written
+_BRACKETS = r"(?s)(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\Z"
+_PARTED = r"(?s)(.*\S)\s*(?:,|\s/\s|\sin\s)\s*(\S.*)\Z"
+NO_UNIT = ("", "-", "1")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Heading:
+    """A column's header."""
+
+    written: str
+    base: str
+    """Without the unit that stands in brackets, behind a comma or in the row below."""
+    unit: str = ""
+    """That unit, spelled as a suffix; empty where there is none."""
+
+    @property
+    def name(self) -> str:
+        """Quantity and unit: `mass_kg`."""
+        if not self.unit or self.base.lower().endswith(f"_{self.unit.lower()}"):
+            return self.base
+        return f"{self.base}_{self.unit}"
+
+    def of(self, quantity: str) -> str | None:
+        """Return the suffix behind a quantity's name, if the column is called by it."""
+        name = self.name.lower()
+        if name == quantity:
+            return ""
+        return self.name[len(quantity) + 1 :] if name.startswith(f"{quantity}_") else None
+
+    def with_unit(self, cell: str, known: Mapping[str, str]) -> Heading:
+        """Return the heading with the unit of the row below; ValueError with the unit that the header itself has."""
+        unit = "" if cell.strip() in NO_UNIT else unit_name(cell.strip().strip("[]()"))
+        if not unit:
+            return self
+        for quantity, dimension in known.items():
+            suffix = self.of(quantity)
+            own = find_unit(dimension, suffix) if suffix else None
+            if own:
+                if find_unit(dimension, unit) == own:
+                    return self
+                raise ValueError(own)
+        if self.unit and self.unit.lower() != unit.lower():
+            raise ValueError(self.unit)
+        return replace(self, unit=unit)
+
+
+def heading(written: str) -> Heading:
+    """Read a header; a column that is renamed has its new name."""
+    written = written.strip()
+    base, unit = _parted(written)
+    for given, foreign in _renamed.items():
+        if foreign.lower() in (written.lower(), base.lower()):
+            _met.add(given)
+            return Heading(written, *_merged(given, unit, written))
+    return Heading(written, base, unit)
+
+
+def _parted(written: str) -> tuple[str, str]:
+    """Split a header into name and unit, both as the suffixes spell them."""
+    base, unit = written, ""
+    if written.endswith(("]", ")")) and (found := re.match(_BRACKETS, written)):
+        base, unit = found.group(1), found.group(2) or found.group(3) or ""
+    elif re.search(r"[,\s]", written) and (found := re.match(_PARTED, written)) and is_unit(found.group(2)):
+        base, unit = found.groups()
+    base = re.sub(r"\s+", "_", base.strip().replace("°", "deg")).translate(str.maketrans("µμ", "uu"))
+    return base, "" if unit.strip() in NO_UNIT else unit_name(unit)
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is the name of a unit, in brackets or not."""
+    return bool(dimensions(unit_name(text.strip().strip("[]()"))))
+
+
+# name here -> header in the file (the option --column), and which were met
+_renamed: dict[str, str] = {}
+_met: set[str] = set()
+
+
+def rename(names: Mapping[str, str]) -> None:
+    """Take columns under other names from now on: name here -> header in the file."""
+    _renamed.clear()
+    _met.clear()
+    _renamed.update(names)
+
+
+def rename_from(path: str) -> None:
+    """Take the headers of `--columns FILE.toml` for this call; where `--column` has the same name, that one holds."""
+    import tomllib
+
+    try:
+        stored = tomllib.loads(load(path).decode("utf-8-sig"))
+    except ValueError as error:
+        raise DataError(f"{path}: {error}") from None
+    for name, header in stored.items():
+        if not isinstance(header, str):
+            raise DataError(f'{path}: {name}: expected a header in quotes, such as mass_g = "Masse"')
+        _renamed.setdefault(name, header.strip())
+
+
+def check_renamed() -> None:
+    """Refuse a renaming whose header no table has had."""
+    for given, foreign in _renamed.items():
+        if given not in _met:
+            raise DataError(f"--column {given}={foreign}: no table has a column '{foreign}'")
+
+
+def _merged(given: str, unit: str, written: str) -> tuple[str, str]:
+    """Return name and unit of a renamed column: the unit stands in the name given, or in the file, or alike in both."""
+    base, own = _parted(given)
+    suffix = own or parted(base)[1]
+    # the name may add how an amplitude is read: mm_s_rms of a column in mm/s
+    tagged = any(suffix.lower() == f"{unit}{tag}".lower() for tag in TAGS)
+    if suffix and unit and not tagged:
+        raise DataError(
+            f"--column {given}={written}: found the unit '{unit}' in the file, expected '{suffix}'"
+        )
+    return base, own or ("" if suffix else unit)
+
+
+def spellings(quantity: str, dimension: str) -> str:
+    """List the names a quantity's column may have: `mass_kg, mass_g or mass_lb`."""
+    # of amplitudes the first unit of everything that instruments measure
+    units = (
+        [next(iter(of)) for of in AMPLITUDES.values()]
+        if dimension == "amplitude"
+        else [*UNITS[dimension]][:4]
+    )
+    names = [f"{quantity}_{unit}" if unit else quantity for unit in units]
+    return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def find_columns(
+    file: str, headings: Sequence[Heading], known: Mapping[str, str], texts: Sequence[str]
+) -> dict[str, tuple[int, str]]:
+    """Find each quantity's column: its place in the row and its unit."""
+    found: dict[str, tuple[int, str]] = {}
+    lower = [each.name.lower() for each in headings]
+    for name in texts:
+        places = [index for index, header in enumerate(lower) if header == name.lower()]
+        if len(places) > 1:
+            raise DataError(f"{file}: the column {name} stands twice: expected it once")
+        if places:
+            found[name] = (places[0], "")
+    for name, dimension in known.items():
+        good: list[tuple[int, str]] = []
+        bad: list[tuple[int, str]] = []
+        for index, each in enumerate(headings):
+            suffix = each.of(name)
+            if suffix is not None:
+                unit = find_unit(dimension, suffix)
+                (bad if unit is None else good).append((index, unit or suffix))
+        if len(good) > 1:
+            both = " and ".join(headings[index].written for index, _ in good)
+            raise DataError(
+                f"{file}: {name} is given more than once, by the columns {both}: expected one of them"
+            )
+        if good:
+            found[name] = good[0]
+        elif bad:
+            # a column that another quantity claims (`z_rotation` beside `z`) is not an unknown unit
+            others = [other for other in (*known, *texts) if other.startswith(name + "_")]
+            strays = [
+                (i, suffix)
+                for i, suffix in bad
+                if not any(lower[i] == o or lower[i].startswith(o + "_") for o in others)
+            ]
+            if strays:
+                index, suffix = strays[0]
+                problem = f"the unknown unit '{suffix}'" if suffix else "no unit"
+                hint = nearest_unit(suffix, dimension) if suffix else ""
+                raise DataError(
+                    f"{file}: the column {headings[index].written} has {problem}: "
+                    f"expected {spellings(name, dimension)}{hint}"
+                )
+    return found
+
+
+def likeness(headings: Iterable[Heading], known: Mapping[str, str], texts: Sequence[str]) -> int:
+    """Count the columns that a command knows, or may be meant to know: what tells a header from a title."""
+    names = {name.lower() for name in texts}
+    return sum(
+        each.name.lower() in names
+        or any(each.of(quantity) is not None for quantity in known)
+        or bool(quantity_meant(each.base, (*known, *texts)))
+        for each in headings
+        if each.written
+    )
+
+
+def offers(headings: Iterable[Heading], known: Mapping[str, str], texts: Sequence[str]) -> list[str]:
+    """Return for columns that are not known but may be meant the option that takes them: `--column mass_g=Masse`."""
+    out = []
+    for each in headings:
+        base, unit = (each.base, each.unit) if each.unit else parted(each.base)
+        quantity = quantity_meant(base, (*known, *texts))
+        if quantity:
+            from shlex import quote
+
+            dimension = known.get(quantity)
+            fit = "" if dimension is None else find_unit(dimension, unit) or next(iter(UNITS[dimension]))
+            out.append(f"--column {quantity}{'_' * bool(fit)}{fit}={quote(each.written)}")
+    return out
+
+
+# -- what quantities are called in English, German, Portuguese, Spanish and French: for hints alone --------
+
+_WORDS = {
+    "mass": "mass masse massa masa gewicht",
+    "weight": "weight gewichtskraft gewicht peso poids force_poids",
+    "radius": "radius radii halbmesser raio radio rayon r",
+    "diameter": "diameter durchmesser diametro diametre",
+    "angle": "angle winkel winkellage angulo ang theta position_angulaire winkelposition",
+    "z": "z axial axial_position abstand lage posicao_axial posicion_axial position_axiale cote distance ebenenlage",
+    "unbalance": "unbalance imbalance unwucht desbalanceamento desbalanco desequilibrio balourd",
+    "plane": "plane ebene ausgleichsebene plano plano_de_correcao plano_de_correccion plan plan_de_correction",
+    "rotor": "rotor machine maschine laeufer maquina",
+    "name": "name bezeichnung benennung nome nombre nom teil",
+    "run": "run lauf messlauf messung corrida rodada medicao marcha medicion ensayo essai mesure lancement",
+    "sensor": "sensor aufnehmer messstelle messpunkt messebene transdutor captador sonda capteur point_de_mesure",
+    "speed": "speed drehzahl velocidade rotacao velocidad velocidad_de_giro vitesse vitesse_de_rotation n rpm",
+    "amplitude": "amplitude schwingung vibration vibracao vibracion amplitud valor wert",
+    "phase": "phase phasenlage phasenwinkel fase fase_angular angle_de_phase",
+    "trial_mass": "trial_mass trial_weight testmasse probemasse probegewicht testgewicht massa_de_teste massa_de_prova "
+    "massa_tentativa masa_de_prueba peso_de_prueba masse_d_essai masse_test",
+    "trial_angle": "trial_angle testwinkel probewinkel angulo_de_teste angulo_da_massa angulo_de_prueba angle_d_essai",
+    "trial_plane": "trial_plane testebene probeebene plano_de_teste plano_de_prueba plan_d_essai plane ebene plano plan",
+    "part": "part teil bauteil peca pieza piece",
+    "shape": "shape form koerper forma forme",
+    "link": "link glied elo barra eslabon membre biela",
+    "step": "step schritt passo paso pas",
+    "inertia": "inertia traegheitsmoment massentraegheitsmoment inercia momento_de_inercia inertie moment_d_inertie",
+    "torque": "torque moment drehmoment torque momento par couple",
+    "length": "length laenge comprimento longitud longueur",
+    "width": "width breite largura ancho anchura largeur",
+    "height": "height hoehe altura hauteur",
+    "density": "density dichte densidade densidad densite",
+    "time": "time zeit tempo tiempo temps t",
+}
+"""Quantity -> its names, without accents; among several quantities the first that a command knows is meant."""
+
+
+def plain_word(word: str) -> str:
+    """Return a word in small letters, without accents, one `_` between its parts."""
+    word = word.casefold().replace("ä", "ae").replace("ö", "oe").replace("ü", "ue")
+    if not word.isascii():
+        import unicodedata
+
+        word = "".join(c for c in unicodedata.normalize("NFKD", word) if not unicodedata.combining(c))
+    return re.sub(r"[^a-z0-9]+", "_", word).strip("_")
+
+
+def quantity_meant(word: str, known: Iterable[str]) -> str:
+    """Return the known quantity that a foreign word may mean; nothing for one that is none.
+
+    Examples
+    --------
+    >>> quantity_meant("Masse", ["mass", "radius"]), quantity_meant("ângulo", ["angle"])
+    ('mass', 'angle')
+    >>> quantity_meant("Bemerkung", ["mass", "radius"])
+    ''
+    """
+    plain = plain_word(word)
+    return next((quantity for quantity in known if plain in _WORDS.get(quantity, "").split()), "")

@@ -1,0 +1,321 @@
+"""The text of a table, and how its cells are told apart: CSV as spreadsheets write it, or a sheet of a workbook."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import islice, zip_longest
+from typing import TYPE_CHECKING
+
+from dalembert.errors import DataError, cell_error, quote
+from dalembert.quantities import is_number
+from dalembert.tables.files import is_workbook, read_bytes, remember, split_sheet
+from dalembert.tables.headers import Heading, heading, is_unit, likeness, offers
+
+if TYPE_CHECKING:
+    from dalembert.tables.workbooks import Sheet
+
+# so many rows are looked at for what parts the cells, and for the header
+LOOKED_AT = 20
+
+LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
+_CONTROLS = bytes([*range(9), *range(14, 32), 127])
+_QUOTED = re.compile(r'"[^"]*"')
+# rows from which importing pandas pays
+LARGE = 10_000
+SHOWN = 8  # hidden rows, percentages: so many are named
+
+
+@dataclass(eq=False, repr=False)
+class Source:
+    """A table before its cells are read."""
+
+    file: str
+    text: str
+    delimiter: str
+    """None parts the cells of a workbook: there it is empty."""
+    warnings: list[str]
+    sheet: Sheet | None = None
+    headings: list[Heading] = field(default_factory=list)
+    above: int = 0
+    """How many records stand above the header."""
+    units_below: bool = False
+    """Whether the row below the header holds units."""
+    records: list[tuple[int, list[str]]] | None = None
+    """Lines and cells in place of those of the text, where they are laid out otherwise."""
+    unnamed_first: bool = False
+    """Whether the rows begin with a cell for which the header has none."""
+
+    @property
+    def of_sheet(self) -> str:
+        """Which sheet of the file, for messages about the table as a whole; nothing for CSV."""
+        return "" if self.sheet is None else f" (sheet {quote(self.sheet.name)})"
+
+    @property
+    def header(self) -> list[str]:
+        """The header, as the file writes it."""
+        return [each.written for each in self.headings]
+
+    @property
+    def large(self) -> bool:
+        """Whether pandas pays, and can read the text as it is."""
+        plain = not (self.records or self.above or self.units_below or self.unnamed_first)
+        return plain and self.sheet is None and self.text.count("\n") >= LARGE
+
+    def has_commas(self, columns: Iterable[Iterable[str]]) -> bool:
+        """Tell whether these cells have decimal commas: where no comma parts cells, and one stands in a cell."""
+        return self.delimiter != "," and any("," in cell for column in columns for cell in column)
+
+    def everything(self) -> Iterator[tuple[int, list[str]]]:
+        """Yield (line, cells) of every row that is not blank."""
+        if self.records is not None:
+            yield from self.records
+            return
+        if self.sheet is not None:
+            for line, row in enumerate(self.sheet.rows, 1):
+                if any(cell and not cell.isspace() for cell in row):
+                    yield line, row
+            return
+        lines = (match.group() for match in LINE.finditer(self.text))
+        reader = csv.reader(lines, delimiter=self.delimiter, strict=True)
+        line = 1
+        try:
+            for record in reader:
+                if any(cell and not cell.isspace() for cell in record):
+                    yield line, record
+                line = reader.line_num + 1
+        except csv.Error as error:
+            raise DataError(f"{self.file}: line {line}: {error}: expected CSV with balanced quotes") from None
+
+    def rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Yield (line, cells) of every row of data."""
+        return islice(self.everything(), self.above + 1 + self.units_below, None)
+
+    def error(self, index: int, column: str, found: str, expected: str) -> DataError:
+        """Make the one line for a cell of a row of data; `column` as the header spells it."""
+        line, _ = next(islice(self.rows(), index, None))
+        if self.sheet is None:
+            return cell_error(self.file, index + 1, line, column, found, expected)
+        from dalembert.tables.workbooks import address
+
+        at = f"row {line}"
+        if column in self.header:
+            at = f"cell {address((line - 1, self.header.index(column)))}"
+        return DataError(
+            f"{self.file}: sheet {quote(self.sheet.name)}, {at}, column {column}: "
+            f"found {quote(found)}, expected {expected}"
+        )
+
+    def check_cells(self, columns: Iterable[int]) -> None:
+        """Refuse merged cells, errors and formulas without a value in the columns that are read."""
+        if self.sheet is None:
+            return
+        used = set(columns)
+        top = next(islice(self.everything(), self.above, None))[0] - 1
+        self._tell_unseen(used, top)
+        for (row, column), (found, expected) in sorted(self.sheet.faults.items()):
+            if row >= top and column in used:
+                raise self.sheet.error((row, column), found, expected)
+
+    def _tell_unseen(self, used: set[int], top: int) -> None:
+        """Remark hidden rows, hidden columns and percentages that take part."""
+        assert self.sheet is not None
+        from dalembert.tables.workbooks import address, letters
+
+        looks, of = self.sheet.unseen, f"{self.file}: sheet {quote(self.sheet.name)}"
+        filled = {line - 1 for line, _ in self.everything()} if looks.rows else set()
+        rows = sorted(row + 1 for row in looks.rows if row >= top and row in filled)
+        columns = sorted(letters(k) for k in looks.columns & used)
+        percent = sorted(place for place in looks.percent if place[0] > top and place[1] in used)
+        for what, names in (("row", list(map(str, rows))), ("column", columns)):
+            if names:
+                many = len(names) > 1
+                self.warnings.append(
+                    f"{of}: the {what}{'s' * many} {_some(names)} {'are' if many else 'is'} hidden and take{'s' * (not many)} part"
+                )
+        if percent:
+            many = len(percent) > 1
+            self.warnings.append(
+                f"{of}: the cell{'s' * many} {_some(list(map(address, percent)))} {'are' if many else 'is'} shown as percentage"
+                f"{'s' * many}, and read as the number{'s' * many} behind: 50 % is 0.5"
+            )
+
+    def told(self, unread: Sequence[Heading], missed: Mapping[str, str], texts: Sequence[str]) -> str:
+        """Say, where a column is missed, what the header is, what of it may be meant, and which other sheets there are."""
+        parts = [f"the header is: {', '.join(self.header)}"]
+        if offered := offers(unread, missed, texts):
+            parts.append(f"did you mean {' '.join(offered)}?")
+        if self.sheet is not None:
+            parts.insert(0, f"sheet {quote(self.sheet.name)}")
+            if self.sheet.others:
+                others = ", ".join(map(quote, self.sheet.others))
+                parts.append(f"other sheets: {others}; choose one by '{self.file}#{self.sheet.others[0]}'")
+        return f"({'; '.join(parts)})"
+
+
+def open_source(path: str, known: Mapping[str, str], texts: Sequence[str] | None) -> Source:
+    """Open a file, or standard input for `-`, and find its header; `texts` is None where every column is taken."""
+    remember(path)
+    path, wanted = split_sheet(path)
+    return source_of(*read_bytes(path), known, texts, wanted)
+
+
+def source_of(
+    file: str, data: bytes, known: Mapping[str, str], texts: Sequence[str] | None, wanted: str = ""
+) -> Source:
+    """Find the header in the bytes of a file; `wanted` is the sheet of a workbook."""
+    warnings: list[str] = []
+    if is_workbook(data):
+        from dalembert.tables.workbooks import read_sheet
+
+        sheet = read_sheet(file, data, wanted)
+        source = Source(file, "", "", warnings, sheet)
+        if sheet.others and not wanted:
+            others = ", ".join(map(quote, sheet.others))
+            warnings.append(f"{file}: read the sheet {quote(sheet.name)}; there are also {others}")
+    else:
+        text = decoded(file, data, warnings)
+        source = Source(file, text, delimiter(text), warnings)
+    first = list(islice(source.everything(), LOOKED_AT))
+    if not first:
+        raise DataError(f"{file}: the file is empty{source.of_sheet}: expected a header and rows")
+    _find_header(source, first, known, texts)
+    return source
+
+
+def table_rows(file: str, data: bytes) -> list[dict[str, str]]:
+    """Return the rows of a whole table, each cell under its column's name with the unit: `angle_deg`.
+
+    Where the cells are not parted by commas, a comma is a decimal one, and then no number has a decimal point.
+
+    Raises
+    ------
+    DataError
+        No text, an empty file, unbalanced quotes, a broken workbook.
+
+    Examples
+    --------
+    >>> table_rows("wind.csv", b"angle [deg];fx_N\\n0;-1,5\\n90;2\\n")
+    [{'angle_deg': '0', 'fx_N': '-1.5'}, {'angle_deg': '90', 'fx_N': '2'}]
+    """
+    source = source_of(file, data, {}, None)
+    names = [each.name for each in source.headings]
+    rows = [cells for _, cells in source.rows()]
+    if source.has_commas(rows):
+        # 2.500 beside 1,5 may be 2500: it is made no number, and refused
+        rows = [[cell.replace(".", "'").replace(",", ".") for cell in row] for row in rows]
+    return [dict(zip_longest(names, row[: len(names)], fillvalue="")) for row in rows]
+
+
+def _find_header(
+    source: Source,
+    records: list[tuple[int, list[str]]],
+    known: Mapping[str, str],
+    texts: Sequence[str] | None,
+) -> None:
+    """Find the header below a title, the units below the header, and what is off in its width."""
+    candidates = [[heading(cell) for cell in cells] for _, cells in records]
+    if texts is not None:
+        scores = [likeness(row, known, texts) for row in candidates]
+        source.above = scores.index(max(scores)) if max(scores) > 1 else 0
+    source.headings = candidates[source.above]
+    line, _ = records[source.above]
+    if source.above:
+        source.warnings.append(
+            f"{source.file}: the header is in line {line}; what stands above it is not read"
+        )
+    below = records[source.above + 1 :]
+    if below and _are_units(source.headings, below, known, texts):
+        source.units_below = True
+        _take_units(source, *below[0], known)
+        below = below[1:]
+    width = len(source.headings)
+    longer = [len(cells) == width + 1 and bool(cells[-1].strip()) for _, cells in below]
+    if below and all(longer) and not any(_is_number(cells[0]) for _, cells in below):
+        source.headings.insert(0, heading(""))
+        source.unnamed_first = True
+
+
+def _are_units(
+    headings: Sequence[Heading],
+    below: list[tuple[int, list[str]]],
+    known: Mapping[str, str],
+    texts: Sequence[str] | None,
+) -> bool:
+    """Whether the row below the header holds units: no number in it, a unit where numbers are expected."""
+    (_, cells), rest = below[0], below[1:]
+    if any(map(_is_number, cells)):
+        return False
+    units = [k for k, cell in enumerate(cells[: len(headings)]) if is_unit(cell)]
+    if texts is None:
+        filled = [k for k, cell in enumerate(cells) if cell.strip(" -[]()")]
+        return bool(rest and units) and units == filled and all(_is_number(rest[0][1][k]) for k in units)
+    return any(likeness([headings[k]], known, ()) for k in units)
+
+
+def _take_units(source: Source, line: int, cells: list[str], known: Mapping[str, str]) -> None:
+    for k, (each, cell) in enumerate(zip(source.headings, cells, strict=False)):
+        try:
+            source.headings[k] = each.with_unit(cell, known)
+        except ValueError as error:
+            found, expected = quote(cell.strip()), f"'{error}', the unit in its header {quote(each.written)}"
+            if source.sheet is not None:
+                raise source.sheet.error((line - 1, k), found, expected) from None
+            raise DataError(
+                f"{source.file}: row of units (line {line}), column {each.written}: "
+                f"found {found}, expected {expected}"
+            ) from None
+
+
+def _some(names: Sequence[str]) -> str:
+    """List a few names, and how many more there are."""
+    few = ", ".join(names[:SHOWN])
+    return f"{few} and {len(names) - SHOWN} more" if len(names) > SHOWN else few
+
+
+def _is_number(cell: str) -> bool:
+    return is_number(cell.replace(",", "."))
+
+
+# -- bytes as text, whatever program wrote them ---------------------------------------------------------
+
+
+def decoded(file: str, data: bytes, warnings: list[str]) -> str:
+    """Return the text of UTF-8, UTF-16 or Windows-1252."""
+    codec = "utf-8-sig"
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        codec = "utf-16"
+    elif b"\0" in data[:200] and len(data) % 2 == 0:
+        # without a byte order mark: ASCII in UTF-16 has its zeros on one side
+        codec = "utf-16-le" if not any(data[1:200:2]) else "utf-16-be" if not any(data[:200:2]) else codec
+    try:
+        text = data.decode(codec)
+    except UnicodeDecodeError:
+        try:
+            text = data.decode("cp1252")
+        except UnicodeDecodeError:
+            raise DataError(f"{file}: this is not text: expected CSV in UTF-8") from None
+        codec = "cp1252"
+    raw = text.encode()
+    if len(raw.translate(None, _CONTROLS)) != len(raw):
+        raise DataError(f"{file}: this is not text (control characters): expected CSV in UTF-8")
+    if codec != "utf-8-sig":
+        warnings.append(
+            f"{file}: read as {'Windows-1252 (Latin-1)' if codec == 'cp1252' else 'UTF-16'}, for it is not UTF-8"
+        )
+    return text
+
+
+def delimiter(text: str) -> str:
+    """Return the mark that parts the most of the first lines into equally many cells."""
+    lines = (match.group() for match in LINE.finditer(text))
+    first = list(islice((_QUOTED.sub("", line) for line in lines if line.strip()), LOOKED_AT))
+
+    def alike(mark: str) -> int:
+        counts = Counter(line.count(mark) for line in first if mark in line)
+        return max(counts.values(), default=0)
+
+    return max("\t;,", key=alike) if any(map(alike, "\t;,")) else ","

@@ -1,0 +1,73 @@
+"""`dalembert field` with limits: the limit that is named can be met, and what is not proven is refused in one line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import Dalembert
+
+INITIAL = "run,sensor,amplitude_um,phase_deg,trial_plane,trial_mass_kg,trial_angle_deg\n0,1,1,0,,,\n0,2,2,0,,,\n0,3,5,90,,,\n"
+
+
+def coefficients(apart: float) -> str:
+    """Three sensors, two planes that act alike but for `apart`."""
+    rows = [
+        (1, "A", 1.0),
+        (1, "B", 1.0),
+        (2, "A", 1.0),
+        (2, "B", 1 + apart),
+        (3, "A", 2.0),
+        (3, "B", 2 - apart),
+    ]
+    lines = (f"{sensor},{plane},{size!r},0" for sensor, plane, size in rows)
+    return "\n".join(["sensor,plane,magnitude_per_kg,phase_deg", *lines]) + "\n"
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize("objective", ["least-squares", "minimax"])
+def test_planes_too_much_alike_are_refused_in_one_line(
+    objective: str, dalembert: Dalembert, tmp_path: Path
+) -> None:
+    (tmp_path / "c.csv").write_text(coefficients(1e-11))
+    done = dalembert(
+        "field",
+        "-",
+        "--influence",
+        "c.csv",
+        "--objective",
+        objective,
+        "--max-mass",
+        "1e11kg",
+        "--json",
+        stdin=INITIAL,
+    )
+    assert done.returncode == 1
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert "nearly dependent (condition number" in line
+
+
+def test_what_is_proven_to_fewer_digits_comes_with_a_warning(dalembert: Dalembert, tmp_path: Path) -> None:
+    (tmp_path / "c.csv").write_text(coefficients(1e-8))
+    words = ("field", "-", "--influence", "c.csv", "--objective", "minimax", "--max-mass", "1e8kg", "--json")
+    done = dalembert(*words, stdin=INITIAL)
+    assert done.returncode == 0
+    (sentence,) = [text for text in json.loads(done.stdout)["warnings"] if "proven" in text]
+    assert "only to a share of" in sentence
+
+
+def test_the_limit_that_is_named_can_be_met(dalembert: Dalembert, tmp_path: Path) -> None:
+    (tmp_path / "c.csv").write_text(coefficients(0.5))
+    for cap in ((), ("--max-mass", "1kg")):
+        words = ("field", "-", "--influence", "c.csv", *cap, "--json", "--max-residual")
+        refused = dalembert(*words, "0.1um", stdin=INITIAL)
+        assert refused.returncode == 1
+        named = refused.stderr.split("can be met is ")[1].split()[0]
+        met = dalembert(*words, f"{named}um", stdin=INITIAL)
+        assert met.returncode == 0, met.stderr
+        assert json.loads(met.stdout)["rotors"][0]["residual_max"] <= float(named)
+        just_below = f"{float(named) * (1 - 1e-5):.8g}um"
+        assert dalembert(*words, just_below, stdin=INITIAL).returncode == 1

@@ -1,0 +1,137 @@
+"""Sheets with a row a run and a column pair for each sensor, as people keep them, in English and German."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import openpyxl
+import pytest
+
+from tests.cli.logs import polar
+from tests.cli.measured import ALPHA, HEAD, V0, W, cell, corrections, document, table
+from tests.conftest import Dalembert
+
+ON = [[0, 0], [1, 0], [1, 1j]]
+READ = [V0 + ALPHA @ np.asarray(on) for on in ON]
+LONG = table(
+    *(
+        f"{run},{'ABC'[s]},{cell(v)},{masses}"
+        for run, (values, masses) in enumerate(zip(READ, [",,,", "1,1,0,yes", "2,1,90,no"], strict=True))
+        for s, v in enumerate(values)
+    ),
+    head=HEAD.replace("_um", "_mm_s") + ",trial_kept",
+)
+PAIRS = [
+    ("{s}_mm_s", "{s}_deg"),
+    ("amplitude_{s}_mm_s", "phase_{s}_deg"),
+    ("{s} amplitude [mm/s]", "{s} phase [°]"),
+    ("Lager {s} [mm/s]", "Phase Lager {s} [°]"),
+    ("Schwinggeschwindigkeit {s} (mm/s)", "Winkel {s} (°)"),
+    ("Amplitude {s}, mm/s", "Phase {s}"),
+    ("Messstelle {s} in mm/s", "Phasenwinkel {s} [deg]"),
+]
+TRIALS = [
+    ("trial_plane", "trial_mass_g", "trial_angle_deg", "trial_kept"),
+    ("Ebene", "Masse [g]", "Winkel [°]", "bleibt"),
+    ("plane", "Testmasse (g)", "Winkel", "bleibt"),
+]
+
+
+def wide(
+    pair: tuple[str, str], trial: tuple[str, str, str, str], run: str = "run", comma: bool = False
+) -> str:
+    names = [name.format(s=s) for s in "ABC" for name in pair]
+    rows = [[run, *names, *trial]]
+    words = {True: ("ja", "nein"), False: ("yes", "no")}[trial[3] == "bleibt"]
+    masses = [["", "", "", ""], ["1", "1", "0", words[0]], ["2", "1", "90", words[1]]]
+    for number, (values, on) in enumerate(zip(READ, masses, strict=True)):
+        read = [part for v in values for part in cell(v).split(",")]
+        rows.append([str(number), *read, *on])
+    if comma:
+        return "\n".join(";".join(row).replace(".", ",") for row in rows) + "\n"
+    return "\n".join(",".join(f'"{each}"' if "," in each else each for each in row) for row in rows) + "\n"
+
+
+def rotor(done: Any) -> Any:
+    found = document(done)["rotors"][0]
+    return {key: found[key] for key in ("corrections", "trim", "standing", "influence", "residual")}
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_a_wide_sheet_is_the_long_one(pair: tuple[str, str], dalembert: Dalembert) -> None:
+    plain = rotor(dalembert("field", "-", "--json", stdin=LONG))
+    assert np.abs(corrections(dalembert("field", "-", "--json", stdin=LONG)) * 1e3 - W).max() < 1e-12
+    for trial, run, comma in zip(TRIALS, ("run", "Lauf", "Messung"), (False, True, True), strict=True):
+        done = dalembert("field", "-", "--json", stdin=wide(pair, trial, run, comma))
+        assert rotor(done) == plain
+        (said,) = (w for w in document(done)["warnings"] if "a row a run" in w)
+        assert f"'{pair[0].format(s='B')}' is the amplitude at sensor B" in said
+        assert f"'{pair[1].format(s='B')}' is the phase at sensor B" in said
+        assert "is the angle of the trial mass" in said
+
+
+def test_trial_masses_in_a_column_for_each_plane(dalembert: Dalembert) -> None:
+    names = ["trial_mass_1_g", "trial_angle_1_deg", "trial_mass_2_g", "trial_angle_2_deg"]
+    rows = [",".join(["run", *(f"{s}_{u}" for s in "ABC" for u in ("mm_s", "deg")), *names])]
+    for run, (values, on) in enumerate(
+        zip(READ, [["", "", "", ""], ["1", "0", "0", ""], ["1", "0", "1", "90"]], strict=True)
+    ):
+        rows.append(",".join([str(run), *(cell(v) for v in values), *on]))
+    done = dalembert("field", "-", "--json", stdin="\n".join(rows) + "\n")
+    assert np.abs(corrections(done) * 1e3 - W).max() < 1e-12
+    # the same with a fit of all runs
+    done = dalembert("field", "-", "--json", "--fit", stdin="\n".join(rows) + "\n")
+    assert np.abs(corrections(done) * 1e3 - W).max() < 1e-12
+
+
+def test_a_wide_sheet_of_a_workbook(dalembert: Dalembert, tmp_path: Path) -> None:
+    """It was refused with: unknown unit 'A_deg'."""
+    book = openpyxl.Workbook()
+    sheet = book.active
+    assert sheet is not None
+    for k, line in enumerate(wide(("amplitude_{s}_mm_s", "phase_{s}_deg"), TRIALS[0]).splitlines()):
+        cells = line.split(",")
+        sheet.append(cells if k == 0 else [float(c) if c and c[-1].isdigit() else c or None for c in cells])
+    book.save(tmp_path / "w.xlsx")
+    found = rotor(dalembert("field", "w.xlsx", "--json"))
+    kept = [polar(entry["mass_kg"] * 1e3, entry["angle_deg"]) for entry in found["standing"]]
+    trim = [polar(entry["mass_kg"] * 1e3, entry["angle_deg"]) for entry in found["trim"]]
+    assert np.abs(np.array(kept) - ON[-1]).max() < 1e-12
+    assert np.abs(np.array(trim) - (W - ON[-1])).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("header", "says"),
+    [
+        (
+            "run,A_mm_s,A_deg,B_mm_s",
+            "the column B_mm_s is the amplitude at sensor B, and no column is the phase there",
+        ),
+        ("run,A_mm_s,A_deg,phase_B_deg", "is the phase at sensor B, and no column is the amplitude there"),
+        ("run,A_mm_s,A_deg,A [mm/s]", "A_mm_s and A [mm/s] are both the amplitude at sensor A"),
+        ("run,A_mm_s,A_deg,B_um,B_deg", "the sensors are in mm_s and um: expected one unit"),
+    ],
+)
+def test_what_is_wrong_in_a_wide_sheet(header: str, says: str, dalembert: Dalembert) -> None:
+    row = ",".join(["1"] * (header.count(",") + 1))
+    done = dalembert("field", "-", stdin=f"{header}\n{row}\n{row}\n")
+    assert done.returncode == 1
+    assert says in done.stderr
+
+
+def test_a_wrong_cell_is_named_by_its_line(dalembert: Dalembert) -> None:
+    text = wide(PAIRS[0], TRIALS[0]).replace("1,1,0,yes", "1,one,0,yes")
+    done = dalembert("field", "-", stdin=text)
+    assert done.returncode == 1
+    assert "line 3" in done.stderr
+    assert "'one'" in done.stderr
+
+
+def test_without_a_column_of_runs_each_row_is_one(dalembert: Dalembert) -> None:
+    text = wide(PAIRS[0], TRIALS[0])
+    bare = "\n".join(line.split(",", 1)[1] for line in text.splitlines())
+    done = dalembert("field", "-", "--json", stdin=bare)
+    assert np.abs(corrections(done) * 1e3 - W).max() < 1e-12
+    assert any("each row is a run" in w for w in document(done)["warnings"])

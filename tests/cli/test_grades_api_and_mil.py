@@ -1,0 +1,107 @@
+"""`--grade API` and `--grade MIL` by hand in both systems of units, in balance and in field."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from balancing import api_unbalance, journal_loads, mil_unbalance, permissible_unbalance
+from tests.conftest import Dalembert
+
+RPM = np.pi / 30
+LB, OZ_IN = 0.45359237, 0.45359237 / 16 * 0.0254
+ROTOR = "unbalance_g_mm,angle_deg,z_mm\n500,30,100\n300,200,300\n"
+PLANES = ("--plane", "A:0mm:50mm", "--plane", "B:400mm:50mm")
+FAN = "run,sensor,amplitude_mm_s,phase_deg,trial_plane,trial_mass_g,trial_angle_deg\n0,b,3.4,116,,,\n1,b,1.8,42,1,2,0\n"
+
+
+def document(done) -> dict:
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_a_published_comparison() -> None:
+    # energy-tech, "Rotor balancing": 1000 lb at 15 000 rpm: API 0.13 and MIL 0.27 oz·in in each plane, ISO G2.5 1.0 in all
+    speed = 15_000 * RPM
+    assert api_unbalance(500 * LB, speed) / OZ_IN == pytest.approx(4 * 500 / 15_000, rel=1e-14)
+    assert mil_unbalance(1000 * LB, speed) / OZ_IN == pytest.approx(4 * 1000 / 15_000, rel=1e-14)
+    assert permissible_unbalance(0.0025, speed, 1000 * LB) / OZ_IN == pytest.approx(1.0, rel=3e-3)
+
+
+def test_by_hand_in_grams_and_millimetres() -> None:
+    # U = 6350 W/N g·mm
+    assert api_unbalance(85.0, 2960 * RPM) * 1e6 == pytest.approx(6350 * 85 / 2960, rel=1e-14)
+    assert mil_unbalance(85.0, 2960 * RPM) * 1e6 == pytest.approx(6350 * 85 / 2960, rel=1e-14)
+
+
+def test_the_three_ranges_of_mil() -> None:
+    for rpm, each in ((100, 0.177), (149.9, 0.177), (151, 4000 / 151**2), (500, 4000 / 500**2), (999, 4000 / 999**2), (1001, 4 / 1001), (60_000, 4 / 60_000)):  # fmt: skip
+        assert mil_unbalance(LB, rpm * RPM) / OZ_IN == pytest.approx(each, rel=1e-12)
+
+
+def test_loads_of_journals_between_and_beyond_the_bearings() -> None:
+    assert journal_loads(80.0, 0.1, 0.0, 0.4) == pytest.approx([60, 20], rel=1e-15)
+    assert journal_loads(80.0, 0.5, 0.0, 0.4) == pytest.approx([20, 100], rel=1e-15)
+    assert journal_loads(80.0, 0.1, 0.4, 0.0) == pytest.approx([20, 60], rel=1e-15)
+
+
+def test_api_in_the_bearings_and_without_them(dalembert: Dalembert) -> None:
+    call = ("balance", "-", *PLANES, "--grade", "API", "--speed", "3000rpm", "--rotor-mass", "12kg", "--json")
+    whole = 0.00635 * 12 / 3000
+    for options, shares in (
+        ((), (0.5, 0.5)),
+        (("--center-z", "100mm"), (0.5, 0.5)),
+        (("--center-z", "100mm", "--bearings", "-100mm:400mm"), (0.6, 0.4)),
+        (("--center-z", "450mm", "--bearings", "-100mm:400mm"), (0.1, 1.1)),
+    ):
+        (rotor,) = document(dalembert(*call, *options, stdin=ROTOR))["rotors"]
+        tolerance = rotor["tolerance"]
+        assert tolerance["grade"] == "API"
+        assert tolerance["permissible_kg_m"] == pytest.approx(whole, rel=1e-14)
+        assert [p["permissible_kg_m"] for p in tolerance["planes"]] == pytest.approx(
+            [share * whole for share in shares], rel=1e-13
+        )
+    done = dalembert(*call, "--center-z", "100mm", stdin=ROTOR)
+    assert "no --bearings: half of the rotor's mass" in done.stderr
+
+
+def test_mil_in_the_correction_planes(dalembert: Dalembert) -> None:
+    call = ("balance", "-", *PLANES, "--speed", "3000rpm", "--rotor-mass", "12kg")
+    for spelling in ("MIL", "mil", "MIL-STD-167-1"):
+        done = dalembert(*call, "--grade", spelling, "--center-z", "100mm", "--json", stdin=ROTOR)
+        (rotor,) = document(done)["rotors"]
+        assert rotor["tolerance"]["grade"] == "MIL"
+        each = 0.00635 * 12 / 3000
+        assert [p["permissible_kg_m"] for p in rotor["tolerance"]["planes"]] == pytest.approx(
+            [each, each], rel=1e-14
+        )
+        assert done.stderr == ""
+    text = dalembert(*call, "--grade", "MIL", "--text", stdin=ROTOR).stdout
+    assert "MIL: U_per = 25.4 g·mm in each plane" in text
+    refused = dalembert(*call, "--grade", "MIL", "--bearings", "0mm:400mm", stdin=ROTOR)
+    assert refused.returncode == 2
+    assert "holds in the correction planes" in " ".join(refused.stderr.split())
+
+
+def test_in_the_field(dalembert: Dalembert) -> None:
+    options = ("--speed", "3000rpm", "--rotor-mass", "12kg", "--radius", "200mm")
+    for grade in ("API", "MIL"):
+        (rotor,) = document(dalembert("field", "-", "--grade", grade, *options, "--json", stdin=FAN))[
+            "rotors"
+        ]
+        (plane,) = rotor["tolerance"]["planes"]
+        assert plane["permissible_kg_m"] == pytest.approx(0.00635 * 12 / 3000, rel=1e-14)
+        assert plane["initial_kg_m"] == pytest.approx(0.2 * 0.00201168, rel=1e-4)
+        assert plane["within"] is False
+
+
+@pytest.mark.parametrize("missing", ["--speed", "--rotor-mass"])
+def test_what_a_grade_needs(missing: str, dalembert: Dalembert) -> None:
+    options = {"--speed": "3000rpm", "--rotor-mass": "12kg"}
+    del options[missing]
+    words = [word for pair in options.items() for word in pair]
+    done = dalembert("balance", "-", *PLANES, "--grade", "API", *words, stdin=ROTOR)
+    assert done.returncode == 2
+    assert "--grade needs --speed and --rotor-mass" in " ".join(done.stderr.split())

@@ -1,0 +1,91 @@
+"""One table of units: what is taken anywhere is taken everywhere, exactly."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import pytest
+
+from dalembert.quantities import quantity_in_si
+from dalembert.units import LISTED, UNITS, composed, find_unit, to_si, unit_name, written
+from virtualwork.describe import DescriptionError
+from virtualwork.describe.units import Units
+
+# NIST SP 811, appendix B: exact by definition
+EXACT = {
+    "in": Fraction(254, 10000),
+    "ft": Fraction(3048, 10000),
+    "lb": Fraction(45359237, 10**8),
+    "oz": Fraction(45359237, 16 * 10**8),
+    "kgf": Fraction(980665, 10**5),
+    "lbf": Fraction(45359237, 10**8) * Fraction(980665, 10**5),
+}
+
+
+@pytest.mark.parametrize("word", EXACT)
+def test_factors_are_those_of_the_definition(word: str) -> None:
+    unit = composed(word)
+    assert unit is not None
+    (num, den), _ = unit
+    assert Fraction(num) / Fraction(den) == EXACT[word]
+
+
+def test_slug_and_blob_are_what_a_pound_force_accelerates() -> None:
+    slug, blob = composed("slug"), composed("blob")
+    assert slug is not None
+    assert blob is not None
+    assert Fraction(slug[0][0]) / Fraction(slug[0][1]) == EXACT["lbf"] / EXACT["ft"]
+    assert Fraction(blob[0][0]) / Fraction(blob[0][1]) == EXACT["lbf"] / EXACT["in"]
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "si"),
+    [
+        ("0.4ft", "length", 0.12192),
+        ("0.1rev", "angle", 0.2 * math.pi),
+        ("700 1/min", "speed", 700 * math.pi / 30),
+        ("700 U/min", "speed", 700 * math.pi / 30),
+        ("2 kN", "force", 2000.0),
+        ("1 slug", "mass", 14.593902937206364),
+        ("4 N/mm", "stiffness", 4000.0),
+        ("-3 °", "angle", -3 * math.pi / 180),
+        ("−3 mm", "length", -0.003),
+    ],
+)
+def test_options_tables_and_files_take_the_same_units(text: str, dimension: str, si: float) -> None:
+    from dalembert.quantities import parse_quantity
+
+    assert quantity_in_si(text, dimension) == pytest.approx(si, rel=4e-16)
+    assert Units({}).number(text, dimension, "x") == pytest.approx(si, rel=4e-16)
+    number, unit = parse_quantity(text, dimension)
+    assert to_si(number, dimension, unit) == pytest.approx(si, rel=4e-16)
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension"),
+    [
+        ("4 N m", "stiffness"),
+        ("3 kg", "length"),
+        ("5 rad", "length"),
+        ("2 mm s", "velocity"),
+        ("1e99 m", "length"),
+    ],
+)
+def test_other_dimensions_are_refused(text: str, dimension: str) -> None:
+    with pytest.raises(DescriptionError, match="expected"):
+        Units({}).number(text, dimension, "x")
+
+
+@pytest.mark.parametrize("dimension", [d for d in LISTED if d not in ("number", "amplitude", "per")])
+def test_a_unit_as_people_write_it_is_the_unit(dimension: str) -> None:
+    for unit in LISTED[dimension]:
+        assert find_unit(dimension, unit_name(written(unit))) == unit
+        assert find_unit(dimension, unit.upper()) == unit
+
+
+def test_what_is_looked_up_does_not_change_the_table() -> None:
+    before = {dimension: list(units) for dimension, units in UNITS.items()}
+    assert find_unit("length", "km") == "km"
+    assert find_unit("length", "furlong") is None
+    assert before == {dimension: list(units) for dimension, units in UNITS.items()}

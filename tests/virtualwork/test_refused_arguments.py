@@ -1,0 +1,90 @@
+"""What is no part of a mechanism, or no rate of its poses, is refused in the words of the field."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.virtualwork.mechanisms import four_bar
+from virtualwork import Force, Guess, Guide, Input, Link, Mechanism
+from virtualwork.describe import DescriptionError
+
+ARM = {"arm": Link({"O": 0j, "P": 1})}
+
+
+def test_parts_of_another_kind():
+    with pytest.raises(DescriptionError, match="links 'arm': expected Link, found dict"):
+        Mechanism({"O": 0j}, {"arm": {"O": 0j, "P": 1}}, inputs=Input("arm"))
+    with pytest.raises(DescriptionError, match="inputs 1: expected Input, found str"):
+        Mechanism({"O": 0j}, ARM, inputs=["arm"])
+    with pytest.raises(DescriptionError, match="guides 2: expected Guide, found dict"):
+        Mechanism({"O": 0j}, ARM, inputs=Input("arm"), guides=[Guide("P", "arm"), {"point": "P"}])
+
+
+@pytest.mark.parametrize("name", ["speed", "acceleration"])
+def test_rates_of_another_length_than_the_angle(name):
+    m, rates = four_bar(), {"speed": 1.0, "acceleration": 0.0}
+    for of in (m, m.vary({"links.crank.B.x": [0.03, 0.04]})):
+        with pytest.raises(ValueError, match=rf"{name}: expected a number or shape \(3,\).*found \(2,\)"):
+            of.motion([0.1, 0.2, 0.3], **{**rates, name: [1.0, 2.0]})
+        own = np.array([1.0, 2.0, 3.0])
+        there = of.motion([0.1, 0.2, 0.3], **{**rates, name: own}).point("B")
+        assert np.isfinite(there.acceleration).all()
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda m: m.motion("abc"), "angle: expected real numbers, found 'abc'"),
+        (lambda m: m.motion([0.1, "b"]), "angle: expected real numbers"),
+        (lambda m: m.motion(1j), "angle: expected real numbers, found 1j"),
+        (lambda m: m.motion(0.1, speed="fast"), "speed: expected real numbers, found 'fast'"),
+        (lambda m: m.vary([1]), "vary: expected numbers by their paths.*found \\[1\\]"),
+        (lambda m: m.vary({}), "vary: expected numbers by their paths"),
+        (lambda m: m.vary({3: [1.0]}), "expected a path such as '.*', found 3"),
+        (lambda m: m.vary({"links.crank.B.x": "abc"}), "links.crank.B.x: expected real numbers"),
+        (lambda m: m.vary({"links.crank.B.x": [0.03]}).motion("abc"), "angle: expected real numbers"),
+        (lambda m: m.motion(0.1).point("B").sensitivity(3), "expected a path such as '.*', found 3"),
+        (lambda m: m.motion(0.1).sensitivity("effort", 3), "expected a path such as '.*', found 3"),
+        (lambda m: Link({"O": (0, 0, 0)}), "expected a point .* found \\(0, 0, 0\\)"),
+        (lambda m: Link({"O": (0,)}), "expected a point .* found \\(0,\\)"),
+        (lambda m: Link("OP"), "points: expected a mapping of names, found str"),
+        (lambda m: Guide("P", "arm", through=(0, 0, 0)), "expected a point .* found \\(0, 0, 0\\)"),
+        (lambda m: Mechanism({"O": 0j}, ARM, gravity=(0, 0, -9.81)), "expected a point"),
+        (lambda m: Mechanism(3, ARM), "points: expected a mapping of names, found int"),
+        (lambda m: Mechanism({"O": 0j}, [Link({"O": 0j})]), "links: expected a mapping of names, found list"),
+        (
+            lambda m: Mechanism({"O": 0j}, ARM, forces=Force("arm", "P", 1j)),
+            "forces: expected a list, found Force",
+        ),
+        (
+            lambda m: Mechanism({"O": 0j}, ARM, forces=[{"link": "arm"}]),
+            "forces 1: expected Force, found dict",
+        ),
+        (lambda m: Mechanism({"O": 0j}, ARM, springs=3), "springs: expected a list, found int"),
+    ],
+)
+def test_what_is_no_number_point_path_or_list(call, said):
+    """In words of ours, not of numpy's or Python's."""
+    with pytest.raises((DescriptionError, ValueError), match=said):
+        call(four_bar())
+
+
+def test_a_guide_through_a_pair_of_numbers_is_that_through_a_complex_one():
+    crank, rod = Link({"O": 0j, "A": 0.1}), Link({"A": 0j, "P": 0.5})
+    places = []
+    for through in ((0.2, 0.05), 0.2 + 0.05j, [0.2, 0.05]):
+        m = Mechanism(
+            {"O": 0j},
+            {"crank": crank, "rod": rod},
+            inputs=Input("crank"),
+            guides=[Guide("P", "rod", through=through)],
+            guess=Guess(0.3, {"rod": 0.0}),
+        )
+        places.append(m.motion(0.3).point("P").position[0])
+    assert places[0] == pytest.approx(
+        [0.1 * np.cos(0.3) + np.sqrt(0.25 - (0.05 - 0.1 * np.sin(0.3)) ** 2), 0.05]
+    )
+    assert (places[0] == places[1]).all()
+    assert (places[0] == places[2]).all()

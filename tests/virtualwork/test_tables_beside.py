@@ -1,0 +1,69 @@
+"""Tables beside a mechanism's file are read as every table: a law of motion as spreadsheets and people write it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from virtualwork import Mechanism
+from virtualwork.describe import DescriptionError
+
+CRANK = """
+[ground]
+A = [0, 0]
+[links.crank]
+points = { A = [0, 0], B = [1, 0] }
+[input]
+link = "crank"
+law = "law.csv"
+"""
+
+
+def crank(folder: Path, table: bytes) -> Mechanism:
+    (folder / "law.csv").write_bytes(table)
+    (folder / "crank.toml").write_text(CRANK)
+    return Mechanism.from_toml(folder / "crank.toml")
+
+
+PLAIN = b"time_s,angle_deg\n0,0\n1,10.5\n2,40\n"
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize(
+    "table",
+    [
+        PLAIN,
+        b"time [s];angle [deg]\n0;0\n1;10,5\n2;40\n",
+        b"time\tangle\ns\tdeg\n0\t0\n1\t10.5\n2\t40\n",
+        "time_s,angle (°),note\n0,0,\n1,10.5,x\n2,40,\n".encode("utf-16"),
+        "\ntime_s;angle_deg;größe\n0;0;1\n1;10,5;2\n2;40;3\n".encode("cp1252"),
+    ],
+    ids=["plain", "brackets", "row of units", "UTF-16", "Windows-1252"],
+)
+def test_every_spelling_of_a_law_is_one_law(table: bytes, tmp_path: Path) -> None:
+    plain, other = crank(tmp_path, PLAIN), crank(tmp_path, table)
+    (one,), (two,) = plain.inputs, other.inputs
+    assert one.history == two.history
+    assert np.degrees([angle for _, angle in two.history]) == pytest.approx([0, 10.5, 40])
+
+
+@pytest.mark.whole
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        (b'time_s,angle_deg\n0,"0\n', "balanced quotes"),
+        (b"time_s,angle_deg\n0,\x01\x02\n", "this is not text"),
+        (b"", "the file is empty"),
+        (b"time_s,speed_rpm\n0,1\n1,2\n", "expected columns time_s and angle_rad or angle_deg"),
+        (b"time_s,angle_deg\n0,0\n1,x\n", "numbers in every row"),
+        (b"time_s;angle_deg\n0;1,5\n1;2.500\n", "numbers in every row"),
+        (b"time_s,angle_deg\n0,0\n1\n", "numbers in every row"),
+    ],
+)
+def test_what_is_wrong_with_a_table_is_one_sentence(table: bytes, words: str, tmp_path: Path) -> None:
+    with pytest.raises(DescriptionError, match="law") as error:
+        crank(tmp_path, table)
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)

@@ -1,0 +1,169 @@
+"""Tables beside a mechanism's file: laws of motion, forces over the input, torques over the time, an angle or a speed."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, TypeVar
+
+from dalembert.errors import DataError
+from dalembert.tables.sources import table_rows
+from dalembert.units import LARGEST
+from virtualwork.describe import DescriptionError
+from virtualwork.describe.file import Entry
+from virtualwork.describe.forms import QUANTITY, TEXT, Form, Quantity, Schema
+from virtualwork.describe.units import SI, Units, wrong
+
+N = TypeVar("N", float, complex)
+
+# columns of a table over the input, with what makes them SI
+TURNS = {"angle_rad": 1.0, "angle_deg": math.pi / 180}
+TRAVELS = {"position_m": 1.0, "position_mm": 1e-3}
+# the columns that a table of torque may be over
+AXES = {
+    "t_s": ("time", 1.0),
+    "time_s": ("time", 1.0),
+    "angle_rad": ("angle", 1.0),
+    "angle_deg": ("angle", math.pi / 180),
+    "speed_rad_s": ("speed", 1.0),
+    "speed_rpm": ("speed", math.pi / 30),
+}
+
+
+@dataclass(frozen=True)
+class Curve(Form):
+    """A table beside the file; it cannot be written into the file itself."""
+
+    def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
+        raise DescriptionError("a table beside the file cannot be written into it")
+
+
+@dataclass(frozen=True)
+class Law(Curve):
+    """A law of motion: a CSV of time_s and angle_deg (angle_rad, position_m, position_mm)."""
+
+    def read(self, value: Any, where: str, entry: Entry) -> tuple[tuple[float, float], ...]:
+        over = TRAVELS if entry.slides else TURNS
+        rows, _ = curve(
+            entry,
+            value,
+            where,
+            over,
+            ("time_s",),
+            f"time_s and {' or '.join(over)}",
+            lambda row, column: (float(row["time_s"]), float(row[column]) * over[column]),
+        )
+        return tuple(rows)
+
+
+@dataclass(frozen=True)
+class ForceTable(Curve):
+    """A force over the input: a CSV of angle_deg (angle_rad, position_m, position_mm), fx_N and fy_N."""
+
+    def fields(self, name: str, value: Any, where: str, entry: Entry) -> dict[str, Any]:
+        inputs = entry.file.rows("input")
+        if len(inputs) != 1:
+            raise wrong(where, value, "a mechanism with one input, for the force is given over it")
+        over = TRAVELS if "slider" in inputs[0] else TURNS
+        rows, column = curve(
+            entry,
+            value,
+            where,
+            over,
+            ("fx_N", "fy_N"),
+            f"{' or '.join(over)}, fx_N and fy_N",
+            lambda row, column: (
+                float(row[column]) * over[column],
+                complex(float(row.get("fx_N") or 0), float(row.get("fy_N") or 0)),
+            ),
+        )
+        rises([at for at, _ in rows], value, where, column)
+        return {name: tuple(rows), "periodic": over is TURNS and is_cycle(rows[0][0], rows[-1][0])}
+
+
+@dataclass(frozen=True)
+class TorqueOrTable(Form):
+    """A torque, or a table of it over the time, or over the angle or speed of its link: a CSV with torque_N_m."""
+
+    torque = Quantity("torque")
+
+    def dimension(self, slides: bool) -> str:
+        return "torque"
+
+    def schema(self) -> Schema:
+        return {"anyOf": [QUANTITY, TEXT]}
+
+    def fields(self, name: str, value: Any, where: str, entry: Entry) -> dict[str, Any]:
+        # a text that does not begin with a number names a file
+        if not isinstance(value, str) or re.match(r"\s*[-+]?(\d|\.\d)", value):
+            return self.torque.fields(name, value, where, entry)
+        rows, column = curve(
+            entry,
+            value,
+            where,
+            AXES,
+            ("torque_N_m",),
+            f"torque_N_m and one of {', '.join(AXES)}",
+            lambda row, column: (float(row[column]) * AXES[column][1], float(row["torque_N_m"])),
+        )
+        rises([at for at, _ in rows], value, where, column)
+        axis = AXES[column][0]
+        periodic = axis == "angle" and is_cycle(rows[0][0], rows[-1][0])
+        return {name: 0.0, "history": tuple(rows), "over": axis, "periodic": periodic}
+
+    def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
+        return self.torque.text(value, units, slides)
+
+
+def curve(
+    entry: Entry,
+    name: Any,
+    where: str,
+    over: Collection[str],
+    values: Collection[str],
+    columns: str,
+    pair: Callable[[dict[str, str], str], tuple[float, N]],
+) -> tuple[list[tuple[float, N]], str]:
+    """The rows of a CSV file beside this one, each as `pair` reads it, and the column that they are over.
+
+    Parameters
+    ----------
+    over, values : collection of str
+        Columns of which one must be there.
+    columns : str
+        The columns as an error names them.
+    pair : function of a row and the column that it is over
+    """
+    try:
+        data = entry.file.beside(name)
+    except (OSError, ValueError):
+        raise wrong(where, name, "a CSV file that can be read") from None
+    try:
+        rows = table_rows(str(name), data)
+    except DataError as error:
+        raise DescriptionError(f"{where}: {error}") from None
+    column = next((c for c in over if rows and c in rows[0]), None)
+    if column is None or rows[0].keys().isdisjoint(values):
+        raise wrong(where, name, f"columns {columns}")
+    try:
+        pairs = [pair(row, column) for row in rows]
+    except (TypeError, ValueError):
+        raise wrong(where, name, "numbers in every row") from None
+    if not all(math.hypot(at, abs(value)) <= LARGEST for at, value in pairs):
+        raise wrong(where, name, "finite numbers in every row")
+    return pairs, column
+
+
+def rises(at: Sequence[float], name: Any, where: str, column: str) -> None:
+    """Refuse a table whose first column does not rise."""
+    if len(at) < 2 or any(not b > a for a, b in pairwise(at)):
+        raise wrong(where, name, f"at least two rows with rising {column}")
+
+
+def is_cycle(first: float, last: float) -> bool:
+    """Whether a span of angles is one of whole turns."""
+    turns = (last - first) / (2 * math.pi)
+    return abs(turns - round(turns)) < 1e-9 and round(turns) > 0

@@ -1,0 +1,270 @@
+"""The forms of values in a mechanism's file: how each is read, checked and written, and its JSON Schema.
+
+Names are checked when the whole mechanism is there: the same check serves a file and a description in Python.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any, Protocol
+
+from virtualwork.describe import DescriptionError, require
+from virtualwork.describe.file import GROUND, Entry
+from virtualwork.describe.units import SI, Units, wrong
+
+Schema = dict[str, Any]
+
+# a number, perhaps with its unit behind it; both stand in the definitions of the schema
+QUANTITY: Schema = {"$ref": "#/$defs/quantity"}
+PAIR: Schema = {"$ref": "#/$defs/pair"}
+TEXT: Schema = {"type": "string"}
+
+
+class Names(Protocol):
+    """The names of a mechanism."""
+
+    @property
+    def links(self) -> Mapping[str, Any]:
+        """The moving links."""
+
+    @property
+    def bodies(self) -> Mapping[str, Mapping[str, complex]]:
+        """The points of each body, the ground's too."""
+
+    @property
+    def guides(self) -> Sequence[Any]:
+        """The guides, each with its point."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of values; one that holds numbers names their dimension, a key of `dalembert.units.DIMENSIONS`."""
+
+    @property
+    def is_pair(self) -> bool:
+        """Whether it holds two numbers, x and y."""
+        return False
+
+    @property
+    def restricts(self) -> bool:
+        """Whether `check` refuses anything."""
+        return type(self).check is not Form.check
+
+    def dimension(self, slides: bool) -> str:
+        """The dimension of its numbers, of a part that slides or turns; empty where it holds none."""
+        return ""
+
+    def schema(self) -> Schema:
+        """What an editor may expect."""
+        return TEXT
+
+    def read(self, value: Any, where: str, entry: Entry) -> Any:
+        """The value of the field, SI."""
+        return str(value)
+
+    def fields(self, name: str, value: Any, where: str, entry: Entry) -> dict[str, Any]:
+        """The fields that a value fills: its own, and those that a table beside the file fills too."""
+        return {name: self.read(value, where, entry)}
+
+    def check(self, value: Any, where: str, part: Any, names: Names) -> None:
+        """Refuse a value that this mechanism cannot have."""
+
+    def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
+        """The value of a field as the file has it."""
+        return value
+
+
+def whole(number: float) -> float:
+    """An integer where a number is one: files and schemas are written with few digits.
+
+    >>> whole(3.0), whole(0.5)
+    (3, 0.5)
+    """
+    return (
+        int(number) if isinstance(number, Real) and number == int(number) and abs(number) < 1e15 else number
+    )
+
+
+@dataclass(frozen=True)
+class Quantity(Form):
+    """A number with a dimension; `sliding` is that of a part that slides, `negative` whether it may be below zero."""
+
+    turning: str
+    sliding: str = ""
+    negative: bool = True
+
+    @property
+    def restricts(self) -> bool:
+        return not self.negative
+
+    def dimension(self, slides: bool) -> str:
+        return self.sliding if slides and self.sliding else self.turning
+
+    def schema(self) -> Schema:
+        return QUANTITY
+
+    def read(self, value: Any, where: str, entry: Entry) -> float:
+        return entry.file.units.number(value, self.dimension(entry.slides), where)
+
+    def check(self, value: Any, where: str, part: Any, names: Names) -> None:
+        if not self.negative and value < 0:
+            raise DescriptionError(f"{where}: found {value}, but it must not be negative")
+
+    def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
+        return whole(units.bare(value, self.dimension(slides)))
+
+
+@dataclass(frozen=True)
+class Pair(Form):
+    """Two numbers [x, y] of one dimension."""
+
+    of: str
+
+    @property
+    def is_pair(self) -> bool:
+        return True
+
+    def dimension(self, slides: bool) -> str:
+        return self.of
+
+    def schema(self) -> Schema:
+        return PAIR
+
+    def read(self, value: Any, where: str, entry: Entry) -> Any:
+        return entry.file.units.pair(value, self.of, where)
+
+    def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
+        return [whole(units.bare(x, self.of)) for x in (value.real, value.imag)]
+
+
+@dataclass(frozen=True)
+class Choice(Form):
+    """One of some words."""
+
+    words: tuple[str, ...]
+
+    def schema(self) -> Schema:
+        return {"enum": list(self.words)}
+
+    def check(self, value: Any, where: str, part: Any, names: Names) -> None:
+        if value not in self.words:
+            raise wrong(where, value, " or ".join(map(repr, self.words)))
+
+
+@dataclass(frozen=True)
+class Body(Form):
+    """The name of a link, or of the ground."""
+
+    ground: bool = True
+
+    def check(self, value: Any, where: str, part: Any, names: Names) -> None:
+        require(value, names.bodies if self.ground else names.links, where, "link")
+
+
+@dataclass(frozen=True)
+class TwoBodies(Form):
+    """The names of two links."""
+
+    def schema(self) -> Schema:
+        return {"type": "array", "items": TEXT, "minItems": 2, "maxItems": 2}
+
+    def read(self, value: Any, where: str, entry: Entry) -> tuple[Any, Any]:
+        if not isinstance(value, list) or len(value) != 2:
+            raise wrong(where, value, "two links")
+        return str(value[0]), str(value[1])
+
+    def check(self, value: Any, where: str, part: Any, names: Names) -> None:
+        for body in value:
+            require(body, names.bodies, where, "link")
+
+    def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
+        return list(value)
+
+
+def _has(names: Names, body: str, point: str, where: str) -> None:
+    """Refuse a point that a body does not have; another check refuses an unknown body."""
+    if body in names.bodies:
+        owner = GROUND if body == GROUND else f"link {body}"
+        require(point, names.bodies[body], where, f"point of {owner}")
+
+
+@dataclass(frozen=True)
+class PointName(Form):
+    """The name of a point of the body that another field names; of any body where it names no field."""
+
+    of: str = ""
+
+    def check(self, value: Any, where: str, part: Any, names: Names) -> None:
+        if self.of:
+            _has(names, getattr(part, self.of), value, where)
+        else:
+            require(value, {p for points in names.bodies.values() for p in points}, where, "point")
+
+
+@dataclass(frozen=True)
+class Place(Form):
+    """A point of the body that another field names: its name, or [x, y] in the axes of that body."""
+
+    of: str
+
+    @property
+    def is_pair(self) -> bool:
+        return True
+
+    def dimension(self, slides: bool) -> str:
+        return "length"
+
+    def schema(self) -> Schema:
+        return {"anyOf": [TEXT, PAIR]}
+
+    def read(self, value: Any, where: str, entry: Entry) -> Any:
+        return value if isinstance(value, str) else entry.file.units.pair(value, "length", where)
+
+    def check(self, value: Any, where: str, part: Any, names: Names) -> None:
+        if isinstance(value, str):
+            _has(names, getattr(part, self.of), value, where)
+
+    def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
+        return value if isinstance(value, str) else Pair("length").text(value, units)
+
+
+@dataclass(frozen=True)
+class Ends(TwoBodies):
+    """Two points, each (body, its name or its place in the axes of the body); `crank.B` in the file."""
+
+    def read(self, value: Any, where: str, entry: Entry) -> tuple[Any, Any]:
+        if not isinstance(value, list) or len(value) != 2:
+            raise wrong(where, value, 'two points such as ["crank.B", "ground.D"]')
+        return entry.file.point_of(value[0], where), entry.file.point_of(value[1], where)
+
+    def check(self, value: Any, where: str, part: Any, names: Names) -> None:
+        for body, point in value:
+            require(body, names.bodies, where, "link")
+            if isinstance(point, str):
+                _has(names, body, point, where)
+
+    def text(self, value: Any, units: Units = SI, slides: bool = False) -> Any:
+        for body, point in value:
+            if not isinstance(point, str):
+                raise DescriptionError(f"between: the end at {point} of {body} needs a named point in a file")
+        return [f"{body}.{point}" for body, point in value]
+
+
+@dataclass(frozen=True)
+class DrivenPoint(Form):
+    """The point of the one slot or slider that an input drives."""
+
+    def check(self, value: Any, where: str, part: Any, names: Names) -> None:
+        points = [guide.point for guide in names.guides]
+        require(value, points, where, "slot or slider")
+        if points.count(value) > 1:
+            raise DescriptionError(f"{where}: '{value}' runs in more than one guide")
+
+
+@dataclass(frozen=True)
+class Free(Form):
+    """A value that the reader takes in a way of its own; `schema` names its schema."""
+
+    name: str

@@ -1,0 +1,113 @@
+"""Points of the plane: complex numbers x + iy, by coordinates or in polar form from another point."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from numbers import Real
+from types import MappingProxyType
+from typing import Any
+
+from dalembert.hints import nearest
+from virtualwork.describe import DescriptionError
+from virtualwork.describe.forms import Form, Quantity
+from virtualwork.describe.keys import declared
+
+Point = complex | tuple[float, float] | Sequence[float]
+
+
+def as_point(value: Point) -> complex:
+    """Read a point of the plane, `x + iy` or `(x, y)`, as a complex number.
+
+    >>> as_point((3, 4))
+    (3+4j)
+    """
+    if isinstance(value, complex):
+        # a number that varies stays what it is
+        return complex(value) if hasattr(value, "dtype") else value
+    if isinstance(value, Real):
+        return complex(value)
+    try:
+        x, y = value
+        return joined(x, y)
+    except (TypeError, ValueError):
+        # a text of two letters is no point either
+        raise DescriptionError(f"expected a point (x, y) or x + iy, found {value!r}") from None
+
+
+def joined(x: float, y: float) -> complex:
+    """x + iy, of numbers that vary too.
+
+    >>> joined(3, 4)
+    (3+4j)
+    """
+    plain = isinstance(x, Real) and isinstance(y, Real)
+    return complex(x, y) if plain else as_number(x) + 1j * as_number(y)
+
+
+def as_number(value: float) -> float:
+    """Read a real number as a float; one that varies stays what it is.
+
+    >>> as_number(3)
+    3.0
+    """
+    return value if isinstance(value, complex) else float(value)
+
+
+def by_name(what: str, given: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Refuse what is no mapping of names."""
+    if not isinstance(given, Mapping):
+        raise DescriptionError(f"{what}: expected a mapping of names, found {type(given).__name__}")
+    return given
+
+
+def as_points(points: Mapping[str, Point]) -> Mapping[str, complex]:
+    """Read named points, and freeze them."""
+    return MappingProxyType({name: as_point(value) for name, value in by_name("points", points).items()})
+
+
+@dataclass(frozen=True)
+class Polar:
+    """A point of a link by its distance and direction from another point of it, in the link's axes, m and rad."""
+
+    origin: str = declared(Form(), "another point of this link", name="from")
+    length: float = declared(Quantity("length"), "the distance from there")
+    angle: float = declared(Quantity("angle"), "its direction against the link's x-axis")
+
+    @property
+    def arm(self) -> complex:
+        """From the other point to this one."""
+        # the schema needs no tape
+        from dalembert.arithmetic.varied import rotation
+
+        return self.length * rotation(self.angle)  # type: ignore[no-any-return]
+
+
+def placed(points: Mapping[str, Point | Polar]) -> Mapping[str, complex]:
+    """The places of the points of a link, those in polar form too; frozen.
+
+    Raises
+    ------
+    DescriptionError
+        Where one refers to no point, or to itself.
+
+    Examples
+    --------
+    >>> dict(placed({"H": Polar("G", 2, 0), "G": (1, 0)}))
+    {'H': (3+0j), 'G': (1+0j)}
+    """
+    places: dict[str, complex] = {}
+    waiting = dict(points)
+    while waiting:
+        ready = [p for p, at in waiting.items() if not isinstance(at, Polar) or at.origin in places]
+        if not ready:
+            point, at = next((p, at) for p, at in waiting.items() if isinstance(at, Polar))
+            if at.origin not in waiting:
+                raise DescriptionError(
+                    f"points.{point} from: unknown point '{at.origin}'{nearest(at.origin, points)}"
+                )
+            raise DescriptionError(f"points.{point} from: '{at.origin}' itself is placed from '{point}'")
+        for point in ready:
+            z = waiting.pop(point)
+            places[point] = places[z.origin] + z.arm if isinstance(z, Polar) else as_point(z)
+    return MappingProxyType({point: places[point] for point in points})
