@@ -277,10 +277,11 @@ def polygons_below(b: Balancing, figure: Figure, dials: Callable[[FigureBase], N
     above, each = 4.5 * len(rotors) + 0.8, 4.8
     figure.set_size_inches(max(4.3 * planes, 9.6), above + each * len(rotors))
     figure.set_layout_engine("constrained")
-    parts = figure.subfigures(1 + len(rotors), 1, height_ratios=[above, *[each] * len(rotors)])
-    dials(parts[0])
-    for r in rotors:
-        polygons(b, r, parts[1 + r])
+    heights = [above, *[each] * len(rotors)]
+    top, *parts = figure.subfigures(1 + len(rotors), 1, height_ratios=heights, squeeze=False)[:, 0]
+    dials(top)
+    for r, part in zip(rotors, parts, strict=True):
+        polygons(b, r, part)
 
 
 def polygons(b: Balancing, rotor: int, figure: FigureBase) -> None:
