@@ -115,12 +115,12 @@ def _inertias(file: str) -> Result:
     from pathlib import Path
 
     from cli.body.inertias import checks, table, warnings
-    from cli.read.robots.reading import read
+    from cli.read.robots import read_robot
     from cli.show.result import Result
     from dalembert.tables.files import read_bytes
 
     name, data = read_bytes(file)
-    robot = read(name, data, None if file == "-" else Path(file).parent)
+    robot = read_robot(name, data, None if file == "-" else Path(file).parent)
     each = checks(robot)
     return Result(
         tables={"inertias": lambda: table(each)},
