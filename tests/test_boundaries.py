@@ -33,7 +33,7 @@ HEAVY = {
 LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
-        ("doubt", "fixed_weights", "next_run"),
+        ("doubt", "fixed_weights", "next_run", "polygons"),
         (
             "amplitudes",
             "engine",

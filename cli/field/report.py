@@ -14,8 +14,8 @@ from cli.field.runs import Complex, Real
 from cli.field.solution import Solved
 from cli.field.tables import Tables, amplitude_unit, channels, masses_text, sense
 from cli.field.trim import LastRun, first_reading, last_run, measured_verdicts, verdicts
+from cli.read.tolerance import verdict_table
 from cli.show.result import Section, Sheet
-from cli.show.verdicts import verdict_table
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table
 from dalembert.results.text import as_list

@@ -15,7 +15,7 @@ from cli.field.runs import Channel, Complex, Real
 from cli.field.solution import Solved
 from cli.field.trim import Trim, verdicts
 from cli.read.rounding import angle_error, size_error
-from cli.show.verdicts import verdict_table
+from cli.read.tolerance import verdict_table
 from dalembert.angles import degrees
 from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.results.text import angle_text
