@@ -9,11 +9,11 @@ import numpy as np
 
 from cli.cases import poses, quantities
 from cli.cases.analysis import Analysis
-from cli.cases.loop import Case
+from cli.cases.case import Case
 from cli.cases.poses import column
 from cli.cases.quantities import Quantity
 from cli.cases.study import PoseCase
-from cli.show.page import shown
+from cli.show.picture import shown
 from dalembert.page import Shown
 from dalembert.results.columns import Table
 from virtualwork import MechanismError

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 from functools import wraps
 from inspect import Parameter, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 
 import typer
 from typer.core import TyperCommand
@@ -29,6 +30,7 @@ Output:
   plot FILE  Draw a picture (.svg, .png or .pdf).
   expect FILE.csv  Check the result against expected values.
   rtol NUMBER  Relative tolerance of --expect (angles: radians).
+  steps  Show the worked solution: equations with their numbers.
   digits  Print only the digits that hold against rounding.
   units UNIT,...  Units of the columns: mm,g,deg,N_mm,rpm.
   report FILE  Write a report (.html or .md): data, results, method.
@@ -73,6 +75,7 @@ class ShowOptions:
     expect: Path | None = None
     rtol: Annotated[float, typer.Option(callback=_tolerance)] = 1e-3
     text: bool = False
+    steps: bool = False
     digits: bool = False
     column: list[str] | None = None
     units: str | None = None
@@ -99,7 +102,7 @@ class ShowOptions:
             return self.output.suffix.lower()
         if self.json:
             return ".json"
-        return "" if self.text or self.expect is not None or sys.stdout.isatty() else ".csv"
+        return "" if self.text or self.steps or self.expect is not None or sys.stdout.isatty() else ".csv"
 
     @property
     def holds_one(self) -> bool:
@@ -118,7 +121,7 @@ class ShowOptions:
 
     @property
     def _others(self) -> bool:
-        return bool(self.text or self.plot or self.expect or self.report)
+        return bool(self.text or self.plot or self.expect or self.report or self.steps)
 
     @property
     def needs_table(self) -> bool:
@@ -304,3 +307,83 @@ def with_help(options: str, example: str, call_of: Callable[[str], str]) -> type
     """Return the kind of command whose help says this of its options, and ends in this example's call."""
     own = {"told": told(options), "example": example, "call_of": staticmethod(call_of)}
     return type("Command", (Command,), own)
+
+
+_DEFAULT = re.compile(r"(N|NUMBER|[a-z|-]+)=(.*)")
+Complete = Callable[[Any, list[str], str], list[str]]
+
+
+def parameters(
+    text: str,
+    eager: Mapping[str, Callable[[bool], None]] | None = None,
+    complete: Mapping[str, Complete] | None = None,
+) -> dict[str, Parameter]:
+    """The parameters of a command, by their names.
+
+    Parameters
+    ----------
+    eager : mapping of name to function
+        Flags that are answered before anything else is looked at.
+    complete : mapping of name to function
+        What a shell completes an option's value with.
+    """
+    found = {}
+    for name, line in told(text).items():
+        kind, default, more = _kind(line.metavar or "", line.heading == "Arguments")
+        shown = line.metavar
+        if shown is not None and not shown.endswith(",..."):
+            shown = shown.removesuffix("...")
+        if "=" in (line.metavar or "") and (match := _DEFAULT.fullmatch(line.metavar or "")):
+            shown = match[1]
+        if eager and name in eager:
+            more = {"is_eager": True, "callback": _answered(eager[name])}
+        if complete and name in complete:
+            more["autocompletion"] = complete[name]
+        if line.heading == "Arguments":
+            info = typer.Argument(metavar=shown, help=line.help, **more)
+        else:
+            words = "|" in (shown or "") and kind is not str
+            info = typer.Option(*line.flags, metavar=None if words else shown, help=line.help, **more)
+        found[name] = Parameter(
+            name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, info]
+        )
+    return found
+
+
+def _kind(metavar: str, argument: bool) -> tuple[Any, Any, dict[str, Any]]:
+    """An option's type, its default, and further settings."""
+    if not metavar:
+        return bool, False, {}
+    if argument:
+        optional = metavar.startswith("[")
+        if metavar.endswith("..."):
+            return list[str], Parameter.empty, {}
+        return (str | None, None, {}) if optional else (str, Parameter.empty, {})
+    if metavar.endswith("...") and not metavar.endswith(",..."):
+        return list[str] | None, None, {}
+    match = _DEFAULT.fullmatch(metavar)
+    value, default = (match[1], match[2]) if match else (metavar, None)
+    if value == "N":
+        least = 1 if default is None else 0
+        return (int, int(default), {"min": least}) if default else (int | None, None, {"min": least})
+    if value == "NUMBER":
+        return (float, float(default), {}) if default else (float | None, None, {})
+    if "|" in value and value.islower():
+        choice = Literal[tuple(value.split("|"))]  # type: ignore[valid-type]
+        return (choice, default, {}) if default else (choice | None, None, {})
+    suffixes = re.findall(r"\.\w+", value) if "(" in value else []
+    if suffixes:
+        return Path | None, None, {"callback": suffix_among(*suffixes)}
+    return str | None, None, {}
+
+
+def _answered(answer: Callable[[bool], None]) -> Callable[[bool], bool]:
+    """A flag's function as a callback: what it prints is all."""
+
+    def callback(value: bool) -> bool:
+        if value:
+            answer(value)
+            raise typer.Exit
+        return value
+
+    return callback

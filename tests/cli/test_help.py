@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from cli.app import COMMANDS
-from cli.show.progress import progress
+from cli.show.terminal import progress
 from tests.conftest import Dalembert
 
 COMMAND = Path(sys.executable).with_name("dalembert")
