@@ -80,7 +80,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "rigidbody3d": (
         ("__init__",),
-        ("freebody", "gyroscope", "integration", "momentum", "shaft", "top"),
+        ("freebody", "gyroscope", "integration", "momentum", "percussion", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("animation", "picture"),
         ("rounding_in_time", "solids", "traced"),

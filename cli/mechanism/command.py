@@ -23,6 +23,7 @@ What:
   newton  Newton-Raphson on all loops at once, with its iterates.
 Output:
   page FILE(.html)  Write a page on which the mechanism moves.
+Further options (docs/commands.md describes them):
   schema  Print the JSON Schema of FILE.toml; needs no FILE.
 """
 
