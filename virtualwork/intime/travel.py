@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -178,6 +178,7 @@ def travel(
     method: Method,
     accuracy: float,
     like: Travel | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Travel:
     """Go from a state of the inputs to a time, or until an input has a value.
 
@@ -233,7 +234,7 @@ def travel(
         most = MOST if like is None else MOST + 2 * like.steps
         path = Path(coordinates, method, inputs)
         way = path, end, tolerance, watches, equations.stops, monitor, most - found.steps, left, plan
-        Walk(*way).go(t, q, v, work)
+        Walk(*way, progress).go(t, q, v, work)
         found.legs.append(path)
         found.ended = path.ended
         if isinstance(equations, Rubbing):
