@@ -52,6 +52,10 @@ GROUPS = {
         "body": ("cli.body.command", "Put a body together: inertia, angular momentum, shaft reactions."),
         "spin": ("cli.spin.command", "Turn a body through time: free, under gravity, under a torque."),
     },
+    "Teaching": {
+        "exercise": ("cli.exercise.command", "Make the variants of an exercise: sheets, key, solutions, questions."),
+        "grade": ("cli.grade.command", "Mark the answers to an exercise, and name likely mistakes."),
+    },
     "Files": {
         "import": ("cli.imports.command", "Import a mechanism drawn in another program."),
         "export": (

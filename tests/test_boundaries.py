@@ -81,6 +81,8 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "cli": (
         ("__main__",),
         ("app",),
+        ("grade",),
+        ("exercise",),
         ("exports", "imports"),
         (
             "balance",
@@ -113,7 +115,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "dalembert": (
         ("__init__",),
         ("arithmetic", "drawing", "page", "results", "tables"),
-        ("angles", "quantities"),
+        ("angles", "figures", "quantities"),
         ("units",),
         ("errors", "hints", "memory"),
     ),
@@ -140,7 +142,7 @@ PACKAGES = (
         "dalembert.results",
         "dalembert.tables",
     ),
-    ("dalembert.angles", "dalembert.quantities"),
+    ("dalembert.angles", "dalembert.figures", "dalembert.quantities"),
     ("dalembert.units",),
     ("dalembert.errors", "dalembert.hints", "dalembert.memory"),
 )
