@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cli.cases.loop import Case
     from cli.cases.options import Asked
     from cli.show.commands import ShowOptions
+    from dalembert.results.way import Topic
     from virtualwork import Mechanism
 
 
@@ -142,7 +143,20 @@ class Call:
         if page is not None and drawn is not None:
             result = replace(result, beside={**result.beside, page: lambda: drawn(loop.every_case())})
         title = {"title": self.mechanism.name or "Mechanism"}
+        if self.show.steps:
+            result = replace(result, way=lambda: self._way(loop))
         return replace(result, about=title | self.about, within=lambda: naming(self.request.file))
+
+    def _way(self, loop: Loop) -> list[Topic]:
+        """The worked solution of every mechanism; of variants each topic says which."""
+        found = []
+        for name, case in loop.every_case():
+            for topic in case.way():
+                if name:
+                    title = f"Variant {name}: {topic.heading}"
+                    topic = replace(topic, head={"variant": name, **topic.head}, title=title)
+                found.append(topic)
+        return found
 
     def _alone(self, study: Study, loop: Loop) -> Result:
         """The mechanism itself: as one table, written part by part, or in every form."""

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from cli.show.commands import ShowOptions
     from cli.show.result import Form, Part, Result
     from dalembert.results.columns import Document
+    from dalembert.results.way import Topic
     from virtualwork import Mechanism
     from virtualwork.describe.dimensions import Dimension
 
@@ -64,6 +65,10 @@ class Case:
 
     def warnings(self) -> list[str]:
         """What there is to warn of, once all is worked out."""
+        return []
+
+    def way(self) -> list[Topic]:
+        """The worked solution, for --steps."""
         return []
 
     def assembled(self, table: Table) -> list[bool] | bool:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from cli.cases.together import Together
     from cli.show.commands import ShowOptions
     from dalembert.results.columns import Document
+    from dalembert.results.way import Topic
 
 METHOD = (
     "Assur groups one after the other, two-link groups in closed form (Chace), larger ones by Newton-Raphson; rates by the "
@@ -147,6 +148,10 @@ class PoseCase(Case):
         """The poses, and what stands beside them."""
         return {"poses": poses.documents(self.analysis), **self.further.document}
 
+    def way(self) -> list[Topic]:
+        """The worked solution."""
+        return self.study.way(self.analysis)
+
     def warnings(self) -> list[str]:
         """Limits, branches, forces that have no value."""
         a = self.analysis
@@ -181,6 +186,10 @@ class PoseStudy(Study):
     def further(self, analysis: Analysis) -> Further:
         """What stands beside the poses of one mechanism."""
         return Further()
+
+    def way(self, analysis: Analysis) -> list[Topic]:
+        """The worked solution of one mechanism, for --steps."""
+        return []
 
     def figure(self, analysis: Analysis) -> Figure:
         """The picture."""

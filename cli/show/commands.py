@@ -30,6 +30,7 @@ Output:
   plot FILE  Draw a picture (.svg, .png or .pdf).
   expect FILE.csv  Check the result against expected values.
   rtol NUMBER  Relative tolerance of --expect (angles: radians).
+  steps  Show the worked solution: equations with their numbers.
   digits  Print only the digits that hold against rounding.
   units UNIT,...  Units of the columns: mm,g,deg,N_mm,rpm.
   report FILE  Write a report (.html or .md): data, results, method.
@@ -74,6 +75,7 @@ class ShowOptions:
     expect: Path | None = None
     rtol: Annotated[float, typer.Option(callback=_tolerance)] = 1e-3
     text: bool = False
+    steps: bool = False
     digits: bool = False
     column: list[str] | None = None
     units: str | None = None
@@ -100,7 +102,7 @@ class ShowOptions:
             return self.output.suffix.lower()
         if self.json:
             return ".json"
-        return "" if self.text or self.expect is not None or sys.stdout.isatty() else ".csv"
+        return "" if self.text or self.steps or self.expect is not None or sys.stdout.isatty() else ".csv"
 
     @property
     def holds_one(self) -> bool:
@@ -119,7 +121,7 @@ class ShowOptions:
 
     @property
     def _others(self) -> bool:
-        return bool(self.text or self.plot or self.expect or self.report)
+        return bool(self.text or self.plot or self.expect or self.report or self.steps)
 
     @property
     def needs_table(self) -> bool:

@@ -65,6 +65,8 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         check_renamed()
         _stream(result, options)
         return
+    if options.steps:
+        result = _with_way(result)
     result = _in_chosen_units(result, options.units)
     whole = cache(_first(result))
     result = _with_first(result, whole)
@@ -140,12 +142,16 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
             print(verdict, file=sys.stderr)
     elif checked is not None:
         print(coloured(verdict, sys.stdout, not options.no_color))
-    elif options.text or (sys.stdout.isatty() and options.output is None):
+    elif options.text or ((options.steps or sys.stdout.isatty()) and options.output is None):
         width = get_terminal_size().columns if sys.stdout.isatty() else None
         text = paragraphs(result.notes(), *_tables_text(result, width), result.afterword())
         sys.stdout.write(coloured(text, sys.stdout, not options.no_color))
     elif options.output is None:
         sys.stdout.write(csv_text(_first(result)().cells))
+    if options.steps and not options.json and options.form != ".json":
+        from cli.show.way import way_text
+
+        sys.stdout.write(way_text(result, options.units, sys.stdout.isatty()))
     sys.stdout.flush()
     shown = (
         options.json or options.text or (checked is None and options.output is None and sys.stdout.isatty())
@@ -153,6 +159,13 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
     if not shown and options.form != ".json":
         for line in result.aside():
             print(f"note: {one_line(line)}", file=sys.stderr)
+
+
+def _with_way(result: Result) -> Result:
+    """Return the result with its worked solution shown."""
+    if result.way is None:
+        raise typer.BadParameter("expected a command that computes in steps", param_hint="--steps")
+    return replace(result, way=cache(result.way), shows_way=True)
 
 
 ROWS = 12  # rows of a further table that a terminal shows

@@ -75,6 +75,10 @@ def report(
 
     about = {"date": date.today().isoformat(), **result.about, **options.head}
     sheets = list(result.sheets() if result.sheets is not None else [_plain_sheet(result)])
+    if result.shows_way:
+        from cli.show.way import way_sheets
+
+        sheets += way_sheets(result)
     given = list(_given(asked, () if result.shows_input else named()))
     if sheets:
         sections = list(sheets[0].sections)
