@@ -53,7 +53,10 @@ GROUPS = {
         "spin": ("cli.spin.command", "Turn a body through time: free, under gravity, under a torque."),
     },
     "Teaching": {
-        "exercise": ("cli.exercise.command", "Make the variants of an exercise: sheets, key, solutions, questions."),
+        "exercise": (
+            "cli.exercise.command",
+            "Make the variants of an exercise: sheets, key, solutions, questions.",
+        ),
         "grade": ("cli.grade.command", "Mark the answers to an exercise, and name likely mistakes."),
     },
     "Files": {

@@ -12,11 +12,11 @@ from math import isfinite
 
 from dalembert.units import MINUS
 
-TIE = Decimal("1e-11")
-"""Share of a unit of the last figure within which a computed number may lie on either side of a tie."""
+TIE = Decimal("1e-13")
+"""Share of a computed number within which it may lie on either side of a tie."""
 _NUMBER = re.compile(
     r"\s*([+-]?)\s*(\d[\d ']*(?:[.,][\d ']*)*|[.,]\d+)"
-    r"(?:\s*(?:[eE]|[·*x×]\s*10\s*(?:\^|\*\*)?\s*\(?)\s*([+-]?\d{1,3})\)?)?\s*(.*?)\s*\Z",
+    r"(?:\s*(?:[eE]|[·*x×]\s*10\s*(?:\^|\*\*)?\s*\(?)\s*([+-]?\d+)\)?)?\s*(.*?)\s*\Z",
     re.DOTALL,
 )
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
@@ -82,6 +82,8 @@ def typed(text: str) -> list[Typed]:
     if match is None:
         return []
     sign, body, exponent, unit = match.groups()
+    if exponent and len(exponent.lstrip("+-0")) > 3:
+        return []
     readings = []
     for plain in _pointed(body.strip()):
         value = Decimal(f"{sign}{plain}{f'e{exponent}' if exponent else ''}")

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from cli.exercise.description import Value
-from cli.exercise.mistakes import Slip
+from cli.exercise.slips import Slip
 from cli.exercise.solving import Answer, Problem, Solved
 from cli.exercise.variants import Variant
 from cli.exercise.work_slips import gravity

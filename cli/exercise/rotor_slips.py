@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing import correct
-from cli.exercise.mistakes import Candidates, Change, Pairs, Slip, together
+from cli.exercise.slips import Candidates, Change, Pairs, Slip, together
 from cli.exercise.solving import Answer
 from cli.exercise.variants import Variant
 from cli.exercise.work_slips import GRAVITIES

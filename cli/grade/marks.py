@@ -11,7 +11,8 @@ from math import pi
 
 from cli.exercise import rotor_slips
 from cli.exercise.description import Exercise
-from cli.exercise.mistakes import Candidates, candidates
+from cli.exercise.mistakes import candidates
+from cli.exercise.slips import Candidates
 from cli.exercise.solving import Answer, Workshop
 from cli.exercise.variants import Variant
 from cli.grade.answers import Student
