@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cli.show.result import Result
 
 
-EXAMPLE = "exercise-riul-rotor"
+EXAMPLE = "exercise-rotor"
 OPTIONS = """
 Arguments:
   file FILE.toml  The exercise.

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from cli.show.result import Result
 
 
-EXAMPLE = "exercise-riul-slider-crank"
+EXAMPLE = "exercise-slider-crank"
 OPTIONS = """
 Arguments:
   file FILE.toml  The exercise.

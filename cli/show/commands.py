@@ -208,7 +208,7 @@ def with_options(
             given["show"] = options
         result = find(**given) if asked is None else find(asked(**given), options)
         with result.within():
-            if not take(result, options):
+            if not take(result):
                 hand_on(result, options, said)
 
     mine = [p for name, p in own.items() if name != "show" and not (two and name == "about")]

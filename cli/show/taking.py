@@ -11,22 +11,21 @@ from typing import TYPE_CHECKING, Any
 from dalembert.errors import DataError
 
 if TYPE_CHECKING:
-    from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
-_taken: list[list[tuple[Result, ShowOptions]]] = []
+_taken: list[list[Result]] = []
 
 
-def take(result: Result, options: ShowOptions) -> bool:
+def take(result: Result) -> bool:
     """Hand a result to whoever runs the command; False where it is run by a user."""
     if not _taken:
         return False
-    _taken[-1].append((result, options))
+    _taken[-1].append(result)
     return True
 
 
 @contextmanager
-def _taking() -> Iterator[list[tuple[Result, ShowOptions]]]:
+def _taking() -> Iterator[list[Result]]:
     _taken.append([])
     try:
         yield _taken[-1]
@@ -76,4 +75,4 @@ def result_of(words: Sequence[str]) -> Result:
             raise DataError(f"{name}: {said()}") from None
     if not taken:
         raise DataError(f"{name}: no result: expected options that compute")
-    return taken[0][0]
+    return taken[0]
