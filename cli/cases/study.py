@@ -11,11 +11,11 @@ import numpy as np
 
 from cli.cases import poses, remarks
 from cli.cases.analysis import Analysis
-from cli.cases.description import naming
-from cli.cases.loop import Case, Study
+from cli.cases.call import naming
+from cli.cases.case import Case, Study
 from cli.cases.rows import like
-from cli.show.progress import progress
 from cli.show.result import Result, Section, Sheet
+from cli.show.terminal import progress
 from dalembert.results.columns import Table
 from dalembert.results.text import heading
 from virtualwork.formulas.positions import BLOCK, EvenSweep
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from cli.cases.loop import Rows
+    from cli.cases.case import Rows
     from cli.cases.together import Together
     from cli.show.commands import ShowOptions
     from dalembert.results.columns import Document

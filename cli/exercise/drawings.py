@@ -14,9 +14,9 @@ from dalembert.errors import DataError
 if TYPE_CHECKING:
     from virtualwork import Mechanism
 
-WIDTH, EDGE = 520.0, 34.0
+WIDTH, EDGE = 430.0, 34.0
 """Of a figure, in units of its own; the edge leaves room for names."""
-TALLEST = 420.0
+TALLEST = 380.0
 STROKES = {
     "rail": 'stroke="#555" stroke-width="1.2"', "hatch": 'stroke="#888" stroke-width=".8"',
     "frame": 'stroke="#444" stroke-width="1.2" fill="#eee"', "link": 'stroke="#1d4f91" stroke-width="3" fill="#1d4f9118"',
@@ -160,12 +160,8 @@ def _inputs(variant: Variant, m: Mechanism) -> Any:
     given = first.get("inputs")
     if isinstance(given, dict) and len(given) == len(m.inputs):
         return [
-            each.get("angle_rad", radians(each["angle_deg"]))
-            if "angle_deg" in each
-            else next(iter(each.values()))
-            for each in given.values()
-            if isinstance(each, dict)
-        ] or list(m.at)
+            radians(each["input_deg"]) if "input_deg" in each else each["input_m"] for each in given.values()
+        ]
     return m.at[0] if len(m.inputs) == 1 else list(m.at)
 
 
@@ -189,14 +185,14 @@ def rotor(variant: Variant) -> str:
     radius = table.numbers["radius"].si if "radius" in table.numbers else np.ones(table.rows)
     angle = np.angle(np.where(read.moment == 0, 1, read.moment))
     z = read.z if chosen.several else None
-    size = 400.0
-    big = 128.0 if z is not None else 150.0
-    cx, cy, r = (150.0 if z is not None else WIDTH / 2), 205.0, big
+    size = 330.0
+    big = 88.0 if z is not None else 110.0
+    cx, cy, r = (128.0 if z is not None else WIDTH / 2), 178.0, big
     parts = [
         f'<circle cx="{cx}" cy="{cy}" r="{r * 1.12:.1f}" stroke="#999" fill="#fafafa"/>',
         f'<circle cx="{cx}" cy="{cy}" r="7" stroke="#444" fill="#ddd"/>',
         f'<path d="M{cx - r * 1.2} {cy}H{cx + r * 1.2}M{cx} {cy + r * 1.2}V{cy - r * 1.2}" stroke="#bbb" stroke-dasharray="7 3 1 3"/>',
-        _text(cx + r * 1.2 - 3, cy + 17, "x", "end"),
+        _text(cx + r * 1.2 + 6, cy + 5, "x"),
         _text(cx + 12, cy - r * 1.2 + 5, "y"),
     ]
     far = float(radius.max()) or 1.0
@@ -210,7 +206,7 @@ def rotor(variant: Variant) -> str:
             ly += 15
         taken.append((lx, ly))
         parts.append(_text(lx, ly, name))
-    parts.append(_text(cx, 24, "seen against +z; angles from x towards y", more='font-size="13"'))
+    parts.append(_text(cx, 20, "seen against +z", more='font-size="13"'))
     if z is not None:
         parts += _side(names, z, radius, angle, chosen, far)
     return _svg(size, parts, "rotor with its masses")
@@ -222,7 +218,7 @@ def _side(names: Sequence[str], z: Any, radius: Any, angle: Any, planes: Any, fa
 
     at = planes.z if planes.z is not None else np.zeros(len(planes.name))
     low, high = float(min(z.min(), at.min())), float(max(z.max(), at.max()))
-    left, right, cy, r = 335.0, WIDTH - 30, 205.0, 100.0
+    left, right, cy, r = 285.0, WIDTH - 24, 178.0, 88.0
     scale = (right - left) / ((high - low) or 1.0)
 
     def x_of(place: float) -> float:
@@ -248,4 +244,4 @@ def _side(names: Sequence[str], z: Any, radius: Any, angle: Any, planes: Any, fa
             x + 12, cy - up + (-8 if up >= 0 else 18) + 15 * same * (1 if up < 0 else -1), name, "start"
         )
     yield _text((left + right) / 2, cy + 1.22 * r + 24, "z →", more='font-size="13"')
-    yield _text((left + right) / 2, 24, "from the side", more='font-size="13"')
+    yield _text((left + right) / 2, 20, "from the side", more='font-size="13"')

@@ -25,10 +25,10 @@ h1 { font-size: 17pt; line-height: 1.2; margin: 0 0 2mm } h2 { font-size: 13pt; 
 h3 { font-size: 11pt; margin: 4mm 0 1mm; break-after: avoid }
 .student { display: flex; flex-wrap: wrap; gap: 1mm 8mm; border-bottom: .4mm solid #111; padding-bottom: 1mm; margin-bottom: 4mm }
 p { margin: 2mm 0 } table { border-collapse: collapse; margin: 2mm 0; font-size: 10pt; max-width: 100% }
-th, td { padding: 1mm 2mm; border: .2mm solid #bbb; text-align: left; vertical-align: top } th { background: #eee }
+th, td { padding: 1mm 1.6mm; border: .2mm solid #bbb; text-align: left; vertical-align: top; overflow-wrap: normal } th { background: #eee }
 .n { text-align: right; font-variant-numeric: tabular-nums } tr { break-inside: avoid } .wide { overflow-x: auto }
-figure { margin: 4mm 0; break-inside: avoid } figure svg, figure img { display: block; width: 100%; max-width: 132mm; height: auto; margin: 0 auto }
-.blank { min-width: 34mm } .small { font-size: 9pt; color: #444 } pre { font: 9pt/1.35 monospace; white-space: pre-wrap; margin: 1.5mm 0 }
+.dense { font-size: 9pt } .dense th, .dense td { padding: .7mm 1mm } figure { margin: 4mm 0; break-inside: avoid } figure svg, figure img { display: block; width: 100%; max-width: 132mm; height: auto; margin: 0 auto }
+.blank { width: 40mm; min-width: 20mm } .small { font-size: 9pt; color: #444 } pre { font: 9pt/1.35 monospace; white-space: pre-wrap; margin: 1.5mm 0 }
 section + section { break-before: page }
 @page { size: A4; margin: 14mm 13mm } @media print { body { margin: 0; padding: 0; max-width: none } .wide { overflow: visible } }
 """
@@ -153,7 +153,8 @@ def sheet_html(sheet: Sheet) -> str:
 
     rows = "".join(f"<tr>{''.join(map(cell, row))}</tr>\n" for row in sheet.rows)
     header = "".join(f"<th>{head(title)}</th>" for title in sheet.header)
-    return f'<div class="wide"><table><thead><tr>{header}</tr></thead><tbody>{rows}</tbody></table></div>\n'
+    dense = ' class="dense"' if len(sheet.header) > 8 else ""
+    return f'<div class="wide"><table{dense}><thead><tr>{header}</tr></thead><tbody>{rows}</tbody></table></div>\n'
 
 
 def sheet_page(exercise: Exercise, student: Student, variant: Variant, drawing: str) -> bytes:

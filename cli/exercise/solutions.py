@@ -13,8 +13,7 @@ from cli.exercise.sheets import Student, label, page, problem_html
 from cli.exercise.solving import unit_text
 from cli.exercise.variants import Variant
 from cli.show.commands import ShowOptions
-from cli.show.report import report
-from cli.show.report_forms import html_part
+from cli.show.report import html_part, report
 from cli.show.taking import options_of
 from dalembert.figures import written
 

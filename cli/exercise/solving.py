@@ -281,6 +281,11 @@ class Problem:
         return self.workshop.exercise
 
     @cached_property
+    def place(self) -> Path:
+        """The folder of its tables."""
+        return Path(tempfile.mkdtemp(dir=self.workshop.folder))
+
+    @cached_property
     def sheets(self) -> dict[str, Sheet]:
         """The tables with this student's numbers."""
         found = {}
@@ -314,7 +319,8 @@ class Problem:
                 if name in self.drawn:
                     word = word.replace(f"{{{name}}}", self.drawn[name].option)
             if word in changed:
-                path = self.workshop.folder / Path(word).with_suffix(".csv").name
+                # a folder of its own: the tables of other students and slips stay as they are
+                path = self.place / Path(word).with_suffix(".csv").name
                 path.write_text(_csv(self.sheets[word]), encoding="utf-8")
                 words.append(str(path))
             elif (
@@ -344,7 +350,7 @@ class Problem:
                 document = result.documented()
                 failed = result.failed()
         except DataError as error:
-            text = str(error).replace(f"{self.workshop.folder}/", "")
+            text = str(error).replace(f"{self.place}/", "")
             raise DataError(f"{self.exercise.file}: key command: {text}") from None
         if failed:
             said = f": {result.warnings[0]}" if result.warnings else ""

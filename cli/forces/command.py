@@ -10,7 +10,7 @@ from cli.show.output import declared_command
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cli.cases.loop import Case
+    from cli.cases.case import Case
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
@@ -48,6 +48,6 @@ def run(asked: Asked, show: ShowOptions) -> Result:
     def page(cases: Sequence[tuple[str, Case]]) -> bytes:
         from cli.cases.page import of_poses
 
-        return of_poses(cases, show.units)
+        return of_poses(cases, show.units, call.bare)
 
     return call.result(study, asked.page, page)

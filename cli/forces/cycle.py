@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.cases.loop import Case
+from cli.cases.case import Case
 from cli.cases.poses import column, records
 from cli.cases.quantities import effort_name
 from cli.cases.study import Further, PoseCase, PoseStudy

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -75,4 +76,7 @@ def result_of(words: Sequence[str]) -> Result:
             raise DataError(f"{name}: {said()}") from None
     if not taken:
         raise DataError(f"{name}: no result: expected options that compute")
-    return taken[0]
+    result = taken[0]
+    if "--steps" in rest and result.way is not None:
+        return replace(result, way=cache(result.way), shows_way=True)
+    return result
