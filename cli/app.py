@@ -112,7 +112,7 @@ def _elsewhere() -> None:
 def _call_of(example: str) -> str:
     from cli.examples.command import describe
 
-    return describe(example)["command"]
+    return str(describe(example)["command"])
 
 
 def build(called: str | None) -> typer.Typer:
