@@ -9,6 +9,7 @@ if TYPE_CHECKING:
         GROUND,
         Force,
         Friction,
+        Belt,
         Gear,
         Guess,
         Guide,
