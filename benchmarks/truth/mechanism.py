@@ -14,6 +14,7 @@ import mpmath as mp
 import numpy as np
 
 from virtualwork import GROUND
+from virtualwork.branch.assembly import Assembly
 from virtualwork.plan.topology import direction
 
 if TYPE_CHECKING:
@@ -78,8 +79,9 @@ class Exact:
                 self.theta[entry.link][0] = self.theta[entry.on][0] + self.drive[j][0]
         self.turned = [self._whole(g) for g in self.m.guides]
         # where a relation does not hang on inputs alone: the double that the motion takes from the guess
-        self.seat = motion.poses.branch.phases
-        self.phase = [self._phase(i, part) for i, part in enumerate((*self.m.gears, *self.m.belts))]
+        self.seat = Assembly.from_guess(self.m).phases
+        self.toothed: list[Any] = [*self.m.gears, *self.m.belts]
+        self.phase = [self._phase(i, part) for i, part in enumerate(self.toothed)]
 
     def _whole(self, g: Guide) -> Any:
         """The angle of a slider's link to its guide's, in the turn of the start."""
@@ -180,7 +182,7 @@ class Exact:
                 self.labels.append(("input", str(driven[g.point]), 0))
             if g.is_slider:
                 angles((f"moment:{i}", g.link), [(g.link, 1), (g.on, -1)], [self.turned[i]])
-        for i, gear in enumerate((*m.gears, *m.belts)):
+        for i, gear in enumerate(self.toothed):
             a, b = gear.links
             r = _ratio(gear)
             angles((f"gear:{i}", b), [(b, 1), (a, -r), (gear.arm, r - 1)], [self.phase[i]])
