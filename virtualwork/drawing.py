@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from itertools import chain
 from math import isfinite, pi
 
+from dalembert.arithmetic.varied import rotation
 from virtualwork.describe.description import Description
 from virtualwork.describe.meshes import Belt, Gear, Rack
 from virtualwork.describe.parts import GROUND, Guide, Spring
@@ -156,8 +157,9 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
         Of each guide, m: over which slides it is drawn. Default, and where NaN: some way about its `through`; of a guide
         that is hardly used some way about its block or pin.
     """
-    s = SYMBOL * mechanism.size
-    reach = UNKNOWN_TRAVEL * mechanism.size
+    # symbols keep their size where the dimensions vary
+    size = complex(mechanism.size).real
+    s, reach = SYMBOL * size, UNKNOWN_TRAVEL * size
     spans = [_long_enough(span, reach, s) for span in (travel or [(-reach, reach)] * len(mechanism.guides))]
     guides = list(zip(mechanism.guides, spans, strict=True))
     meshes = [
@@ -190,7 +192,7 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
         ],
         *(_block(mechanism, guide, s) for guide, _ in guides if guide.is_slider),
         (_coil(mechanism, spring, s) for spring in mechanism.springs),
-        *(_mass(body, own.center, s) for body, own in mechanism.rigid.items() if own.mass),
+        *(_mass(body, own.center, s) for body, own in mechanism.rigid.items() if complex(own.mass)),
         _points(mechanism, s),
     ]
     return Drawing(tuple(chain.from_iterable(layers)), tuple(_labels(mechanism)), s)
@@ -219,7 +221,7 @@ def _coil(mechanism: Description, spring: Spring, s: float) -> Coil:
 
 def _ends(mechanism: Description, guide: Guide, span: tuple[float, float], beyond: float) -> list[complex]:
     """Return the ends of a guide's line, in the axes of the body that carries it."""
-    along = cmath.exp(1j * guide.angle)
+    along = rotation(guide.angle)
     start = mechanism.through(guide)
     return [start + (span[0] - beyond) * along, start + (span[1] + beyond) * along]
 
@@ -229,7 +231,7 @@ def _in_ground(mechanism: Description, guide: Guide, span: tuple[float, float], 
     if guide.on != GROUND or not guide.is_slider:
         return
     low, high = _ends(mechanism, guide, span, 4 * s)
-    along = cmath.exp(1j * guide.angle)
+    along = rotation(guide.angle)
     for side in (2, -2):
         wall = (low + side * 1j * s * along, high + side * 1j * s * along)
         yield Line("rail", GROUND, wall)
@@ -238,7 +240,7 @@ def _in_ground(mechanism: Description, guide: Guide, span: tuple[float, float], 
 
 def _hatched(start: complex, end: complex, depth: float) -> Iterator[Line]:
     """Short strokes to the left of a line (to the right where the depth is negative)."""
-    count = max(2, round(abs(end - start) / (1.8 * abs(depth))))
+    count = max(2, round(abs(complex(end - start)) / (1.8 * abs(depth))))
     way = (end - start) / count
     along = way / abs(way) if way else 1
     for i in range(count):
@@ -266,7 +268,7 @@ def _link(
         if guide.on == name:
             points += _ends(mechanism, guide, span, 3 * s)
     own = mechanism.rigid[name]
-    if len(points) == 1 and own.mass:
+    if len(points) == 1 and complex(own.mass):
         points.append(own.center)
     outline = hull(points)
     if len(outline) > 1:
@@ -283,9 +285,14 @@ def hull(points: Iterable[complex]) -> tuple[complex, ...]:
     >>> hull([0, 2, 1])
     (0j, (2+0j))
     """
-    ordered = sorted(set(map(complex, points)), key=lambda z: (z.real, z.imag))
+    # numbers that vary stay what they are: which of them are corners is decided by their own values
+    own = {complex(z): z for z in points}
+    return tuple(own[z] for z in _corners(sorted(own, key=lambda z: (z.real, z.imag))))
+
+
+def _corners(ordered: list[complex]) -> Sequence[complex]:
     if len(ordered) < 3:
-        return tuple(ordered)
+        return ordered
     width = abs(ordered[-1] - ordered[0])
 
     def chain_of(line: Iterable[complex]) -> list[complex]:
@@ -389,7 +396,7 @@ def _axis(mechanism: Description, body: str, arm: str) -> str:
 def _slot(mechanism: Description, guide: Guide, span: tuple[float, float], s: float) -> Iterator[Shape]:
     """The rounded outline of a slot, as wide as its pin."""
     low, high = _ends(mechanism, guide, span, 0)
-    along = 1.35 * s * cmath.exp(1j * guide.angle)
+    along = 1.35 * s * rotation(guide.angle)
     round_ = [cmath.exp(1j * (pi / 2 + pi * k / 8)) for k in range(9)]
     outline = [*(low + along * turn for turn in round_), *(high - along * turn for turn in round_)]
     yield Line("slot", guide.on, tuple(outline), closed=True)
@@ -397,7 +404,7 @@ def _slot(mechanism: Description, guide: Guide, span: tuple[float, float], s: fl
 
 def _block(mechanism: Description, guide: Guide, s: float) -> Iterator[Shape]:
     centre = mechanism.bodies[guide.link][guide.point]
-    along = s * cmath.exp(-1j * (guide.turned or 0.0))
+    along = s * rotation(-(guide.turned or 0.0))
     corners = tuple(centre + along * corner for corner in (-3.2 - 2j, 3.2 - 2j, 3.2 + 2j, -3.2 + 2j))
     yield Line("block", guide.link, corners, closed=True)
 

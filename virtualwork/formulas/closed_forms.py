@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dalembert.arithmetic.recorded import RECORDED
 from dalembert.arithmetic.varied import rotation
 from virtualwork.formulas.numbers import ONE, Folded, Kind, Number, cross
 from virtualwork.formulas.positions import State, tied
@@ -66,6 +67,28 @@ def gap_of(kind: str, names: tuple[str, ...], w: complex, v: complex, u: complex
         if abs(cross(u, v)) <= 1e-12 * abs(u) * abs(v):
             return Gap(offset, 0.0, "its two guides are parallel, {by} apart, and do not meet")
     return None
+
+
+def missing(kind: str, w: Number, v: Number, u: Number) -> Number:
+    """By how much a closed form does not close, m, of recorded numbers: what `gap_of` says; negative where it does.
+
+    >>> from dalembert.arithmetic.recorded import Recorder
+    >>> recorder = Recorder()
+    >>> short = missing("RRR", RECORDED.join(recorder.input("w"), 0.0), 700 + 0j, 500 + 0j)
+    >>> from dalembert.arithmetic.engines import run
+    >>> run(recorder.tape({"short": short}), {"w": 1264.0})["short"]
+    64.0
+    """
+    if kind == "RRR":
+        d, r1, r2 = abs(w), abs(v), abs(u)
+        far, near = d - (r1 + r2), abs(r1 - r2) - d
+        return RECORDED.select(far - near, far, near)
+    if kind == "RRP":
+        return abs(cross(u, w)) / abs(u) - abs(v)
+    if kind == "RPR":
+        return abs(cross(u, v)) / abs(u) - abs(w)
+    # two guides always cut, unless they are parallel
+    return -1.0
 
 
 def two_angles(
