@@ -63,7 +63,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("study",),
         ("textbook",),
         ("branch",),
-        ("bounds",),
+        ("digits",),
         ("formulas",),
         ("drawing", "plan"),
         ("describe",),
