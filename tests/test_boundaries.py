@@ -33,10 +33,9 @@ HEAVY = {
 LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "balancing": (
         ("__init__",),
-        ("doubt", "fixed_weights", "next_run"),
+        ("doubt", "fixed_weights", "next_run", "polygons"),
         (
             "amplitudes",
-            "confidence",
             "engine",
             "log_balance",
             "placement",
@@ -47,9 +46,19 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ),
         ("balance", "correction", "run_log"),
         ("optimality",),
-        ("limited", "rounding"),
+        ("limited", "loads", "rounding"),
         ("influence", "propagation", "qr"),
-        ("cone_problem", "dependence", "flywheel", "indexing", "phase", "picture", "rotor", "synchronous"),
+        (
+            "cone_problem",
+            "dependence",
+            "flywheel",
+            "indexing",
+            "phase",
+            "picture",
+            "reading_errors",
+            "rotor",
+            "synchronous",
+        ),
     ),
     "virtualwork": (
         ("__init__",),
@@ -70,7 +79,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "rigidbody3d": (
         ("__init__",),
-        ("freebody", "gyroscope", "integration", "momentum", "shaft", "top"),
+        ("freebody", "gyroscope", "integration", "momentum", "percussion", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("animation", "picture"),
         ("rounding_in_time", "solids", "traced"),

@@ -228,8 +228,8 @@ class Motion:
         >>> from virtualwork import Input, Link, Mechanism
         >>> crank = Mechanism({"O": 0j}, {"crank": Link({"O": 0j, "P": 1})}, inputs=Input(link="crank"))
         >>> found = crank.motion(1.0, speed=2.0).error_estimates("points.P", "links.crank.omega")
-        >>> bool(0 < found["points.P"][0] < 1e-15), found["links.crank.omega"]
-        (True, array([0.]))
+        >>> bool(0 < found["points.P"][0] < 1e-15), bool(found["links.crank.omega"][0] < 1e-28)
+        (True, True)
         """
         from virtualwork.evaluator import key_of
 

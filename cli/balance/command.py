@@ -12,7 +12,9 @@ from cli.show.output import command
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from cli.show.commands import ShowOptions
     from cli.show.result import Result
+    from dalembert.results.way import Topic
 
 
 EXAMPLE = "riul-rotor"
@@ -54,6 +56,8 @@ def run(
     permissible: str | None = None,
     bearings: str | None = None,
     workers: Annotated[int, typer.Option(min=1)] = 1,
+    *,
+    show: ShowOptions,
 ) -> Result:
     """Balance rotors from a table of known eccentric masses, in one, two or more planes.
 
@@ -88,12 +92,18 @@ def run(
     def figure() -> Figure:
         from cli.balance.picture import draw
 
-        return draw(balancing)
+        return draw(balancing, polygons=show.steps)
+
+    def way() -> list[Topic]:
+        from cli.balance.way import way
+
+        return way(balancing)
 
     return Result(
         tables=tables(balancing),
         head={"correction": "remove" if remove else "add"},
         figure=figure,
+        way=way,
         method=METHOD,
         about={"title": "Balancing of known masses"},
         warnings=[*rotors.table.warnings, *warnings(balancing)],

@@ -14,15 +14,24 @@ from cli.show.picture import blank
 from dalembert.units import from_si
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, FigureBase
 
 
-def draw(found: Balancing) -> Figure:
-    """Draw the first rotors below each other, their planes beside each other."""
+def draw(found: Balancing, *, polygons: bool = False) -> Figure:
+    """Draw the first rotors below each other, their planes beside each other; with --steps the closed polygons too."""
     figure = blank()
+    if polygons:
+        from cli.balance.way import polygons_below
+
+        polygons_below(found, figure, lambda part: _dials(found, part))
+    else:
+        _dials(found, figure)
+    return figure
+
+
+def _dials(found: Balancing, figure: FigureBase) -> None:
     unit = found.rotors.unbalance_unit.replace("_", "·")
     known_masses(list(_rotors(found)), unit, remove=found.request.remove, figure=figure)
-    return figure
 
 
 def _rotors(found: Balancing) -> Iterator[KnownMasses]:

@@ -12,7 +12,7 @@ import numpy as np
 from balancing import GRADES
 from cli.balance.rotors import Balancing
 from cli.read.rounding import angle_error, size_error
-from cli.show.verdicts import verdict_table
+from cli.read.tolerance import verdict_table
 from dalembert.angles import degrees
 from dalembert.results.columns import Column, Table, names, number, read_number
 from dalembert.units import from_si

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from cli.body.moving import ShaftRequest
     from cli.show.result import Result
+    from dalembert.results.way import Topic
 
 _VECTOR = "X,Y,Z"
 
@@ -97,10 +98,16 @@ def run(
     def figure() -> Figure:
         return tables.draw(moving)
 
+    def way() -> list[Topic]:
+        from cli.body.way import way
+
+        return way(moving)
+
     return Result(
         tables=tables.tables(moving),
         screen=lambda: tables.quantities(moving),
         figure=figure,
+        way=way,
         method=tables.METHOD,
         about={
             "title": "A shaft on two bearings"
@@ -115,12 +122,12 @@ def _inertias(file: str) -> Result:
     from pathlib import Path
 
     from cli.body.inertias import checks, table, warnings
-    from cli.read.robots.reading import read
+    from cli.read.robots import read_robot
     from cli.show.result import Result
     from dalembert.tables.files import read_bytes
 
     name, data = read_bytes(file)
-    robot = read(name, data, None if file == "-" else Path(file).parent)
+    robot = read_robot(name, data, None if file == "-" else Path(file).parent)
     each = checks(robot)
     return Result(
         tables={"inertias": lambda: table(each)},

@@ -1,27 +1,128 @@
-"""A call of a command on a mechanism: its file and its options become the cases, and these the result."""
+"""One call on a mechanism: its file with the tables beside it, its cases, its results."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cli.cases.analysis import Analysis, Request
 from cli.cases.axes import Grid, grids
-from cli.cases.description import load, naming
-from cli.cases.loop import Loop, Study
+from cli.cases.case import Study
+from cli.cases.loop import Loop
 from cli.cases.values import Driven, Varied, assigned, with_numbers
+from cli.read.about import about
 from cli.read.options import bad
 from cli.show.result import Result
+from dalembert.errors import DataError
+from dalembert.results.text import csv_text
+from dalembert.tables.files import note, read_bytes, remember, split_sheet
+from dalembert.tables.table import Numbers, read
+from dalembert.units import UNITS, to_si
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from cli.cases.loop import Case
+    from cli.cases.case import Case
     from cli.cases.options import Asked
     from cli.show.commands import ShowOptions
+    from dalembert.results.way import Topic
     from virtualwork import Mechanism
+
+
+class Described(NamedTuple):
+    """A mechanism as its file describes it."""
+
+    mechanism: Mechanism
+    bare: dict[str, str]
+    """The units of bare lengths and angles, as far as `[units]` names them."""
+    warnings: list[str]
+    """Remarks about the tables beside the file."""
+    about: dict[str, str]
+    """What the file has for the head of a report."""
+
+
+def load(path: str) -> Described:
+    """Read a description; - is standard input."""
+    import tomllib
+
+    from virtualwork import Mechanism
+
+    remember(path)
+    file, data = read_bytes(path)
+    warnings: list[str] = []
+    try:
+        text = data.decode("utf-8-sig")
+        folder = Path() if path == "-" else Path(path).parent
+        mechanism = Mechanism.from_toml_text(text, file, folder, lambda table: _beside(warnings, table))
+    except UnicodeDecodeError:
+        raise DataError(f"{file}: this is not text: expected TOML in UTF-8") from None
+    except ValueError as error:
+        raise DataError(str(error)) from None
+    document = tomllib.loads(text)
+    units = {kind: str(unit) for kind, unit in document.get("units", {}).items()}
+    return Described(mechanism, units, warnings, about(file, document))
+
+
+def _beside(warnings: list[str], path: Path) -> bytes:
+    # loaded where the file has a table beside it
+
+    return beside(warnings, path)
+
+
+@contextmanager
+def naming(file: str) -> Iterator[None]:
+    """Name the file in what is wrong with a mechanism."""
+    from virtualwork import MechanismError
+
+    try:
+        yield
+    except MechanismError as error:
+        raise DataError(f"{error}" if str(error).startswith(file) else f"{file}: {error}") from None
+
+
+_KNOWN = {
+    "time": "time",
+    "t": "time",
+    "angle": "angle",
+    "position": "length",
+    "speed": "speed",
+    "fx": "force",
+    "fy": "force",
+    "torque": "torque",
+}
+# what the library reads as it stands; anything else is put into the first of them
+_PLAIN = {"angle": ("rad", "deg"), "position": ("m", "mm")}
+
+
+def beside(warnings: list[str], path: Path) -> bytes:
+    """Return a table as plain CSV: commas, points, units of the library; remarks are added to `warnings`.
+
+    Raises
+    ------
+    OSError
+        No such file.
+    DataError
+        As of every table: row or cell, column, what was found, what was expected.
+    """
+    note(split_sheet(str(path))[0]).stat()
+    table = read(str(path), numbers=_KNOWN, texts=("step",), blank=tuple(_KNOWN))
+    warnings += table.warnings
+    columns = dict(_plain(name, column) for name, column in table.numbers.items())
+    return csv_text(columns).encode()
+
+
+def _plain(name: str, column: Numbers) -> tuple[str, list[float]]:
+    """Return header and values of a column; where the library knows its unit the digits are those of the file."""
+    dimension = _KNOWN[name]
+    first = next(iter(UNITS[dimension]))
+    if column.unit in _PLAIN.get(name, (first,)):
+        return f"{name}_{column.unit}", column.values.tolist()
+    si = _PLAIN.get(name, (first,))[0]
+    return f"{name}_{si}", to_si(column.values, dimension, column.unit).tolist()
 
 
 @dataclass(eq=False, repr=False)
@@ -135,14 +236,27 @@ class Call:
             loop = Loop(study, self.varied, self.workers)
             self.remarks += study.warnings()
             if page is not None:
-                from cli.show.page import refuse_long
+                from cli.show.picture import refuse_long
 
                 refuse_long((self.poses if states is None else states) * loop.count)
             result = self._alone(study, loop) if self.varied is None else self._of_variants(loop)
         if page is not None and drawn is not None:
             result = replace(result, beside={**result.beside, page: lambda: drawn(loop.every_case())})
         title = {"title": self.mechanism.name or "Mechanism"}
+        if self.show.steps:
+            result = replace(result, way=lambda: self._way(loop))
         return replace(result, about=title | self.about, within=lambda: naming(self.request.file))
+
+    def _way(self, loop: Loop) -> list[Topic]:
+        """The worked solution of every mechanism; of variants each topic says which."""
+        found = []
+        for name, case in loop.every_case():
+            for topic in case.way():
+                if name:
+                    title = f"Variant {name}: {topic.heading}"
+                    topic = replace(topic, head={"variant": name, **topic.head}, title=title)
+                found.append(topic)
+        return found
 
     def _alone(self, study: Study, loop: Loop) -> Result:
         """The mechanism itself: as one table, written part by part, or in every form."""

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from cli.cases import poses
 from cli.cases.analysis import Analysis
-from cli.cases.loop import Case
+from cli.cases.case import Case
 from cli.cases.study import PoseCase
-from cli.show.page import shown
+from cli.show.picture import shown
 from dalembert.page import Shown
 from virtualwork import MechanismError
 from virtualwork.animation import JointForce, Series, moving_page

@@ -11,11 +11,11 @@ import numpy as np
 
 from cli.cases import poses, remarks
 from cli.cases.analysis import Analysis
-from cli.cases.description import naming
-from cli.cases.loop import Case, Study
+from cli.cases.call import naming
+from cli.cases.case import Case, Study
 from cli.cases.rows import like
-from cli.show.progress import progress
 from cli.show.result import Result, Section, Sheet
+from cli.show.terminal import progress
 from dalembert.results.columns import Table
 from dalembert.results.text import heading
 from virtualwork.formulas.positions import BLOCK, EvenSweep
@@ -25,10 +25,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from cli.cases.loop import Rows
+    from cli.cases.case import Rows
     from cli.cases.together import Together
     from cli.show.commands import ShowOptions
     from dalembert.results.columns import Document
+    from dalembert.results.way import Topic
 
 METHOD = (
     "Assur groups one after the other, two-link groups in closed form (Chace), larger ones by Newton-Raphson; rates by the "
@@ -147,6 +148,10 @@ class PoseCase(Case):
         """The poses, and what stands beside them."""
         return {"poses": poses.documents(self.analysis), **self.further.document}
 
+    def way(self) -> list[Topic]:
+        """The worked solution."""
+        return self.study.way(self.analysis)
+
     def warnings(self) -> list[str]:
         """Limits, branches, forces that have no value."""
         a = self.analysis
@@ -181,6 +186,10 @@ class PoseStudy(Study):
     def further(self, analysis: Analysis) -> Further:
         """What stands beside the poses of one mechanism."""
         return Further()
+
+    def way(self, analysis: Analysis) -> list[Topic]:
+        """The worked solution of one mechanism, for --steps."""
+        return []
 
     def figure(self, analysis: Analysis) -> Figure:
         """The picture."""

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cli.cases.analysis import Analysis
+from cli.cases.case import TableCase, TableStudy
 from cli.cases.inputs import Inputs
 from cli.cases.poses import listed
-from cli.cases.single import TableCase, TableStudy
 from dalembert.results.columns import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.cases.loop import Rows
+    from cli.cases.case import Rows
     from virtualwork.study.equilibrium import Equilibria as Found
 
 Document = dict[str, Any]

@@ -44,7 +44,7 @@ def run(file: str, output: Path, at: str | None = None) -> Result:
     pose, closed to the last digit. What a format cannot hold is named on standard error.
     """
     from cli.cases.axes import grids
-    from cli.cases.description import load
+    from cli.cases.call import load
     from cli.cases.inputs import of_one
     from cli.exports.written import written
     from cli.show.result import Result
@@ -64,7 +64,7 @@ def run(file: str, output: Path, at: str | None = None) -> Result:
         raise DataError(f"{file}: {error}") from None
 
     def sheets() -> list[Sheet]:
-        from cli.cases.posed import posed
+        from cli.cases.picture import posed
         from cli.show.result import Section
 
         whole = [] if notes else ["Nothing is left out."]

@@ -10,8 +10,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from cli.exports.markup import add, digits, document
-from cli.exports.skeleton import Skeleton
-from cli.exports.travel import Travel
+from cli.exports.skeleton import Skeleton, Travel
 from dalembert.errors import DataError
 from virtualwork import drawing
 from virtualwork.describe.parts import GROUND

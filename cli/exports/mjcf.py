@@ -5,8 +5,7 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 from cli.exports.markup import add, digits, document, spatial
-from cli.exports.skeleton import LIGHT, THICK, Branching, Joint, Part, Skeleton
-from cli.exports.travel import Travel
+from cli.exports.skeleton import LIGHT, THICK, Branching, Joint, Part, Skeleton, Travel
 from virtualwork.describe.parts import GROUND
 
 # MuJoCo takes nothing lighter

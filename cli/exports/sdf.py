@@ -6,8 +6,7 @@ from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement
 
 from cli.exports.markup import add, digits, document
-from cli.exports.skeleton import LIGHT, Joint, Part, Skeleton
-from cli.exports.travel import Travel
+from cli.exports.skeleton import LIGHT, Joint, Part, Skeleton, Travel
 from virtualwork.describe.parts import GROUND, Gear
 
 WORLD = "world"

@@ -7,8 +7,7 @@ from xml.etree.ElementTree import Element
 
 from cli.exports import sdf
 from cli.exports.markup import add, digits, document, spatial
-from cli.exports.skeleton import Branching, Part, Skeleton
-from cli.exports.travel import Travel
+from cli.exports.skeleton import Branching, Part, Skeleton, Travel
 from virtualwork.describe.parts import GROUND, Gear
 
 # a limit that is none

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cli.exports.drawing import DXF_UNITS, draw, dxf, svg
-from cli.exports.skeleton import Skeleton
-from cli.exports.travel import Travel
+from cli.exports.skeleton import Skeleton, Travel
 from dalembert.errors import DataError
 from dalembert.results.text import csv_text
 from dalembert.units import UNITS, to_si

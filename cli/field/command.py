@@ -146,7 +146,7 @@ def run(
 
     from cli.field import request as read
     from cli.field.field_balancing import FieldBalancing
-    from cli.field.readers import read_measured
+    from cli.field.reading import read_measured
     from cli.read.tolerance import tolerance_of
 
     request = read.Request(

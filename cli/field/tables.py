@@ -15,7 +15,7 @@ from cli.field.runs import Channel, Complex, Real
 from cli.field.solution import Solved
 from cli.field.trim import Trim, verdicts
 from cli.read.rounding import angle_error, size_error
-from cli.show.verdicts import verdict_table
+from cli.read.tolerance import verdict_table
 from dalembert.angles import degrees
 from dalembert.results.columns import ABSENT, Column, Table, names, number
 from dalembert.results.text import angle_text
@@ -362,7 +362,7 @@ def _errors(b: FieldBalancing) -> str:
         )
         return f"{stated}, or as the repeats scatter where that is more" if scatter else stated
     if b.runs.fitted:
-        left = any((s.group.fit.degrees_of_freedom > 0).any() for s in b.solved if s.group.fit is not None)
+        left = any((s.fit.degrees_of_freedom > 0).any() for s in b.solved)
         return f"reading errors as the {'residuals of the fit' if left else 'readings behind the coefficients'} scatter"
     return "reading errors as the repeats scatter"
 

@@ -34,8 +34,7 @@ def run(asked: Asked, show: ShowOptions) -> Result:
     file with the fitted numbers.
     """
     from cli.cases.analysis import Request
-    from cli.cases.call import Call
-    from cli.cases.description import naming
+    from cli.cases.call import Call, naming
     from cli.fit.fitting import STARTS, Fits, aims, bounds
     from cli.read.options import bad
 

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.cases.loop import Case
-from cli.cases.single import TableCase, TableStudy
-from cli.cases.tables_beside import beside
+from cli.cases.call import beside
+from cli.cases.case import Case, TableCase, TableStudy
 from cli.cases.values import Varied, assigned_paths, quantity
 from cli.fit.targets import targets, wanted, weights
 from cli.read import options
@@ -30,7 +29,7 @@ from virtualwork.describe.units import Units
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.cases.loop import Rows
+    from cli.cases.case import Rows
     from dalembert.results.columns import Document, Json
     from virtualwork import Mechanism
     from virtualwork.family.fitting import Fit

@@ -10,7 +10,7 @@ from cli.show.output import declared_command
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cli.cases.loop import Case
+    from cli.cases.case import Case
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cli.cases.loop import Case
+from cli.cases.case import Case
 from cli.cases.poses import column, records
 from cli.cases.quantities import effort_name
 from cli.cases.study import Further, PoseCase, PoseStudy
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from cli.cases.axes import Grid
     from cli.cases.call import Call
     from cli.show.commands import ShowOptions
+    from dalembert.results.way import Topic
 
 Document = dict[str, Any]
 
@@ -102,6 +103,12 @@ class Forces(PoseStudy):
             tables["counterweights"] = lambda: of_counterweights(weights)
             words.append(counterweights_text(weights))
         return Further(document, tables, "\n\n".join(words))
+
+    def way(self, analysis: Analysis) -> list[Topic]:
+        """The ledger of every pose, free-body diagrams."""
+        from cli.forces.way import way
+
+        return way(analysis)
 
     def figure(self, analysis: Analysis) -> Figure:
         """The forces against the input, or the requested quantities; of one pose the mechanism."""

@@ -1,20 +1,239 @@
-"""An imported mechanism put together: does it stand where it is drawn, and where nothing is drawn, how does it stand?"""
+"""An imported drawing put together: its inputs, its TOML text, whether it stands where it is drawn, the pages of its report."""
 
 from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Sequence
+import tomllib
+from collections.abc import Iterable, Iterator, Sequence
+from fractions import Fraction
 from itertools import chain
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cli.imports.drawn import GROUND, Drawing
-from cli.imports.inputs import fit
-from cli.imports.toml import text
+from cli.cases.picture import posed
+from cli.imports.drawn import GROUND, Body, Drawing, Drive, Load, Place, Slide, exact
+from cli.read.names import unused
+from cli.show.report import CODE
+from cli.show.result import Section, Sheet
 from virtualwork import Mechanism
 from virtualwork.describe import MechanismError
+from virtualwork.describe.parts import Gear, Guess, Guide, Input, Link
+from virtualwork.describe.text import AsWritten, Table, document, written
 from virtualwork.motion import Motion
+
+Rows = NDArray[np.float64]
+# below this share a row of speeds follows from others: a file's decimals are fewer than ours
+FOLLOWS = 1e-6
+
+
+class _Speeds:
+    """Speeds of a drawing's bodies: (vx, vy, ω) of each, as columns; lengths as shares of its size."""
+
+    def __init__(self, d: Drawing) -> None:
+        self.d = d
+        self.size = d.size() or 1.0
+        self.columns = {name: 3 * k for k, name in enumerate(d.bodies)}
+
+    def at(self, body: str, z: Place) -> complex:
+        """Where a body's place stands, a share of the size."""
+        b = self.d.bodies[body]
+        x, y = (complex(float(p[0]), float(p[1])) for p in (b.at, z))
+        return (x + y * cmath.rect(1.0, b.turn)) / self.size
+
+    def moves(self, body: str, at: complex) -> Rows:
+        """The speed of a body's point, (2, columns)."""
+        rows = np.zeros((2, 3 * len(self.columns)))
+        k = self.columns[body]
+        rows[:, k : k + 2] = np.eye(2)
+        rows[:, k + 2] = -at.imag, at.real
+        return rows
+
+    def turns(self, body: str) -> Rows:
+        """A body's angular velocity, (columns,)."""
+        row = np.zeros(3 * len(self.columns))
+        row[self.columns[body] + 2] = 1.0
+        return row
+
+    def along(self, s: Slide, turned: float) -> Rows:
+        """The speed of a slide's point against its line, in the line's direction or across it."""
+        way = cmath.rect(1.0, self.d.bodies[s.on].turn + s.angle + turned)
+        at = self.at(s.link, self.d.bodies[s.link].points[s.point])
+        relative = self.moves(s.link, at) - self.moves(s.on, at)
+        return np.asarray(np.array([way.real, way.imag]) @ relative)
+
+    def joints(self) -> Rows:
+        """What the ground, pins, slides and gears hold at zero."""
+        d = self.d
+        rows = [np.eye(3, 3 * len(self.columns))]
+        for point, (first, *others) in d.pins().items():
+            at = self.at(first, d.bodies[first].points[point])
+            rows += [self.moves(first, at) - self.moves(other, at) for other in others]
+        for s in d.slides:
+            rows.append(self.along(s, np.pi / 2)[None])
+            if s.turned is not None:
+                rows.append((self.turns(s.link) - self.turns(s.on))[None])
+        for m in d.meshes:
+            a, b, arm = (self.turns(name) for name in (m.a, m.b, m.arm))
+            rows.append((b - arm - m.ratio * (a - arm))[None])
+        return np.concatenate(rows)
+
+    def driven(self, e: Drive) -> Rows:
+        """What an input drives."""
+        if e.slide is not None:
+            return self.along(e.slide, 0.0)
+        return self.turns(str(e.link)) - self.turns(e.on)
+
+
+def fit(d: Drawing) -> None:
+    """Leave out inputs that follow from those before them, and take free joints as inputs in addition."""
+    speeds = _Speeds(d)
+    _, s, vt = np.linalg.svd(speeds.joints())
+    free = vt[int(np.sum(s > FOLLOWS * s[0])) :]
+    kept: list[Drive] = []
+    spare = [e for e in d.spare if all(e.moves != other.moves for other in d.drives)]
+    # where the file drives too many, those at the ground stay
+    for e in (*sorted(d.drives, key=lambda e: GROUND not in e.pair), *spare):
+        row = free @ speeds.driven(e)
+        if np.linalg.norm(row) > FOLLOWS:
+            # what the input holds is free no more
+            kept.append(e)
+            free = np.linalg.svd(row[None])[2][1:] @ free
+    _note(
+        d, (e for e in d.drives if e not in kept), "left out as an input: its motion follows from the others'"
+    )
+    _note(d, (e for e in kept if e not in d.drives), "taken as an input in addition: it was free to move")
+    d.drives = [e for e in (*d.drives, *spare) if e in kept]
+
+
+def _note(d: Drawing, drives: Iterable[Drive], what: str) -> None:
+    d.notes += [f"{e.pair[0]} against {e.pair[1]}: {what}" for e in drives]
+
+
+ORIGIN: Place = (Fraction(0), Fraction(0))
+
+
+def text(d: Drawing, source: str) -> str:
+    """Return the TOML text; `source` says where the mechanism is from."""
+    d = _named(d)
+    origins = {name: _origin(d, name, body) for name, body in d.bodies.items()}
+    tree = document(_parts(d, origins), AsWritten())
+    for drive, table in zip(d.drives, tree.get("input", []), strict=True):
+        # a speed keeps the unit of the other program
+        table |= {} if drive.speed is None else {"speed": drive.speed}
+    for load in d.loads:
+        tree.setdefault(load.table, []).append(_ends(d, load, origins) | load.values)
+    return written(tree | {"source": source, "units": {"length": d.length, "angle": d.angle}})
+
+
+def _parts(d: Drawing, origins: dict[str, Place]) -> dict[str, object]:
+    """Return the parts of a description, their numbers in the units of the file."""
+    links = {name: body for name, body in d.bodies.items() if name != GROUND}
+    return {
+        "name": d.name,
+        "gravity": complex(*(d.gravity or (0.0, 0.0))),
+        "ground": _places(d.bodies[GROUND].points),
+        "links": {name: _link(b, origins[name]) for name, b in links.items()},
+        "guides": [
+            Guide(s.point, s.link, s.on, _place(s.through, origins[s.on]), s.angle, s.turned)
+            for s in d.slides
+        ],
+        "gears": [Gear((m.a, m.b), m.ratio, m.arm) for m in d.meshes],
+        "inputs": [
+            Input(e.link, e.on, value=e.at) if e.slide is None else Input(slider=e.slide.point, value=e.at)
+            for e in d.drives
+        ],
+        "guess": Guess([e.at for e in d.drives], {name: b.turn for name, b in links.items()}),
+    }
+
+
+def _link(b: Body, origin: Place) -> Link:
+    points = _places(b.points, origin)
+    return Link(points, b.mass, _place(b.center, origin), b.inertia) if b.mass > 0 else Link(points)
+
+
+def _origin(d: Drawing, name: str, body: Body) -> Place:
+    """Return where a link's axes begin: at the first of its joints."""
+    if d.own_axes or name == GROUND:
+        return ORIGIN
+    joints = set(d.pins()) | {s.point for s in d.slides}
+    first = next((z for p, z in body.points.items() if p in joints), None)
+    return first or next(iter(body.points.values()), ORIGIN)
+
+
+def _ends(d: Drawing, load: Load, origins: dict[str, Place]) -> Table:
+    """Name the bodies that a load holds on to; a spring's ends are points that `_named` has made."""
+    if load.table == "torsion_springs":
+        return {"links": [name for name, _ in load.ends]}
+    if load.table == "springs":
+        ends = [
+            (name, next(p for p, z in d.bodies[name].points.items() if z == at)) for name, at in load.ends
+        ]
+        return {"between": [".".join(end) for end in ends]}
+    ((name, at),) = load.ends
+    if at is None:
+        return {"link": name}
+    z = _place(at, origins[name])
+    return {"link": name, "point": [z.real, z.imag]}
+
+
+def _named(d: Drawing) -> Drawing:
+    """Give names that a description takes: no dots, no link `ground` or `at`, no point called as a link is."""
+    _own_points(d)
+    links = {GROUND: GROUND}
+    for name in d.bodies:
+        if name != GROUND:
+            links[name] = unused(name.replace(".", "_").strip() or "link", {*links.values(), "at"})
+    points: dict[str, str] = {}
+    for load in d.loads:
+        if load.table == "springs":
+            for k, (name, at) in enumerate(load.ends):
+                held = d.bodies[name].points
+                if at is not None and at not in held.values():
+                    held[d.fresh(f"S{d.loads.index(load) + 1}{'ab'[k]}")] = at
+    for e in d.drives:
+        if e.speed is not None and float(str(e.speed).split()[0]) == 0:
+            e.speed = None
+            d.notes.append(f"the input {' against '.join(e.pair)} has the speed 0: it has no speed here")
+    for body in d.bodies.values():
+        for p in body.points:
+            if p not in points:
+                points[p] = unused(p.replace(".", "_").strip() or "P", {*points.values(), *links.values()})
+        body.points = {points[p]: z for p, z in body.points.items()}
+    d.bodies = {links[n]: b for n, b in d.bodies.items()}
+    d.rename(links.__getitem__)
+    for s in d.slides:
+        s.point = points[s.point]
+    return d
+
+
+def _own_points(d: Drawing) -> None:
+    """Give each further guide of a point a point of its own, as a guide is called as its point is.
+
+    It lies on the guide's line away from the pin. A pin in two slots has a shoe in the second.
+    """
+    guided: set[str] = set()
+    for s in d.slides:
+        if s.point in guided and not d.own_axes:
+            z, shared = d.bodies[s.link].points[s.point], s.point
+            if s.turned is None:
+                s.link, s.turned = unused(f"{shared} shoe", set(d.bodies)), -s.angle
+                d.body(s.link).points[shared] = z
+            way, far = math.radians(s.angle), d.size()
+            s.through = z[0] + exact(far * math.cos(way)), z[1] + exact(far * math.sin(way))
+            s.point = d.fresh(f"{shared} on {s.on}")
+            d.bodies[s.link].points[s.point] = s.through
+        guided.add(s.point)
+
+
+def _place(z: Place, origin: Place = ORIGIN) -> complex:
+    return complex(float(z[0] - origin[0]), float(z[1] - origin[1]))
+
+
+def _places(points: dict[str, Place], origin: Place = ORIGIN) -> dict[str, complex]:
+    return {p: _place(z, origin) for p, z in points.items()}
+
 
 # degrees of an input that says nothing of where it begins
 TRIED = tuple(range(0, 360, 15))
@@ -110,3 +329,15 @@ def _seek(d: Drawing, source: str) -> None:
     for e, at in zip(d.drives, start, strict=True):
         e.at = at
     d.notes.append(f"no assembly was found{': ' + why if why else ''}")
+
+
+def pages(title: str, taken: list[str], made: str) -> list[Sheet]:
+    """Return the sheets of a mechanism, and of its file; `taken` says from what it was taken over."""
+    first = Section("Taken over", taken)
+    file = Sheet("", [Section("The file for dalembert mechanism", [CODE + made.rstrip("\n")])])
+    try:
+        m = Mechanism.from_toml_text(made)
+        inputs = tuple(at if e.value is None else e.value for e, at in zip(m.inputs, m.at, strict=True))
+        return [posed(title, m, inputs, tomllib.loads(made).get("units", {}), first), file]
+    except MechanismError as error:
+        return [Sheet(title, [first, Section("Mechanism", [str(error)])]), file]

@@ -47,7 +47,7 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
     """
     from cli.imports.assembled import described
     from cli.imports.drawn import settle
-    from cli.imports.told import read
+    from cli.imports.programs import read
     from cli.show.result import Result
 
     if output is not None and output.suffix.lower() != ".toml":
@@ -81,7 +81,7 @@ def run(file: str, output: Path | None = None, kind: Kind | None = None) -> Resu
     ]
 
     def sheets() -> list[Sheet]:
-        from cli.imports.pages import pages
+        from cli.imports.assembled import pages
 
         taken = [f"{name}: {KINDS[told].partition(' (')[0]}, {len(data)} bytes"]
         return [

@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from cli.cases.analysis import Analysis
+from cli.cases.case import TableCase, TableStudy
 from cli.cases.poses import listed
-from cli.cases.single import TableCase, TableStudy
 from cli.cases.study import METHOD
 from dalembert.results.columns import Table
 from virtualwork.plan.steps import Group, Place, Slide, Turn
@@ -18,7 +18,7 @@ from virtualwork.plan.steps import Group, Place, Slide, Turn
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.cases.loop import Rows
+    from cli.cases.case import Rows
     from dalembert.results.columns import Cell
     from virtualwork.formulas.asked import Key
 

@@ -10,7 +10,7 @@ from cli.show.output import declared_command
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cli.cases.loop import Case
+    from cli.cases.case import Case
     from cli.show.commands import ShowOptions
     from cli.show.result import Result
 
@@ -23,6 +23,7 @@ What:
   newton  Newton-Raphson on all loops at once, with its iterates.
 Output:
   page FILE(.html)  Write a page on which the mechanism moves.
+Further options (docs/commands.md describes them):
   schema  Print the JSON Schema of FILE.toml; needs no FILE.
 """
 

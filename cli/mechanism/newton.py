@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from cli.cases.analysis import Analysis
     from cli.show.commands import ShowOptions
+    from dalembert.results.way import Topic
 
 Document = dict[str, Any]
 # radians between the solution from the guess and that of the groups: beyond it they are two assemblies
@@ -52,6 +53,12 @@ class Poses(PoseStudy):
         document = iterates(analysis)
         tables = {"newton": lambda: records(document["iterates"])}
         return Further(document, tables, newton_text(document))
+
+    def way(self, analysis: Analysis) -> list[Topic]:
+        """Loops, closed forms, Newton's iterates, parts of motion."""
+        from cli.mechanism.way import way
+
+        return way(analysis, newton=self.newton)
 
     def figure(self, analysis: Analysis) -> Figure:
         """The mechanism to scale: the first pose in full, others as ghosts, the paths of its points; or curves."""

@@ -1,4 +1,4 @@
-"""The options of a balance tolerance: --grade with --speed and --rotor-mass, or --permissible; --bearings."""
+"""Tolerances of rotors, after ISO 21940-11, API or MIL-STD-167-1: their options, and the verdicts as a table."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from cli.read import options
+from dalembert.results.columns import Table, names, number
 
 if TYPE_CHECKING:
     import numpy as np
@@ -118,3 +119,27 @@ def tolerance_of(
         limit = api_unbalance if standard == "API" else mil_unbalance
         return Tolerance(standard, float(limit(mass, omega)), planes)
     return Tolerance(f"G{value * 1000:g}", float(permissible_unbalance(value, omega, mass)), planes)
+
+
+def verdict_table(rows: Sequence[tuple[str, Verdict]], unit: str) -> Table:
+    """Return for each rotor and plane what is permissible, what the unbalance was and is, and whether that is within it."""
+    import numpy as np
+
+    share, before, after = (np.array([v[k] for _, v in rows], dtype=float) for k in (1, 2, 3))
+
+    def within(sizes: np.typing.NDArray[np.float64]) -> list[bool | None]:
+        return [
+            None if size != size else size <= limit
+            for size, limit in zip(sizes.tolist(), share.tolist(), strict=True)
+        ]
+
+    columns = [
+        names("rotor", [name for name, _ in rows]),
+        names("plane", [v.plane for _, v in rows]),
+        number("permissible", "unbalance", share, unit),
+        number("initial", "unbalance", before, unit),
+        number("residual", "unbalance", after, unit),
+        names("verdict", [v.of(v.residual) for _, v in rows], place=None),
+    ]
+    documented = [names("within", within(before)), names("residual_within", within(after))]
+    return Table(columns, ("rotor", "plane"), "rotors[].tolerance.planes[]", documented=documented)

@@ -49,7 +49,7 @@ class Form:
 
             return Written(csv_text(table.cells, header=number == 0).encode(), unknown)
         if self.folder is not None:
-            from cli.show.parts import parquet
+            from cli.show.files import parquet
 
             (self.folder / f"part-{number:06d}.parquet").write_bytes(b"".join(parquet([table])))
             return Written(b"", unknown)
@@ -65,8 +65,7 @@ def stream(result: Result, suffix: str, output: Path | None, units: str | None, 
     int
         Of how many numbers --digits knows no digit.
     """
-    from cli.show.files import write
-    from cli.show.parts import parquet, workbook
+    from cli.show.files import parquet, workbook, write
 
     assert result.blocks is not None
     unknown = 0

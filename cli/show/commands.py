@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import wraps
 from inspect import Parameter, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args
+from textwrap import wrap
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 
 import typer
 from typer.core import TyperCommand
@@ -22,20 +24,21 @@ if TYPE_CHECKING:
 
 SHARED = """
 What:
-  column NAME=HEADER  Read the column HEADER as NAME: mass_kg=Masse; repeatable.
+  column NAME=HEADER  Read column HEADER as NAME; repeatable.
 Output:
   json  Print one JSON document, SI units, full precision.
   output -o --output FILE  Write to FILE (.csv .json .xlsx .parquet .md .tex).
   plot FILE  Draw a picture (.svg, .png or .pdf).
   expect FILE.csv  Check the result against expected values.
-  rtol NUMBER  Relative tolerance of --expect (angles: radians).
+  steps  Show the worked solution: equations with their numbers.
   digits  Print only the digits that hold against rounding.
   units UNIT,...  Units of the columns: mm,g,deg,N_mm,rpm.
   report FILE  Write a report (.html or .md): data, results, method.
-  about KEY=TEXT  Its head: title=, machine=, customer=, date=, author=.
-Terminal:
+Further options (docs/commands.md describes them):
+  rtol NUMBER  Relative tolerance of --expect (angles: radians).
+  about KEY=TEXT  Head of the report: title=, machine=, customer=, date=, author=.
   text  Print the aligned table even into a pipe.
-  no_color  No colours; so does NO_COLOR in the environment.
+  no_color  No colours; NO_COLOR in the environment does the same.
   help  Show this message and exit.
 """
 """What the help says of the options that every command shares."""
@@ -73,6 +76,7 @@ class ShowOptions:
     expect: Path | None = None
     rtol: Annotated[float, typer.Option(callback=_tolerance)] = 1e-3
     text: bool = False
+    steps: bool = False
     digits: bool = False
     column: list[str] | None = None
     units: str | None = None
@@ -99,7 +103,7 @@ class ShowOptions:
             return self.output.suffix.lower()
         if self.json:
             return ".json"
-        return "" if self.text or self.expect is not None or sys.stdout.isatty() else ".csv"
+        return "" if self.text or self.steps or self.expect is not None or sys.stdout.isatty() else ".csv"
 
     @property
     def holds_one(self) -> bool:
@@ -118,7 +122,7 @@ class ShowOptions:
 
     @property
     def _others(self) -> bool:
-        return bool(self.text or self.plot or self.expect or self.report)
+        return bool(self.text or self.plot or self.expect or self.report or self.steps)
 
     @property
     def needs_table(self) -> bool:
@@ -180,7 +184,7 @@ def with_options(
     two = "about" in own
     if two:
         point, head = told(options)["about"], told(SHARED)["about"]
-        line = head._replace(metavar=point.metavar, help=f"{point.help} KEY=TEXT: {head.help}")
+        line = point._replace(help=f"{point.help} KEY=TEXT: {head.help}")
         shared["about"] = shared["about"].replace(annotation=_annotated(list[str] | None, line))
 
     @wraps(find)
@@ -274,12 +278,20 @@ class Command(TyperCommand):
             typer.echo(line, err=True)
             raise typer.Exit(2) from None
 
-    def panels_of(self, ctx: Any) -> dict[str, list[tuple[str, str]]]:
-        """Return the rows of help below their headings."""
-        place = {name: said.heading for name, said in {**self.told, **told(SHARED)}.items()}
-        headings = ("Arguments", "Options", *place.values())
+    def panels_of(self, ctx: Any, without: Collection[str] = ()) -> dict[str, list[tuple[str, str]]]:
+        """Return the rows of help below their headings, further options last; `without`: parameters to leave out."""
+        shared = told(SHARED)
+        place = {name: line.heading for name, line in {**shared, **self.told}.items()}
+        listed = (
+            "Arguments",
+            "Options",
+            *(line.heading for of in (self.told, shared) for line in of.values()),
+        )
+        headings = sorted(listed, key=lambda heading: heading.startswith(FURTHER))
         rows: dict[str, list[tuple[str, str]]] = {heading: [] for heading in headings}
         for param in self.get_params(ctx):
+            if param.name in without:
+                continue
             record = param.get_help_record(ctx)
             if record is not None:
                 heading = "Arguments" if param.param_type_name == "argument" else "Options"
@@ -290,7 +302,11 @@ class Command(TyperCommand):
         for heading, records in self.panels_of(ctx).items():
             with formatter.section(heading):
                 if heading.startswith(FURTHER):
-                    formatter.write_text(", ".join(flags for flags, _ in records))
+                    lead = " " * formatter.current_indent
+                    text = ", ".join(flags for flags, _ in records)
+                    # names are not cut at their hyphens
+                    lines = wrap(text, formatter.width - len(lead), break_on_hyphens=False)
+                    formatter.write("".join(f"{lead}{line}\n" for line in lines))
                 else:
                     formatter.write_dl(records)
 
@@ -304,3 +320,84 @@ def with_help(options: str, example: str, call_of: Callable[[str], str]) -> type
     """Return the kind of command whose help says this of its options, and ends in this example's call."""
     own = {"told": told(options), "example": example, "call_of": staticmethod(call_of)}
     return type("Command", (Command,), own)
+
+
+_DEFAULT = re.compile(r"(N|NUMBER|[a-z|-]+)=(.*)")
+Complete = Callable[[Any, list[str], str], list[str]]
+
+
+def parameters(
+    text: str,
+    eager: Mapping[str, Callable[[bool], None]] | None = None,
+    complete: Mapping[str, Complete] | None = None,
+) -> dict[str, Parameter]:
+    """The parameters of a command, by their names.
+
+    Parameters
+    ----------
+    eager : mapping of name to function
+        Flags that are answered before anything else is looked at.
+    complete : mapping of name to function
+        What a shell completes an option's value with.
+    """
+    found = {}
+    for name, line in told(text).items():
+        kind, default, more = _kind(line.metavar or "", line.heading == "Arguments")
+        shown = line.metavar
+        if shown is not None and not shown.endswith(",..."):
+            shown = shown.removesuffix("...")
+        if "=" in (line.metavar or "") and (match := _DEFAULT.fullmatch(line.metavar or "")):
+            shown = match[1]
+        if eager and name in eager:
+            more = {"is_eager": True, "callback": _answered(eager[name])}
+        if complete and name in complete:
+            more["autocompletion"] = complete[name]
+        if line.heading == "Arguments":
+            info = typer.Argument(metavar=shown, help=line.help, **more)
+        else:
+            # typer shows the words of a choice itself
+            words = "|" in (shown or "") and (shown or "").islower()
+            info = typer.Option(*line.flags, metavar=None if words else shown, help=line.help, **more)
+        found[name] = Parameter(
+            name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, info]
+        )
+    return found
+
+
+def _kind(metavar: str, argument: bool) -> tuple[Any, Any, dict[str, Any]]:
+    """An option's type, its default, and further settings."""
+    if not metavar:
+        return bool, False, {}
+    if argument:
+        optional = metavar.startswith("[")
+        if metavar.endswith("..."):
+            return list[str], Parameter.empty, {}
+        return (str | None, None, {}) if optional else (str, Parameter.empty, {})
+    if metavar.endswith("...") and not metavar.endswith(",..."):
+        return list[str] | None, None, {}
+    match = _DEFAULT.fullmatch(metavar)
+    value, default = (match[1], match[2]) if match else (metavar, None)
+    if value == "N":
+        least = 1 if default is None else 0
+        return (int, int(default), {"min": least}) if default else (int | None, None, {"min": least})
+    if value == "NUMBER":
+        return (float, float(default), {}) if default else (float | None, None, {})
+    if "|" in value and value.islower():
+        choice = Literal[tuple(value.split("|"))]  # type: ignore[valid-type]
+        return (choice, default, {}) if default else (choice | None, None, {})
+    suffixes = re.findall(r"\.\w+", value) if "(" in value else []
+    if suffixes:
+        return Path | None, None, {"callback": suffix_among(*suffixes)}
+    return str | None, None, {}
+
+
+def _answered(answer: Callable[[bool], None]) -> Callable[[bool], bool]:
+    """A flag's function as a callback: what it prints is all."""
+
+    def callback(value: bool) -> bool:
+        if value:
+            answer(value)
+            raise typer.Exit
+        return value
+
+    return callback

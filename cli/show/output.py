@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cli.show.colour import coloured
 from cli.show.commands import FORMS, ShowOptions, with_options
 from cli.show.files import refuse_inputs
+from cli.show.terminal import coloured
 from dalembert.errors import one_line
 from dalembert.results.columns import document as result_document
 
@@ -43,11 +43,11 @@ def declared_command(
     eager: Mapping[str, Callable[[bool], None]] | None = None,
     complete: Mapping[str, Callable[[Any, list[str], str], list[str]]] | None = None,
 ) -> Callable[[Callable[..., Result]], Callable[..., None]]:
-    """Make a command whose options are declared by their text alone (`cli.show.declared`).
+    """Make a command whose options are declared by their text alone (`cli.show.commands`).
 
     The function takes its own options, as attributes of a `values`, and the shared ones.
     """
-    from cli.show.declared import parameters
+    from cli.show.commands import parameters
 
     own = parameters(options, eager, complete)
     return lambda find: with_options(find, options, None, show, values, own)
@@ -65,6 +65,8 @@ def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None
         check_renamed()
         _stream(result, options)
         return
+    if options.steps:
+        result = _with_way(result)
     result = _in_chosen_units(result, options.units)
     whole = cache(_first(result))
     result = _with_first(result, whole)
@@ -140,12 +142,16 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
             print(verdict, file=sys.stderr)
     elif checked is not None:
         print(coloured(verdict, sys.stdout, not options.no_color))
-    elif options.text or (sys.stdout.isatty() and options.output is None):
+    elif options.text or ((options.steps or sys.stdout.isatty()) and options.output is None):
         width = get_terminal_size().columns if sys.stdout.isatty() else None
         text = paragraphs(result.notes(), *_tables_text(result, width), result.afterword())
         sys.stdout.write(coloured(text, sys.stdout, not options.no_color))
     elif options.output is None:
         sys.stdout.write(csv_text(_first(result)().cells))
+    if options.steps and not options.json and options.form != ".json":
+        from cli.show.way import way_text
+
+        sys.stdout.write(way_text(result, options.units, sys.stdout.isatty()))
     sys.stdout.flush()
     shown = (
         options.json or options.text or (checked is None and options.output is None and sys.stdout.isatty())
@@ -153,6 +159,13 @@ def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> 
     if not shown and options.form != ".json":
         for line in result.aside():
             print(f"note: {one_line(line)}", file=sys.stderr)
+
+
+def _with_way(result: Result) -> Result:
+    """Return the result with its worked solution shown."""
+    if result.way is None:
+        raise typer.BadParameter("expected a command that computes in steps", param_hint="--steps")
+    return replace(result, way=cache(result.way), shows_way=True)
 
 
 ROWS = 12  # rows of a further table that a terminal shows
@@ -220,7 +233,7 @@ def _report(
     """Return the files of --report."""
     if options.report is None:
         return {}
-    from cli.show.report_forms import pages
+    from cli.show.report import pages
 
     files = pages(result, options, asked, checked)
     return {path: partial(bytes, page) for path, page in files.items()}
@@ -276,10 +289,10 @@ def _formed(result: Result, form: str) -> bytes | Iterable[bytes]:
     every = ((name.strip("-"), table()) for name, table in result.tables.items())
     formed = {name: table for name, table in every if table.columns}
     if form == ".xlsx":
-        from cli.show.parts import workbook
+        from cli.show.files import workbook
 
         return workbook({name: [table] for name, table in formed.items()})
-    from cli.show.handed_on import handed_on
+    from cli.show.files import handed_on
 
     return handed_on(form, formed, result.warnings)
 
@@ -287,7 +300,7 @@ def _formed(result: Result, form: str) -> bytes | Iterable[bytes]:
 def _one_table(form: str, table: Callable[[], Table]) -> bytes | Iterable[bytes]:
     """Return a file of a single table."""
     if form == ".parquet":
-        from cli.show.parts import parquet
+        from cli.show.files import parquet
 
         return parquet([table()])
     from dalembert.results.text import csv_text

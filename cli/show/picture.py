@@ -1,4 +1,4 @@
-"""A figure as the bytes of a file."""
+"""A figure as the bytes of a file, and what a moving page shows."""
 
 from __future__ import annotations
 
@@ -6,10 +6,18 @@ import io
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from cli.read import options
+from cli.show.in_units import chosen_units, in_units
 from dalembert.errors import needs
+from dalembert.page import Shown, fits
+from dalembert.units import UNITS, to_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from dalembert.results.columns import Table
 
 
 def blank() -> Figure:
@@ -31,3 +39,31 @@ def drawn(draw: Callable[[], Figure], suffix: str) -> bytes:
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix)
     draw().savefig(stream, format=suffix, dpi=150, metadata=metadata)
     return stream.getvalue()
+
+
+# what a scene is drawn from: of these alone the page must know the unit
+DRAWN = ("length", "angle", "velocity", "acceleration", "speed", "force", "time")
+
+
+def refuse_long(count: int) -> None:
+    """Refuse --page of more poses than a page can hold."""
+    try:
+        fits(count)
+    except ValueError as error:
+        raise options.bad("--page", str(error)) from None
+
+
+def shown(table: Table, units: str | None) -> dict[str, Shown]:
+    """Return the columns of numbers under their SI headers, in the units of --units."""
+    chosen = {} if units is None else chosen_units(units)
+    pairs = zip(table.columns, in_units(table, chosen).columns, strict=True)
+    return {
+        column.header: Shown(np.array(other.values, dtype=float), other.header, _si(other.unit))
+        for column, other in pairs
+        if column.unit or not any(isinstance(value, str) for value in column.values)
+    }
+
+
+def _si(unit: str) -> float:
+    """Return what one of a unit is in SI; 1 where the page need not know."""
+    return next((float(to_si(1.0, d, unit)) for d in DRAWN if unit in UNITS[d]), 1.0)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from dalembert.results.columns import Document, Json
+    from dalembert.results.way import Topic
 
     # of a table, or of a list of the JSON document; and what is written of it
     Part: TypeAlias = "Table | list[Document]"
@@ -94,6 +95,10 @@ class Result:
     """What the table in parts is called, or the list in JSON, which stands behind what else is in the document."""
     within: Callable[[], AbstractContextManager[None]] = nullcontext
     """What the forms are made within: it turns errors of a library into those that a user is told."""
+    way: Callable[[], Sequence[Topic]] | None = None
+    """The worked solution, formed with --steps alone."""
+    shows_way: bool = False
+    """Whether it is asked for."""
     toml: Callable[[], bytes] | None = None
     """The mechanism's file that was found, for -o FILE.toml."""
     late_warnings: Callable[[], list[str]] = list
@@ -102,5 +107,9 @@ class Result:
     def documented(self) -> Document:
         """Return the JSON document, without its warnings."""
         if self.document is not None:
-            return self.document()
-        return {**self.head, **document(table() for table in self.tables.values())}
+            whole = self.document()
+        else:
+            whole = {**self.head, **document(table() for table in self.tables.values())}
+        if self.shows_way and self.way is not None:
+            whole = {**whole, "way": [topic.documented() for topic in self.way()]}
+        return whole

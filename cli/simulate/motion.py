@@ -14,12 +14,11 @@ import numpy as np
 from cli.cases import quantities
 from cli.cases.analysis import Analysis
 from cli.cases.axes import input_values
-from cli.cases.loop import Case, Variants
+from cli.cases.case import Case, TableCase, TableStudy
 from cli.cases.poses import column
 from cli.cases.quantities import SLIDE, Quantity, bounds_of, cells, in_rows, keys_of, nested
-from cli.cases.single import TableCase, TableStudy
 from cli.read import options
-from cli.show.page import shown as on_page
+from cli.show.picture import shown as on_page
 from dalembert.angles import read_degrees
 from dalembert.arithmetic.engines import anew
 from dalembert.errors import DataError
@@ -31,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from cli.cases.loop import Rows
+    from cli.cases.case import Rows
     from dalembert.results.columns import Column, Document
     from virtualwork import Mechanism
     from virtualwork.animation import Series
@@ -263,13 +262,13 @@ class Simulation(TableStudy):
         r = self.request
         return r.only is None and r.branch is None and not (r.forces or self.digits or self.json)
 
-    def cases(self, part: Variants) -> Iterator[tuple[Case | None, list[str]]]:
+    def cases(self, shown: Rows) -> Iterator[tuple[Case | None, list[str]]]:
         """The cases of some variants, each with its remarks; None where one cannot be simulated."""
         anew()
         if self.at_once:
-            yield from _lanes(self, part.shown)
+            yield from _lanes(self, shown)
             return
-        yield from super().cases(part)
+        yield from super().cases(shown)
 
 
 @dataclass(eq=False)

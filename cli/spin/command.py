@@ -78,7 +78,7 @@ def run(
     else:
         times = [options.number_or_quantity("--at", text, "time") for text in at or ["0"]]
     if page is not None:
-        from cli.show.page import refuse_long
+        from cli.show.picture import refuse_long
 
         refuse_long(len(times))
     turning = read_body(body)
@@ -89,7 +89,7 @@ def run(
         return tables.draw(rotation)
 
     def moving() -> bytes:
-        from cli.show.page import shown
+        from cli.show.picture import shown
         from rigidbody3d.animation import turning_page
 
         table = shown(tables.states(rotation), show.units)

@@ -9,6 +9,7 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.result import Result
+    from dalembert.results.way import Topic
 
 
 EXAMPLE = "riul-slider-crank"
@@ -40,10 +41,17 @@ def run(states: str, gravity: str | None = None, ledger: bool = False) -> Result
 
     table = read_states(states)
     balance = WorkBalance(table, g)
+
+    def way() -> list[Topic]:
+        from cli.work.way import way
+
+        return way(balance)
+
     return Result(
         tables=tables(balance, ledger_first=ledger),
         figure=lambda: draw(balance),
         method=METHOD,
+        way=way,
         about={"title": "Balance of virtual power"},
         warnings=[*table.table.warnings, *table.warnings, *balance.warnings],
     )

@@ -143,6 +143,10 @@ class WorkBalance:
         group, place = self.where[index]
         return self.groups[group][1], place
 
+    def group(self, index: int) -> tuple[LinkStates, Balance]:
+        """Return the states that a step is among, and what balances them."""
+        return self.groups[self.where[index][0]]
+
     def terms(self, index: int, *, bounds: bool = False) -> Iterator[Term]:
         """Yield the terms of a step, with the bounds of their errors where these are asked for."""
         step = self.states.steps[index]

@@ -8,7 +8,7 @@ import numpy as np
 
 from cli.imports.assembled import described
 from cli.imports.drawn import settle
-from cli.imports.told import read
+from cli.imports.programs import read
 from virtualwork import Mechanism
 
 FORMATS = Path(__file__).parents[1] / "data" / "formats"

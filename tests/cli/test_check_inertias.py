@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cli.body.inertias import Check, checks
-from cli.read.robots.reading import read
+from cli.read.robots import read_robot
 from tests.conftest import Dalembert
 
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
@@ -26,7 +26,7 @@ def link(entries: str, mass: str = "1", more: str = "", at: str = "0 0 0") -> st
 
 
 def only(text: str) -> Check:
-    (found,) = checks(read("file", text.encode(), None))
+    (found,) = checks(read_robot("file", text.encode(), None))
     return found
 
 

@@ -13,7 +13,7 @@ import pytest
 from cli.exports.written import written
 from cli.imports.assembled import described
 from cli.imports.drawn import settle
-from cli.imports.told import read
+from cli.imports.programs import read
 from tests.cli.exported import EXAMPLES, FILES, FOUR_BAR, MASSIVE, PLANETARY, exported, home, moved
 from tests.conftest import Dalembert
 from virtualwork import Mechanism

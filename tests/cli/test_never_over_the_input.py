@@ -78,7 +78,7 @@ def test_tables_beside_a_mechanism_are_kept(
     option: str, name: str, dalembert: Dalembert, tmp_path: Path
 ) -> None:
     before = (tmp_path / name).read_text()
-    refused(dalembert("mechanism", "m.toml", option, name), name)
+    refused(dalembert("forces", "m.toml", option, name), name)
     assert (tmp_path / name).read_text() == before
 
 

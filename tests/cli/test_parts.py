@@ -14,7 +14,7 @@ import pyarrow
 import pyarrow.parquet
 import pytest
 
-from cli.show import parts
+from cli.show import files
 from dalembert.results.columns import Column, Table
 from tests.conftest import Dalembert
 from virtualwork.formulas.positions import BLOCK
@@ -78,7 +78,7 @@ def test_a_block_is_a_row_group(dalembert: Dalembert, tmp_path: Path) -> None:
     assert file.schema_arrow.field("H_x_m").type == pyarrow.float64()
 
 
-@pytest.mark.parametrize("form", [parts.parquet, lambda tables: parts.workbook({"poses": tables})])
+@pytest.mark.parametrize("form", [files.parquet, lambda tables: files.workbook({"poses": tables})])
 def test_no_block_is_held_once_it_is_written(form: Callable[[Iterator[Table]], Iterator[bytes]]) -> None:
     made: list[weakref.ref[Table]] = []
 
@@ -97,9 +97,9 @@ def test_no_block_is_held_once_it_is_written(form: Callable[[Iterator[Table]], I
 
 
 def test_a_full_sheet_goes_on_on_the_next(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(parts, "MOST", 3)
+    monkeypatch.setattr(files, "MOST", 3)
     blocks = [Table([Column("x", "m", [float(4 * k + i) for i in range(4)])]) for k in range(2)]
-    (tmp_path / "b.xlsx").write_bytes(b"".join(parts.workbook({"poses": blocks})))
+    (tmp_path / "b.xlsx").write_bytes(b"".join(files.workbook({"poses": blocks})))
     book = openpyxl.load_workbook(tmp_path / "b.xlsx")
     assert book.sheetnames == ["poses", "poses 2", "poses 3"]
     rows = [list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets]

@@ -30,7 +30,8 @@ EXAMPLES = {
     "balance": "riul-rotor",
     "field": "pump-trials-left-on",
     "place": "blades",
-    "mechanism": "toggle-clamp",
+    "mechanism": "klann",
+    "forces": "toggle-clamp",
     "work": "riul-slider-crank",
     "body": "riul-rod",
     "spin": "tennis-racket",
@@ -85,7 +86,7 @@ def read(path: Path) -> Read:
 def made(dalembert: Dalembert, command: str, *options: str) -> subprocess.CompletedProcess[str]:
     example = EXAMPLES[command]
     assert dalembert("examples", example).returncode == 0
-    words = describe(example)["command"].split()[1:]
+    words = [word for word in describe(example)["command"].split()[1:] if word != "--text"]
     words = words[: words.index("--plot")] if "--plot" in words else words
     done = dalembert(*words, *options)
     assert done.returncode == 0, done.stderr

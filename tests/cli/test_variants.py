@@ -164,26 +164,27 @@ def test_many_variants_are_written_part_by_part(dalembert, files, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (("--over", "links.crnak.B.x=1:2:1"), "did you mean 'links.crank.B.x'"),
         (("--set", "links.coupler.H.x=1"), "expected links.coupler.H.length or links.coupler.H.angle"),
         (("--over", "links.crank.B=1:2:1"), "expected links.crank.B.x or links.crank.B.y"),
         (("--over", "links.crank.B.x=40:30:1"), "never gets from 40 to 30"),
         (("--over", "links.crank.B.x=40:nan:1"), "nan"),
-        (("--over", "links.crank.B.x"), "PATH=FROM:TO:STEP"),
+        (("--over", "links.crank.B.x"), "expected START:STOP:STEP"),
         (("--set", "links.crank.B.x=3kg"), "unit of mass"),
         (("--set", "links.coupler.mass=-1"), "must not be negative"),
         (("--set", "gravity=1", "--set", "gravity.x=1"), "two values X,Y"),
         (("--set", "gravity=1,2", "--set", "gravity.x=1"), "given twice"),
-        (("--over", "links.crank.B.x=1:2:1", "--cases", "v.csv"), "--over or --variants"),
+        (("--over", "links.crank.B.x=1:2:1", "--cases", "v.csv"), "given twice, by --cases and --over"),
         (("--over", "links.crank.B.x=40:41:1", "--states", "s.csv"), "expected one mechanism"),
     ],
 )
-def test_a_bad_option_is_one_line_and_nothing_is_written(dalembert, files, tmp_path, options, said):
-    found = dalembert("mechanism", files(), *options, "-o", "out.csv")
+def test_a_bad_option_is_one_line_and_nothing_is_written(dalembert, files, tmp_path, options, message):
+    (tmp_path / "v.csv").write_text("links.crank.B.x_mm\n40\n41\n")
+    found = dalembert("forces" if "--states" in options else "mechanism", files(), *options, "-o", "out.csv")
     assert found.returncode == 2
-    assert said in found.stderr
+    assert message in found.stderr
     assert not found.stdout
     assert not (tmp_path / "out.csv").exists()
 
@@ -195,7 +196,7 @@ def test_a_bad_option_is_one_line_and_nothing_is_written(dalembert, files, tmp_p
         ("links.crnak.B.x_mm\n40\n", "unknown dimension 'links.crnak.B.x_mm'"),
         ("links.crank.B_mm\n40\n", "links.crank.B"),
         ("links.crank.B.x_kg\n40\n", "'kg' is a unit of mass"),
-        ("crank_mm\n40\n", "no column names a dimension"),
+        ("crank_mm\n40\n", "'mm' is a unit of length"),
         ("links.crank.B.x_mm\n", "no rows"),
     ],
 )

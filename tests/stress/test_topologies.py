@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import cProfile
+import pstats
 from collections import Counter
-from time import process_time
 
 import numpy as np
 import pytest
@@ -48,11 +49,11 @@ FAULTS = {
 
 @pytest.mark.parametrize("seed", FAULTS)
 def test_a_fault_of_the_campaign(seed: int) -> None:
-    mechanism = generate(seed)
-    verdict(mechanism)
-    start = process_time()
-    assert verdict(generate(seed)) in ("put together", "refused")
-    assert process_time() - start < 1, FAULTS[seed]
+    verdict(generate(seed))
+    # calls are the same on every machine, seconds are not; 0.9 million take 0.7 s
+    work = cProfile.Profile()
+    assert work.runcall(verdict, generate(seed)) in ("put together", "refused")
+    assert pstats.Stats(work).total_calls < 1_500_000, FAULTS[seed]  # type: ignore[attr-defined]
 
 
 def _tally(seeds: range) -> None:

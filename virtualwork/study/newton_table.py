@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from virtualwork.branch.assembly import Assembly
 from virtualwork.branch.solutions import guessed_unknowns
 from virtualwork.describe import AssemblyError
 from virtualwork.describe.description import known_by_guess
-from virtualwork.formulas.newton import Iterate, newton, write_unknowns
-from virtualwork.formulas.numbers import Reals, stack
+from virtualwork.formulas.newton import Iterate, gaps, newton, write_unknowns
+from virtualwork.formulas.numbers import Reals, solve, stack, stack_rows
 from virtualwork.formulas.positions import State, columns
+from virtualwork.plan.steps import Group
 
 
 @record
@@ -47,18 +49,43 @@ class AllAtOnce:
         return f"AllAtOnce({', '.join(self.unknowns)}: {len(self.iterates)} iterates, {end})"
 
 
-def all_at_once(assembly: Assembly, inputs: tuple[float, ...], limit: int = 50) -> AllAtOnce:
-    """Solve all loops of a mechanism at once by Newton-Raphson from its guess, undamped, with the table of iterates.
+class Worked(NamedTuple):
+    """An iterate with its system: the unknowns, f (m; x and y of each loop), Φ, and Δx = −Φ⁻¹·f."""
 
-    x_{k+1} = x_k − Φ(x_k)⁻¹·f(x_k) (Nicoletti, lecture 7).
+    k: int
+    unknowns: Reals
+    residual: Reals
+    jacobian: Reals
+    step: Reals
 
-    Raises
-    ------
-    AssemblyError
-        Where the guess does not give every unknown angle.
+
+def worked(assembly: Assembly, inputs: tuple[float, ...], done: AllAtOnce) -> list[Worked]:
+    """Return the system of every iterate of `all_at_once`, with its numbers (Nicoletti, lecture 7).
+
+    Examples
+    --------
+    >>> from virtualwork import Guess, Input, Link, Mechanism
+    >>> m = Mechanism({"A": 0j, "D": 3}, {"crank": Link({"A": 0j, "B": 1}), "coupler": Link({"B": 0j, "C": 3}),
+    ...     "rocker": Link({"D": 0j, "C": 2})}, inputs=Input(link="crank"), guess=Guess(0.0, {"coupler": 0.7, "rocker": 1.7}))
+    >>> done = m.newton(0.0)
+    >>> first, second, *_ = worked(m.assembly, (0.0,), done)
+    >>> first.jacobian.shape, bool(np.allclose(first.unknowns + first.step, second.unknowns))
+    ((2, 2), True)
     """
+    group, st = _prepared(assembly, inputs)
+    found = []
+    for iterate in done.iterates:
+        x = iterate.unknowns[None]
+        with np.errstate(all="ignore"):
+            write_unknowns(group, st, x)
+            f, jacobian = stack_rows(gaps(group, st), 1), stack(columns(group, st), 1)
+            step = solve(jacobian, -f)
+        found.append(Worked(iterate.k, iterate.unknowns, f[0], jacobian[0], step[0]))
+    return found
 
-    m = assembly.mechanism
+
+def _prepared(assembly: Assembly, inputs: tuple[float, ...]) -> tuple[Group, State]:
+    """All loops as one group, and the state of what is known without them."""
     merged, group = assembly.merged
     if group is None:
         raise AssemblyError("newton: the mechanism has no loop to close")
@@ -67,19 +94,29 @@ def all_at_once(assembly: Assembly, inputs: tuple[float, ...], limit: int = 50) 
         if step is group:
             break
         assembly.run([step], st)
-    angles, points = known_by_guess(m)
-    for body in group.angles:
-        if body not in angles:
-            raise AssemblyError(
-                f"[guess]: newton starts from the guess, and the angle of '{body}' is missing there"
-            )
-    start = guessed_unknowns(group, st, angles, points, m, merged.directions)
-    assert start is not None
-    write_unknowns(group, st, start)
+    return group, st
+
+
+def all_at_once(
+    assembly: Assembly, inputs: tuple[float, ...], limit: int = 50, start: Reals | None = None
+) -> AllAtOnce:
+    """Solve all loops of a mechanism at once by Newton-Raphson from its guess, undamped, with the table of iterates.
+
+    x_{k+1} = x_k − Φ(x_k)⁻¹·f(x_k) (Nicoletti, lecture 7). `start`: the unknowns to begin with, in place of the guess.
+
+    Raises
+    ------
+    AssemblyError
+        Where the guess does not give every unknown angle.
+    """
+    m = assembly.mechanism
+    group, st = _prepared(assembly, inputs)
+    first = _guessed(assembly, group, st) if start is None else start[None]
+    write_unknowns(group, st, first)
     jacobian = stack(columns(group, st), 1)[0]
     table: list[Iterate] = []
     with np.errstate(all="ignore"):
-        x, closed = newton(group, st, start, m.size, limit, table, damped=False)
+        x, closed = newton(group, st, first, m.size, limit, table, damped=False)
         exact = assembly.state(inputs)
         # numpy's maximum keeps a NaN: where one link is not assembled there is nothing to compare with
         away = [
@@ -89,3 +126,17 @@ def all_at_once(assembly: Assembly, inputs: tuple[float, ...], limit: int = 50) 
         difference = float(np.max(away, initial=0.0))
     names = (*group.angles, *(m.guides[g].point for g in group.slides))
     return AllAtOnce(names, len(group.angles), tuple(table), jacobian, bool(closed[0]), difference)
+
+
+def _guessed(assembly: Assembly, group: Group, st: State) -> Reals:
+    """The unknowns at the guess, (1, unknowns)."""
+    m = assembly.mechanism
+    angles, points = known_by_guess(m)
+    for body in group.angles:
+        if body not in angles:
+            raise AssemblyError(
+                f"[guess]: newton starts from the guess, and the angle of '{body}' is missing there"
+            )
+    start = guessed_unknowns(group, st, angles, points, m, assembly.merged[0].directions)
+    assert start is not None
+    return np.asarray(start)

@@ -113,7 +113,7 @@ class LinkStates:
         Kinds without a load are never multiplied out.
         """
         found = {}
-        for kind, (load, rate) in self._products().items():
+        for kind, (load, rate) in self.products().items():
             if load.any():
                 size, power = np.abs(load), _power(load, rate)
                 fastest = self.fastest[0 if np.iscomplexobj(load) else 1]
@@ -152,7 +152,7 @@ class LinkStates:
     def power_error_estimate(self) -> Real:
         """Return a bound (...) of the rounding error of `power`, W."""
         size, cut = np.zeros(self.shape), np.zeros(self.shape)
-        for kind, (load, rate) in self._products().items():
+        for kind, (load, rate) in self.products().items():
             if kind in self.terms:
                 size = size + _sizes(load, rate)
                 # a power that was taken for none because it is below rounding may yet be one
@@ -161,7 +161,7 @@ class LinkStates:
 
     def term_error_estimate(self, kind: str) -> Real:
         """Return a bound (..., n) of the rounding error of each power of one kind, W."""
-        return np.broadcast_to(FACTORS * _sizes(*self._products()[kind]), self.shape)
+        return np.broadcast_to(FACTORS * _sizes(*self.products()[kind]), self.shape)
 
     def unit_power_error_estimate(self, unknown: UnitLoad) -> Real:
         """Return a bound (...) of the rounding error of the power of a unit of an unknown, W."""
@@ -169,8 +169,14 @@ class LinkStates:
         size = size + _sizes(np.asarray(unknown.torque, dtype=float), np.asarray(self.omega, dtype=float))
         return _summed(np.broadcast_to(size, self.shape))
 
-    def _products(self) -> dict[str, tuple[Any, Any]]:
-        """What is multiplied for the power of each kind: force and velocity, complex, or torque and angular velocity."""
+    def products(self) -> dict[str, tuple[Any, Any]]:
+        """Return what is multiplied for the power of each kind: force and velocity, complex, or torque and ω.
+
+        >>> states = LinkStates(velocity=[2 + 1j], mass=[3], gravity=-10j)
+        >>> force, velocity = states.products()["weight"]
+        >>> complex(force[0]), complex(velocity[0])
+        ((-0-30j), (2+1j))
+        """
         v, a, force = (np.asarray(x, dtype=complex) for x in (self.velocity, self.acceleration, self.force))
         mass, inertia, omega, alpha, torque = (
             np.asarray(x, dtype=float) for x in (self.mass, self.inertia, self.omega, self.alpha, self.torque)

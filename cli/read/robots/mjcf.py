@@ -10,7 +10,9 @@ import numpy as np
 
 from cli.read.robots.elements import At, child, children, named, parse
 from cli.read.robots.robot import (
+    DENSITY,
     DIAGONAL_FIRST,
+    SIZES,
     WORLD,
     Array,
     Inertial,
@@ -24,8 +26,9 @@ from cli.read.robots.robot import (
     pose,
     printed,
     quaternion,
+    together,
+    unit_mass,
 )
-from cli.read.robots.shapes import DENSITY, SIZES, together, unit_mass
 from dalembert.errors import DataError, quote
 from dalembert.tables.files import load
 

@@ -1,17 +1,16 @@
-"""The rows of a log side by side: rotors of like shape become arrays together, whatever their runs are called."""
+"""The rows of a table of runs side by side: rotors of like shape become arrays together."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cli.field.runs import SHOWN, Channel, Complex, Log, Real, Rows, Runs
-from cli.field.trial_runs import NO, YES
-from dalembert.errors import DataError
+from cli.field.runs import NO, SHOWN, YES, Channel, Complex, Log, Real, Rows, Runs, Trial
+from dalembert.errors import DataError, quote
 
 
 class Masses(NamedTuple):
@@ -58,10 +57,9 @@ class LogRows:
     """What the rows are of."""
     rotor: Rows
     vibration: Complex
-    channel: Rows
-    channels: list[Channel]
-    """The sensor, state and speed of each row."""
     masses: Masses
+    named: NDArray[np.bool_]
+    """Whether a row names a plane, or a mass where there is but one plane."""
     run: Rows
     runs: list[str]
     years: Real | None = None
@@ -69,6 +67,9 @@ class LogRows:
     reading_share: float = 0.0
     """By what share of it a reading may be off from its decimals."""
     mass_share: float = 0.0
+    channels: list[Channel] = field(default_factory=list)
+    channel: Rows = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    """The sensor, state and speed of each row."""
 
 
 class Lines(Sequence[Log]):
@@ -112,12 +113,16 @@ class Part(NamedTuple):
     """(g, r, s)."""
     masses: Complex
     """(g, r, p)."""
+    sizes: Real
+    """The sizes of all masses of which these are the sum, (g, r, p)."""
     standing: Complex
     """What is on the rotor in its last run, (g, p)."""
     last: list[str]
     """What that run is called, (g,)."""
     weights: Real | None
     """(g, s)."""
+    trials: list[Trial]
+    """The runs, the initial one first; none where all are fitted together."""
 
     def only(self, rotors: Rows, lines: Rows, channels: Rows) -> Part:
         """Return some lines and channels of some of the rotors."""
@@ -128,9 +133,11 @@ class Part(NamedTuple):
             self.planes,
             self.readings[np.ix_(rotors, lines, channels)],
             self.masses[np.ix_(rotors, lines)],
+            self.sizes[np.ix_(rotors, lines)],
             self.standing[rotors],
             [self.last[k] for k in rotors],
             None if self.weights is None else self.weights[np.ix_(rotors, channels)],
+            self.trials,
         )
 
 
@@ -162,14 +169,19 @@ class _Listed:
         """Return the numbers that these rotors have, (g, …): each of them as many."""
         return np.asarray(self.start[rotors, None] + np.arange(self.count[rotors[0]]))
 
-    def told_apart(self, label: Rows) -> Rows:
-        """Tell rotors apart whose lists differ, beside what tells them apart already."""
-        most = int(self.code.max(initial=0)) + 2
+    def told_apart(self, label: Rows, codes: Rows | None = None) -> Rows:
+        """Tell rotors apart whose lists differ, or these codes of them, beside what tells them apart already."""
+        of_list = self.code if codes is None else codes
+        most = int(of_list.max(initial=0)) + 2
         for j in range(int(self.count.max(initial=0))):
             has = self.count > j
-            code = np.where(has, self.code[np.where(has, self.start + j, 0)], most - 1)
+            code = np.where(has, of_list[np.where(has, self.start + j, 0)], most - 1)
             label = np.unique(label * most + code, return_inverse=True)[1]
         return label
+
+
+class NoInitialRun(DataError):
+    """No run is without a mass: all have to be fitted together."""
 
 
 class Sorted:
@@ -209,23 +221,67 @@ class Sorted:
         width = int(self.planes.count.max(initial=0))
         on = np.zeros((len(first), width), dtype=complex)
         on[self.run[at], self.planes.place] = value
+        sizes = np.abs(on)
         self.has = np.zeros(on.shape, dtype=bool)
         self.has[self.run[at], self.planes.place] = True
-        self.on = on
-        stays = self._stays()
+        self.on, self.sizes = on, sizes
+        self.stays = stays = self._stays()
+        self.after_kept = np.zeros(len(first), dtype=bool)
+        """Whether an earlier run of the rotor has left a mass on."""
         if stays.any():
-            standing = np.zeros((rotors, width), dtype=complex)
+            standing, size = np.zeros((rotors, width), dtype=complex), np.zeros((rotors, width))
+            kept = np.zeros(rotors, dtype=bool)
             for j in range(int(self.runs.count.max())):
                 mine = np.flatnonzero(self.runs.count > j)
                 run = self.runs.start[mine] + j
+                self.after_kept[run] = kept[mine]
                 on[run] += standing[mine]
-                standing[mine[stays[run]]] = on[run[stays[run]]]
+                sizes[run] += size[mine]
+                stay, here = mine[stays[run]], run[stays[run]]
+                standing[stay], size[stay], kept[stay] = on[here], sizes[here], True
             self.has |= on != 0
         read = np.zeros(len(first), dtype=bool)
         read[self.run[np.isfinite(rows.vibration[self.order])]] = True
         numbers = np.where(read, np.arange(len(first)), np.repeat(self.runs.start, self.runs.count))
         self.last = np.maximum.reduceat(numbers, self.runs.start)
         """The last run of each rotor in which anything was read."""
+
+    def find_initial(self, stored: bool) -> None:
+        """Find the initial run of each rotor, and refuse runs that are none with trial runs."""
+        rows, file = self.rows, self.rows.of.table.file
+        self.tried = np.zeros(len(self.runs.first), dtype=bool)
+        self.tried[self.run[rows.named[self.order]]] = True
+        bare = ~self.tried & ~self.after_kept
+        rotors = len(rows.of.rotors)
+        rotor_of = np.repeat(np.arange(rotors), self.runs.count)
+        many = np.bincount(rotor_of[bare], minlength=rotors)
+        if (many > 1).any():
+            rotor = int(np.argmax(many > 1))
+            run, again = np.flatnonzero(bare & (rotor_of == rotor))[:2].tolist()
+            one, two = (quote(rows.runs[self.runs.code[k]]) for k in (run, again))
+            if stored:
+                raise DataError(
+                    f"{file}: {rows.of.of(rotor)}runs {one} and {two} both have no trial mass: expected one run, for --influence "
+                    "gives the coefficients"
+                )
+            one, two = (rows.runs[self.runs.code[k]] for k in (run, again))
+            expected = f"a trial mass in run {two}, for run {one} is the initial one already"
+            raise rows.of.table.error(int(self.order[self.runs.first[again]]), "trial_plane", "", expected)
+        if not many.all():
+            raise NoInitialRun(
+                f"{file}: {rows.of.of(int(np.argmin(many)))}every run has a trial mass: expected an initial run with trial_plane, "
+                "trial_mass and trial_angle empty"
+            )
+        if not stored and (self.runs.count < 2).any():
+            raise DataError(
+                f"{file}: {rows.of.of(int(np.argmin(self.runs.count)))}no trial run: expected a run with a trial mass for every "
+                "plane, or stored coefficients by --influence"
+            )
+        self.initial = np.flatnonzero(bare)
+        """The initial run of each rotor."""
+        self.is_initial = np.zeros(len(self.order), dtype=bool)
+        self.is_initial[self.order] = bare[self.run]
+        """Which rows are of it."""
 
     def _agree(
         self, told: Rows, first: Rows, at: Rows, plane: Rows, value: Complex, counts: NDArray[np.bool_]
@@ -277,10 +333,19 @@ class Sorted:
         rotor, place = np.nonzero(active)
         return _Listed(rotor, self.planes.code[self.planes.start[rotor] + place], len(active)), place
 
-    def parts(self, named: Sequence[str | None] | None) -> Iterator[Part]:
-        """Yield rotors of like channels, planes and number of readings, and of like names where these count."""
+    def parts(self, named: Sequence[str | None] | None, stored: bool = False) -> Iterator[Part]:
+        """Yield rotors of like channels, planes and number of readings, and of like names where these count.
+
+        Of an initial run and trial runs the names of the runs count too; with stored coefficients the initial run is all.
+        """
         rows, rotors = self.rows, len(self.rows.of.rotors)
-        mine = np.flatnonzero(self.takes_part[self.run] & np.isfinite(rows.vibration[self.order]))
+        takes_part = self.takes_part[self.run] & np.isfinite(rows.vibration[self.order])
+        if stored:
+            takes_part &= self.is_initial[self.order]
+        mine = np.flatnonzero(takes_part)
+        if not rows.of.fitted:
+            # the initial run first
+            mine = mine[np.lexsort((~self.is_initial[self.order[mine]], self.rotor[mine]))]
         rotor, run, channel = self.rotor[mine], self.run[mine], rows.channel[self.order[mine]]
         lacking = np.flatnonzero(np.bincount(rotor, minlength=rotors) == 0)
         if len(lacking):
@@ -292,12 +357,17 @@ class Sorted:
             )
             raise DataError(f"{rows.of.table.file}: {of}{left}: expected runs to fit")
         again = _again(run * len(rows.channels) + channel)
-        lines = _Listed(rotor, run * (int(again.max()) + 1) + again, rotors)
+        repeats = int(again.max()) + 1
+        lines = _Listed(rotor, run * repeats + again, rotors)
         channels = _Listed(rotor, channel, rotors)
         planes, places = self._planes()
-        if named is None:
+        if named is None and rows.of.fitted:
             self._require_masses()
         label = planes.told_apart(channels.told_apart(lines.count))
+        if not rows.of.fitted:
+            of_line = run[lines.first]
+            codes = (self.runs.code[of_line] * 2 + self.stays[of_line]) * repeats + again[lines.first]
+            label = lines.told_apart(label, numbered(codes)[0])
         if named is not None:
             known: dict[str | None, int] = {}
             of_name = np.array([known.setdefault(name, len(known)) for name in named])
@@ -327,10 +397,20 @@ class Sorted:
                 [rows.masses.planes[k] for k in planes.code[columns[0]].tolist()],
                 readings,
                 np.take_along_axis(self.on[run[first]], places[columns][:, None, :], axis=2),
+                np.take_along_axis(self.sizes[run[first]], places[columns][:, None, :], axis=2),
                 np.take_along_axis(self.on[self.last[group]], places[columns], axis=1),
                 [rows.runs[k] for k in self.runs.code[self.last[group]].tolist()],
                 self._weights(group, self.order[mine[channels.first[heads]]]),
+                [] if rows.of.fitted else self._trials(run[first[0]]),
             )
+
+    def _trials(self, run: Rows) -> list[Trial]:
+        """Return the runs of rotors that were measured alike, in order; `run` is that of each row of readings."""
+        names, code = self.rows.runs, self.runs.code
+        return [
+            Trial(names[code[k]], np.flatnonzero(run == k).tolist(), bool(self.tried[k]), bool(self.stays[k]))
+            for k in dict.fromkeys(run.tolist())
+        ]
 
     def _require_masses(self) -> None:
         """Refuse a rotor on which no mass ever was."""

@@ -1,4 +1,4 @@
-"""Which program a file is from, told by its content."""
+"""Which program a file is from, recognised by its content."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from cli.imports import linkage2, linkage_sim, motiongen, pmks, pmkslist, pmksweb, robots
+from cli.imports import linkage2, linkage_sim, motiongen, pmks, pmksweb, robots
 from cli.imports.drawn import Drawing
 from cli.imports.words import unknown
-from cli.read.robots import reading
+from cli.read.robots import ROOTS, read_robot
 from cli.read.robots.elements import LARGEST_FILE
-from cli.read.robots.reading import ROOTS
 from dalembert.errors import DataError
 
 
@@ -79,10 +78,12 @@ def kind_of(file: str, text: str) -> str:
     line = next((unquote(row).strip() for row in text.splitlines() if row.strip()), "")
     if "mech=" in text or "mech%3" in text.lower():
         return "pmks-text"
-    if pmkslist.LINK.search(text):
-        return "pmks-web"
     string = line.rpartition("?")[2]
-    if pmksweb.STRING.fullmatch(string) or ("pmksplus" in line and "." in string):
+    if (
+        pmksweb.LISTED.search(text)
+        or pmksweb.STRING.fullmatch(string)
+        or ("pmksplus" in line and "." in string)
+    ):
         return "pmks-web"
     if any(re.search(r"(^|[\s,])(R|P|RP|G)[\s,]+[-+.\d]", row, re.IGNORECASE) for row in text.splitlines()):
         return "pmks-text"
@@ -94,12 +95,12 @@ def read(file: str, data: bytes, kind: str | None, folder: Path | None = None) -
     text = decoded(file, data)
     kind = kind or kind_of(file, text)
     if kind in ROOTS.values():
-        return kind, [robots.drawing(reading.read(file, data, folder))]
+        return kind, [robots.drawing(read_robot(file, data, folder))]
     if kind == "linkage":
         return kind, linkage2.read(file, text)
     if kind == "pmks-text":
         return kind, pmks.read(file, parsed(file, text) if text.lstrip()[:1] in ("{", "[") else text)
     if kind == "pmks-web":
-        return kind, (pmkslist if pmkslist.LINK.search(text) else pmksweb).read(file, text)
+        return kind, pmksweb.read(file, text)
     document = parsed(file, text)
     return kind, (motiongen if kind == "motiongen" else linkage_sim).read(file, document)

@@ -1,0 +1,317 @@
+"""The worked solution of `dalembert balance`: components and sums, moments about a plane, forces (Riul, eqs. 6 to 21)."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dalembert.angles import degrees
+from dalembert.results.columns import Column, Table, names, number
+from dalembert.results.way import Topic, figures
+from dalembert.units import from_si
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure, FigureBase
+
+    from balancing import Correction
+    from cli.balance.rotors import Balancing
+
+COMPONENTS = ("x", "y", "zx", "zy")
+
+
+def quadrant(x: float, y: float) -> int | None:
+    """Return the quadrant of a vector, an axis with the quadrant that it begins; None of nothing.
+
+    >>> [quadrant(*v) for v in ((1, 0), (0, 1), (-1, 0), (0, -1), (-328.3, -1402.0))], quadrant(0, 0)
+    ([1, 2, 3, 4, 3], None)
+    """
+    if x == 0 and y == 0:
+        return None
+    if y >= 0:
+        return 1 if x > 0 and y >= 0 else 2 if y > 0 else 3
+    return 4 if x >= 0 else 3
+
+
+def way(b: Balancing) -> list[Topic]:
+    """The topics of every rotor, one after the other."""
+    found = []
+    for group, rows, fix in b.solved:
+        for i, rotor in enumerate(group.tolist()):
+            found.append((rotor, _of_rotor(b, rotor, rows[i].tolist(), fix, i)))
+    return [topic for _, topics in sorted(found, key=lambda each: each[0]) for topic in topics]
+
+
+class _Scale:
+    """How the equations show an unbalance: as the document does, W·r in N·mm where the table has weights."""
+
+    def __init__(self, b: Balancing) -> None:
+        unit = b.rotors.unbalance_unit
+        self.length = b.length_unit
+        self.letter = "m"
+        if b.rotors.weights:
+            self.letter = "W"
+            length = self.length if self.length in ("mm", "m", "in") else "mm"
+            self.length, self.name = length, f"N·{length}"
+            self.factor = b.request.gravity * float(from_si(1.0, "length", length))
+        else:
+            self.name, self.factor = unit.replace("_", "·"), float(from_si(1.0, "unbalance", unit))
+        self.reach = float(from_si(1.0, "length", self.length))
+
+    def of(self, value: float) -> str:
+        return figures(value * self.factor)
+
+    def moment(self, value: float) -> str:
+        return figures(value * self.factor * self.reach)
+
+
+def _of_rotor(b: Balancing, rotor: int, rows: list[int], fix: Correction, i: int) -> list[Topic]:
+    head = {"rotor": b.rotors.names[rotor]} if len(b.rotors.names) > 1 else {}
+    title = f"Rotor {b.rotors.names[rotor]}: " if head else ""
+    scale = _Scale(b)
+    planes = [b.planes.name[b.plane_of_row[row]] for row in rows]
+    mine = np.flatnonzero(b.rotors.rotor == rotor)
+    has_z = b.rotors.z is not None and b.planes.z is not None
+    z_plane = [float(b.planes.z[b.plane_of_row[row]]) for row in rows] if b.planes.z is not None else []
+    about = z_plane[0] if has_z else None
+    made = b.ideal[rows]
+    topics = [_components(b, mine, about, planes[0], scale)]
+    masses = _masses(b, mine)
+    if len(planes) == 1 or not has_z:
+        static = complex(fix.static[i]) if fix.static.ndim else complex(fix.static)
+        text = [
+            f"Σ {scale.letter}·r + {scale.letter}_e·r_e = 0, each component alone (Riul, eqs. 6 to 11):",
+            f"  {_sum_of(scale, masses, 'x')} + x = 0,  x = {scale.of(-static.real)} {scale.name}",
+            f"  {_sum_of(scale, masses, 'y')} + y = 0,  y = {scale.of(-static.imag)} {scale.name}",
+        ]
+        topics.append(_plane(b, rows[0], planes[0], complex(made[0]), text, scale))
+    elif len(planes) == 2:
+        topics += _two_planes(b, rows, planes, z_plane, made, masses, scale, fix, i)
+    else:
+        topics += _many_planes(b, rows, planes, z_plane, made, scale, fix, i)
+    for topic in topics:
+        topic.head = {**head, **topic.head}
+        topic.title = title + topic.heading
+    last = topics[-1]
+    last.figure = partial(_figure, b, rotor)
+    return topics
+
+
+def _masses(b: Balancing, mine: Any) -> list[complex]:
+    return [complex(u) for u in b.rotors.moment[mine]]
+
+
+def _names(b: Balancing, mine: Any) -> list[str]:
+    every = b.rotors.table.texts.get("name") or [str(k + 1) for k in range(b.rotors.table.rows)]
+    return [every[k] for k in mine]
+
+
+def _components(b: Balancing, mine: Any, about: float | None, plane: str, scale: _Scale) -> Topic:
+    rotors = b.rotors
+    u = rotors.moment[mine]
+    z = rotors.z[mine] if rotors.z is not None else np.full(len(mine), np.nan)
+    lever = z - about if about is not None else np.full(len(mine), np.nan)
+    unit, length = rotors.unbalance_unit, b.length_unit
+    moment_unit = f"{unit}_{length}".replace(f"{length}_{length}", f"{length}2")
+    angle = degrees(u)
+    values = {"x": u.real, "y": u.imag, "zx": lever * u.real, "zy": lever * u.imag}
+
+    def component(name: str, amount: Any) -> Column:
+        if len(name) == 1:
+            return number(name, "unbalance", amount, unit)
+        return number(name, "inertia", amount, moment_unit)
+
+    shown = [c for c in COMPONENTS if about is not None or len(c) == 1]
+    columns = [
+        names("name", _names(b, mine)),
+        number("unbalance", "unbalance", np.abs(u), unit),
+        number("angle", "angle", angle),
+        *([number("z", "length", z, length)] if rotors.z is not None else []),
+        *(component(name, values[name]) for name in shown),
+    ]
+    hidden = [] if rotors.z is not None else [number("z", "length", z, length)]
+    hidden += [component(name, values[name]) for name in COMPONENTS if name not in shown]
+    sums = {name: np.array([np.sum(of)]) for name, of in values.items()}
+    total = Table(
+        [names("name", ["sum"], None), *(component(name, sums[name]) for name in shown)],
+        ("name",),
+        "sum",
+        documented=[component(name, sums[name]) for name in COMPONENTS if name not in shown],
+    )
+    text = ["Components of each unbalance, x = m·r·cos θ, y = m·r·sin θ:"]
+    if about is not None:
+        at = figures(about * scale.reach)
+        text = [
+            f"Components of each unbalance, and their moments about plane {plane} (z = {at} {scale.length.replace('_', '·')}), "
+            f"zx = (z − z_{plane})·x, zy = (z − z_{plane})·y:"
+        ]
+    rows = Table(columns, ("name",), "rows[]", documented=hidden)
+    return Topic("components", [*text, rows, total], "Components and sums", head={"about_z_m": about})
+
+
+def _sum_of(scale: _Scale, vectors: list[complex], axis: str, levers: list[float] | None = None) -> str:
+    """A sum with its numbers: `(20·1 350 + 65·(−2 598.08))`; of many its first terms."""
+    terms = []
+    for k, v in enumerate(vectors[:6]):
+        value = scale.of(v.real if axis == "x" else v.imag)
+        value = f"({value})" if value.startswith("−") else value
+        terms.append(value if levers is None else f"{figures(levers[k] * scale.reach)}·{value}")
+    return f"({' + '.join(terms)}{' + …' if len(vectors) > 6 else ''})"
+
+
+def _plane(
+    b: Balancing, row: int, name: str, made: complex, text: list[str], scale: _Scale, heading: str = ""
+) -> Topic:
+    radius = float(b.radius[row])
+    mass = abs(made) / radius
+    x, y = (value + 0.0 for value in (made.real, made.imag))
+    q = quadrant(x, y)
+    angle = float(degrees(np.array([made]))[0])
+    amount = (
+        f"W = {figures(mass * b.request.gravity)} N"
+        if b.rotors.weights
+        else f"m = {figures(float(from_si(mass, 'mass', b.rotors.mass_unit)))} {b.rotors.mass_unit}"
+    )
+    length = b.length_unit
+    lines = [
+        *text,
+        f"  √(x² + y²) = {scale.of(abs(made))} {scale.name}; at r = {figures(float(from_si(radius, 'length', length)))} {length}: {amount}",
+    ]
+    if q is not None:
+        signs = (
+            f"x {'<' if x < 0 else '>' if x > 0 else '='} 0, y {'<' if y < 0 else '>' if y > 0 else '='} 0"
+        )
+        lines.append(f"  tan θ = y/x; {signs}: quadrant {q}, θ = {figures(angle)}°")
+    if b.request.remove:
+        lines.append(f"  to remove instead: on the other side, at {figures((angle + 180.0) % 360.0)}°")
+    unit = b.rotors.unbalance_unit
+    table = Table(
+        [],
+        (),
+        "",
+        documented=[
+            number("x", "unbalance", [x], unit),
+            number("y", "unbalance", [y], unit),
+            names("quadrant", [q]),
+            number("unbalance", "unbalance", [abs(made)], unit),
+            number("mass", "mass", [mass], b.rotors.mass_unit),
+            number("angle", "angle", [angle]),
+        ],
+    )
+    return Topic(f"plane {name}", [*lines, table], heading)
+
+
+def _two_planes(
+    b: Balancing, rows: list[int], planes: list[str], z: list[float], made: Any, masses: list[complex],
+    scale: _Scale, fix: Correction, i: int,
+) -> list[Topic]:  # fmt: skip
+    first, second = planes
+    mine = np.flatnonzero(b.rotors.rotor == b.rotor_of_row[rows[0]])
+    assert b.rotors.z is not None
+    levers = [float(v) - z[0] for v in b.rotors.z[mine]]
+    apart = figures((z[1] - z[0]) * scale.reach)
+    couple = complex(np.ravel(fix.couple(fix.planes[..., 0]))[i])
+    c = complex(made[1])
+    w = scale.letter
+    text = [
+        f"ΣM = 0 about plane {first}: Σ a·{w}·r + a_{second}·{w}_{second}·r_{second} = 0 (Riul, eqs. 13 to 19):"
+    ]
+    for axis, mark, total, value in (
+        ("x", "C1", couple.real, c.real),
+        ("y", "C2", couple.imag, c.imag),
+    ):
+        text.append(
+            f"  {mark} = −{_sum_of(scale, masses, axis, levers)}/{apart} = −({scale.moment(total)})/{apart} = {scale.of(value)} {scale.name}"
+        )
+    found = [_plane(b, rows[1], second, c, text, scale, f"Plane {second}: moments about plane {first}")]
+    d = complex(made[0])
+    text = [f"ΣF = 0: Σ {w}·r + {w}_{second}·r_{second} + {w}_{first}·r_{first} = 0 (Riul, eqs. 12, 20, 21):"]
+    for axis, mark, other, value in (("x", "d1", c.real, d.real), ("y", "d2", c.imag, d.imag)):
+        text.append(
+            f"  {mark} = −({scale.of(other)} + {_sum_of(scale, masses, axis)}) = {scale.of(value)} {scale.name}"
+        )
+    return [*found, _plane(b, rows[0], first, d, text, scale, f"Plane {first}: forces")]
+
+
+def _many_planes(
+    b: Balancing, rows: list[int], planes: list[str], z: list[float], made: Any, scale: _Scale, fix: Correction, i: int
+) -> list[Topic]:  # fmt: skip
+    """Of three planes and more the corrections of least norm."""
+    square = sum((p - q) ** 2 for k, p in enumerate(z) for q in z[k + 1 :])
+    moments = [complex(np.ravel(fix.couple(fix.planes[..., k]))[i]) for k in range(len(z))]
+    found = []
+    for k, (name, value) in enumerate(zip(planes, made, strict=True)):
+        text = [
+            "Least norm: W_p = −Σ_q (z_p − z_q)·M_q / Σ_(q<r) (z_q − z_r)², M_q the moment about plane q:"
+        ]
+        for mark, part in (("x", "real"), ("y", "imag")):
+            terms = " + ".join(
+                f"{figures((z[k] - q) * scale.reach)}·({scale.moment(getattr(m, part))})"
+                for q, m in zip(z, moments, strict=True)
+                if q != z[k]
+            )
+            text.append(
+                f"  {mark} = −({terms})/{figures(square * scale.reach**2)} = {scale.of(getattr(complex(value), part))} {scale.name}"
+            )
+        found.append(_plane(b, rows[k], name, complex(value), text, scale))
+    return found
+
+
+def _figure(b: Balancing, rotor: int) -> Figure:
+    from cli.show.picture import blank
+
+    figure = blank()
+    polygons(b, rotor, figure)
+    return figure
+
+
+def polygons_below(b: Balancing, figure: Figure, dials: Callable[[FigureBase], None]) -> None:
+    """Draw the dials, and below them the closed polygons of each rotor that has a dial."""
+    from balancing.picture import MOST
+
+    rotors = range(min(len(b.rotors.names), MOST))
+    planes = max(len(range(b.rows_of(r).start, b.rows_of(r).stop)) for r in rotors)
+    above, each = 4.5 * len(rotors) + 0.8, 4.8
+    figure.set_size_inches(max(4.3 * planes, 9.6), above + each * len(rotors))
+    figure.set_layout_engine("constrained")
+    heights = [above, *[each] * len(rotors)]
+    top, *parts = figure.subfigures(1 + len(rotors), 1, height_ratios=heights, squeeze=False)[:, 0]
+    dials(top)
+    for r, part in zip(rotors, parts, strict=True):
+        polygons(b, r, part)
+
+
+def polygons(b: Balancing, rotor: int, figure: FigureBase) -> None:
+    """Draw the closed polygon of forces, and with several planes that of moments about the first."""
+    from balancing.polygons import Polygon, closed
+
+    mine, rows = np.flatnonzero(b.rotors.rotor == rotor), b.rows_of(rotor)
+    here = b.plane_of_row[rows]
+    unit = b.rotors.unbalance_unit
+    labels = _names(b, mine)
+    planes = [b.planes.name[p] for p in here]
+    given, made = b.rotors.moment[mine], b.ideal[rows]
+    every = [
+        Polygon("forces", labels, from_si(given, "unbalance", unit), planes, from_si(made, "unbalance", unit), unit)
+    ]  # fmt: skip
+    if b.rotors.z is not None and b.planes.z is not None and len(planes) > 1:
+        z = b.planes.z[here]
+        about = z[0]
+        length = b.length_unit
+        moment = f"{unit}_{length}".replace(f"{length}_{length}", f"{length}2")
+        factor = float(from_si(1.0, "inertia", moment))
+        every.append(
+            Polygon(
+                f"moments about plane {planes[0]}",
+                labels,
+                given * (b.rotors.z[mine] - about) * factor,
+                planes[1:],
+                (made * (z - about))[1:] * factor,
+                moment,
+            )
+        )
+    title = f"rotor {b.rotors.names[rotor]}: " if len(b.rotors.names) > 1 else ""
+    closed(every, title, figure)

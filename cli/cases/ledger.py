@@ -1,0 +1,150 @@
+"""The ledger of virtual power as a topic of the way: force, velocity, torque, omega and power of every load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from dalembert.results.columns import Column, Table, names
+from dalembert.results.way import Topic, figures, vector_text
+
+if TYPE_CHECKING:
+    from dalembert.results.columns import Cell
+
+PERPENDICULAR, REST, PAIR = "perpendicular to the displacement", "at rest", "pair"
+"""Why a force does no work (Riul, unit II, eq. 2 and what follows it)."""
+SYMBOLS = {"weight": "W", "inertia force": "Fi", "inertia torque": "Ti"}
+
+
+def of_link(letter: str, link: str) -> str:
+    """Return a letter with the link that it belongs to.
+
+    >>> of_link("ω", "3"), of_link("ω", "coupler")
+    ('ω3', 'ω(coupler)')
+    """
+    return f"{letter}{link}" if len(link) < 3 else f"{letter}({link})"
+
+
+class Entry(NamedTuple):
+    """A load at an instant: a force on a point that moves, or a torque on a link that turns."""
+
+    link: str
+    kind: str
+    force: complex | None = None
+    velocity: complex | None = None
+    torque: float | None = None
+    omega: float | None = None
+    power: float = 0.0
+    workless: str | None = None
+    field: str = ""
+    point: str = ""
+
+    @property
+    def symbol(self) -> str:
+        """How an equation calls the load: `W3`, `Fi4`, `T2`."""
+        return of_link(SYMBOLS.get(self.kind, "F" if self.force is not None else "T"), self.link)
+
+    @property
+    def rate(self) -> str:
+        """How an equation calls the velocity that it is multiplied with."""
+        return of_link("ω" if self.force is None else "V", self.link)
+
+    def equation(self) -> str:
+        """Return the product with its numbers: `W3·V3 = (0, −30)·(300, 200) = −6 000 W`."""
+        if self.force is not None and self.velocity is not None:
+            f, v = self.force, self.velocity
+            product = f"{vector_text(f.real, f.imag)}·{vector_text(v.real, v.imag)}"
+        else:
+            omega = figures(self.omega or 0.0)
+            product = f"{figures(self.torque or 0.0)}·{f'({omega})' if omega.startswith('−') else omega}"
+        return f"{self.symbol}·{self.rate} = {product} = {figures(self.power)} W"
+
+
+def why_not(load: complex | float, rate: complex | float, works: bool, fastest: float) -> str | None:
+    """Return why a load does no work; None where it does.
+
+    >>> why_not(-30j, 5.0, False, 5.0), why_not(-30j, 0j, False, 5.0), why_not(2.0, 3.0, True, 3.0)
+    ('perpendicular to the displacement', 'at rest', None)
+    """
+    if works:
+        return None
+    return REST if abs(rate) <= 1e-13 * fastest or isinstance(rate, float) else PERPENDICULAR
+
+
+def ledger(
+    place: str, instants: Sequence[tuple[Sequence[Column], Sequence[Entry]]], before: Sequence[str | Table]
+) -> Topic:
+    """Make the topic: a list in JSON, below `place`, with the terms of every instant.
+
+    `instants`: the columns (one row) that name an instant, and its loads; `before`: equations above the table.
+    """
+    heads = [columns for columns, _ in instants]
+    every = [(i, entry) for i, (_, entries) in enumerate(instants) for entry in entries]
+    pose = Column("instant", "", [str(i) for i in range(len(instants))])
+    joined = [
+        Column(
+            each.name,
+            each.unit,
+            [columns[k].values[0] for columns in heads],
+            place=each.place,
+            stored=None if each.stored is None else [columns[k].documented[0] for columns in heads],
+        )
+        for k, each in enumerate(heads[0] if heads else ())
+    ]
+    index = Column("instant", "", [str(i) for i, _ in every])
+    named = [Column(c.name, c.unit, [heads[i][k].values[0] for i, _ in every]) for k, c in enumerate(joined)]
+    several = any(entry.field for _, entry in every)
+    points = any(entry.point for _, entry in every)
+    shown = [
+        *(named if len(instants) > 1 else []),
+        *([names("field", [e.field or None for _, e in every], None)] if several else []),
+        names("link", [e.link for _, e in every], None),
+        names("kind", [e.kind for _, e in every], None),
+        *([names("point", [e.point or None for _, e in every], None)] if points else []),
+        *_components("F", "N", [e.force for _, e in every]),
+        *_components("V", "m_s", [e.velocity for _, e in every]),
+        Column("torque", "N_m", [e.torque for _, e in every]),
+        Column("omega", "rad_s", [e.omega for _, e in every]),
+        Column("power", "W", [e.power for _, e in every]),
+        names("workless", [e.workless for _, e in every], None),
+    ]
+    documented = [
+        *([names("field", [e.field for _, e in every])] if several else []),
+        names("link", [e.link for _, e in every]),
+        names("kind", [e.kind for _, e in every]),
+        *([names("point", [e.point or None for _, e in every])] if points else []),
+        _vectors("force_N", [e.force for _, e in every]),
+        _vectors("velocity_m_s", [e.velocity for _, e in every]),
+        names("torque_N_m", [e.torque for _, e in every]),
+        names("omega_rad_s", [e.omega for _, e in every]),
+        names("power_W", [e.power for _, e in every]),
+        names("workless", [e.workless for _, e in every]),
+    ]
+    return Topic(
+        "ledger",
+        [
+            *before,
+            Table([], ["instant"], place, documented=[pose, *joined]),
+            Table(shown, ("instant", "link", "kind"), f"{place}.terms[]", documented=[index, *documented]),
+        ],
+        "Ledger of virtual power (Riul, unit II, eqs. 3 to 5)",
+    )
+
+
+def _components(letter: str, unit: str, values: Sequence[complex | None]) -> list[Column]:
+    """The two components of vectors, as they are shown."""
+    return [
+        Column(f"{letter}{axis}", unit, [None if v is None else getattr(v, part) for v in values])
+        for axis, part in (("x", "real"), ("y", "imag"))
+    ]
+
+
+def _vectors(place: str, values: Sequence[complex | None]) -> Column:
+    """Vectors as JSON has them; null where there is none."""
+    stored: list[Any] = [None if v is None else [_plain(v.real), _plain(v.imag)] for v in values]
+    return Column(place, "", [None] * len(stored), place=place, stored=stored)
+
+
+def _plain(value: float) -> Cell:
+    """A number as JSON can have it; no −0."""
+    return float(value) + 0.0 if value - value == 0 else None

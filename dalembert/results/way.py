@@ -1,0 +1,76 @@
+"""The way to a result, as a book has it: topics of equations with numbers and of tables of quantities.
+
+Terminal, report and JSON walk the same topics; a command forms them with --steps alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from dalembert.results.columns import Table, document
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from dalembert.results.columns import Document, Json
+
+
+@dataclass(eq=False, repr=False)
+class Topic:
+    """A step of the way: what it is about, then equations and tables in the order of the book.
+
+    Examples
+    --------
+    >>> from dalembert.results.columns import number
+    >>> moments = Table([number("x", "unbalance", [0.5])], place="")
+    >>> Topic("plane B", ["ΣM_A = 0", moments], head={"rotor": "1"}).documented()
+    {'topic': 'plane B', 'rotor': '1', 'x_kg_m': 0.5}
+    """
+
+    name: str
+    """What JSON calls it."""
+    parts: Sequence[str | Table] = ()
+    """Equations and sentences as text, and tables; a table's `place` is where it stands in this topic's JSON."""
+    title: str = ""
+    """What stands above it, where that is more than the name."""
+    head: Mapping[str, Json] = field(default_factory=dict)
+    """What else JSON has of it, in front of the tables."""
+    figure: Callable[[], Figure] | None = None
+    """Its picture, for the report."""
+
+    @property
+    def heading(self) -> str:
+        """What stands above it."""
+        text = self.title or self.name
+        return text[:1].upper() + text[1:]
+
+    def documented(self) -> Document:
+        """Return its entry in the JSON list `way`."""
+        tables = [part for part in self.parts if isinstance(part, Table)]
+        return {"topic": self.name, **self.head, **document(tables)}
+
+
+def figures(value: float) -> str:
+    """Return a number as it stands in an equation: six figures, a true minus sign, thousands apart.
+
+    >>> figures(-2500000.0), figures(0.05), figures(-1e-9)
+    ('−2 500 000', '0.05', '−1e−09')
+    """
+    text = f"{value + 0.0:.6g}"
+    if "e" in text and 1e6 <= abs(value) < 1e9:
+        text = f"{float(text):.0f}"
+    if "e" not in text:
+        whole, point, rest = text.partition(".")
+        text = f"{int(whole):,}".replace(",", "\u2009") + point + rest if whole.lstrip("-") != "0" else text
+    return text.replace("-", "−").replace("\u2009", " ")
+
+
+def vector_text(x: float, y: float) -> str:
+    """Return a vector of the plane as it stands in an equation: `(300, 200)`.
+
+    >>> vector_text(300.0, -200.0)
+    '(300, −200)'
+    """
+    return f"({figures(x)}, {figures(y)})"
