@@ -8,8 +8,8 @@ Further inputs of the tape
 --------------------------
 `sign GROUP`         of every closed form that has two assemblies
 `links.crank.B.x`    a dimension, by its path
-`guess crank`        an angle of the guess, and `at 0`, an input there: of gears, whose constant is that of the guess
-`phase 0`            the constant of a gear that the guess fixes by way of other links
+`guess crank`        an angle of the guess, and `at 0`, an input there: of gears, belts and racks, whose constant is that of the guess
+`phase 0`            the constant of one of these that the guess fixes by way of other links
 `f 0`                the first unknown of redundant statics
 """
 
@@ -30,7 +30,7 @@ from virtualwork.describe.dimensions import Dimension, changed, dimensions, valu
 from virtualwork.formulas.dynamics import applied_loads, reduced
 from virtualwork.formulas.effort import generalized_force
 from virtualwork.formulas.lanes import Turning
-from virtualwork.formulas.newton import gaps, unknowns
+from virtualwork.formulas.newton import gaps
 from virtualwork.formulas.numbers import Written
 from virtualwork.formulas.positions import State
 from virtualwork.formulas.recording import Recording
@@ -72,7 +72,7 @@ class Numbers:
                 if isinstance(number, Varied):
                     numbers[path] = number
         self.mechanism = changed(m, numbers)
-        if m.gears:
+        if m.meshes:
             self.mechanism = replace(self.mechanism, guess=self._guess())
 
     def _number(self, dimension: Dimension) -> Any:
@@ -83,6 +83,11 @@ class Numbers:
             if abs(x / (math.pi / 2) - quarters) <= 1e-15 * max(1.0, abs(quarters)):
                 exact = QUARTER * float(quarters)
         whole = dimension.kind == "number" and x.is_integer()
+        if dimension.where[0] == "belts":
+            # a ratio in whole numbers turns without the angle itself
+            first, second = self._of.belts[int(dimension.where[1])].radii
+            whole = (first / second).is_integer()
+            exact = Doubled(x) if whole else exact
         if not exact.low and (x == 0 or whole or (dimension.kind != "angle" and abs(x) == 1)):
             # it is as exact as it stands, and costs nothing
             return x
@@ -120,7 +125,6 @@ class Exact(Recording):
     ("generalized", j)          the effort as if every motor sat on the body that its angle is measured from
     ("applied", link)           complex: what acts on a link but its weight and inertia
     ("applied moment", link)    about its centre of mass
-    ("unknown", group, i)       of a group without a closed form: an unknown one step of Newton's on from what enters
     ("gap", group, loop)        complex: what the unknowns of a group leave open of a loop
     ("balance", row)            what the forces that enter leave of an equation of redundant statics
 
@@ -177,9 +181,6 @@ class Exact(Recording):
 
     def _gap(self, group: str, loop: int) -> Number:
         return gaps(self.solved(group), self.st)[loop]
-
-    def _unknown(self, group: str, i: int) -> Number:
-        return unknowns(self.solved(group), self.st)[i]
 
     def _generalized(self, j: int) -> Number:
         paths, _, block = self.forces
