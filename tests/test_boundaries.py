@@ -57,6 +57,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "picture",
             "reading_errors",
             "rotor",
+            "severity",
             "synchronous",
         ),
     ),
