@@ -66,9 +66,10 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("mechanism",),
         ("intime",),
         ("motion",),
+        ("computing",),
         ("family",),
         ("animation", "evaluator", "parts_of_motion", "still"),
-        ("forces", "table"),
+        ("forces", "quantities", "table"),
         ("picture",),
         ("study",),
         ("textbook",),
@@ -80,7 +81,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "rigidbody3d": (
         ("__init__",),
-        ("freebody", "gyroscope", "integration", "momentum", "shaft", "top"),
+        ("freebody", "gyroscope", "integration", "momentum", "percussion", "shaft", "top"),
         ("body", "free_rotation", "states"),
         ("animation", "picture"),
         ("rounding_in_time", "solids", "traced"),
@@ -91,6 +92,8 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "cli": (
         ("__main__",),
         ("app",),
+        ("grade",),
+        ("exercise",),
         ("exports", "imports"),
         (
             "balance",
@@ -123,7 +126,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "dalembert": (
         ("__init__",),
         ("arithmetic", "drawing", "page", "results", "tables"),
-        ("angles", "quantities"),
+        ("angles", "figures", "quantities"),
         ("units",),
         ("errors", "hints", "memory"),
     ),
@@ -150,7 +153,7 @@ PACKAGES = (
         "dalembert.results",
         "dalembert.tables",
     ),
-    ("dalembert.angles", "dalembert.quantities"),
+    ("dalembert.angles", "dalembert.figures", "dalembert.quantities"),
     ("dalembert.units",),
     ("dalembert.errors", "dalembert.hints", "dalembert.memory"),
 )
