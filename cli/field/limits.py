@@ -39,7 +39,7 @@ def zones(b: FieldBalancing) -> Table:
 
     def zone(vibration: Complex) -> list[str]:
         size = to_si(np.abs(vibration), "amplitude", b.runs.amplitude_unit.removesuffix(tag))
-        return severity_zone(RMS[tag] * np.asarray(size) / to_si(1.0, "amplitude", "m_s"), machine).tolist()
+        return list(severity_zone(RMS[tag] * np.asarray(size) / to_si(1.0, "amplitude", "m_s"), machine))
 
     rows, named, hidden = of_channels(b)
     before, after = (rows.numbers(lambda s, of=of: getattr(s, of)) for of in ("initial", "residual"))  # type: ignore[misc]
