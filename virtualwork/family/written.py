@@ -133,7 +133,9 @@ class Written:
             # zero is allowed
             bounded = (getattr(link, key.field) for key in keys_of(Link) if key.form.restricts)
             yield from (RECORDED.select(-bare(x), -1.0, 1.0) for x in bounded)
-        yield from (abs(bare(gear.ratio)) for gear in m.gears)
+        yield from (abs(bare(ratio)) for ratio in m.ratios)
+        yield from (bare(radius) for belt in m.belts for radius in belt.radii)
+        yield from (abs(bare(rack.radius)) for rack in m.racks)
 
     def told(self, samples: int) -> Tape:
         """The tape of how all closed forms close at the inputs of the guess, and whether that is told plainly.

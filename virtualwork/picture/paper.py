@@ -32,6 +32,8 @@ LINES: dict[str, dict[str, Any]] = {
     "link": {"lw": 2.2, "solid_capstyle": "round"},
     "wheel": {"lw": 1.1, "ls": CHAIN},
     "spoke": {"lw": 1.4},
+    "belt": {"lw": 1.6},
+    "rack": {"lw": 1.4},
     "slot": {"lw": 0.9},
     "block": {"lw": 1.4},
     "spring": {"color": "0.25", "lw": 0.9},
