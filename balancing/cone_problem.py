@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.qr import triangle
+from balancing.triangle import triangle
 from dalembert.arithmetic.exact import EPS
 
 Real = NDArray[np.float64]

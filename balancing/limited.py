@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 
 from balancing.cone_problem import ConeProblem, solve
 from balancing.dependence import DependentPlanes, columns_scaled, roundings
-from balancing.qr import smallest_squares, triangle
+from balancing.qr import smallest_squares
+from balancing.triangle import triangle
 from dalembert.arithmetic.exact import EPS
 
 Real = NDArray[np.float64]

@@ -269,7 +269,7 @@ def _error(fine: Travel, coarse: Travel, t: Reals, part: float) -> Reals:
 def _least(fine: Travel, t: Reals) -> Reals:
     """What no shorter steps make smaller: rounding, and interpolation near change points, (n, k)."""
     q, v, a, _ = fine.at(t)
-    return np.asarray(rounding(t, q, v, a) + fine.blur(t)[:, None])
+    return np.asarray(np.maximum(rounding(t, q, v, a), fine.noise(t)) + fine.blur(t)[:, None])
 
 
 def _arrives(fine: Travel, coarse: Travel, levels: Levels, part: float) -> bool:

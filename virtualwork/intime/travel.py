@@ -21,6 +21,8 @@ from virtualwork.intime.path import Method, Path, followed
 from virtualwork.intime.walk import MOST, Walk
 from virtualwork.intime.watch import Floats, noise
 
+# standard deviations of rounding that count
+DEVIATIONS = 3.0
 # changes of coordinates in one simulation
 CHANGES = 10_000
 # changes of the mode of friction at one time, for each joint that rubs
@@ -112,6 +114,23 @@ class Travel:
                 t, places = [*t, nodes.t[1:]], [*places, way]
                 before, place = float(ends[-1]), float(way[-1])
         return np.interp(times, np.concatenate(t), np.concatenate(places))
+
+    def noise(self, times: Reals) -> Reals:
+        """How far the coordinates may be wrong for what rounds in their accelerations, at times between nodes too, (n, k)."""
+        k = self.legs[0].equations.k
+        t, places, place = [self.legs[0].nodes.t[:1]], [np.zeros((1, k))], np.zeros(k)
+        before = np.zeros(k)
+        for leg in self.legs:
+            if leg.steps:
+                h = np.diff(leg.nodes.t)[:, None]
+                # a step takes each stage with its weight, and each of them rounds by itself
+                each = DEVIATIONS * leg.noise * float(np.linalg.norm(leg.method.stages[1])) * h
+                squares = before + np.cumsum(each**2, axis=0)
+                way = place + np.cumsum(np.sqrt(squares) * h, axis=0)
+                t, places = [*t, leg.nodes.t[1:]], [*places, way]
+                before, place = squares[-1], way[-1]
+        nodes, whole = np.concatenate(t), np.concatenate(places)
+        return np.stack([np.interp(times, nodes, of) for of in whole.T], axis=1)
 
     @property
     def halves(self) -> Floats:
