@@ -252,11 +252,12 @@ def test_what_is_hidden_in_an_old_workbook() -> None:
 
     begin = len(book(0, 0))
     data = compound(book(begin, begin + len(other + end)) + other + end + sheet + end)
-    assert looks(data, "Öl1") == ({1}, {3, 4}, {(1, 0), (1, 2), (2, 1), (2, 3)})
-    assert looks(data, "Other") == ({7}, set(), set())
+    rows, columns, percent = map(set, looks(data, "Öl1"))
+    assert (rows, columns, percent) == ({1}, {3, 4}, {(1, 0), (1, 2), (2, 1), (2, 3)})
+    assert list(map(set, looks(data, "Other"))) == [{7}, set(), set()]
     # of what is damaged nothing is known
-    assert looks(data[:1100], "Öl1") == (set(), set(), set())
-    assert looks(b"\xd0\xcf", "Öl1") == (set(), set(), set())
+    assert not any(looks(data[:1100], "Öl1"))
+    assert not any(looks(b"\xd0\xcf", "Öl1"))
 
 
 def test_a_hidden_row_of_an_old_workbook_is_named(dalembert: Dalembert, plain: str, tmp_path: Path) -> None:
