@@ -365,7 +365,11 @@ class Exact:
             wheel = self.series(rack.gear, self.m.bodies[rack.gear][pin], 0)[0]
             touch, bodies = wheel - 1j * mp.mpf(rack.radius) * along, ((g.link, 1), (rack.gear, -1))
         # in a slot the link may turn: a block of no mass takes the teeth, pinned to the link, and its guide the moment
-        seat = touch if g.is_slider or rack.gear == g.link else self.series(g.link, self.m.bodies[g.link][g.point], 0)[0]
+        seat = (
+            touch
+            if g.is_slider or rack.gear == g.link
+            else self.series(g.link, self.m.bodies[g.link][g.point], 0)[0]
+        )
         row.clear()
         if g.on != GROUND:
             row[3 * self.links.index(g.on)] = mp.im(mp.conj(touch - seat) * along)
