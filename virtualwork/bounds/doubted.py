@@ -30,6 +30,7 @@ from dalembert.arithmetic.guard import guarded
 from dalembert.arithmetic.recorded import RECORDED, Number, Recorder, bare
 from dalembert.arithmetic.rounding import UNIT_ROUNDOFF
 from dalembert.arithmetic.varied import made
+from virtualwork.describe.description import Description
 from virtualwork.formulas.asked import Key
 from virtualwork.formulas.dynamics import applied_loads, reduced
 from virtualwork.formulas.effort import generalized_force
@@ -131,6 +132,13 @@ class Constants:
         return step
 
 
+def _ratios(m: Description) -> Iterable[float]:
+    """By what the turns of gears, belts and racks are multiplied."""
+    yield from m.ratios
+    for rack in m.racks:
+        yield from (rack.radius, 1 / rack.radius)
+
+
 def _differences(
     places: NDArray[np.complex128], known: dict[complex, tuple[float, float]]
 ) -> dict[complex, tuple[float, float]]:
@@ -174,7 +182,7 @@ class Doubted(Recording):
         m = branch.mechanism
         through = {body: [m.through(g) for g in m.guides if g.on == body] for body in m.bodies}
         places = [[*of.values(), *through[body]] for body, of in m.bodies.items()]
-        constants = Constants(branch.plan, places, [gear.ratio for gear in m.gears])
+        constants = Constants(branch.plan, places, _ratios(m))
         self.constants, self.entered = constants.numbers, entered
         self._left: dict[str, list[Number]] = {}
         self._groups: dict[Key, tuple[str, ...]] = {}
