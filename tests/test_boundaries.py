@@ -91,11 +91,10 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "cli": (
         ("__main__",),
         ("app",),
-        ("exports", "imports"),
+        ("completion", "exports", "imports"),
         (
             "balance",
             "body",
-            "completion",
             "equilibrium",
             "engine",
             "examples",
