@@ -52,6 +52,13 @@ GROUPS = {
         "body": ("cli.body.command", "Put a body together: inertia, angular momentum, shaft reactions."),
         "spin": ("cli.spin.command", "Turn a body through time: free, under gravity, under a torque."),
     },
+    "Teaching": {
+        "exercise": (
+            "cli.exercise.command",
+            "Make the variants of an exercise: sheets, key, solutions, questions.",
+        ),
+        "grade": ("cli.grade.command", "Mark the answers to an exercise, and name likely mistakes."),
+    },
     "Files": {
         "import": ("cli.imports.command", "Import a mechanism drawn in another program."),
         "export": (
@@ -107,7 +114,7 @@ def _elsewhere() -> None:
 def _call_of(example: str) -> str:
     from cli.examples.command import describe
 
-    return describe(example)["command"]
+    return str(describe(example)["command"])
 
 
 def build(called: str | None) -> typer.Typer:

@@ -57,6 +57,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "picture",
             "reading_errors",
             "rotor",
+            "severity",
             "synchronous",
         ),
     ),
@@ -73,7 +74,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("study",),
         ("textbook",),
         ("branch",),
-        ("bounds",),
+        ("digits",),
         ("formulas",),
         ("drawing", "plan"),
         ("describe",),
@@ -91,6 +92,8 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "cli": (
         ("__main__",),
         ("app",),
+        ("grade",),
+        ("exercise",),
         ("completion", "exports", "imports"),
         (
             "balance",
@@ -122,7 +125,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "dalembert": (
         ("__init__",),
         ("arithmetic", "drawing", "page", "results", "tables"),
-        ("angles", "quantities"),
+        ("angles", "figures", "quantities"),
         ("units",),
         ("errors", "hints", "memory"),
     ),
@@ -149,7 +152,7 @@ PACKAGES = (
         "dalembert.results",
         "dalembert.tables",
     ),
-    ("dalembert.angles", "dalembert.quantities"),
+    ("dalembert.angles", "dalembert.figures", "dalembert.quantities"),
     ("dalembert.units",),
     ("dalembert.errors", "dalembert.hints", "dalembert.memory"),
 )

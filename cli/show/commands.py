@@ -17,6 +17,7 @@ import typer
 from typer.core import TyperCommand
 
 from cli.read.about import HEAD
+from cli.show.taking import take
 
 if TYPE_CHECKING:
     from cli.show.result import Result
@@ -209,7 +210,8 @@ def with_options(
             given["show"] = options
         result = find(**given) if asked is None else find(asked(**given), options)
         with result.within():
-            hand_on(result, options, said)
+            if not take(result):
+                hand_on(result, options, said)
 
     mine = [p for name, p in own.items() if name != "show" and not (two and name == "about")]
     parameters = [*mine, *shared.values()]
