@@ -80,7 +80,7 @@ class Rotor:
         for node, u in unbalances.items():
             force[2 * node] += speed**2 * u
         dynamic = of["k"] - speed**2 * of["m"] + 1j * speed * of["c"] + speed**2 * of["g"]
-        return np.linalg.solve(dynamic, force)[::2]
+        return np.asarray(np.linalg.solve(dynamic, force)[::2], dtype=complex)
 
     def modes(self, count: int) -> tuple[Real, Real]:
         """Return the lowest natural frequencies at rest, rad/s, and the shapes (count, nodes), largest value 1."""
