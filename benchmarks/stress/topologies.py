@@ -291,7 +291,8 @@ def rows(t: Topology) -> list[tuple[str, tuple[Any, ...]]]:
         found.append(("line", (g.link, m.links[g.link].points[g.point], g.on, g.through, g.angle)))
         if g.turned is not None:
             found.append(("turn", ({g.link: 1.0, g.on: -1.0}, (g.angle, g.turned), None)))
-    for part in (*m.gears, *m.belts):
+    toothed: tuple[Gear | Belt, ...] = (*m.gears, *m.belts)
+    for part in toothed:
         a, b = part.links
         held = {b: 1.0, a: -part.ratio}
         held[part.arm] = held.get(part.arm, 0.0) + part.ratio - 1.0
