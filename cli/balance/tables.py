@@ -138,7 +138,8 @@ def bearings(b: Balancing) -> Table:
     ]
     if carried.mass is not None and b.request.center is not None:
         share = np.array([z2 - b.request.center, b.request.center - z1]) / (z2 - z1)
-        static = np.tile(share * complex(0.0, carried.mass * b.request.gravity), (n, 1)).astype(complex)
+        weight = share * complex(0.0, carried.mass * b.request.gravity)
+        static = np.asarray(np.tile(weight, (n, 1)), dtype=np.complex128)
         columns += vector("static", "force", across(static), "xy")
     # rounding of nothing is shown as nothing
     left = np.where(np.abs(after) > 1e-12 * np.abs(before).max(axis=-1, keepdims=True), after, 0)
