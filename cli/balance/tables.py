@@ -143,7 +143,10 @@ def bearings(b: Balancing) -> Table:
         columns += vector("static", "force", across(static), "xy")
     # rounding of nothing is shown as nothing
     left = np.where(np.abs(after) > 1e-12 * np.abs(before).max(axis=-1, keepdims=True), after, 0)
-    turning = {"dynamic": -square * before, "corrected": -square * left}
+    turning: dict[str, Complex] = {
+        "dynamic": np.asarray(-square * before, dtype=np.complex128),
+        "corrected": np.asarray(-square * left, dtype=np.complex128),
+    }
     for name, force in turning.items():
         columns += vector(name, "force", across(force), "xy")
         columns.append(number(f"{name}_size", "force", np.abs(force).ravel(), place=f"{name}_size"))
