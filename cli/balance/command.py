@@ -31,7 +31,7 @@ How:
   remove  Corrections as material to remove, not to add.
   round_mass MASS  Round the corrections to this step, such as 0.1g.
   round_angle ANGLE  Round the angles to this step, such as 1deg.
-  workers N  Processes that solve many rotors.
+  modes FILE.csv  Mode shapes (z_* and a column for each mode): their modal sums vanish.
 How: the tolerance:
   center_z Z  Where the centre of mass lies: for the couple and the tolerance.
   grade GRADE  Balance quality grade of ISO 21940-11, such as G2.5; or API (4W/N), or MIL (MIL-STD-167-1).
@@ -39,6 +39,10 @@ How: the tolerance:
   rotor_mass MASS  Mass of the rotor, such as 12kg.
   permissible UNBALANCE  Permissible residual unbalance, such as 30g_mm, in place of a grade.
   bearings Z1:Z2  The bearing planes, where the tolerance holds; with --speed also the forces in them.
+Further options (docs/commands.md describes them):
+  mode_count K  Take the first K modes of --modes.
+  rigid  With --modes: force and couple vanish too (N + 2 planes).
+  workers N  Processes that solve many rotors.
 """
 
 
@@ -58,6 +62,9 @@ def run(
     rotor_mass: str | None = None,
     permissible: str | None = None,
     bearings: str | None = None,
+    modes: str | None = None,
+    mode_count: Annotated[int | None, typer.Option(min=1)] = None,
+    rigid: bool = False,
     workers: Annotated[int, typer.Option(min=1)] = 1,
     *,
     show: ShowOptions,
@@ -70,7 +77,7 @@ def run(
     """
     # numpy and what stands on it are loaded only once the command line itself is in order
     from cli.balance.rotors import Balancing, Carried, Request, read_rotors
-    from cli.balance.tables import METHOD, tables, warnings
+    from cli.balance.tables import METHOD, MODAL, tables, warnings
     from cli.read.planes import from_options, from_table
     from cli.read.tolerance import tolerance_of
     from cli.show.result import Result
@@ -79,9 +86,18 @@ def run(
         raise options.bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
     if not 1e-9 < gravity < 1e9:
         raise options.bad("--gravity", f"'{gravity:g}': expected a positive number of m/s²")
+    if modes is None:
+        options.refuse("needs --modes", mode_count=mode_count, rigid=rigid)
+    else:
+        options.refuse("shows rigid balancing: it does not go with --modes", steps=show.steps, mass=mass)
+    shapes = None
+    if modes is not None:
+        from cli.balance.modes import read_modes
+
+        shapes = read_modes(modes, mode_count, rigid)
     chosen = from_table(planes) if planes is not None else from_options(plane or [], sought=True)
     carried = None
-    if bearings is not None and speed is not None:
+    if bearings is not None and speed is not None and shapes is None:
         carried = Carried(
             options.two_bearings("--bearings", bearings),
             options.needed("--speed", speed, "speed", positive=True),
@@ -97,8 +113,10 @@ def run(
         tolerance=None if only_forces else tolerance_of(grade, speed, rotor_mass, permissible, bearings),
         masses=_masses(mass or [], chosen),
         carried=carried,
+        modes=shapes,
     )
-    rotors = read_rotors(table, gravity, needs_z=chosen.several or carried is not None)
+    needs_z = chosen.several or carried is not None or shapes is not None
+    rotors = read_rotors(table, gravity, needs_z=needs_z)
     if carried is not None and chosen.z is None:
         raise options.bad("--bearings", "the forces need the place of the plane: --plane NAME:Z:RADIUS")
     with options.processes(workers) as executor:
@@ -119,9 +137,9 @@ def run(
         head={"correction": "remove" if remove else "add"},
         figure=figure,
         way=way,
-        method=METHOD,
+        method=METHOD if shapes is None else MODAL,
         about={"title": "Balancing of known masses"},
-        warnings=[*rotors.table.warnings, *warnings(balancing)],
+        warnings=[*rotors.table.warnings, *(shapes.warnings if shapes else []), *warnings(balancing)],
     )
 
 
