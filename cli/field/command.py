@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cli.field.tables import Tables
     from cli.show.result import Result, Sheet
     from dalembert.results.columns import Column, Table
+    from dalembert.results.way import Topic
 
 
 EXAMPLE = "fan-one-plane"
@@ -205,6 +206,11 @@ def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
 
         return draw(b, range(min(len(b.runs.rotors), 3)))
 
+    def way() -> list[Topic]:
+        from cli.field.way import way
+
+        return way(b)
+
     def aside() -> list[str]:
         if b.predict is None:
             return []
@@ -227,6 +233,7 @@ def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
         sheets=sheets,
         shows_input=True,
         about={"title": "Balancing in the field"},
+        way=way,
         beside={} if save_influence is None else {save_influence: stored},
         warnings=remarks,
     )
