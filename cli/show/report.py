@@ -35,9 +35,9 @@ if TYPE_CHECKING:
     from dalembert.results.columns import Cell
 
 
-ROWS = 36  # so many rows of a result are shown
-READ = 24  # so many rows of an input
-LINES = 100  # so many lines of a file
+ROWS = 36  # rows of a result that are shown
+READ = 24  # rows of an input that are shown
+LINES = 100  # lines of a file that are shown
 WIDE = 88  # characters beside each other that fit A4 and Letter
 VERDICT = "Verdict"  # of a report that begins with it
 TINY = 1e-9  # a number smaller than this may be the rounding of zero
@@ -211,7 +211,7 @@ def _printed(parts: Iterable[str | Table | Bars], finish: Callable[[Table], Tabl
 
 
 def _grids(table: Table) -> Iterator[Part]:
-    """Yield a table in blocks that fit the page, and what is left out of it."""
+    """Yield a table in blocks that fit the page, and what is omitted."""
     length = len(table.columns[0].values)
     thinned = table.columns[0].header in _THINNED
     every = -(-length // ROWS) if thinned else 1
