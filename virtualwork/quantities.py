@@ -163,7 +163,7 @@ def effort_name(slide: bool) -> str:
 
 def forces(m: Description, pairs: Iterable[tuple[Joint, str, str]]) -> list[Quantity]:
     """The effort of every input both ways and their difference, and what the joints carry and the ground feels."""
-    found = []
+    result = []
     for j, entry in enumerate(m.inputs):
         name, several = effort_name(entry.is_slide), len(m.inputs) > 1
         lead = f"{entry.name}_" if several else ""
@@ -180,35 +180,35 @@ def forces(m: Description, pairs: Iterable[tuple[Joint, str, str]]) -> list[Quan
             ),
             Quantity((), f"{lead}difference_{name}", euler, less=work, names=(f"{owner}.difference_{word}",)),
         ]
-        found += [each._replace(owners=(owner,)) for each in every]
-    return found + reactions(m, pairs)
+        result += [each._replace(owners=(owner,)) for each in every]
+    return result + reactions(m, pairs)
 
 
 def reactions(m: Description, pairs: Iterable[tuple[Joint, str, str]]) -> list[Quantity]:
     """What the joints carry, on one side and on the other, and what shakes the ground."""
     rub = {each.joint for each in m.friction}
-    found: list[Quantity] = []
+    result: list[Quantity] = []
     for joint, on, of in pairs:
-        found += _joint_force(joint, on, of, joint.guide is not None or joint.name in rub)
+        result += _joint_force(joint, on, of, joint.guide is not None or joint.name in rub)
         if len(joint.bodies) == 2:
             other = _joint_force(joint, of, on, joint.guide is not None or joint.name in rub)
-            found += [each._replace(reverse=True, owners=(f"{joint.name}.{of}",)) for each in other]
+            result += [each._replace(reverse=True, owners=(f"{joint.name}.{of}",)) for each in other]
     shaking = vector(("shaking",), "shaking_", FORCE, ("shaking",))
     shaking.append(Quantity(("shaking", "moment_N_m"), "shaking_moment_N_m", ("shaking moment",)))
-    return found + called(shaking, "shaking")
+    return result + called(shaking, "shaking")
 
 
 def _joint_force(joint: Joint, on: str, of: str, turns: bool) -> list[Quantity]:
     """The force and the moment of a joint on a body; a pin has a moment where it rubs."""
     path, lead = ("reactions", (joint.name, on, of)), f"{joint.name}_{of}_on_{on}_"
-    found = vector(path, lead, FORCE, ("force", joint.key, on))
+    result = vector(path, lead, FORCE, ("force", joint.key, on))
     key = ("moment", joint.key, on) if turns else ()
-    found.append(Quantity((*path, "moment_N_m"), f"{lead}moment_N_m", key))
+    result.append(Quantity((*path, "moment_N_m"), f"{lead}moment_N_m", key))
     side, kind = f"{joint.name}.{on}", joint.key.partition(":")[0]
     return [
         each._replace(
             names=(f"{side}.{_word(each)}", f"{side}.{kind}.{_word(each)}"),
             owners=(joint.name, on, of, side, f"{side}.{kind}"),
         )
-        for each in found
+        for each in result
     ]

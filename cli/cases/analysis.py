@@ -276,7 +276,7 @@ class Analysis:
     def named(self) -> list[Key]:
         """Places of the points, links and slides that are requested, as a motion computes them."""
         homes = self.mechanism.points
-        found: list[Key] = [("point", homes[name][0], 0j, name, 0) for name in self.points]
-        found += [("angle", name, 0) for name in self.links]
+        result: list[Key] = [("point", homes[name][0], 0j, name, 0) for name in self.points]
+        result += [("angle", name, 0) for name in self.links]
         slides = [each.key for each in self.places if each.path[0] == "slides"]
-        return [*found, *dict.fromkeys((*key[:2], 0) for key in slides)]
+        return [*result, *dict.fromkeys((*key[:2], 0) for key in slides)]

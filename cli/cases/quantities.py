@@ -130,9 +130,9 @@ def cells_of(
     Parameters
     ----------
     found : mapping
-        What the motion has been asked for.
+        What the motion has computed.
     given : mapping
-        Of driven links the angles as they were asked for, degrees.
+        Of driven links the angles as requested, degrees.
     where : array (n,) of bool, optional
         The poses that have any.
     """
