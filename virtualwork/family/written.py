@@ -99,7 +99,7 @@ class Written:
         return [("margin", group.name) for group in self.closed]
 
     def _once(self, write: Callable[..., Tape], *asked: Any) -> Tape:
-        """A tape, written when it is first asked for."""
+        """A tape, written on the first request."""
         key = write.__name__, *asked
         if key not in self._tapes:
             self._tapes[key] = write(*asked)
@@ -110,7 +110,7 @@ class Written:
         return self._once(self.recording.tape, tuple(keys))
 
     def tested(self, keys: Sequence[Key], also: Sequence[Key] = ()) -> Tape:
-        """The tape of quantities, and `sound`: positive where all is assembled that they, and others, hang on.
+        """The tape of quantities, and `sound`: positive where all is assembled that they, and others, depend on.
 
         And where forces among them have digits.
         """
@@ -206,7 +206,7 @@ class Written:
         return recorder.tape(outputs)
 
     def slopes(self, keys: tuple[Key, ...], enters: tuple[str, ...]) -> Tape:
-        """The tape of quantities' derivatives to what enters, as far as they hang on that."""
+        """The tape of quantities' derivatives to what enters, as far as they depend on that."""
         return self._once(self._slopes, keys, enters)
 
     def _slopes(self, keys: tuple[Key, ...], enters: tuple[str, ...]) -> Tape:
@@ -219,11 +219,11 @@ class Written:
 
     def _along(self, keys: tuple[Key, ...], steps: tuple[tuple[str, float], ...]) -> Tape:
         recorder = Recorder()
-        found = _again(self.slopes(keys, tuple(name for name, _ in steps)), recorder, {})
+        result = _again(self.slopes(keys, tuple(name for name, _ in steps)), recorder, {})
         parts = [part for key in keys for part in names(key)]
         return recorder.tape(
             {
-                part: sum(step * found.get(f"d({part})/d({name})", 0.0) for name, step in steps)
+                part: sum(step * result.get(f"d({part})/d({name})", 0.0) for name, step in steps)
                 for part in parts
             }
         )
