@@ -47,7 +47,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("balance", "correction", "run_log"),
         ("optimality",),
         ("limited", "loads", "rounding"),
-        ("influence", "propagation", "qr"),
+        ("influence", "modal", "propagation", "qr"),
         (
             "cone_problem",
             "dependence",
@@ -95,11 +95,10 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("app",),
         ("grade",),
         ("exercise",),
-        ("exports", "imports"),
+        ("completion", "exports", "imports"),
         (
             "balance",
             "body",
-            "completion",
             "equilibrium",
             "engine",
             "examples",
