@@ -8,7 +8,7 @@ What a tape has not is left to a page that replays: `refused` says what.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -19,7 +19,7 @@ from dalembert.arithmetic.engines.javascript import engine, written
 from dalembert.arithmetic.recorded import Number, Real, bare
 from dalembert.arithmetic.tape import Tape
 from dalembert.page import Page, Shown, packed
-from dalembert.units import UNITS, to_si
+from dalembert.page.typed import units
 from virtualwork.animation import JointForce, Series, moving_page
 from virtualwork.branch.assembly import Assembly
 from virtualwork.describe import DescriptionError
@@ -307,30 +307,6 @@ def handles(m: Description) -> list[list[Any]]:
                 elif point in part.polar and f"{path}.length" in every:
                     found.append([path, link, point, part.polar[point].origin])
     return found
-
-
-def units(kinds: Iterable[str]) -> dict[str, dict[str, list[float]]]:
-    """What can be typed: every unit of these dimensions, and what it is in SI and radians, as a ratio."""
-    found = {}
-    for kind in dict.fromkeys(kinds):
-        listed = UNITS.get(kind, {})
-        si = min(listed, key=lambda unit: abs(float(to_si(1.0, kind, unit)) - 1.0), default="")
-        # the SI unit first
-        order = sorted(listed, key=lambda unit: unit != si)
-        found[kind] = {spelled(unit): [float(x) for x in listed[unit]] for unit in order}
-    return found
-
-
-def spelled(unit: str) -> str:
-    """A unit of a header as people write it.
-
-    >>> spelled("m_s2"), spelled("N_m"), spelled("N_s_per_m"), spelled("kg_m3")
-    ('m/s2', 'N m', 'N s/m', 'kg m3')
-    """
-    above, per, below = unit.partition("_per_")
-    if not per and re.search(r"[a-z]_s[23]?$", above):
-        above, per, below = above.rpartition("_")
-    return above.replace("_", " ") + (f"/{below.replace('_', ' ')}" if per else "")
 
 
 def computing_page(

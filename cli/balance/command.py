@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.read import options
+from cli.show.commands import ShowOptions, suffix_among
 from cli.show.output import command
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.show.commands import ShowOptions
     from cli.show.result import Result
     from dalembert.results.way import Topic
 
@@ -37,6 +38,8 @@ How: the tolerance:
   rotor_mass MASS  Mass of the rotor, such as 12kg.
   permissible UNBALANCE  Permissible residual unbalance, such as 30g_mm, in place of a grade.
   bearings Z1:Z2  The bearing planes, where the tolerance holds.
+Output:
+  page FILE.html  Write a page with the masses to edit, which computes the corrections itself.
 """
 
 
@@ -56,6 +59,7 @@ def run(
     permissible: str | None = None,
     bearings: str | None = None,
     workers: Annotated[int, typer.Option(min=1)] = 1,
+    page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
     *,
     show: ShowOptions,
 ) -> Result:
@@ -99,8 +103,14 @@ def run(
 
         return way(balancing)
 
+    def sheet() -> bytes:
+        from cli.balance.page import sheet
+
+        return sheet(balancing).html.encode()
+
     return Result(
         tables=tables(balancing),
+        beside={} if page is None else {page: sheet},
         head={"correction": "remove" if remove else "add"},
         figure=figure,
         way=way,

@@ -13,7 +13,7 @@ from cli.show.commands import suffix_among
 from cli.show.output import command
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from matplotlib.figure import Figure
 
@@ -44,6 +44,7 @@ Output: where masses go, the next run:
   save_influence FILE.csv  Store the coefficients.
   blades N  Split onto N places, evenly spaced.
   predict MASS@ANGLE,…  Predict a run: 10kg@-90deg or A=1g@0deg.
+  page FILE.html  Write the machine's sheet: readings are typed in, corrections come out.
 Further options (docs/commands.md describes them):
   columns FILE.toml  Read columns by other headers: lines such as mass_g = "Masse", as --column has them.
   rotation  Direction of rotation seen against +z: phases lead in that direction, mass angles are ccw.
@@ -107,6 +108,7 @@ def run(
     view: Literal["static-couple"] | None = None,
     columns: str | None = None,
     workers: Annotated[int, typer.Option(min=1)] = 1,
+    page: Annotated[Path | None, typer.Option(callback=suffix_among(".html"))] = None,
     signal: Annotated[str | None, typer.Option(hidden=True)] = None,
     pulses: Annotated[str | None, typer.Option(hidden=True)] = None,
     suggest_trial: Annotated[bool, typer.Option(hidden=True)] = False,
@@ -173,10 +175,10 @@ def run(
     measured, stored = read_measured(runs, request, influence or (), runout)
     with options.processes(workers) as executor:
         balancing = FieldBalancing(measured, request, stored, executor)
-    return _result(balancing, save_influence)
+    return _result(balancing, save_influence, page)
 
 
-def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
+def _result(b: FieldBalancing, save_influence: Path | None, page: Path | None) -> Result:
     from cli.field.doubts import warnings
     from cli.field.tables import METHOD, sense
     from cli.show.result import Result
@@ -210,6 +212,12 @@ def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
 
         return prediction_lines(b)
 
+    beside: dict[Path, Callable[[], bytes]] = {} if save_influence is None else {save_influence: stored}
+    if page is not None:
+        from cli.field.page import sheet
+
+        html = sheet(b).html.encode()
+        beside[page] = lambda: html
     return Result(
         tables=tables,
         head={
@@ -225,7 +233,7 @@ def _result(b: FieldBalancing, save_influence: Path | None) -> Result:
         sheets=sheets,
         shows_input=True,
         about={"title": "Balancing in the field"},
-        beside={} if save_influence is None else {save_influence: stored},
+        beside=beside,
         warnings=remarks,
     )
 

@@ -1,0 +1,223 @@
+"""Balancing on tapes: what a page needs to compute corrections anew, from the same functions as everywhere.
+
+Corrections are linear in what they balance. What one unbalance asks of every plane, and what one vibration asks there, comes
+from `correct` and `least_squares`; the tapes hold the vectors of the entries, their sums, sizes and angles.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing.balance import least_squares
+from balancing.correction import correct
+from dalembert.arithmetic.recorded import RECORDED, Recorder
+from dalembert.arithmetic.tape import Tape
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Number = Any
+Outputs = dict[str, Any]
+
+
+def shares(planes: Real) -> tuple[Real, Real, float]:
+    """What an unbalance of 1 at z adds in every plane, first + slope·(z − about): (first, slope, about).
+
+    >>> first, slope, about = shares(np.array([0.0, 0.09]))
+    >>> (first + slope * (0.03 - about)).round(12)
+    array([-0.66666667, -0.33333333])
+    """
+    about = float(planes[0])
+    if len(planes) == 1:
+        return -np.ones(1), np.zeros(1), about
+    span = float(np.ptp(planes))
+    first, last = (correct([1.0], [z], planes).unbalance.real for z in (about, about + span))
+    return first, (last - first) / span, about
+
+
+def size_and_angle(name: str, z: Number) -> Outputs:
+    """The outputs of a vector: its size, and its angle in (−π, π]."""
+    return {f"{name} size": abs(z), f"{name} angle": RECORDED.angle(z)}
+
+
+def vector(recorder: Recorder, name: str) -> Number:
+    """A vector that enters by its parts."""
+    return RECORDED.join(recorder.input(f"{name} x"), recorder.input(f"{name} y"))
+
+
+def parts(name: str, z: Number) -> Outputs:
+    """The outputs of a vector: its parts."""
+    return {f"{name} x": z.real, f"{name} y": z.imag}
+
+
+def known_masses(
+    planes: Real,
+    radius: Real,
+    about: float,
+    gravity: float | None,
+    bearings: Real | None = None,
+    remove: bool = False,
+) -> dict[str, Tape]:
+    """The tapes of a rotor whose masses are known.
+
+    `mass` adds one entry (`amount`, kg, N or kg·m; `radius`; `angle`; `z`) to the sums and gives its share of every plane;
+    `result` has the corrections, the rotor's state before and after, and what the tolerance is held against.
+
+    Parameters
+    ----------
+    planes, radius : array (p,)
+        m.
+    about : float
+        The place of the couple, m.
+    gravity : float, optional
+        Where the amounts are weights.
+    bearings : array (2,), optional
+        The planes of the tolerance.
+    remove : bool
+        Whether corrections are material to remove.
+    """
+    recorder = Recorder()
+    amount, arm, angle, z = (recorder.input(name) for name in ("amount", "radius", "angle", "z"))
+    u = amount * arm * RECORDED.turn(angle)
+    if gravity is not None:
+        u = u / gravity
+    outputs: Outputs = {}
+    sums = {"static": u, "couple": u * (z - about)}
+    places = {"plane": planes} | ({} if bearings is None else {"bearing": bearings})
+    for what, at in places.items():
+        first, slope, start = shares(np.asarray(at, dtype=float))
+        for p in range(len(at)):
+            share = u * (float(first[p]) + float(slope[p]) * (z - start))
+            sums[f"{what} {p}"] = share
+            if what == "plane":
+                outputs |= parts(f"share {p}", -share)
+    for name, share in sums.items():
+        outputs |= parts(f"sum {name}", vector(recorder, f"sum {name}") + share)
+    mass = recorder.tape(outputs)
+
+    recorder = Recorder()
+    found: Outputs = {}
+    made = [vector(recorder, f"sum plane {p}") for p in range(len(planes))]
+    static, couple = (vector(recorder, f"sum {name}") for name in ("static", "couple"))
+    for p, w in enumerate(made):
+        found |= size_and_angle(f"plane {p}", -w if remove else w)
+        found[f"mass {p}"] = abs(w) / float(radius[p])
+        found |= parts(f"made {p}", w)
+    found |= size_and_angle("static", static) | size_and_angle("couple", couple)
+    found |= {"left static": abs(sum(made, static))}
+    levers = [w * float(at - about) for w, at in zip(made, planes, strict=True)]
+    found |= {"left couple": abs(sum(levers, couple))}
+    if bearings is not None:
+        for p in range(len(bearings)):
+            found[f"before {p}"] = abs(vector(recorder, f"sum bearing {p}"))
+    return {"mass": mass, "result": recorder.tape(found)}
+
+
+def measured(
+    influence: Complex,
+    weights: Real | None = None,
+    ridge: float = 0.0,
+    runs: int = 3,
+    errors: tuple[float, float] | None = None,
+    runout: Complex | None = None,
+    covariance: Complex | None = None,
+) -> Tape:
+    """The tape of a machine's sheet: stored coefficients, readings of an initial run and of runs with masses.
+
+    Inputs are `run K amplitude S`, `run K phase S` and `run K there S` (1 where it was read, else 0), `run K mass P` and
+    `run K angle P` (what stands on the rotor in that run, nothing in the first). The initial vibration is the mean of what
+    every run says of it. Outputs: corrections, the vibration they leave, the trim after each run, what each run's reading is
+    off, and with stated errors of readings the standard deviations of the corrections.
+
+    Parameters
+    ----------
+    influence : complex array (s, p)
+        Amplitude per kg.
+    weights : array (s,), optional
+        As `least_squares` takes them; `ridge` too.
+    errors : (relative error of the amplitude, error of the phase in rad), optional
+    runout : complex array (s,), optional
+        What the sensors read of a rotor that runs true.
+    covariance : complex array (s, p, p), optional
+        E δδᴴ of the coefficients' errors, which count as independent of the readings.
+    """
+    s, p = influence.shape
+    off = np.zeros(s, dtype=complex) if runout is None else runout
+    solution = np.stack(
+        [least_squares(influence, each, weights, ridge=ridge).corrections for each in np.eye(s)], axis=1
+    )
+    recorder = Recorder()
+    outputs: Outputs = {}
+    alpha = [[complex(x) for x in row] for row in influence.tolist()]
+    standing = [
+        [
+            recorder.input(f"run {k} mass {j}") * RECORDED.turn(recorder.input(f"run {k} angle {j}"))
+            for j in range(p)
+        ]
+        if k
+        else [0j] * p
+        for k in range(runs)
+    ]
+    read: list[list[Number]] = []
+    initial: list[Number] = []
+    for i in range(s):
+        total, count, mine = 0j, 0.0, []
+        for k in range(runs):
+            there = recorder.input(f"run {k} there {i}")
+            v = recorder.input(f"run {k} amplitude {i}") * RECORDED.turn(recorder.input(f"run {k} phase {i}"))
+            v = v - complex(off[i])
+            mine.append(v)
+            own = v - sum((a * w for a, w in zip(alpha[i], standing[k], strict=True)), 0j) if k else v
+            total, count = total + own * there, count + there
+        read.append(mine)
+        initial.append(total * (1.0 / count))
+    corrections = [
+        sum((complex(c) * v for c, v in zip(row, initial, strict=True)), 0j) for row in solution.tolist()
+    ]
+    for j, w in enumerate(corrections):
+        outputs |= size_and_angle(f"plane {j}", w)
+        for k in range(1, runs):
+            outputs |= size_and_angle(f"trim {k} {j}", w - standing[k][j])
+    for i, v in enumerate(initial):
+        left = v + sum((a * w for a, w in zip(alpha[i], corrections, strict=True)), 0j) + complex(off[i])
+        outputs |= size_and_angle(f"residual {i}", left) | size_and_angle(f"initial {i}", v)
+        for k in range(runs):
+            expected = v + sum((a * w for a, w in zip(alpha[i], standing[k], strict=True)), 0j)
+            outputs[f"off {k} {i}"] = abs(read[i][k] - expected)
+    if errors is not None:
+        for j, w in enumerate(corrections):
+            along, across = 0.0, 0.0
+            way = w.conjugate() * (1.0 / abs(w))
+            for i, v in enumerate(initial):
+                if covariance is not None:
+                    # as likely in every direction
+                    of_channel = covariance[i].tolist()
+                    terms = [
+                        (complex(c) * corrections[m].conjugate() * corrections[n]).real
+                        for m, row in enumerate(of_channel)
+                        for n, c in enumerate(row)
+                    ]
+                    half = sum(terms, 0.0) * (0.5 * abs(solution[j, i]) ** 2)
+                    along, across = along + half, across + half
+                turned = complex(solution[j, i]) * v * way
+                a, b = turned * errors[0], turned * errors[1]
+                along = along + a.real * a.real + b.imag * b.imag
+                across = across + a.imag * a.imag + b.real * b.real
+            outputs[f"along {j}"] = RECORDED.sqrt(along)
+            outputs[f"across {j}"] = RECORDED.sqrt(across)
+    return recorder.tape(outputs)
+
+
+def split() -> Tape:
+    """The tape of a correction on two places: `size`, `angle`, and the places' angles `first`, `second`."""
+    recorder = Recorder()
+    size, angle, first, second = (recorder.input(name) for name in ("size", "angle", "first", "second"))
+    w, a, b = size * RECORDED.turn(angle), RECORDED.turn(first), RECORDED.turn(second)
+
+    def across(z: Number, other: Number) -> Number:
+        return z.real * other.imag - z.imag * other.real
+
+    inverse = 1.0 / across(a, b)
+    return recorder.tape({"first": across(w, b) * inverse, "second": across(a, w) * inverse})
