@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
     from balancing.rounding import Bounds, Solved
+    from dalembert.page import Page
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -75,6 +76,33 @@ class Balance:
         else:
             raise ValueError(f"'{of}': expected corrections or residual")
         return table({names[0]: np.abs(values), names[1]: np.degrees(angle_of(values))}, ("rotor", axis))
+
+    def page(self, sensors: Sequence[str] = (), planes: Sequence[str] = (), amplitude: str = "") -> Page:
+        """Return the machine's sheet: a page into which readings are typed, and which computes corrections and trim.
+
+        Parameters
+        ----------
+        sensors, planes, amplitude
+            As `plot` takes them; least squares without limits, of one machine.
+
+        Raises
+        ------
+        ValueError
+            Of several machines, or of minimax or with limits.
+        """
+        from balancing.sheet import machine_sheet
+
+        if (
+            self.influence.ndim > 2
+            or self.of_largest
+            or self.max_mass is not None
+            or self.max_residual is not None
+        ):
+            raise ValueError("a sheet is of one machine, and computes least squares without limits")
+        s, p = self.influence.shape
+        names = [list(given) or [str(i + 1) for i in range(n)] for given, n in ((sensors, s), (planes, p))]
+        more = {"weights": self.weights, "ridge": self.ridge, "amplitude_unit": amplitude}
+        return machine_sheet(self.influence, self.initial, *names, **more)  # type: ignore[arg-type]
 
     def plot(
         self,

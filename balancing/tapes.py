@@ -1,7 +1,7 @@
 """Balancing on tapes: what a page needs to compute corrections anew, from the same functions as everywhere.
 
-Corrections are linear in what they balance. What one unbalance asks of every plane, and what one vibration asks there, comes
-from `correct` and `least_squares`; the tapes hold the vectors of the entries, their sums, sizes and angles.
+Corrections are linear in what they balance: what a vibration of 1 at each sensor asks of every plane comes from the same least
+squares as everywhere (`qr`); the tape holds the vectors of the readings, their sums, sizes and angles.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.balance import least_squares
-from balancing.correction import correct
+from balancing.qr import smallest_squares
 from dalembert.arithmetic.recorded import RECORDED, Recorder
 from dalembert.arithmetic.tape import Tape
 
@@ -20,21 +19,6 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Number = Any
 Outputs = dict[str, Any]
-
-
-def shares(planes: Real) -> tuple[Real, Real, float]:
-    """What an unbalance of 1 at z adds in every plane, first + slope·(z − about): (first, slope, about).
-
-    >>> first, slope, about = shares(np.array([0.0, 0.09]))
-    >>> (first + slope * (0.03 - about)).round(12)
-    array([-0.66666667, -0.33333333])
-    """
-    about = float(planes[0])
-    if len(planes) == 1:
-        return -np.ones(1), np.zeros(1), about
-    span = float(np.ptp(planes))
-    first, last = (correct([1.0], [z], planes).unbalance.real for z in (about, about + span))
-    return first, (last - first) / span, about
 
 
 def size_and_angle(name: str, z: Number) -> Outputs:
@@ -50,69 +34,6 @@ def vector(recorder: Recorder, name: str) -> Number:
 def parts(name: str, z: Number) -> Outputs:
     """The outputs of a vector: its parts."""
     return {f"{name} x": z.real, f"{name} y": z.imag}
-
-
-def known_masses(
-    planes: Real,
-    radius: Real,
-    about: float,
-    gravity: float | None,
-    bearings: Real | None = None,
-    remove: bool = False,
-) -> dict[str, Tape]:
-    """The tapes of a rotor whose masses are known.
-
-    `mass` adds one entry (`amount`, kg, N or kg·m; `radius`; `angle`; `z`) to the sums and gives its share of every plane;
-    `result` has the corrections, the rotor's state before and after, and what the tolerance is held against.
-
-    Parameters
-    ----------
-    planes, radius : array (p,)
-        m.
-    about : float
-        The place of the couple, m.
-    gravity : float, optional
-        Where the amounts are weights.
-    bearings : array (2,), optional
-        The planes of the tolerance.
-    remove : bool
-        Whether corrections are material to remove.
-    """
-    recorder = Recorder()
-    amount, arm, angle, z = (recorder.input(name) for name in ("amount", "radius", "angle", "z"))
-    u = amount * arm * RECORDED.turn(angle)
-    if gravity is not None:
-        u = u / gravity
-    outputs: Outputs = {}
-    sums = {"static": u, "couple": u * (z - about)}
-    places = {"plane": planes} | ({} if bearings is None else {"bearing": bearings})
-    for what, at in places.items():
-        first, slope, start = shares(np.asarray(at, dtype=float))
-        for p in range(len(at)):
-            share = u * (float(first[p]) + float(slope[p]) * (z - start))
-            sums[f"{what} {p}"] = share
-            if what == "plane":
-                outputs |= parts(f"share {p}", -share)
-    for name, share in sums.items():
-        outputs |= parts(f"sum {name}", vector(recorder, f"sum {name}") + share)
-    mass = recorder.tape(outputs)
-
-    recorder = Recorder()
-    found: Outputs = {}
-    made = [vector(recorder, f"sum plane {p}") for p in range(len(planes))]
-    static, couple = (vector(recorder, f"sum {name}") for name in ("static", "couple"))
-    for p, w in enumerate(made):
-        found |= size_and_angle(f"plane {p}", -w if remove else w)
-        found[f"mass {p}"] = abs(w) / float(radius[p])
-        found |= parts(f"made {p}", w)
-    found |= size_and_angle("static", static) | size_and_angle("couple", couple)
-    found |= {"left static": abs(sum(made, static))}
-    levers = [w * float(at - about) for w, at in zip(made, planes, strict=True)]
-    found |= {"left couple": abs(sum(levers, couple))}
-    if bearings is not None:
-        for p in range(len(bearings)):
-            found[f"before {p}"] = abs(vector(recorder, f"sum bearing {p}"))
-    return {"mass": mass, "result": recorder.tape(found)}
 
 
 def measured(
@@ -136,7 +57,7 @@ def measured(
     influence : complex array (s, p)
         Amplitude per kg.
     weights : array (s,), optional
-        As `least_squares` takes them; `ridge` too.
+        As `balance.least_squares` takes them; `ridge` too.
     errors : (relative error of the amplitude, error of the phase in rad), optional
     runout : complex array (s,), optional
         What the sensors read of a rotor that runs true.
@@ -145,9 +66,12 @@ def measured(
     """
     s, p = influence.shape
     off = np.zeros(s, dtype=complex) if runout is None else runout
-    solution = np.stack(
-        [least_squares(influence, each, weights, ridge=ridge).corrections for each in np.eye(s)], axis=1
-    )
+    root = np.ones(s) if weights is None else np.sqrt(weights)
+    # what a vibration of 1 at each sensor asks of every plane
+    each = [
+        smallest_squares(influence * root[:, None], one * root, ridge)[0] for one in np.eye(s, dtype=complex)
+    ]
+    solution = np.stack(each, axis=1)
     recorder = Recorder()
     outputs: Outputs = {}
     alpha = [[complex(x) for x in row] for row in influence.tolist()]

@@ -28,11 +28,13 @@ from virtualwork.describe.dimensions import Dimension, changed, dimensions, valu
 from virtualwork.describe.text import toml_text
 from virtualwork.drawing import Circle, Coil, Drawing, Line, draw
 from virtualwork.family.written import Written
+from virtualwork.forces import Forces
 from virtualwork.formulas.asked import FORCES, Key, names
 from virtualwork.formulas.loads import Tabled
 from virtualwork.formulas.poses import Poses
 from virtualwork.picture.paper import travel_of
-from virtualwork.quantities import Quantity
+from virtualwork.quantities import Quantity, places
+from virtualwork.quantities import forces as quantities_of_forces
 
 ORDERS = 2
 """How often places are differentiated in time."""
@@ -370,3 +372,43 @@ def computing_page(
         return f"{engine()}\nconst tapes = {{\n{tapes}\n}};\n", {"model": model}
 
     return moving_page(m.name, [series, *others], computed=computed)
+
+
+def page_of(poses: Poses, drawing: Drawing, forces: Forces | None = None, over: Sequence[float] = ()) -> Page:
+    """Return the page of one motion: it computes itself where its formulas can be written down, else it replays and says why.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        What a page that replays draws.
+    forces : Forces, optional
+        Those of the motion, where they are to be there too.
+    over : sequence of float
+        The input of the pose that is shown at first.
+    """
+    m = poses.mechanism
+    named = places(m, ORDERS)
+    moves = any(np.any(rate) for rates in poses.rates for rate in rates)
+    listed = [each for each in named if not each.order or moves]
+    arrows: list[JointForce] = []
+    if forces is not None:
+        pairs = forces.reactions.order.pairs
+        every = quantities_of_forces(m, pairs)
+        named += every
+        listed += [each for each in every if each.key and not each.reverse]
+        arrows = [JointForce.of(*pair) for pair in pairs]
+    degree = float(np.pi / 180)
+    several = len(m.inputs) > 1
+    columns: dict[str, tuple[Quantity | int, Shown]] = {}
+    for j, entry in enumerate(m.inputs):
+        header = f"{entry.name}_input_m" if entry.is_slide else f"{entry.name}_input_deg"
+        header = header if several else header.removeprefix(f"{entry.name}_")
+        columns[header] = j, Shown((), header, 1.0 if entry.is_slide else degree)
+    for each in listed:
+        columns[each.header] = each, Shown((), each.header, degree if each.turns else 1.0)
+    made = computing_page(poses, columns, named, arrows, first=over or None)
+    if isinstance(made, Page):
+        return made
+    from virtualwork.animation import of_motion
+
+    return of_motion(poses, drawing, forces, f"This page replays what was computed: {made}.")

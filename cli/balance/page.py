@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from balancing.tapes import known_masses
+from balancing.known_masses import known_masses
 from cli.balance.rotors import Balancing
 from dalembert.arithmetic.engines.javascript import engine, written
 from dalembert.errors import DataError

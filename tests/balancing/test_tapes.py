@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from balancing import correct, least_squares
-from balancing.tapes import known_masses, measured, shares, split
+from balancing.known_masses import known_masses, shares
+from balancing.tapes import measured, split
 from dalembert.arithmetic.engines import run
 
 RNG = np.random.default_rng(28)
@@ -71,7 +72,7 @@ def test_a_sheet_is_least_squares(s: int, p: int) -> None:
     tape = measured(alpha, weights, runs=3)
     on = 0.3 * exact.corrections
     second = v + alpha @ on
-    given = {name: 0.0 for name in tape.inputs}
+    given = dict.fromkeys(tape.inputs, 0.0)
     for k, read in ((0, v), (1, second)):
         for i, x in enumerate(read):
             given |= {
