@@ -49,8 +49,8 @@ def measured(
 
     Inputs are `run K amplitude S`, `run K phase S` and `run K there S` (1 where it was read, else 0), `run K mass P` and
     `run K angle P` (what stands on the rotor in that run, nothing in the first). The initial vibration is the mean of what
-    every run says of it. Outputs: corrections, the vibration they leave, the trim after each run, what each run's reading is
-    off, and with stated errors of readings the standard deviations of the corrections.
+    every run says of it that is there. Outputs: corrections, the vibration they leave, the trim after each run (the corrections
+    less what stands; `fresh`: what its own reading alone asks for), what each run's reading is off, and with stated errors of readings the standard deviations of the corrections.
 
     Parameters
     ----------
@@ -104,6 +104,8 @@ def measured(
         outputs |= size_and_angle(f"plane {j}", w)
         for k in range(1, runs):
             outputs |= size_and_angle(f"trim {k} {j}", w - standing[k][j])
+            last = sum((complex(c) * mine[k] for c, mine in zip(solution[j].tolist(), read, strict=True)), 0j)
+            outputs |= size_and_angle(f"fresh {k} {j}", last)
     for i, v in enumerate(initial):
         left = v + sum((a * w for a, w in zip(alpha[i], corrections, strict=True)), 0j) + complex(off[i])
         outputs |= size_and_angle(f"residual {i}", left) | size_and_angle(f"initial {i}", v)

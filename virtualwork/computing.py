@@ -111,6 +111,8 @@ class Formulas:
             return "the speed follows a law in time"
         if forces and m.friction:
             return "friction is found by iteration"
+        if {g.name: g.kind for g in self.written.plan.groups} != {g.name: g.kind for g in own.plan.groups}:
+            return "its loops have a closed form for these numbers alone"
         if self.written.open_gears:
             return "a gear's phase depends on links that the guess places"
         if not self.written.recording.takes(keys):
@@ -356,7 +358,8 @@ def computing_page(
 
     def computed() -> tuple[str, dict[str, Any]]:
         quantities: dict[str, dict[str, Any]] = {}
-        for each in named:
+        # of two joints of one name on one link that which has the number
+        for each in sorted(named, key=lambda one: not one.key):
             for word in each.names:
                 quantities.setdefault(word, formulas.column(each))
         places, numbers = drawn_numbers(drawing, draw(formulas.written.mechanism, travel), formulas)

@@ -17,7 +17,8 @@ function enter(last) {
   for (let k = 0; k < sheet.runs.length; k++) {
     for (let s = 0; s < sheet.sensors.length; s++) {
       const there = k <= last && has(reading(k, s, "amplitude")) && has(reading(k, s, "phase"));
-      given[`run ${k} there ${s}`] = there ? 1 : 0;
+      // as the program takes them: the initial run tells the initial vibration, later ones where it was not read
+      given[`run ${k} there ${s}`] = there && (k === 0 || !has(reading(0, s, "amplitude"))) ? 1 : 0;
       given[`run ${k} amplitude ${s}`] = there ? values[reading(k, s, "amplitude")] : 0;
       given[`run ${k} phase ${s}`] = there ? (sheet.against ? -1 : 1) * values[reading(k, s, "phase")] : 0;
     }
@@ -64,6 +65,10 @@ solveSheet = () => {
     const trim = last ? `trim ${last} ${p}` : `plane ${p}`;
     answers.set(`trim.${plane}.${word}`, out.get(`${trim} size`));
     answers.set(`trim.${plane}.angle`, turned(`${trim} angle`));
+    if (last && sheet.sensors.every((_, s) => has(reading(last, s, "amplitude")))) {
+      answers.set(`fresh.${plane}.${word}`, out.get(`fresh ${last} ${p} size`));
+      answers.set(`fresh.${plane}.angle`, turned(`fresh ${last} ${p} angle`));
+    }
     if (sheet.errors) {
       answers.set(`${plane}.${word}_uncertainty`, out.get(`along ${p}`));
       answers.set(`${plane}.angle_uncertainty`, [out.get(`across ${p}`)[0] / out.get(`plane ${p} size`)[0], 0]);
@@ -170,6 +175,7 @@ drawSheet = () => {
   const vectors = (lead, more) => sheet.planes.map((plane) => [plane, shownAnswer(`${lead}${plane}.${word}`, sheet.mass.si) + (more ? sure(`${plane}.${word}_uncertainty`, sheet.mass.si) : ""), shownAnswer(`${lead}${plane}.angle`, turn) + (more ? sure(`${plane}.angle_uncertainty`, turn) : "")]);
   listed(host, TEXTS.corrections, ["", `${word}, ${sheet.mass.unit}`, "angle, deg"], vectors("", true));
   listed(host, TEXTS.trim, ["", `${word}, ${sheet.mass.unit}`, "angle, deg"], vectors("trim.", false));
+  if (sheet.planes.some((plane) => answers.has(`fresh.${plane}.${word}`))) listed(host, TEXTS.fresh, ["", `${word}, ${sheet.mass.unit}`, "angle, deg"], vectors("fresh.", false));
   if (doubts.length) put(host, "p", { class: "doubt", role: "status" }, doubts.join(" "));
   listed(host, TEXTS.expected, ["", `${TEXTS.amplitude}, ${amplitudeUnit}`, `${TEXTS.phase}, deg`], sheet.sensors.map((sensor) => [sensor, shownAnswer(`residual/${sensor}/amplitude`), shownAnswer(`residual/${sensor}/phase`, turn)]));
   const drawn = put(host, "div", { class: "polygons" });

@@ -88,6 +88,8 @@ def test_a_sheet_is_least_squares(s: int, p: int) -> None:
         assert abs(made - w) < 1e-11 * np.abs(exact.corrections).max()
         trim = found[f"trim 1 {j} size"] * np.exp(1j * found[f"trim 1 {j} angle"])
         assert abs(trim - 0.7 * w) < 1e-11 * np.abs(exact.corrections).max()
+        fresh = found[f"fresh 1 {j} size"] * np.exp(1j * found[f"fresh 1 {j} angle"])
+        assert abs(fresh - 0.7 * w) < 1e-11 * np.abs(exact.corrections).max()
     left = [found[f"residual {i} size"] for i in range(s)]
     assert left == pytest.approx(list(abs(exact.residual)), abs=1e-11 * np.abs(v).max())
     # both runs say the same
