@@ -19,6 +19,7 @@ const TEXTS = {
   unknown: (name) => `nothing is named "${name}"`,
   impossible: "these numbers make no mechanism: a joint's two points fall together, or a mass is negative",
   short: (group, by) => `${group} cannot be closed at this input: ${by} missing`,
+  openAtGuess: (group) => `${group} cannot be closed at the input of the guess: the iteration from there finds no closed loop`,
   open: "cannot be assembled at this input",
   limits: (list) => `Limits of the input: ${list}`,
   noLimits: "The input turns without a limit.",
