@@ -21,10 +21,10 @@ Rotors (`balancing`):
     trial_effect, trial_unbalance, unseen_combination
 
 Mechanisms (`virtualwork`):
-    AssemblyError, Check, Cycle, DescriptionError, Equilibria, Equilibrium, Force, Friction, GROUND,
+    AssemblyError, Belt, Check, Cycle, DescriptionError, Equilibria, Equilibrium, Force, Friction, GROUND,
     Gear, Guess, Guide, Input, Link, LinkStates, Mechanism, MechanismError, MobilityError, Motion,
-    Motor, Spring, Target, Torque, TorsionSpring, UnitLoad, balance_virtual_power, block_on_bar,
-    counterweights, crank_rod_piston, direction_angle, equilibria, grashof_class, on_incline,
+    Motor, Rack, Spring, Target, Torque, TorsionSpring, UnitLoad, balance_virtual_power, block_on_bar,
+    counterweights, crank_rod_piston, direction_angle, equilibria, grashof_class, newton, on_incline,
     on_moving_ramp, rotation_of_point, second_point, work_ledger
 
 Bodies (`rigidbody3d`):

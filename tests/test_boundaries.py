@@ -50,7 +50,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("tapes",),
         ("optimality",),
         ("limited", "loads", "rounding"),
-        ("influence", "propagation", "qr"),
+        ("influence", "modal", "propagation", "qr"),
         (
             "cone_problem",
             "dependence",
@@ -60,8 +60,10 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
             "picture",
             "reading_errors",
             "rotor",
+            "severity",
             "synchronous",
         ),
+        ("triangle",),
     ),
     "virtualwork": (
         ("__init__",),
@@ -77,7 +79,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("study",),
         ("textbook",),
         ("branch",),
-        ("bounds",),
+        ("digits",),
         ("formulas",),
         ("drawing", "plan"),
         ("describe",),
@@ -95,11 +97,12 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "cli": (
         ("__main__",),
         ("app",),
-        ("exports", "imports"),
+        ("grade",),
+        ("exercise",),
+        ("completion", "exports", "imports"),
         (
             "balance",
             "body",
-            "completion",
             "equilibrium",
             "engine",
             "examples",
@@ -127,7 +130,7 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "dalembert": (
         ("__init__",),
         ("arithmetic", "drawing", "page", "results", "tables"),
-        ("angles", "quantities"),
+        ("angles", "figures", "quantities"),
         ("units",),
         ("errors", "hints", "memory"),
     ),
@@ -154,7 +157,7 @@ PACKAGES = (
         "dalembert.results",
         "dalembert.tables",
     ),
-    ("dalembert.angles", "dalembert.quantities"),
+    ("dalembert.angles", "dalembert.figures", "dalembert.quantities"),
     ("dalembert.units",),
     ("dalembert.errors", "dalembert.hints", "dalembert.memory"),
 )

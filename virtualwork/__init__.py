@@ -7,6 +7,7 @@ if TYPE_CHECKING:
     from virtualwork.describe import AssemblyError, DescriptionError, MechanismError, MobilityError
     from virtualwork.describe.parts import (
         GROUND,
+        Belt,
         Force,
         Friction,
         Gear,
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
         Input,
         Link,
         Motor,
+        Rack,
         Spring,
         Torque,
         TorsionSpring,
@@ -37,10 +39,12 @@ if TYPE_CHECKING:
         sense,
     )
     from virtualwork.textbook.link_states import LinkStates, UnitLoad, balance
+    from virtualwork.textbook.newton import newton
 
 __all__ = [
     "GROUND",
     "AssemblyError",
+    "Belt",
     "Check",
     "Cycle",
     "DescriptionError",
@@ -59,6 +63,7 @@ __all__ = [
     "MobilityError",
     "Motion",
     "Motor",
+    "Rack",
     "Spring",
     "Target",
     "Torque",
@@ -71,6 +76,7 @@ __all__ = [
     "equilibria",
     "grashof_class",
     "ledger",
+    "newton",
     "on_incline",
     "on_moving_ramp",
     "rotation",
@@ -81,7 +87,7 @@ __all__ = [
 # where each name stands; a room is loaded when one of its names is asked for
 _ROOMS = {
     "virtualwork.describe": "AssemblyError DescriptionError MechanismError MobilityError",
-    "virtualwork.describe.parts": "GROUND Force Friction Gear Guess Guide Input Link Motor Spring Torque TorsionSpring",
+    "virtualwork.describe.parts": "GROUND Belt Force Friction Gear Guess Guide Input Link Motor Rack Spring Torque TorsionSpring",
     "virtualwork.formulas.effort": "ledger",
     "virtualwork.mechanism": "Mechanism equilibria",
     "virtualwork.motion": "Motion",
@@ -92,6 +98,7 @@ _ROOMS = {
     "virtualwork.study.equilibrium": "Equilibria Equilibrium",
     "virtualwork.textbook.combinations": "block_on_bar crank_rod_piston on_incline on_moving_ramp rotation second_point sense",
     "virtualwork.textbook.link_states": "LinkStates UnitLoad balance",
+    "virtualwork.textbook.newton": "newton",
 }
 
 

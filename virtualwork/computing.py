@@ -151,21 +151,16 @@ class Formulas:
         written = self.written
         groups = written.plan.groups
         closed = [g.name for g in written.closed]
-        iterated = [g for g in groups if g.kind == "Newton"]
         every = ("closed", *(g.name for g in groups))
         found = {
             "pose": written.tape((*self.keys, every)),
             "choice": written.choice,
             "margins": written.tape([("margin", name) for name in closed]),
-            "short": written.tape([("short", g.name) for g in groups if g.kind != "Newton"]),
+            "short": written.short,
             "drawn": written.recording.recorder.tape(dict(drawn)),
         }
-        if iterated:
-            keys: list[Key] = []
-            for g in iterated:
-                keys.append(("open loops", g.name))
-                keys += [("unknown", g.name, i) for i in range(len(g.angles) + len(g.slides))]
-            found["steps"] = written.tape(keys)
+        if any(g.kind == "Newton" for g in groups):
+            found["steps"] = written.steps
         if self.mechanism.torsion_springs:
             springs = range(len(self.mechanism.torsion_springs))
             found["twists"] = written.tape([("twist", i) for i in springs])

@@ -16,18 +16,24 @@ import cmath
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from math import isfinite, pi
+from math import isfinite, pi, sqrt
+from typing import Any
 
-from dalembert.arithmetic.varied import rotation
+from dalembert.arithmetic.recorded import RECORDED, bare
+from dalembert.arithmetic.varied import Varied, heading, made, rotation
 from virtualwork.describe.description import Description
-from virtualwork.describe.parts import GROUND, Gear, Guide, Spring
+from virtualwork.describe.meshes import Belt, Gear, Rack
+from virtualwork.describe.parts import GROUND, Guide, Spring
+from virtualwork.describe.points import joined
 
 ROLES = {
     "rail": "the walls of a guide in the ground",
     "hatch": "what marks the ground as fixed",
     "frame": "the foot of a fixed pivot",
     "link": "a link: a bar, or the hull of its points, its slots and its centre of mass",
-    "wheel": "the pitch circle of a gear",
+    "wheel": "the pitch circle of a gear, or of a belt's pulley",
+    "belt": "a belt or a chain where it runs between its wheels",
+    "rack": "the pitch line of a rack, with its teeth",
     "spoke": "a mark that shows how a wheel turns",
     "slot": "the outline of a slot",
     "block": "the block of a slider",
@@ -39,6 +45,8 @@ ROLES = {
 
 SYMBOL = 0.016
 """The radius of a pin, of the size of the mechanism."""
+TOOTH = ((0.1, -1.0), (0.4, 1.0), (0.6, 1.0), (0.9, -1.0))
+"""The outline of a tooth: along the rack, of the tooth's length, and across, of half its height."""
 UNKNOWN_TRAVEL = 0.2
 """Where nobody says how far a guide is used: so much of the size of the mechanism either way."""
 
@@ -157,7 +165,12 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
     s, reach = SYMBOL * size, UNKNOWN_TRAVEL * size
     spans = [_long_enough(span, reach, s) for span in (travel or [(-reach, reach)] * len(mechanism.guides))]
     guides = list(zip(mechanism.guides, spans, strict=True))
-    wheels = list(dict.fromkeys(chain.from_iterable(_wheels(mechanism, gear) for gear in mechanism.gears)))
+    meshes = [
+        *(_wheels(mechanism, gear) for gear in mechanism.gears),
+        *(_pulleys(mechanism, belt) for belt in mechanism.belts),
+        *(_pinion(mechanism, rack) for rack in mechanism.racks),
+    ]
+    wheels = list(dict.fromkeys(chain.from_iterable(meshes)))
     slots = {
         name: [span for span in guides if span[0].on == name and not span[0].is_slider]
         for name in mechanism.bodies
@@ -172,7 +185,9 @@ def draw(mechanism: Description, travel: Sequence[tuple[float, float]] = ()) -> 
         layers += [_link(mechanism, name, guides, wheels, s)] if name != GROUND else []
         layers += [_slot(mechanism, guide, span, s) for guide, span in slots[name]]
     layers += [
+        *(_belt(mechanism, belt) for belt in mechanism.belts),
         wheels,
+        *(_teeth(mechanism, rack, spans[mechanism.guide_at(rack.slider)], s) for rack in mechanism.racks),
         [
             Line("spoke", w.body, (w.centre, w.centre + w.radius))
             for w in wheels
@@ -305,12 +320,91 @@ def _wheels(mechanism: Description, gear: Gear) -> Iterator[Circle]:
     None where the wheels share their axis, or where the links turn alike.
     """
     arm = mechanism.bodies[gear.arm]
-    axes = [next((p for p in mechanism.bodies[body] if p in arm), "") for body in gear.links]
+    axes = [_axis(mechanism, body, gear.arm) for body in gear.links]
     if complex(gear.ratio) == 1 or gear.arm in gear.links or "" in axes or axes[0] == axes[1]:
         return
     second = abs(arm[axes[1]] - arm[axes[0]]) / abs(1 - gear.ratio)
     for body, axis, radius in zip(gear.links, axes, (abs(gear.ratio) * second, second), strict=True):
         yield Circle("wheel", body, mechanism.bodies[body][axis], radius)
+
+
+def _pulleys(mechanism: Description, belt: Belt) -> Iterator[Circle]:
+    """The wheels of a belt, where they turn on pins of the body that carries both."""
+    axes = [_axis(mechanism, body, belt.arm) for body in belt.links]
+    if all(axes):
+        for body, axis, radius in zip(belt.links, axes, belt.radii, strict=True):
+            yield Circle("wheel", body, mechanism.bodies[body][axis], radius)
+
+
+def _belt(mechanism: Description, belt: Belt) -> Iterator[Line]:
+    """A belt: tangents of its wheels, and around them, in the axes of the body that carries both."""
+    axes = [_axis(mechanism, body, belt.arm) for body in belt.links]
+    if not all(axes):
+        return
+    here, there = (mechanism.bodies[belt.arm][axis] for axis in axes)
+    (first, second), way = belt.radii, there - here
+    side = -1 if belt.crossed else 1
+    if abs(way) <= abs(first - side * second):
+        # the one stands inside the other
+        return
+    # from the line of centres to where the belt touches
+    share = (first - side * second) / abs(way)
+    touch = heading(joined(share, _root(1 - share * share)))
+    along = way / abs(way)
+    behind, ahead = 2 * pi - 2 * touch, 2 * touch if side > 0 else 2 * pi - 2 * touch
+    start = touch if side > 0 else touch - pi
+    around = [there + second * along * rotation(start - side * ahead * (k / 24)) for k in range(25)]
+    back = [here + first * along * rotation(-(touch + behind * (k / 24))) for k in range(25)]
+    yield Line("belt", belt.arm, (*around, *back), closed=True)
+
+
+def _root(x: float) -> Any:
+    """The root of a number, plain or varied."""
+    if isinstance(x, Varied):
+        return made(sqrt(complex(x).real), RECORDED.sqrt(bare(x)))
+    return sqrt(x)
+
+
+def _pinion(mechanism: Description, rack: Rack) -> Iterator[Circle]:
+    """The wheel of a rack, about its pin on the body that carries the rack's guide, or about its own guided point."""
+    guide = mechanism.guides[mechanism.guide_at(rack.slider)]
+    axis = guide.point if guide.link == rack.gear else _axis(mechanism, rack.gear, guide.on)
+    if axis:
+        yield Circle("wheel", rack.gear, mechanism.bodies[rack.gear][axis], abs(rack.radius))
+
+
+def _teeth(mechanism: Description, rack: Rack, span: tuple[float, float], s: float) -> Iterator[Line]:
+    """The pitch line of a rack with its teeth, as long as its wheel rolls on it."""
+    guide = mechanism.guides[mechanism.guide_at(rack.slider)]
+    d, start = rotation(guide.angle), mechanism.through(guide)
+    low, high = span[0] - 4 * s, span[1] + 4 * s
+    if guide.link == rack.gear:
+        # the wheel rolls: its rack is of the body that carries the slot
+        body, origin, along = guide.on, start + 1j * rack.radius * d, d
+        depth = -1j * rack.radius * d
+    else:
+        axis = _axis(mechanism, rack.gear, guide.on)
+        if not axis or guide.turned is None:
+            return
+        back = rotation(-(guide.angle + guide.turned))
+        touch = mechanism.bodies[guide.on][axis] - 1j * rack.radius * d - start
+        body, along = guide.link, d * back
+        origin = mechanism.bodies[guide.link][guide.point] + touch * back
+        # as far as the guided point, too
+        point = -(touch * d.conjugate()).real
+        low, high = min(-high, point), max(-low, point)
+        depth = 1j * rack.radius * along
+    tooth = max(s, 0.06 * abs(rack.radius))
+    depth *= 0.7 * tooth / abs(rack.radius)
+    count = min(60, max(4, round(complex((high - low) / (2.4 * tooth)).real)))
+    step = (high - low) / count
+    line = [origin + (low + step * (k + x)) * along + y * depth for k in range(count) for x, y in TOOTH]
+    yield Line("rack", body, tuple(line))
+
+
+def _axis(mechanism: Description, body: str, arm: str) -> str:
+    """The pin on which a wheel turns on the body that carries it; empty where there is none."""
+    return next((p for p in mechanism.bodies[body] if p in mechanism.bodies[arm]), "")
 
 
 def _slot(mechanism: Description, guide: Guide, span: tuple[float, float], s: float) -> Iterator[Shape]:

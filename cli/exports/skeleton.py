@@ -16,6 +16,7 @@ import numpy as np
 
 from cli.read.names import Groups, unused
 from dalembert.errors import DataError
+from virtualwork.describe.meshes import Mesh
 from virtualwork.describe.parts import GROUND, TorsionSpring
 from virtualwork.drawing import hull, tracers
 from virtualwork.parts_of_motion import SlideMotion
@@ -144,9 +145,12 @@ class Skeleton:
 
     # --- joints -----------------------------------------------------------------------------------------------
     def _wanted(self) -> list[tuple[str, str]]:
-        """Pairs of bodies between which a joint is wanted: of inputs, then of gears and their arms."""
+        """Pairs of bodies between which a joint is wanted: of inputs, then of gears, belts and racks and their arms."""
         pairs = [(e.on, str(e.link)) for e in self.m.inputs if not e.is_slide]
-        return pairs + [(g.arm, link) for g in self.m.gears for link in g.links]
+        pairs += [(g.arm, link) for g in self.m.gears for link in g.links]
+        pairs += [(b.arm, link) for b in self.m.belts for link in b.links]
+        racks = [(self.m.guides[self.m.guide_at(rack.slider)].on, rack.gear) for rack in self.m.racks]
+        return pairs + racks
 
     def _pins(self) -> None:
         wanted = self._wanted()
@@ -286,11 +290,19 @@ class Skeleton:
 
     def terms(self, shares: Mapping[str, float]) -> dict[str, float]:
         """Return a sum of the bodies' angles as one of the tree's pins."""
-        found: dict[str, float] = {}
+        result: dict[str, float] = {}
         for body, c in shares.items():
             for name, sense in self.path[body].items():
-                found[name] = found.get(name, 0.0) + c * sense
-        return {name: c for name, c in found.items() if abs(c) > 1e-12}
+                result[name] = result.get(name, 0.0) + c * sense
+        return {name: c for name, c in result.items() if abs(c) > 1e-12}
+
+    def mesh(self, mesh: Mesh) -> dict[str, float]:
+        """Return what a gear, a belt or a rack holds, as a sum of the tree's coordinates."""
+        result = self.terms(mesh.torques)
+        if mesh.guide is not None:
+            slide = next(j.name for j in self.joints if j.guide == mesh.guide)
+            result[slide] = mesh.shares[mesh.guide]
+        return result
 
     def twist(self, spring: TorsionSpring) -> float:
         """Return how far a torsion spring is wound, rad: within half a turn at the guess, and followed from there."""
@@ -349,8 +361,8 @@ class Travel:
     @cached_property
     def limits(self) -> tuple[float, float] | None:
         """The ends of the input's travel, rad or m; None where it is not limited on both sides."""
-        found = self.m.check.input_limits
-        return None if found is None or not all(map(math.isfinite, found)) else found
+        result = self.m.check.input_limits
+        return None if result is None or not all(map(math.isfinite, result)) else result
 
     @cached_property
     def motion(self) -> Motion | None:
@@ -391,8 +403,8 @@ class Travel:
             return None
         from virtualwork.parts_of_motion import SlideMotion
 
-        found = SlideMotion(self.motion, guide).position
-        return (float(np.nanmin(found)), float(np.nanmax(found))) if np.isfinite(found).any() else None
+        result = SlideMotion(self.motion, guide).position
+        return (float(np.nanmin(result)), float(np.nanmax(result))) if np.isfinite(result).any() else None
 
     @cached_property
     def peak(self) -> float | None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cli.cases.poses import over_poses, pose_head
 from dalembert.angles import read_degrees
 from dalembert.results.columns import Column, Table, names
 from dalembert.results.way import Topic, figures, vector_text
@@ -53,7 +54,7 @@ KEYS = (
 
 def way(analysis: Analysis, *, newton: bool = False) -> list[Topic]:
     """The topics of one mechanism, of each assembly after the other."""
-    found: list[Topic] = []
+    result: list[Topic] = []
     several = analysis.several
     for assembly, motion in zip(analysis.assemblies, analysis.motions, strict=True):
         topics = [*_loops(analysis, motion), *_groups(analysis, motion)]
@@ -65,25 +66,8 @@ def way(analysis: Analysis, *, newton: bool = False) -> list[Topic]:
             if several:
                 topic.head = {"branch": assembly.number, **topic.head}
                 topic.title = f"Assembly {assembly.number}: {topic.heading}"
-        found += topics
-    return found
-
-
-def pose_head(analysis: Analysis, i: int) -> Document:
-    """What names a pose in JSON: `input_deg`, or `inputs` of several."""
-    shown = analysis.inputs.shown[i].tolist()
-    every = {
-        e.name: {analysis.input_names[e.name]: value}
-        for e, value in zip(analysis.mechanism.inputs, shown, strict=True)
-    }
-    return next(iter(every.values())) if len(every) == 1 else {"inputs": every}
-
-
-def over_poses(analysis: Analysis, entries: list[Document]) -> Document:
-    """What a topic has in JSON: of one pose its entry, of several the list `poses`."""
-    if len(entries) == 1:
-        return entries[0]
-    return {"poses": [{**pose_head(analysis, i), **entry} for i, entry in enumerate(entries)]}
+        result += topics
+    return result
 
 
 def _loops(analysis: Analysis, motion: Motion) -> list[Topic]:
@@ -100,7 +84,7 @@ def _groups(analysis: Analysis, motion: Motion) -> list[Topic]:
     from virtualwork.study.loops import CASES, apex, closed_form
 
     assembly, m = motion.assembly, motion.mechanism
-    found = []
+    groups = []
     for group in assembly.plan.groups:
         head: Document = {"links": list(group.links)}
         title = f"Group {', '.join(group.links)}"
@@ -110,7 +94,7 @@ def _groups(analysis: Analysis, motion: Motion) -> list[Topic]:
                 f"No closed form: {len(group.angles)} angles and {len(group.slides)} slides from {len(group.closures)} loops "
                 "by Newton and Raphson, x(k+1) = x(k) − Φ⁻¹·f(x(k)) (Nicoletti, lecture 7); --newton shows iterates."
             )
-            found.append(Topic("group", [text], title, head))
+            groups.append(Topic("group", [text], title, head))
             continue
         case = CASES[group.kind]
         name, _ = apex(m, group)
@@ -128,8 +112,8 @@ def _groups(analysis: Analysis, motion: Motion) -> list[Topic]:
                 parts.append(f"At {figures(analysis.inputs.shown[first][0])}:")
             parts += _root_text(group, its)
         parts.append(_root_table(analysis, m, group, name, at))
-        found.append(Topic("group", parts, title, head))
-    return found
+        groups.append(Topic("group", parts, title, head))
+    return groups
 
 
 def _pair(z: complex) -> list[float]:
@@ -365,8 +349,10 @@ def _parts_table(every: list[Parts], i: int, *, velocity: bool) -> Table:
         whole = abs(complex((each.velocity if velocity else each.acceleration)[i]))
         for word, name in wanted:
             value = complex(getattr(each, name)[i])
-            if word == "sum" or abs(value) > 1e-12 * whole:
-                rows.append((each, word, value))
+            # rounding of nothing is shown as nothing
+            x, y = (0.0 if abs(part) < 1e-12 * whole else part for part in (value.real, value.imag))
+            if word == "sum" or x or y:
+                rows.append((each, word, complex(x, y)))
     return Table(
         [
             Column("point", "", [each.point for each, *_ in rows]),

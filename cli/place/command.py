@@ -20,6 +20,7 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.result import Result
+    from dalembert.results.way import Topic
 
 
 EXAMPLE = "blades"
@@ -35,7 +36,7 @@ What:
 How: weights as they are:
   stock MASSES  Weights in stock, such as 1g,2g,5g; one a place; the fewest that come within 1 % of the correction, at most three.
   weights MASSES  Weights of fixed mass that stand at any angle, such as 4g,4g: the angle of each.
-  max_pieces N  Least error with so many weights from stock altogether, in place of the fewest within 1 %.
+  max_pieces N  Largest number of weights from stock in all: least error, in place of the fewest within 1 %.
 How: elsewhere:
   at_radius R  Radius the corrections were found for.
   to_radius R  Radius the masses go to.
@@ -114,7 +115,13 @@ def run(
         sections = [Section(heading(name), [table.above, table]) for name, table in parts.items()]
         return Sheet(placing.of.name, sections, lambda: draw(placing))
 
+    def way() -> list[Topic]:
+        from cli.place.way import way
+
+        return [topic for each in placings for topic in way(each, "" if alone else each.of.name)]
+
     return Result(
+        way=way,
         tables=tables(placings),
         figure=(lambda: draw(placings[0])) if alone else None,
         method=METHOD,

@@ -19,7 +19,7 @@ import numpy as np
 from virtualwork.branch.choice import Choice
 from virtualwork.branch.sampling import chebyshev_nodes
 from virtualwork.formulas.numbers import Number, Reals, stack, stack_rows
-from virtualwork.formulas.positions import State
+from virtualwork.formulas.positions import State, tied
 from virtualwork.formulas.rates import Passage, Rates
 from virtualwork.plan.steps import Group, Step
 
@@ -79,7 +79,7 @@ def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[
     Parameters
     ----------
     start : callable
-        Gives fresh `Rates` at the change point, with everything the group hangs on known to order + 1.
+        Gives fresh `Rates` at the change point, with everything the group depends on known to order + 1.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[
     d = start()
     jacobian = stack(d.columns(group), 1)[0]
     if not np.isfinite(jacobian).all():
-        # what the group hangs on is not assembled here
+        # what the group depends on is not assembled here
         return []
     u, s, vt = np.linalg.svd(jacobian)
     left, null = u[:, -1], vt[-1]
@@ -112,7 +112,7 @@ def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[
 
     c, plus, minus = second(0.0), second(1.0), second(-1.0)
     a, b = (plus + minus) / 2 - c, (plus - minus) / 2
-    found = []
+    branches = []
     for rate in _roots(a, b, c):
         trial = start()
         trial.right_side(group, 1)
@@ -128,8 +128,8 @@ def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[
             x = x + mu * null
             trial.write(group, k, list(x))
             series.append(x)
-        found.append(series)
-    return found
+        branches.append(series)
+    return branches
 
 
 def _roots(a: float, b: float, c: float) -> list[float]:
@@ -184,7 +184,7 @@ def _nearest(way: Along, group: Group, q0: float, span: float, share: float) -> 
         for j, g in enumerate(group.slides):
             at.slide[g] = slide[j]
         for tie in group.ties:
-            at.turn[tie.body] = at.rotate(tie.angle)
+            tied(tie, at)
         d = Rates(choice.plan, at, [[1.0]], way)
         for k in range(1, ORDER + 2):
             d.advance(before, k)
@@ -193,7 +193,7 @@ def _nearest(way: Along, group: Group, q0: float, span: float, share: float) -> 
     try:
         found = branches(group, start, ORDER)
     except ZeroDivisionError:
-        # a group that this one hangs on has no direction here
+        # a group that this one depends on has no direction here
         found = []
     best, nearest = None, np.inf
     probe = int(np.argmax(nodes))
@@ -273,7 +273,7 @@ def mend(changes: ChangePoints, group: Group, st: State) -> None:
             put(st.slide, g, near, change.slide[j] + move[..., len(group.angles) + j])
         put(st.margin, group.name, near, np.zeros(np.shape(delta)))
         for tie in group.ties:
-            st.turn[tie.body] = st.rotate(tie.angle)
+            tied(tie, st)
 
 
 def mend_rates(changes: ChangePoints, q: Number, k: int, x: list[Number]) -> list[Number]:

@@ -12,7 +12,8 @@ from dalembert.arithmetic.recorded import bare, squared
 from dalembert.arithmetic.varied import rotation
 from virtualwork.branch.choice import Choice
 from virtualwork.describe import AssemblyError, MechanismError, MobilityError, ParallelGuidesError
-from virtualwork.describe.description import Description, known_by_guess
+from virtualwork.describe.description import Description, known_by_guess, slide_by_guess
+from virtualwork.describe.meshes import Coordinate
 from virtualwork.formulas.closed_forms import Case
 from virtualwork.formulas.numbers import Number, cross, dot, stack, stack_rows
 from virtualwork.formulas.positions import State, columns, principal, run
@@ -75,9 +76,9 @@ class _Chooser:
 
     def _made(self, make: Callable[..., C], warnings: tuple[str, ...] = ()) -> C:
         """What is chosen so far."""
-        found = make(self.m, self.plan, self.signs, self.starts, 1, warnings, self.phases)
-        found.cases.update(self.cases)
-        return found
+        result = make(self.m, self.plan, self.signs, self.starts, 1, warnings, self.phases)
+        result.cases.update(self.cases)
+        return result
 
     def _singular(self, st: State) -> bool:
         """Whether a group has a singular Jacobian at the guess, or none at all."""
@@ -157,8 +158,10 @@ class _Chooser:
         if self.plan.blocks.redundant:
             self._refuse_overdriven(st)
         self.phases = {
-            i: sum(c * float(st.angle[body]) for body, c in gear.shares().items())
-            for i, gear in enumerate(self.m.gears)
+            i: sum(
+                c * float(st.slide[x] if isinstance(x, int) else st.angle[x]) for x, c in mesh.shares.items()
+            )
+            for i, mesh in enumerate(self.m.meshes)
         }
 
     # --- gears --------------------------------------------------------------------------------------------------
@@ -171,18 +174,27 @@ class _Chooser:
         for i, _ in angle.gears[:-1]:
             self.phases.setdefault(i, self._constant(i, st))
         for i, p in angle.gears[-1:]:
-            if i not in self.phases and all(b in st.angle for b, _ in angle.bases):
-                rest = st.affine(angle) + sum(r * st.angle[b] for b, r in angle.bases)
+            rest = st.whole(angle)
+            if i not in self.phases and rest is not None:
                 rest += sum(k * self.phases[g] for g, k in angle.gears[:-1])
-                self.phases[i] = (self.angles.get(step.body, 0.0) - rest) / p
+                self.phases[i] = (self._guessed(step.body) - rest) / p
             self.phases.setdefault(i, self._constant(i, st))
         const = angle.const + sum(p * self.phases[i] for i, p in angle.gears)
         return Turn(step.body, replace(angle, const=const, gears=()))
 
     def _constant(self, gear: int, st: State) -> float:
-        """Σ c·θ of a gear: of angles that are known, and of the guess for the others."""
-        shares = self.m.gears[gear].shares().items()
-        return sum(c * float(st.angle[b] if b in st.angle else self.angles.get(b, 0.0)) for b, c in shares)
+        """Σ c·x of a gear, a belt or a rack: of what is known, and of the guess for the others."""
+        total = 0.0
+        for x, c in self.m.meshes[gear].shares.items():
+            known = st.slide.get(x) if isinstance(x, int) else st.angle.get(x)
+            total += c * float(self._guessed(x) if known is None else known)
+        return total
+
+    def _guessed(self, x: Coordinate) -> float:
+        """An angle or a slide of the guess; zero where it says nothing."""
+        if isinstance(x, int):
+            return slide_by_guess(self.m, x, self.angles, self.points) or 0.0
+        return self.angles.get(x, 0.0)
 
     # --- closed forms -------------------------------------------------------------------------------------------
     def _sign(self, group: Group, case: Case, st: State) -> int:
@@ -227,7 +239,7 @@ class _Chooser:
 
     def _solutions(self, group: Group, case: Case, st: State) -> list[tuple[int, State]]:
         """The signs of which a closed form has a solution, each with that."""
-        found = []
+        solutions = []
         for sign in (1, -1):
             trial = st.copy()
             try:
@@ -236,11 +248,11 @@ class _Chooser:
                 continue
             unknowns = [*(trial.turn[b] for b in group.members), *(trial.slide[g] for g in group.slides)]
             if all(map(np.isfinite, unknowns)):
-                found.append((sign, trial))
-        return found
+                solutions.append((sign, trial))
+        return solutions
 
     def _beside(self, group: Group, apart: float) -> State:
-        """What a group hangs on, with the one input as far beside the guess, rad or m."""
+        """What a group depends on, with the one input as far beside the guess, rad or m."""
         st = State([self.m.at[0] + apart])
         chosen = self._made(Choice)
         chosen.run_untracked(chosen.before(group), st)
@@ -326,27 +338,27 @@ class _Chooser:
                 return x[0]
             left = float(np.linalg.norm(stack_rows(gaps(group, many), 1)))
             why = f": from the guess on its loops stay {left:.6g} m apart"
-        found = every_solution(group, many, self.m.size)
-        if len(found) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
+        result = every_solution(group, many, self.m.size)
+        if len(result) == 0 and len(group.angles) + len(group.slides) < 2 * len(group.closures):
             raise MobilityError(
                 f"{group.name}: more constraints than unknowns, and they contradict each other: a structure, or lengths "
                 f"that do not fit (look at {', '.join(self.plan.blocks.redundant)})"
             )
-        if len(found) == 0:
+        if len(result) == 0:
             raise AssemblyError(
                 f"[guess] at: {group.name} cannot be assembled there{why} (Newton-Raphson from many starts finds no "
                 "closed loop); give an `at` where it can, or check the lengths"
             )
         states = []
-        for x in found:
+        for x in result:
             trial = st.copy()
             write_unknowns(group, trial, x[None])
             states.append(trial)
-        if len(found) > 1 and not informed(self.m, group):
+        if len(result) > 1 and not informed(self.m, group):
             raise AssemblyError(self._choices(group, states))
         best = int(np.argmin([self._distance(group, trial) for trial in states]))
-        write_unknowns(group, st, found[best][None])
-        return found[best]
+        write_unknowns(group, st, result[best][None])
+        return result[best]
 
 
 def distance(

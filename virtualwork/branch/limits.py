@@ -107,6 +107,9 @@ class Reach:
         if not track.active or track.slides:
             return None
         track.cover(track.start, track.start + track.length)
+        if any(t.slides for t in turns(track.plan.steps)):
+            # what a rack moves runs on and on
+            return None
         if track.settled or track.comes_back or not track.plan.groups:
             return 1
         steps = track.assembly.needed([key for g in track.plan.groups for key in track.plan.writes(g)])
@@ -164,7 +167,7 @@ class Reach:
     def limits(self) -> list[Limit]:
         """Where the input can go no further, over one period of the branch or what was covered, to full precision.
 
-        The poses of a branch between two limits are told apart over less than brings them back: ends of other ranges
+        The poses of a branch between two limits are distinguished over less than brings them back: ends of other ranges
         are those of the turns in which its own lies.
         """
         track = self.track

@@ -68,8 +68,9 @@ class Track:
         self._samples: dict[str, Samples] = {}
         # one turn says it all where every turn of a body is a whole number of turns of the input
         angles = [t.angle for t in turns(self.plan.steps)]
-        factors = [k for angle in angles for _, k in (*angle.inputs, *angle.bases)]
-        self.whole = not self.slides and all(float(k).is_integer() for k in factors)
+        factors = [k for angle in angles for _, k in (*angle.inputs, *angle.turning)]
+        runs = any(t.slides for t in turns(self.plan.steps))
+        self.whole = not (self.slides or runs) and all(float(k).is_integer() for k in factors)
         self.repeats = self.whole and all(g.kind != "Newton" for g in self.plan.groups)
         # no body turns with one of a loop, or with a slide's line, any faster than the input
         follows = any(angle.bases for angle in angles) or any(g.kind == "RPR" for g in self.plan.groups)
@@ -228,17 +229,17 @@ class Track:
 
     def warnings(self) -> tuple[str, ...]:
         """The assembly's warnings, and the groups that are singular in every pose in what was covered."""
-        found = []
+        result = []
         for g in self.plan.groups:
             if g.name in self.folded:
                 guides = self.assembly.mechanism.guides
                 what = ", ".join([*g.members, *(f"the slide at {guides[s].point}" for s in g.slides)])
-                found.append(
+                result.append(
                     f"singular in every pose: the speed of {what} is not determined: the assemblies of {g.name} meet "
-                    "all along. Places are those where they meet; rates and forces that hang on them are left out"
+                    "all along. Places are those where they meet; rates and forces that depend on them are left out"
                 )
         meeting = tuple(f"[guess] at: {name} " for name in self.folded)
-        return (*found, *(w for w in self.assembly.warnings if not (meeting and w.startswith(meeting))))
+        return (*result, *(w for w in self.assembly.warnings if not (meeting and w.startswith(meeting))))
 
     def samples(self, low: float, high: float, count: int) -> Reals:
         """Inputs from low to high, at least so many steps, between which no body turns far."""
@@ -246,11 +247,15 @@ class Track:
             return np.array([low])
         loops = [g for g in self.plan.groups if g.members]
         ratios = {body: 1.0 for g in loops for body in g.members}
-        for body, r in (base for t in turns(self.plan.steps) for base in t.angle.bases):
-            ratios[body] = max(abs(r), ratios[body])
-        fast = max((abs(k) for t in turns(self.plan.steps) for _, k in t.angle.inputs), default=0.0)
+        tied = [t for t in turns(self.plan.steps) if isinstance(t.body, str)]
+        for t in tied:
+            if any(isinstance(x, int) for x, _ in t.angle.bases):
+                ratios.setdefault(str(t.body), 1.0)
+        for body, r in (base for t in tied for base in t.angle.turning):
+            ratios[body] = max(abs(r), ratios.get(body, 1.0))
+        fast = max((abs(k) for t in tied for _, k in t.angle.inputs), default=0.0)
         step = (high - low) / count
-        step = step if self.slides else min(step, FINE / max(fast, FINE / step))
+        step = min(step, FINE / max(fast, FINE / step))
         uneven = partial(turns_far, np.array([*ratios.values()], dtype=float))
 
         def look(q: Reals) -> Complexes:
@@ -318,13 +323,14 @@ class Track:
         uneven = partial(moves_far, group.kind, np.array([*driving.values()], dtype=float))
         winds = bool(self.assembly.geared.intersection(group.members))
         if self.even and self.repeats and not self.flips and not winds:
-            # nothing that it hangs on has a longer period than the input
+            # nothing that it depends on has a longer period than the input
             period = self.length
         else:
             rate = None if winds else self.pace.rate(group, self.noted.seen)
             period = np.inf if rate is None else 2 * np.pi / rate
         coarse = (b - a) / SAMPLES
-        step = coarse if self.slides or not fast else min(coarse, FINE / fast)
+        plain = not fast or (self.slides and self.even)
+        step = coarse if plain else min(coarse, FINE / fast)
         if step == coarse and (
             (not driving and hardly_moves(case, st)) or not uneven(loop_rows(case, st, [*driving])).any()
         ):
@@ -415,8 +421,8 @@ class Track:
     @property
     def crossings(self) -> list[float]:
         """Inputs at which two branches cross, in what was covered: of closed forms, and met on the way of the others."""
-        found = [float(q) for flips in self.flips.values() for q in flips]
-        return found + [float(q) for way in self.continuations.values() for q in way.crossings]
+        result = [float(q) for flips in self.flips.values() for q in flips]
+        return result + [float(q) for way in self.continuations.values() for q in way.crossings]
 
     # --- groups with no closed form ------------------------------------------------------------------------------
     def _continued(self, group: Group) -> Continuation:

@@ -18,7 +18,7 @@ import numpy as np
 from dalembert.arithmetic.recorded import RECORDED
 from dalembert.arithmetic.varied import rotation
 from virtualwork.formulas.numbers import ONE, Folded, Kind, Number, cross
-from virtualwork.formulas.positions import State
+from virtualwork.formulas.positions import State, tied
 from virtualwork.plan.steps import Angle, Group, Term
 
 
@@ -217,9 +217,9 @@ class Case:
 
     def __init__(self, group: Group, constant: Callable[[Number], Number] | None = None) -> None:
         closure = group.closures[0]
-        tie = {t.body: t.angle for t in group.ties}
+        tie = {str(t.body): t.angle for t in group.ties}
         owner = {b: b for b in group.angles} | {
-            b: next(base for base, _ in a.bases if base in group.angles) for b, a in tie.items()
+            b: next(str(base) for base, _ in a.bases if base in group.angles) for b, a in tie.items()
         }
         members = set(owner)
         self.closure, self.group = closure, group
@@ -313,4 +313,4 @@ class Case:
         if folded:
             st.folded.add(group.name)
         for tie in group.ties:
-            st.turn[tie.body] = st.rotate(tie.angle)
+            tied(tie, st)

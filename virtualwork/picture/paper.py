@@ -32,6 +32,8 @@ LINES: dict[str, dict[str, Any]] = {
     "link": {"lw": 2.2, "solid_capstyle": "round"},
     "wheel": {"lw": 1.1, "ls": CHAIN},
     "spoke": {"lw": 1.4},
+    "belt": {"lw": 1.6},
+    "rack": {"lw": 1.4},
     "slot": {"lw": 0.9},
     "block": {"lw": 1.4},
     "spring": {"color": "0.25", "lw": 0.9},
@@ -168,12 +170,12 @@ class _Paper:
 
     def _names(self, i: int) -> list[Label]:
         """Return the names of points and links in a pose; a link of one point is named beside it."""
-        found = []
+        names = []
         for label in self.drawing.labels:
             at, point = complex(self._at(label.body, label.at, i)[0]), label.of == "point"
             color, size = ("black", 9.0) if point else (self.colors[label.body], 8.0)
-            found.append(Label(label.text, (at.real, at.imag), color, size))
-        return found
+            names.append(Label(label.text, (at.real, at.imag), color, size))
+        return names
 
     def _paths(self, points: Sequence[str] | None) -> list[Label]:
         """Draw the paths of points over the whole travel, and return their names."""

@@ -1,4 +1,4 @@
-"""The topology of a mechanism: what its order of solution hangs on, the plan kept for it, and which equations go together.
+"""The topology of a mechanism: what its order of solution depends on, the plan kept for it, and which equations go together.
 
 Which links meet, which points of a link lie at the same place, how angles are tied: no length is in it. A plan is made
 once for a topology, with its vectors written down in the names of the points (`order.Vector`); a mechanism puts its numbers in.
@@ -53,7 +53,7 @@ def direction(angle: float) -> complex:
 
 @dataclass(frozen=True)
 class Topology:
-    """What a plan hangs on.
+    """What a plan depends on.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Topology:
     def plan(self, make: Callable[[Topology], Plan]) -> Plan:
         """The order of solution in names: made once, but where a gear's constant, or a constant that varies, is in it."""
         tied = [angle for *_, angles in self.guides if angles for angle in angles]
-        if self.first.gears or any(isinstance(angle, Constant) for angle in tied):
+        if self.first.meshes or any(isinstance(angle, Constant) for angle in tied):
             return make(self)
         return _kept(self, make)
 
@@ -170,7 +170,9 @@ def equations(m: Description, tied: Sequence[Relation]) -> tuple[list[Variable],
         Equation(f"input {e.name}", (("slide", str(m.guide_of(e))),), True) for e in m.inputs if e.is_slide
     ]
     for relation in tied:
-        angles = tuple(("angle", body) for body in relation.shares if body != GROUND)
+        angles = tuple(
+            ("slide", str(x)) if isinstance(x, int) else ("angle", x) for x in relation.shares if x != GROUND
+        )
         rows.append(Equation(relation.label, angles, relation.kind == "input"))
     for pin, bodies in m.pins.items():
         for name in bodies:
@@ -285,7 +287,7 @@ def _components(
     low: dict[Variable, int] = {}
     stack: list[Variable] = []
     on: set[Variable] = set()
-    found: list[tuple[Variable, ...]] = []
+    components: list[tuple[Variable, ...]] = []
     place = {v: i for i, v in enumerate(variables)}
 
     def visit(root: Variable) -> None:
@@ -316,9 +318,9 @@ def _components(
                         block.append(u)
                         if u == v:
                             break
-                    found.append(tuple(sorted(block, key=place.__getitem__)))
+                    components.append(tuple(sorted(block, key=place.__getitem__)))
 
     for v in variables:
         if v not in index:
             visit(v)
-    return found
+    return components

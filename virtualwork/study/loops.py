@@ -44,9 +44,9 @@ def loops(m: Description, plan: Plan) -> list[Loop]:
 
     Examples
     --------
-    >>> from virtualwork import Input, Link, Mechanism
+    >>> from virtualwork import Guess, Input, Link, Mechanism
     >>> m = Mechanism({"A": 0j, "D": 3}, {"crank": Link({"A": 0j, "B": 1}), "coupler": Link({"B": 0j, "C": 3}),
-    ...     "rocker": Link({"D": 0j, "C": 2})}, inputs=Input(link="crank"))
+    ...     "rocker": Link({"D": 0j, "C": 2})}, inputs=Input(link="crank"), guess=Guess(0.0, {"coupler": 0.7, "rocker": 1.4}))
     >>> [loop.text for loop in loops(m, m.assembly.plan)]
     ['A→B→C − A→D→C = 0']
     """
@@ -59,7 +59,7 @@ def loops(m: Description, plan: Plan) -> list[Loop]:
     ]
     left = edges - set(cuts)
     order = [*m.ground]
-    found = []
+    loops = []
     for joint, body in cuts:
         way = _way(left, joint, body)
         if way is None:
@@ -77,8 +77,8 @@ def loops(m: Description, plan: Plan) -> list[Loop]:
         pair = [(first, along_first), (second, along_second)]
         # the way that does not begin on the ground goes first: the driven side
         pair.sort(key=lambda way: way[1][:1] == (GROUND,))
-        found.append(Loop(*pair[0], *pair[1]))
-    return found
+        loops.append(Loop(*pair[0], *pair[1]))
+    return loops
 
 
 def _way(edges: set[tuple[str, str]], joint: str, body: str) -> list[str] | None:
