@@ -68,9 +68,8 @@ def measured(
     off = np.zeros(s, dtype=complex) if runout is None else runout
     root = np.ones(s) if weights is None else np.sqrt(weights)
     # what a vibration of 1 at each sensor asks of every plane
-    each = [
-        smallest_squares(influence * root[:, None], one * root, ridge)[0] for one in np.eye(s, dtype=complex)
-    ]
+    scaled = np.asarray(influence * root[:, None], dtype=complex)
+    each = [smallest_squares(scaled, (one * root).astype(complex), ridge)[0] for one in np.eye(s)]
     solution = np.stack(each, axis=1)
     recorder = Recorder()
     outputs: Outputs = {}
