@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from balancing.rotor import by_size
     from balancing.rounding import influence_error
     from balancing.run_log import JointFit, Undetermined, determined, initial_alone, joint_fit
+    from balancing.severity import ZONE_BOUNDARIES, severity_zone
     from balancing.synchronous import OncePerTurn, once_per_turn
     from balancing.tolerance import (
         GRADES,
@@ -64,6 +65,7 @@ _HOMES = {
     "balancing.influence": "influence_coefficients",
     "balancing.run_log": "JointFit Undetermined determined initial_alone joint_fit",
     "balancing.limited": "Doubtful Infeasible NotConverged",
+    "balancing.severity": "ZONE_BOUNDARIES severity_zone",
     "balancing.log_balance": "LogBalance region_factor spread",
     "balancing.next_run": "NextRun suggest_run",
     "balancing.synchronous": "OncePerTurn once_per_turn",
@@ -91,6 +93,7 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "GRADES",
+    "ZONE_BOUNDARIES",
     "AmplitudeFit",
     "Balance",
     "CoincidentPlanes",
@@ -147,6 +150,7 @@ __all__ = [
     "region_factor",
     "repeats",
     "robust_fit",
+    "severity_zone",
     "spread",
     "stored_prior",
     "suggest_run",

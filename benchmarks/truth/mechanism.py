@@ -26,6 +26,12 @@ DIGITS = 50
 Series = list[Any]  # Taylor coefficients in time
 
 
+def along(angle: float) -> Any:
+    """The direction of a guide: what stands at a quarter turn is exactly there."""
+    d = direction(angle)
+    return mp.mpc(d) if d in (1, -1, 1j, -1j) else mp.expj(mp.mpf(angle))
+
+
 def _ratio(part: Any) -> Any:
     """The ratio of a gear, or of a belt by its radii."""
     if not hasattr(part, "radii"):
@@ -87,7 +93,7 @@ class Exact:
         """The angle of a slider's link to its guide's, in the turn of the start."""
         if g.turned is None:
             return mp.mpf(0)
-        given = mp.mpf(g.angle) + mp.mpf(g.turned)
+        given = mp.arg(along(g.angle)) + mp.mpf(g.turned)
         here = self.theta[g.link][0] - self.theta[g.on][0]
         return given + 2 * mp.pi * mp.nint((here - given) / (2 * mp.pi))
 
@@ -206,8 +212,7 @@ class Exact:
 
     def _along(self, g: Guide, order: int, point: Any) -> tuple[Series, dict[int, Any]]:
         """The point from `through`, in axes along the guide, and its row."""
-        d = direction(g.angle)
-        exact = mp.mpc(d) if d in (1, -1, 1j, -1j) else mp.expj(mp.mpf(g.angle))
+        exact = along(g.angle)
         through = self.m.bodies[g.on][g.through] if isinstance(g.through, str) else g.through
         z = self.m.links[g.link].points[g.point]
         apart = [

@@ -190,8 +190,12 @@ def bound(motion: Motion, key: Key, given: Mapping[str, Reals]) -> Reals:
         return motion.rounding.of(key)
     if of[0] in given:
         return TURNED * np.abs(given[of[0]])
-    # in degrees it lies in a whole turn
-    return np.asarray(np.degrees(motion.rounding.of(key)) + np.finfo(float).eps * 360)
+    from dalembert.arithmetic.doubled import PI, Doubled
+
+    # what the degrees as they are shown round besides
+    value = motion.value(key)
+    off = (Doubled(value) * (180.0 / PI) - degrees(np.exp(1j * value))).value
+    return np.asarray(np.degrees(motion.rounding.of(key)) + np.abs(off - 360.0 * np.rint(off / 360.0)))
 
 
 def bounds_of(bounds: Reals) -> list[float]:

@@ -50,7 +50,7 @@ def _remarks(found: FieldBalancing, solved: Solved) -> Iterator[str]:
         yield from _more(len(rows), "planes nearly dependent")
     if not found.request.four_run:
         yield from _thirty(found, group)
-    for i, fit in enumerate(solved.fits):
+    for i, (fit, *_) in enumerate(solved.fits):
         for s, (first, rival) in enumerate(zip(group.initial[i], fit.other, strict=True)):
             if rival == rival:
                 other = -first / rival

@@ -32,7 +32,7 @@ from cli.read.options import bad
 from dalembert.angles import degrees
 from dalembert.arithmetic.parts import in_parts
 from dalembert.errors import DataError
-from dalembert.units import Scaled, from_si
+from dalembert.units import Scaled, amplitude_kind, from_si
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -54,6 +54,11 @@ class FieldBalancing:
         self.runs, self.request, self.stored, self.executor = runs, request, stored, executor
         if request.tolerance is not None and runs.per == "mass" and request.radius is None:
             raise bad("--radius", "the tolerance is of unbalances: expected the radius of the trial masses")
+        if request.zone_class is not None and amplitude_kind(runs.amplitude_unit)[0] != "velocity":
+            raise bad(
+                "--zone-class",
+                f"zones are of velocities, the readings are in {runs.amplitude_unit}: expected mm_s",
+            )
         self.max_mass = limits_in(request.max_mass, runs) or runs.max_mass
         """Limit of each plane, SI; the key "" is for all."""
         self.ceiling = ceiling_in(request.max_residual, runs)
@@ -129,13 +134,13 @@ class FieldBalancing:
                 )
         return standing
 
-    def _fit(self, group: Group) -> tuple[list[str], JointFit, list[AmplitudeFit]]:
+    def _fit(self, group: Group) -> tuple[list[str], JointFit, list[list[AmplitudeFit]]]:
         """Return the planes, and the fit of initial vibration and coefficients: these stored, or from amplitudes alone."""
         if group.fit is not None:
             return group.planes, group.fit, []
         if self.request.four_run:
             fits = self._amplitudes(group)
-            alpha = np.stack([fit.influence for fit in fits])[..., None]
+            alpha = np.array([[fit.influence for fit in one] for one in fits]).swapaxes(1, 2)
             first = group.readings[:, group.trials[0].lines]
             return group.planes, initial_alone(first, alpha), fits
         assert self.stored is not None
@@ -248,34 +253,52 @@ class FieldBalancing:
         except NotConverged as error:
             raise DataError(f"{self.of(problem.group, i or 0)}{error}") from None
 
-    def _amplitudes(self, group: Group) -> list[AmplitudeFit]:
-        """The four-run method, rotor by rotor."""
-        if len(group.planes) != 1:
+    def _amplitudes(self, group: Group) -> list[list[AmplitudeFit]]:
+        """The four-run method, rotor by rotor, plane by plane: each run with masses has them in one plane.
+
+        Several planes (Everett, J. Vib. Acoust. 109 (1987) 162-167): at each sensor the phases of all coefficients count from
+        that sensor's own initial vibration, so that O + Σ α w = 0 is one linear system whatever these phases are.
+        """
+        several = np.flatnonzero((group.on[:, 1:] != 0).sum(axis=2).max(axis=0, initial=0) > 1)
+        if len(several):
             raise DataError(
-                f"{self.of(group)}the four-run method is for one plane, found {', '.join(group.planes)}: with more planes "
-                "the phase must be measured"
+                f"{self.of(group)}run {group.trials[1 + several[0]].run}: masses in several planes: without phase each trial run "
+                "has a mass in one plane, the others empty: four runs for the first plane, then three for each other one"
             )
-        fits = []
-        for i in range(len(group.rotors)):
-            try:
-                first, *runs = group.means[i].real
-                fit = influence_from_amplitudes(first, np.array(runs), group.on[i, 1:, 0])
-            except ValueError as error:
-                raise DataError(f"{self.runs.table.file}: {self.of(group, i)}{error}") from None
-            fits.append(fit)
-            unit = self.runs.amplitude_unit
-            for channel, misfit, first in zip(group.channels, fit.misfit, group.initial[i].real, strict=True):
-                text = (
-                    f"{self.of(group, i)}sensor {channel}: the readings are inconsistent: no influence coefficient fits them "
-                    f"better than {misfit:.3g} {unit} (r.m.s.), {misfit / first:.0%} of the initial reading"
+        return [
+            [self._amplitudes_of(group, i, p) for p in range(len(group.planes))]
+            for i in range(len(group.rotors))
+        ]
+
+    def _amplitudes_of(self, group: Group, i: int, p: int) -> AmplitudeFit:
+        """Fit one plane's coefficients to the amplitudes of its trial runs."""
+        named = f" plane {group.planes[p]}:" if len(group.planes) > 1 else ""
+        first, *runs = group.means[i].real
+        tried = np.flatnonzero(group.on[i, 1:, p] != 0)
+        try:
+            fit = influence_from_amplitudes(first, np.array(runs)[tried], group.on[i, 1 + tried, p])
+        except ValueError as error:
+            raise DataError(
+                f"{self.runs.table.file}: {self.of(group, i)}{named.lstrip()}{' ' * bool(named)}{error}"
+            ) from None
+        unit = self.runs.amplitude_unit
+        for channel, misfit, size in zip(group.channels, fit.misfit, first, strict=True):
+            text = (
+                f"{self.of(group, i)}sensor {channel}:{named} the readings are inconsistent: no influence coefficient fits them "
+                f"better than {misfit:.3g} {unit} (r.m.s.), {misfit / size:.0%} of the initial reading"
+            )
+            if misfit > 0.25 * size:
+                raise DataError(
+                    f"{self.runs.table.file}: {text}: expected four readings that fit one plane's effect"
                 )
-                if misfit > 0.25 * first:
-                    raise DataError(
-                        f"{self.runs.table.file}: {text}: expected four readings that fit one plane's effect"
-                    )
-                if misfit > 0.05 * first:
-                    self.warnings.append(text)
-        return fits
+            if misfit > 0.05 * size:
+                self.warnings.append(text)
+        if named and not np.isnan(fit.other).all():
+            raise DataError(
+                f"{self.runs.table.file}: {self.of(group, i)}two coefficients of plane {group.planes[p]} fit the amplitudes: expected "
+                "a third trial run in this plane, at an angle off the line of the others"
+            )
+        return fit
 
     def _sought(self, solved: Solved) -> Sought:
         request = self.request

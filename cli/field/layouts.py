@@ -251,6 +251,7 @@ def _vectors(file: str, text: str) -> Layout:
         "amplitude": Numbers("A", "um", size, "amplitude"),
         "phase": Numbers("A", "deg", turn, "angle"),
     }
+    table.warnings.append(f"{file}: no units: amplitudes are taken as um, masses as kg, angles as deg")
     for key in set(given) - {
         "A",
         "B",

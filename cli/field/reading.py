@@ -97,6 +97,7 @@ class _Reading:
 
     def __init__(self, layout: Layout, request: Request, files: Sequence[Stored], fitted: bool) -> None:
         self.layout, self.table, self.request, self.fitted = layout, layout.table, request, fitted
+        self.amplitude = self.table.require("amplitude", "amplitude")
         self.stored = files[0] if files and not fitted else None
         self.sisters = Sisters(files) if files and fitted else None
         sizes = [
@@ -160,8 +161,7 @@ class _Reading:
 
     def _vibration(self) -> tuple[NDArray[np.complex128], float]:
         """Return what each row reads, NaN where it is blank, and by what share of it that may be off from its decimals."""
-        table, request = self.table, self.request
-        amplitude = table.require("amplitude", "amplitude")
+        table, request, amplitude = self.table, self.request, self.amplitude
         table.reject(amplitude.values < 0, "amplitude", "an amplitude that is not negative")
         unread = np.isnan(amplitude.values)
         if "weight" in table.numbers:

@@ -25,11 +25,14 @@ def fit_errors(found: FieldBalancing, solved: Solved) -> Real:
         of_alpha = EPS * (6 + turn / 2) * np.abs(solved.alpha)
     else:
         # relative errors of amplitudes and masses: what is written with many digits is rounded once
-        on = np.abs(solved.group.masses[..., 0])
-        share = (masses[..., 0] / np.where(on > 0, on, 1.0)).max(axis=1).tolist()
-        of_alpha = np.stack(
-            [fit.error_estimate(data_error=s) for fit, s in zip(solved.fits, share, strict=True)]
-        )[..., None]
+        on = np.abs(solved.group.masses)
+        share = (masses / np.where(on > 0, on, 1.0)).max(axis=(1, 2)).tolist()
+        of_alpha = np.array(
+            [
+                [fit.error_estimate(data_error=s) for fit in one]
+                for one, s in zip(solved.fits, share, strict=True)
+            ]
+        ).swapaxes(1, 2)
     return np.concatenate([first[..., None], of_alpha], axis=-1)
 
 

@@ -24,8 +24,8 @@ class Problem:
     planes: list[str]
     fit: JointFit
     """Initial vibration and coefficients, run-out and all."""
-    fits: list[AmplitudeFit]
-    """Of the four-run method, rotor by rotor."""
+    fits: list[list[AmplitudeFit]]
+    """Of the four-run method, rotor by rotor, plane by plane."""
     initial: Complex
     """(g, s), run-out off."""
     standing: Complex

@@ -20,6 +20,7 @@ from cli.show.output import command
 
 if TYPE_CHECKING:
     from cli.show.result import Result
+    from dalembert.results.way import Topic
 
 
 EXAMPLE = "blades"
@@ -114,7 +115,13 @@ def run(
         sections = [Section(heading(name), [table.above, table]) for name, table in parts.items()]
         return Sheet(placing.of.name, sections, lambda: draw(placing))
 
+    def way() -> list[Topic]:
+        from cli.place.way import way
+
+        return [topic for each in placings for topic in way(each, "" if alone else each.of.name)]
+
     return Result(
+        way=way,
         tables=tables(placings),
         figure=(lambda: draw(placings[0])) if alone else None,
         method=METHOD,

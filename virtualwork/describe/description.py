@@ -7,7 +7,7 @@ of solution, the formulas and the studies work on this.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -36,6 +36,7 @@ from virtualwork.describe.parts import (
     TorsionSpring,
 )
 from virtualwork.describe.points import Point, as_point, as_points, by_name
+from virtualwork.describe.units import Decimals
 
 
 @record
@@ -70,6 +71,8 @@ class Description(Record):
         'limits of dimensions by their paths: "links.crank.B.x" = "0.05 mm" is ± that',
         default=None,
     )
+    # of the file that it was read from
+    decimals: Decimals | None = field(default=None, compare=False)
 
     def __init__(
         self,
@@ -90,6 +93,7 @@ class Description(Record):
         tolerances: Mapping[str, float] | None = None,
         belts: Sequence[Belt] = (),
         racks: Sequence[Rack] = (),
+        decimals: Decimals | None = None,
     ) -> None:
         values = {
             "ground": as_points(ground),
@@ -109,6 +113,7 @@ class Description(Record):
             "belts": _several("belts", belts),
             "racks": _several("racks", racks),
             "tolerances": MappingProxyType(dict(tolerances or {})),
+            "decimals": decimals,
         }
         for key, value in values.items():
             object.__setattr__(self, key, value)

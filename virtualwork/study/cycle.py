@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from dalembert.arithmetic.guard import Lock, guarded
-from virtualwork.bounds.forces import ForceErrors
 from virtualwork.branch.limits import TURNS
+from virtualwork.digits.forces import ForceErrors
 from virtualwork.formulas.dynamics import Dynamics, Moving
 from virtualwork.formulas.loads import OWN
 from virtualwork.formulas.numbers import Number, Reals, minus, plus

@@ -1,45 +1,51 @@
-"""Bounds of the rounding errors of forces: effort, joint forces, shaking force; dimensions, loads and inputs exact.
+"""Estimates of the rounding errors of forces: effort, joint forces, shaking force.
 
-Each is that of a quantity on the tape (`virtualwork.bounds.quantities`), but for joint forces where statics is
-redundant. Those solve the equilibrium of all links, A f + b = 0, by singular values: what the computed f̂ leave there,
-with the rounding of A, b and their sum, ρ together, bounds them (N. J. Higham, Accuracy and Stability of Numerical
-Algorithms, 2nd ed., §7.2): |δf| ≤ |A⁻¹|·ρ.
+Each is that of a quantity on the tape (`virtualwork.digits.estimates`), but for joint forces where statics is
+redundant. Those solve the equilibrium of all links, A f + b = 0, by singular values: what the computed f leave there in
+32 digits, A⁺ times that, is what they are off by, one step of iterative refinement (N. J. Higham, Accuracy and
+Stability of Numerical Algorithms, 2nd ed., §12.1).
 
 Joint friction exchanges loads and forces until neither changes; its poses have no estimate (infinite).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from dalembert.arithmetic.doubled import Doubled
+from dalembert.arithmetic.exact import EPS
 from dalembert.arithmetic.guard import guarded
-from virtualwork.bounds.quantities import Bounds
-from virtualwork.bounds.second_order import grown, inverse
 from virtualwork.describe.parts import GROUND
-from virtualwork.formulas.asked import Key
+from virtualwork.digits.estimates import OWN, Estimates
+from virtualwork.formulas.asked import Key, over_blocks
 from virtualwork.formulas.dynamics import Dynamics, joints_at
-from virtualwork.formulas.numbers import EPS, Reals
-from virtualwork.formulas.statics import Column
+from virtualwork.formulas.numbers import Reals
+from virtualwork.formulas.statics import NULL, Column
 from virtualwork.plan.steps import Joint
 
 
 @guarded
 class ForceErrors:
-    """Bounds of the rounding errors of forces, under the names of what they bound; each is formed when asked for."""
+    """Estimates of the rounding errors of forces, under the names of these; each is formed when first asked for."""
 
     def __init__(self, dynamics: Dynamics) -> None:
         self.dynamics, self.n, self.lock = dynamics, dynamics.poses.n, dynamics.lock
         self.mechanism = dynamics.poses.mechanism
-        self.bounds = Bounds(dynamics.poses)
+        self.estimates = Estimates(dynamics.poses, self._values)
+
+    def _values(self, keys: Sequence[Key]) -> list[Any]:
+        """The forces as they were handed out."""
+        return [over_blocks(self.dynamics.poses, key, self.dynamics) for key in keys]
 
     def together(self, reactions: Iterable[Key] | None = None) -> None:
-        """Form the bounds of some joints' forces, or of all that `bounds` has: they have most of the sweep in common."""
+        """Form the estimates of some joints' forces, or of all: they have most of the second run in common."""
         if reactions is not None:
             if self._redundant is None:
-                self.bounds.together(reactions)
+                self.estimates.together(reactions)
             return
         inputs, joints = range(len(self.mechanism.inputs)), self.dynamics.reactions.joints
         keys: list[Key] = [("shaking",), ("shaking moment",), *(("effort", j) for j in inputs)]
@@ -48,7 +54,7 @@ class ForceErrors:
             sides = [(joint, body) for joint in joints for body in joint.bodies]
             keys += [("force", joint.key, body) for joint, body in sides]
             keys += [("moment", joint.key, body) for joint, body in sides if self._holds(joint)]
-        self.bounds.together(keys)
+        self.estimates.together(keys)
 
     def _holds(self, joint: Joint) -> bool:
         """Whether a joint keeps its bodies from turning against each other."""
@@ -57,8 +63,8 @@ class ForceErrors:
     def _each(self, kind: str) -> Reals:
         """Of a quantity of every input, (n, k)."""
         keys: list[Key] = [(kind, j) for j in range(len(self.mechanism.inputs))]
-        self.bounds.together(keys)
-        return np.stack([self.bounds.of(key) for key in keys], axis=1)
+        self.estimates.together(keys)
+        return np.stack([self.estimates.of(key) for key in keys], axis=1)
 
     @cached_property
     def effort(self) -> Reals:
@@ -81,68 +87,72 @@ class ForceErrors:
     def joint_force(self, joint: Joint, body: str) -> Reals:
         """Of `Dynamics.joint_force`, (n,): the length of the error."""
         if self._redundant is None:
-            return self.bounds.of(("force", joint.key, body))
+            return self.estimates.of(("force", joint.key, body))
         if joint.guide is None:
             if body == GROUND:
                 others = [self.joint_force(joint, other) for other in joint.bodies if other != GROUND]
                 return np.asarray(sum(others))
             return np.hypot(self._of(("fx", joint.key, body)), self._of(("fy", joint.key, body)))
-        name = "normal", joint.key, ""
+        # along the rail's normal, whose direction rounds too
         assert self.dynamics.statics is not None
-        turned = self.bounds.of(("turn", self.mechanism.guides[joint.guide].on))
-        return np.asarray(self._of(name) + np.abs(self.dynamics.statics.get(name)) * turned)
+        normal: Column = ("normal", joint.key, "")
+        turned = self.estimates.of(("turn", self.mechanism.guides[joint.guide].on))
+        return np.asarray(self._of(normal) + (turned + EPS) * np.abs(self.dynamics.statics.get(normal)))
 
     def joint_moment(self, joint: Joint, body: str) -> Reals:
         """Of `Dynamics.joint_moment`, (n,)."""
         if not self._holds(joint):
             return np.zeros(self.n)
         if self._redundant is None:
-            return self.bounds.of(("moment", joint.key, body))
+            return self.estimates.of(("moment", joint.key, body))
         return self._of(("moment", joint.key, ""))
 
     def reaction(self, joint: str, on: str) -> Reals:
         """Of `Dynamics.reaction`, (n,): the length of the error."""
         if self._redundant is None:
-            return self.bounds.of(("reaction", joint, on))
+            return self.estimates.of(("reaction", joint, on))
         here = joints_at(self.dynamics.reactions.joints, joint, on)
         return np.asarray(sum(self.joint_force(found, on) for found in here))
 
     @cached_property
     def shaking(self) -> tuple[Reals, Reals]:
         """Of `Dynamics.shaking`: the length of the force's error (n,), and the moment's (n,)."""
-        self.bounds.together([("shaking",), ("shaking moment",)])
-        return self.bounds.of(("shaking",)), self.bounds.of(("shaking moment",))
+        self.estimates.together([("shaking",), ("shaking moment",)])
+        return self.estimates.of(("shaking",)), self.estimates.of(("shaking moment",))
 
     def applied(self, link: str) -> tuple[Reals, Reals]:
         """Of `Dynamics.applied`: the length of the force's error (n,), and the moment's (n,)."""
-        self.bounds.together([("applied", link), ("applied moment", link)])
-        return self.bounds.of(("applied", link)), self.bounds.of(("applied moment", link))
+        self.estimates.together([("applied", link), ("applied moment", link)])
+        return self.estimates.of(("applied", link)), self.estimates.of(("applied moment", link))
 
     # --- redundant statics ------------------------------------------------------------------------------------------
     @cached_property
     def _redundant(self) -> tuple[list[Column], Reals] | None:
-        """The unknown forces of all links and their bounds, (n, unknowns); torques divided by the size."""
+        """The unknown forces of all links and their estimates, (n, unknowns); torques divided by the size."""
         statics = self.dynamics.statics
         if statics is None:
             return None
-        value = statics.solved[0]
+        value, least = statics.solved[0], statics.least[0]
         if self.dynamics.scene.friction:
             return statics.unknowns, np.full(value.shape, np.inf)
         # what statics does not determine has a part in the balance too
-        known = {f"f {i}": column for i, column in enumerate(np.nan_to_num(statics.least[0]).T)}
+        known = {f"f {i}": Doubled(column) for i, column in enumerate(np.nan_to_num(least).T)}
         keys: list[Key] = [("balance", row) for row in range(statics.rows)]
-        left, tau = self.bounds.residual(keys, known)
-        with np.errstate(all="ignore"):
-            found = (np.abs(inverse(statics.system()[0])) @ left[..., None])[..., 0]
-            found *= np.atleast_1d(grown(tau, 1))[:, None]
-        found[~np.isfinite(found) & np.isfinite(value)] = np.inf
-        return statics.unknowns, found
+        left = self.estimates.second.doubled(keys, known)
+        rest = np.stack([np.broadcast_to(left[key][0].value, self.n) for key in keys], axis=1)
+        off = np.full(value.shape, np.inf)
+        system = statics.system()[0]
+        good = np.isfinite(system).all(axis=(1, 2)) & np.isfinite(rest).all(axis=1)
+        back = np.linalg.pinv(system[good], rcond=NULL)
+        off[good] = OWN * np.abs(back @ rest[good][..., None])[..., 0]
+        return statics.unknowns, off
 
     def _of(self, unknown: Column) -> Reals:
         """One of the unknowns of redundant statics, (n,)."""
         assert self._redundant is not None
         assert self.dynamics.statics is not None
-        names, bounds = self._redundant
-        scale = self.mechanism.size if unknown[0] in ("moment", "gear", "torque") else 1.0
-        own = EPS * np.abs(self.dynamics.statics.get(unknown))
-        return np.asarray(scale * bounds[:, names.index(unknown)] + own)
+        names, errors = self._redundant
+        scaled = unknown[0] in ("moment", "gear", "torque")
+        own = 0.5 * EPS * np.abs(self.dynamics.statics.get(unknown)) if scaled else 0.0
+        scale = self.mechanism.size if scaled else 1.0
+        return np.asarray(scale * errors[:, names.index(unknown)] + own)
