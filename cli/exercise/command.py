@@ -145,10 +145,15 @@ def _students(text: str) -> list[Student]:
 
 
 def _show(result: Result, given: ShowOptions, asked: object) -> None:
-    """Show the result as every command does; into a pipe the note stands in place of the key."""
-    if not given.json:
-        given.text = True
-    show(result, given, {})
+    """Say what was written; with --json the document with the key."""
+    import typer
+
+    if given.json:
+        show(result, given, {})
+        return
+    for line in result.warnings:
+        typer.echo(f"warning: {line}", err=True)
+    typer.echo(result.notes(), nl=False)
 
 
-run = with_options(_run, OPTIONS, ("json", "text", "no_color"), _show)
+run = with_options(_run, OPTIONS, ("json",), _show)
