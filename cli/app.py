@@ -72,6 +72,8 @@ GROUPS = {
         "completion": ("cli.completion.command", "Print the completion script for bash, zsh or fish."),
     },
 }
+COMPLETE = "_DALEMBERT_COMPLETE"
+"""The environment variable by which a shell asks for completions."""
 COMMANDS = {name: line for group in GROUPS.values() for name, line in group.items()}
 
 
@@ -133,6 +135,10 @@ def build(called: str | None) -> typer.Typer:
             from cli.show.commands import with_help
 
             file = import_module(module)
+            if COMPLETE in os.environ:
+                from cli.completion.values import complete
+
+                complete(file.run, name)
             kind = with_help(getattr(file, "OPTIONS", ""), getattr(file, "EXAMPLE", ""), _call_of)
             app.command(name, short_help=line, cls=kind)(file.run)
         else:
@@ -142,7 +148,7 @@ def build(called: str | None) -> typer.Typer:
 
 def _words() -> list[str]:
     """Return the words of the command line; where a shell completes it, those that it has so far."""
-    if "_DALEMBERT_COMPLETE" not in os.environ:
+    if COMPLETE not in os.environ:
         return sys.argv[1:]
     from typer.completion import completion_init  # type: ignore[attr-defined]
 

@@ -94,11 +94,10 @@ LEVELS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("app",),
         ("grade",),
         ("exercise",),
-        ("exports", "imports"),
+        ("completion", "exports", "imports"),
         (
             "balance",
             "body",
-            "completion",
             "equilibrium",
             "engine",
             "examples",

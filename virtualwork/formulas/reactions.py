@@ -38,7 +38,7 @@ class JointForces:
 
     def __init__(self, paths: LoadPaths, formed: set[str]) -> None:
         self.paths = paths
-        # the names of what has been formed, for `--explain` and the tests
+        # the names of what has been formed, for `dalembert inspect` and the tests
         self.formed = formed
         self.order = paths.order
         self.plan, self.mechanism = paths.plan, paths.mechanism
