@@ -29,7 +29,7 @@ How:
   remove  Corrections as material to remove, not to add.
   round_mass MASS  Round the corrections to this step, such as 0.1g.
   round_angle ANGLE  Round the angles to this step, such as 1deg.
-  workers N  Processes that solve many rotors.
+  modes FILE.csv  Mode shapes (z_* and a column for each mode): their modal sums vanish.
 How: the tolerance:
   center_z Z  Where the centre of mass lies: for the couple and the tolerance.
   grade GRADE  Balance quality grade of ISO 21940-11, such as G2.5; or API (4W/N), or MIL (MIL-STD-167-1).
@@ -37,6 +37,10 @@ How: the tolerance:
   rotor_mass MASS  Mass of the rotor, such as 12kg.
   permissible UNBALANCE  Permissible residual unbalance, such as 30g_mm, in place of a grade.
   bearings Z1:Z2  The bearing planes, where the tolerance holds.
+Further options (docs/commands.md describes them):
+  mode_count K  Take the first K modes of --modes.
+  rigid  With --modes: force and couple vanish too (N + 2 planes).
+  workers N  Processes that solve many rotors.
 """
 
 
@@ -55,6 +59,9 @@ def run(
     rotor_mass: str | None = None,
     permissible: str | None = None,
     bearings: str | None = None,
+    modes: str | None = None,
+    mode_count: Annotated[int | None, typer.Option(min=1)] = None,
+    rigid: bool = False,
     workers: Annotated[int, typer.Option(min=1)] = 1,
     *,
     show: ShowOptions,
@@ -67,7 +74,7 @@ def run(
     """
     # numpy and what stands on it are loaded only once the command line itself is in order
     from cli.balance.rotors import Balancing, Request, read_rotors
-    from cli.balance.tables import METHOD, tables, warnings
+    from cli.balance.tables import METHOD, MODAL, tables, warnings
     from cli.read.planes import from_options, from_table
     from cli.read.tolerance import tolerance_of
     from cli.show.result import Result
@@ -76,6 +83,15 @@ def run(
         raise options.bad("--plane", "expected --plane (once or more) or --planes FILE.csv")
     if not 1e-9 < gravity < 1e9:
         raise options.bad("--gravity", f"'{gravity:g}': expected a positive number of m/s²")
+    if modes is None:
+        options.refuse("needs --modes", mode_count=mode_count, rigid=rigid)
+    else:
+        options.refuse("shows rigid balancing: it does not go with --modes", steps=show.steps)
+    shapes = None
+    if modes is not None:
+        from cli.balance.modes import read_modes
+
+        shapes = read_modes(modes, mode_count, rigid)
     request = Request(
         gravity=gravity,
         remove=remove,
@@ -83,9 +99,10 @@ def run(
         angle_step=options.with_unit("--round-angle", round_angle, "angle", positive=True),
         center=options.quantity("--center-z", center_z, "length"),
         tolerance=tolerance_of(grade, speed, rotor_mass, permissible, bearings),
+        modes=shapes,
     )
     chosen = from_table(planes) if planes is not None else from_options(plane or [])
-    rotors = read_rotors(table, gravity, needs_z=chosen.several)
+    rotors = read_rotors(table, gravity, needs_z=chosen.several or shapes is not None)
     with options.processes(workers) as executor:
         balancing = Balancing(rotors, chosen, request, executor)
 
@@ -104,7 +121,7 @@ def run(
         head={"correction": "remove" if remove else "add"},
         figure=figure,
         way=way,
-        method=METHOD,
+        method=METHOD if shapes is None else MODAL,
         about={"title": "Balancing of known masses"},
-        warnings=[*rotors.table.warnings, *warnings(balancing)],
+        warnings=[*rotors.table.warnings, *(shapes.warnings if shapes else []), *warnings(balancing)],
     )

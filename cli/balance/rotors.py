@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing import CoincidentPlanes, Correction, by_size, correct
+from balancing import CoincidentPlanes, Correction, UnreachedMode, by_size, correct, modal_corrections
 from cli.read.planes import Planes
 from cli.read.rounding import EPS, vector_error
 from cli.read.tolerance import Tolerance, Verdict
@@ -21,6 +21,9 @@ from dalembert.units import Scaled, from_si, to_si
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+
+    from balancing import ModalCorrection
+    from cli.balance.modes import Modes
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -104,6 +107,8 @@ class Request:
     angle_step: tuple[float, str] | None
     center: float | None
     tolerance: Tolerance | None
+    modes: Modes | None = None
+    """Whose modal sums are to vanish, in place of force and couple alone."""
 
 
 @dataclass(eq=False, repr=False)
@@ -145,11 +150,39 @@ class Balancing:
             self.ideal[rows] = fix.unbalance
             self.growth[group] = fix.amplification
             self.solved.append((group, rows, fix))
+        self.modal: list[tuple[NDArray[np.intp], NDArray[np.intp], ModalCorrection]] = []
+        """Where modes are given: of rotors of like size their numbers, the rows of their planes, their corrections."""
+        if request.modes is not None:
+            self._modal(request.modes, z, plane_z)
         self.mass, self.angle, self.made = self._given_out()
         for group, rows, fix in self.solved:
             left = fix.residual_of(self.made[rows], self.about[group])
             self.residual_static[group], self.residual_couple[group] = left
         self.before, self.after = self._in_tolerance_planes()
+
+    def _modal(self, modes: Modes, z: Real, plane_z: Real) -> None:
+        """Find the corrections that leave the modes without excitation."""
+        names, conditions = self.rotors.names, modes.conditions
+        for group, masses, rows in self._groups():
+            there = masses >= 0
+            planes = plane_z[self.plane_of_row[rows]]
+            if planes.shape[-1] < len(conditions):
+                raise DataError(
+                    f"rotor {quote(names[group[0]])}: {', '.join(conditions)} are to vanish, and there {'are' if planes.shape[-1] > 1 else 'is'} "
+                    f"{planes.shape[-1]} plane{'s' * (planes.shape[-1] > 1)}: expected {len(conditions)} at least"
+                )
+            at = np.where(there, z[masses], modes.z[0])
+            try:
+                fix = modal_corrections(
+                    np.where(there, self.rotors.moment[masses], 0),
+                    modes.at(at, "a mass"),
+                    modes.at(planes, "a plane"),
+                )
+            except UnreachedMode as error:
+                raise DataError(f"{modes.file}: {modes.unreached(error)}") from None
+            self.ideal[rows] = fix.unbalance
+            self.growth[group] = fix.condition_number
+            self.modal.append((group, rows, fix))
 
     def _groups(self) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]]:
         """Yield rotors of like size: their numbers, the places of their masses, the rows of their planes."""
@@ -238,7 +271,12 @@ class Balancing:
 
     @cached_property
     def bound(self) -> Real:
-        """Bounds of the rounding errors of the ideal corrections: of the solution, and of the masses' own vectors."""
+        """Bounds of the rounding errors of the ideal corrections: of the solution, and of the masses' own vectors.
+
+        NaN with modes: the shapes are read and interpolated, and none is known.
+        """
+        if self.modal:
+            return np.full(len(self.rotor_of_row), np.nan)
         rotors, row = self.rotors, self.rotor_of_row
         angle = rotors.table.numbers["angle"]
         wrong = np.bincount(rotors.rotor, vector_error(np.abs(rotors.moment), angle.values, angle.unit))

@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 
 NEAR = 20.0  # from this growth of errors on the planes are named as near each other
 
+MODAL = (
+    "Modal balancing: the corrections of least sum of squares with which the modal sums ΣU·φ of the modes vanish (R. E. D. "
+    "Bishop, G. M. L. Gladwell 1959), with --rigid also ΣU and ΣU·z (W. Kellenberger 1972, N + 2 planes). Angles are "
+    "counter-clockwise as seen against +z."
+)
 METHOD = (
     "Each mass is an unbalance U = m·r·e^{iθ}. The corrections are those with the least sum of squares whose resultant and "
     "moment about the planes are opposite to ΣU and ΣU·z (J. A. Riul, Dinâmica das Máquinas, unit II, eqs. 6–21); "
@@ -35,7 +40,41 @@ def tables(b: Balancing) -> dict[str, Callable[[], Table]]:
         "corrections": cache(lambda: corrections(b)),
         "rotors": lambda: states(b),
     }
+    if b.modal:
+        found["modes"] = lambda: modes(b)
     return found | ({} if b.request.tolerance is None else {"tolerance": lambda: verdicts(b)})
+
+
+def modes(b: Balancing) -> Table:
+    """One row per rotor and mode: the modal sum ΣU·φ before and with the corrections as given out."""
+    shapes = b.request.modes
+    assert shapes is not None
+    first, unit = len(shapes.conditions) - len(shapes.names), b.rotors.unbalance_unit
+    order = np.argsort(np.concatenate([group for group, _, _ in b.modal]), kind="stable")
+    before = np.concatenate([fix.modal[:, first:] for _, _, fix in b.modal])[order]
+    after = np.concatenate([fix.residual_of(b.made[rows])[:, first:] for _, rows, fix in b.modal])[order]
+    # rounding of nothing is shown as nothing
+    size = np.concatenate(
+        [np.abs(fix.at_planes) @ np.abs(b.made[rows])[..., None] for _, rows, fix in b.modal]
+    )[order]
+    left = np.where(np.abs(after) > 1e-12 * size[:, first:, 0], np.abs(after), 0.0)
+    count = len(shapes.names)
+    return Table(
+        [
+            names("rotor", [name for name in b.rotors.names for _ in range(count)]),
+            names("mode", shapes.names * len(b.rotors.names)),
+            number(
+                "modal_unbalance", "unbalance", np.abs(before).ravel(), unit, place="initial.modal_unbalance"
+            ),
+            number("angle", "angle", degrees(before).ravel(), place="initial.angle"),
+            number(
+                "residual_modal_unbalance", "unbalance", left.ravel(), unit, place="residual.modal_unbalance"
+            ),
+        ],
+        ("rotor", "mode"),
+        "rotors[].modes[]",
+        "modal sums of unbalances times shape, before and with the corrections",
+    )
 
 
 def corrections(b: Balancing) -> Table:
@@ -142,9 +181,9 @@ def verdicts(b: Balancing) -> Table:
 def warnings(b: Balancing) -> list[str]:
     """What a reader of the corrections has to know."""
     near = np.flatnonzero(b.growth > NEAR)
+    why = "hardly tell the modes apart" if b.modal else "are close to each other and far from the masses"
     lines = [
-        f"rotor {b.rotors.names[r]}: the correction planes are close to each other and far from the masses: "
-        f"errors grow by a factor of {b.growth[r]:.3g}"
+        f"rotor {b.rotors.names[r]}: the correction planes {why}: errors grow by a factor of {b.growth[r]:.3g}"
         for r in near[:5]
     ]
     if len(near) > 5:

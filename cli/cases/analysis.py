@@ -57,10 +57,10 @@ def names(
     """Names between commas."""
     if text is None:
         return None
-    found = [name.strip() for name in text.split(",") if name.strip()]
-    if not found:
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names:
         raise options.bad(flag, f"expected {example}")
-    return found
+    return names
 
 
 def branch(text: str | None) -> str | None:
@@ -139,11 +139,11 @@ class Analysis:
         from virtualwork.motion import Motion
 
         q = self.inputs
-        found = tuple(Motion(a, q.values, q.speed, q.acceleration) for a in self.assemblies)
-        for motion in found:
+        result = tuple(Motion(a, q.values, q.speed, q.acceleration) for a in self.assemblies)
+        for motion in result:
             motion.poses.input_rest = q.rest
             motion.poses.time = q.time
-        return found
+        return result
 
     # --- quantities -----------------------------------------------------------------------------------------------
     @cached_property
@@ -262,10 +262,10 @@ class Analysis:
         """Which poses are assembled, as far as the requested names go: with --only the rest is not solved."""
         if self.whole:
             return motion.assembled
-        found = np.ones(motion.n, dtype=bool)
+        result = np.ones(motion.n, dtype=bool)
         for values in motion.values(self.named):
-            found &= np.isfinite(values)
-        return found
+            result &= np.isfinite(values)
+        return result
 
     @property
     def whole(self) -> bool:

@@ -249,14 +249,14 @@ class Call:
 
     def _way(self, loop: Loop) -> list[Topic]:
         """The worked solution of every mechanism; of variants each topic says which."""
-        found = []
+        result = []
         for name, case in loop.every_case():
             for topic in case.way():
                 if name:
                     title = f"Variant {name}: {topic.heading}"
                     topic = replace(topic, head={"variant": name, **topic.head}, title=title)
-                found.append(topic)
-        return found
+                result.append(topic)
+        return result
 
     def _alone(self, study: Study, loop: Loop) -> Result:
         """The mechanism itself: as one table, written part by part, or in every form."""

@@ -199,22 +199,22 @@ def over_poses(analysis: Analysis, entries: list[Document]) -> Document:
 
 def marks_of(analysis: Analysis, motion: Motion) -> list[list[str]]:
     """What is special about each pose: a change point, a limit of the input, a dead point."""
-    found: list[list[str]] = [[] for _ in range(motion.n)]
+    result: list[list[str]] = [[] for _ in range(motion.n)]
     track = motion.assembly.track
     if not track.active:
-        return found
+        return result
     near = 1e-9 * track.length
     q = motion.inputs[:, 0]
     for at in track.crossings:
         for i in np.flatnonzero(np.abs(q - at) <= near):
-            if "change point" not in found[i]:
-                found[i].append("change point")
+            if "change point" not in result[i]:
+                result[i].append("change point")
     if track.has_limits:
         reach = motion.assembly.reach
         for limit in reach.limits():
             for i in np.flatnonzero(np.abs(reach.apart(q, limit.input)) <= near):
-                found[i] += [word for word in ("limit", "dead point") if word not in found[i]]
-    return found
+                result[i] += [word for word in ("limit", "dead point") if word not in result[i]]
+    return result
 
 
 # --- tables of what stands beside the poses ---------------------------------------------------------------------------

@@ -124,11 +124,11 @@ def of_forces(analysis: Analysis) -> list[str]:
 
 def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
     """What the forces cannot say, and the inputs where they cannot."""
-    found: list[tuple[str, list[float]]] = []
+    troubles: list[tuple[str, list[float]]] = []
 
     def note(bad: NDArray[np.bool_], what: str) -> None:
         if bad.any():
-            found.append((what, analysis.inputs.shown[bad, 0].tolist()))
+            troubles.append((what, analysis.inputs.shown[bad, 0].tolist()))
 
     for motion in analysis.motions:
         d = motion.dynamics
@@ -154,7 +154,7 @@ def troubles(analysis: Analysis) -> list[tuple[str, list[float]]]:
                 note(there & ~np.isfinite(values).all(axis=1) & ~d.locked, what)
         if d.scene.friction:
             note(there & d.locked, "friction locks the mechanism: no reaction balances its own friction")
-    return found
+    return troubles
 
 
 def statements(analysis: Analysis) -> list[str]:

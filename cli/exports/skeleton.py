@@ -298,11 +298,11 @@ class Skeleton:
 
     def mesh(self, mesh: Mesh) -> dict[str, float]:
         """Return what a gear, a belt or a rack holds, as a sum of the tree's coordinates."""
-        found = self.terms(mesh.torques)
+        result = self.terms(mesh.torques)
         if mesh.guide is not None:
             slide = next(j.name for j in self.joints if j.guide == mesh.guide)
-            found[slide] = mesh.shares[mesh.guide]
-        return found
+            result[slide] = mesh.shares[mesh.guide]
+        return result
 
     def twist(self, spring: TorsionSpring) -> float:
         """Return how far a torsion spring is wound, rad: within half a turn at the guess, and followed from there."""

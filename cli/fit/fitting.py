@@ -143,12 +143,12 @@ def aims(
 
 def bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[str, tuple[float, float]]:
     """Every `--free NAME=LOW:HIGH` in SI."""
-    found: dict[str, tuple[float, float]] = {}
+    bounds: dict[str, tuple[float, float]] = {}
     for text in free:
         (first, *both), span = assigned_paths(m, text, "--free", "LOW:HIGH")
         if both:
             raise options.bad("--free", f"'{text}': two numbers: expected {first.path} or {both[0].path}")
-        if first.path in found:
+        if first.path in bounds:
             raise options.bad("--free", f"'{text}': {first.path} is given twice")
         ends = span.split(":")
         if len(ends) != 2:
@@ -159,8 +159,8 @@ def bounds(m: Mechanism, free: Sequence[str], bare: Mapping[str, str]) -> dict[s
             raise options.bad(
                 "--free", f"'{text}': expected the lower bound first, and a higher one after it"
             )
-        found[first.path] = low, high
-    return found
+        bounds[first.path] = low, high
+    return bounds
 
 
 def _drawn(found: Fit[Mechanism]) -> Figure:
@@ -203,16 +203,16 @@ def _parameters(found: Fit[Mechanism]) -> dict[str, float]:
 
 def _misses(reached: Sequence[Reached]) -> dict[str, float]:
     """Root of the mean square and largest distance of lengths together, and of angles."""
-    found: dict[str, float] = {}
+    misses: dict[str, float] = {}
     for unit in ("m", "deg"):
         parts = [_size(each, each.distances) for each in reached if _unit(each) == unit]
         if parts:
             every = np.concatenate(parts)
-            found |= {
+            misses |= {
                 f"rms_{unit}": float(np.sqrt(np.mean(every**2))),
                 f"max_{unit}": float(every.max()),
             }
-    return found
+    return misses
 
 
 def _document(solutions: Sequence[Fit[Mechanism]]) -> Document:

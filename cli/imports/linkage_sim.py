@@ -171,10 +171,10 @@ class _Reader:
 
     def named_body(self, where: str, e: dict[str, Any], key: str) -> tuple[str, float, complex]:
         """Return the same of the body that an entry names; it must be there."""
-        found = self.whole(str(self.get(where, e, key)))
-        if found[0] not in self.d.bodies:
-            raise damaged(self.file, where, found[0], "one of the bodies")
-        return found
+        result = self.whole(str(self.get(where, e, key)))
+        if result[0] not in self.d.bodies:
+            raise damaged(self.file, where, result[0], "one of the bodies")
+        return result
 
     def held(self, where: str, e: dict[str, Any], key: str, point: str) -> tuple[str, Place]:
         """Return the body that an entry names, and the place of its point there."""

@@ -241,12 +241,12 @@ class _Layer:
     # --- what ties and what drives ---------------------------------------------------------------------------
     def _turning_alike(self) -> Groups:
         """Return the bodies that slides join, which turn alike. The ground stands for its own, blocks for none."""
-        found = Groups([GROUND, *(g.name for g in self.groups.values())])
+        result = Groups([GROUND, *(g.name for g in self.groups.values())])
         for s in self.slides.values():
-            pair = found.of(s.link), found.of(s.on)
+            pair = result.of(s.link), result.of(s.on)
             keep = min(pair, key=lambda name: (name != GROUND, name.startswith(BLOCK)))
-            found.join(keep, *pair)
-        return found
+            result.join(keep, *pair)
+        return result
 
     def _shares(
         self, terms: list[tuple[str, float]], where: str, wanted: str = ""

@@ -178,12 +178,10 @@ def _tables_text(result: Result, width: int | None) -> Iterator[str]:
     first, *others = result.tables.items()
     table = (result.screen or first[1])()
     yield _below_each_other(table.above, table_text(table.cells, table.keys, width), table.below)
-    if result.document is not None:
-        return
     for name, of in others:
         table = of()
-        if not table.columns:
-            # of the document alone
+        # without columns it is of the document alone; of a result whose document has another form it is told in words
+        if not table.columns or (result.document is not None and table.place is None):
             continue
         if table.length == 1:
             table = as_list(table)

@@ -160,7 +160,7 @@ class Tolerances(TableCase):
 
     def spreads(self) -> dict[str, Any]:
         """What `tolerance` holds."""
-        found: dict[str, Any] = {
+        spreads: dict[str, Any] = {
             "columns": {
                 header: {"worst": cells(its.worst), "sd": cells(its.sd)}
                 for header, its in self.linear.items()
@@ -173,7 +173,7 @@ class Tolerances(TableCase):
         }
         if self.draws:
             drawn, whole = self.drawn
-            found["drawn"] = {
+            spreads["drawn"] = {
                 "columns": {
                     header: _sample(its)
                     | {f"{name}_error": cells(e) for name, e in zip(NAMES, its.errors, strict=True)}
@@ -184,23 +184,25 @@ class Tolerances(TableCase):
                 "distribution": self.study.distribution,
                 "assembled": whole,
             }
-        return found
+        return spreads
 
     def table(self) -> Table:
         """The table of poses, each number with its worst case and its standard deviation."""
         base = poses.table(self.analysis)
-        found: list[Column] = []
+        result: list[Column] = []
         for column in base.columns:
-            found.append(column)
+            result.append(column)
             if column.header not in self.linear:
                 continue
             its = self.linear[column.header]
-            found.append(Column(f"{column.name}_worst", column.unit, cells(its.worst)))
-            found.append(Column(f"{column.name}_sd", column.unit, cells(its.sd)))
+            result.append(Column(f"{column.name}_worst", column.unit, cells(its.worst)))
+            result.append(Column(f"{column.name}_sd", column.unit, cells(its.sd)))
             if self.draws:
                 sample = _sample(self.drawn[0][column.header])
-                found += [Column(f"{column.name}_drawn_{name}", column.unit, sample[name]) for name in sample]
-        return Table(found, base.keys)
+                result += [
+                    Column(f"{column.name}_drawn_{name}", column.unit, sample[name]) for name in sample
+                ]
+        return Table(result, base.keys)
 
     def assembled(self, table: Table) -> list[bool] | bool:
         """Of each row of a table whether its pose is assembled, or whether any is."""

@@ -112,7 +112,7 @@ def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[
 
     c, plus, minus = second(0.0), second(1.0), second(-1.0)
     a, b = (plus + minus) / 2 - c, (plus - minus) / 2
-    found = []
+    branches = []
     for rate in _roots(a, b, c):
         trial = start()
         trial.right_side(group, 1)
@@ -128,8 +128,8 @@ def branches(group: Group, start: Callable[[], Rates], order: int) -> list[list[
             x = x + mu * null
             trial.write(group, k, list(x))
             series.append(x)
-        found.append(series)
-    return found
+        branches.append(series)
+    return branches
 
 
 def _roots(a: float, b: float, c: float) -> list[float]:

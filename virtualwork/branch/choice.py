@@ -83,11 +83,11 @@ class Choice(Record):
 
         The angle with its whole turns.
         """
-        found: set[str] = set()
+        result: set[str] = set()
         for turn in reversed(list(turns(self.plan.steps))):
-            needs = turn.slides or turn.body in found
-            found |= {b for b, r in turn.angle.turning if needs or not float(r).is_integer()}
-        return found
+            needs = turn.slides or turn.body in result
+            result |= {b for b, r in turn.angle.turning if needs or not float(r).is_integer()}
+        return result
 
     @cached_property
     def plain(self) -> dict[str, Callable[[State], None]]:

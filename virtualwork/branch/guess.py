@@ -76,9 +76,9 @@ class _Chooser:
 
     def _made(self, make: Callable[..., C], warnings: tuple[str, ...] = ()) -> C:
         """What is chosen so far."""
-        found = make(self.m, self.plan, self.signs, self.starts, 1, warnings, self.phases)
-        found.cases.update(self.cases)
-        return found
+        result = make(self.m, self.plan, self.signs, self.starts, 1, warnings, self.phases)
+        result.cases.update(self.cases)
+        return result
 
     def _singular(self, st: State) -> bool:
         """Whether a group has a singular Jacobian at the guess, or none at all."""
@@ -239,7 +239,7 @@ class _Chooser:
 
     def _solutions(self, group: Group, case: Case, st: State) -> list[tuple[int, State]]:
         """The signs of which a closed form has a solution, each with that."""
-        found = []
+        solutions = []
         for sign in (1, -1):
             trial = st.copy()
             try:
@@ -248,8 +248,8 @@ class _Chooser:
                 continue
             unknowns = [*(trial.turn[b] for b in group.members), *(trial.slide[g] for g in group.slides)]
             if all(map(np.isfinite, unknowns)):
-                found.append((sign, trial))
-        return found
+                solutions.append((sign, trial))
+        return solutions
 
     def _beside(self, group: Group, apart: float) -> State:
         """What a group hangs on, with the one input as far beside the guess, rad or m."""

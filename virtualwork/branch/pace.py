@@ -56,17 +56,17 @@ class Pace:
 
     def driving(self, group: Group) -> dict[str, float]:
         """The bodies of loops that other bodies turn with so many times as fast, among all that a group hangs on."""
-        found: dict[str, float] = {}
+        result: dict[str, float] = {}
         for step in self.assembly.before(group):
             if isinstance(step, Turn):
                 for body, r in step.angle.bases:
                     if isinstance(step.body, str):
                         # what a slide turns is seen itself
                         body, r = (step.body, 1.0) if isinstance(body, int) else (body, r)
-                        found[body] = max(abs(r), found.get(body, 0.0))
+                        result[body] = max(abs(r), result.get(body, 0.0))
             elif isinstance(step, Group) and step.kind == "RPR":
-                found.setdefault(step.angles[0], 1.0)
-        return found
+                result.setdefault(step.angles[0], 1.0)
+        return result
 
     def rate(self, group: Group, seen: Mapping[str, Repeating]) -> float | None:
         """How often a turn of the input brings all that a group hangs on back to where it stood; None: never."""

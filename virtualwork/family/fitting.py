@@ -400,7 +400,7 @@ def _cost(squared: Reals) -> Reals:
 
 def _free(m: Description, free: Mapping[str, tuple[float, float]]) -> dict[Dimension, tuple[float, float]]:
     known = dimensions(m)
-    found: dict[Dimension, tuple[float, float]] = {}
+    result: dict[Dimension, tuple[float, float]] = {}
     for path, (low, high) in free.items():
         (dimension, *both) = named(m, path, known)
         if both:
@@ -411,7 +411,7 @@ def _free(m: Description, free: Mapping[str, tuple[float, float]]) -> dict[Dimen
             raise DescriptionError(f"{dimension.path} moves no point: expected a dimension of the geometry")
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise DescriptionError(f"{dimension.path}: found bounds {low:g} to {high:g}, expected low < high")
-        found[dimension] = (float(low), float(high))
-    if not found:
+        result[dimension] = (float(low), float(high))
+    if not result:
         raise DescriptionError("no dimension is free: expected one or more")
-    return found
+    return result

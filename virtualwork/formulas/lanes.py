@@ -213,28 +213,28 @@ class Lanes:
 
     def entering(self, inputs: Iterable[str]) -> dict[str, Any]:
         """The inputs of a tape, by their names."""
-        poses, found = self.poses, {}
+        poses, result = self.poses, {}
         for name in inputs:
             kind, _, of = name.partition(" ")
             if not of:
                 j = int(name[1:])
                 value = poses.inputs[:, j] if name[0] == "q" else poses.rates[NAMES.index(name[0]) - 1][j]
-                found[name] = value
+                result[name] = value
             elif kind == "sign":
-                found[name] = np.asarray(self.branch.sign(of, poses.inputs[:, 0]), dtype=float)
+                result[name] = np.asarray(self.branch.sign(of, poses.inputs[:, 0]), dtype=float)
             elif kind == "x":
-                found[name] = self._unknown(*of.rsplit(" ", 1))
+                result[name] = self._unknown(*of.rsplit(" ", 1))
             elif kind == "table":
                 number, part = of.split()
                 force = self._table(int(number))
-                found[name] = force.real if part == "x" else force.imag
+                result[name] = force.real if part == "x" else force.imag
             elif of.startswith("spring "):
-                found[name] = self.twist(int(of.removeprefix("spring ")))
+                result[name] = self.twist(int(of.removeprefix("spring ")))
             else:
-                found[name] = self._angle(of)
+                result[name] = self._angle(of)
         if poses.n == 1:
-            found = {name: float(np.ravel(value)[0]) for name, value in found.items()}
-        return found
+            result = {name: float(np.ravel(value)[0]) for name, value in result.items()}
+        return result
 
     def _unknown(self, group: str, i: str) -> Reals:
         """An unknown of a group without a closed form, from its own iteration."""
@@ -283,8 +283,8 @@ def recorded(branch: Turning, moves: tuple[bool, ...]) -> Recording:
             branch.recordings[key] = Recording(
                 branch.mechanism, branch.plan, branch.signs, moves, branch.turning_over, branch.geared
             )
-    found: Recording = branch.recordings[key]
-    return found
+    result: Recording = branch.recordings[key]
+    return result
 
 
 def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
@@ -293,8 +293,8 @@ def taped(branch: Turning, recording: Recording, keys: tuple[Key, ...]) -> Tape:
     with branch.lock:
         if key not in branch.recordings:
             branch.recordings[key] = recording.tape(keys)
-    found: Tape = branch.recordings[key]
-    return found
+    result: Tape = branch.recordings[key]
+    return result
 
 
 def _cut(branch: Turning, recording: Recording, keys: tuple[Key, ...], known: frozenset[int] | None) -> Later:
@@ -308,8 +308,8 @@ def _cut(branch: Turning, recording: Recording, keys: tuple[Key, ...], known: fr
             if len(made) >= MANY:
                 del made[next(iter(made))]
             made[key] = later(recording, keys, known)
-        found: Later = made[key]
-        return found
+        result: Later = made[key]
+        return result
 
 
 def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:
@@ -322,8 +322,8 @@ def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Re
     if name not in known:
         with branch.lock:
             known[name] = _made(branch, moves, keys)
-    found: Ready | None = known[name]
-    return found
+    result: Ready | None = known[name]
+    return result
 
 
 def _made(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:

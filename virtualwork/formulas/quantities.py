@@ -218,14 +218,14 @@ def in_order(quantity: Quantity) -> list[Quantity]:
     Forming them so keeps the chain of calls short, however long the chain of links.
     """
     done: set[Quantity] = set()
-    found: list[Quantity] = []
+    result: list[Quantity] = []
     stack: list[tuple[Quantity, bool]] = [(quantity, False)]
     while stack:
         here, open_ = stack.pop()
         if open_:
-            found.append(here)
+            result.append(here)
         elif here not in done:
             done.add(here)
             stack.append((here, True))
             stack += [(part, False) for part in here.reads() if part is not None and part not in done]
-    return found
+    return result

@@ -208,10 +208,10 @@ class Reactions(JointForces):
         """
         self._drive()
         n = self.scene.poses.n
-        found: list[Any] = [np.empty(n, dtype=kind) for _ in forms]
+        result: list[Any] = [np.empty(n, dtype=kind) for _ in forms]
 
         def work(block: Block) -> None:
-            for out, form in zip(found, forms, strict=True):
+            for out, form in zip(result, forms, strict=True):
                 value = form(block)
                 out[block.rows] = 0.0 if value is None else value
             if also is not None:
@@ -222,9 +222,9 @@ class Reactions(JointForces):
 
         self.scene.each(self.scene.case.places, work)
         if self.scene.lost is not None:
-            for out in found:
+            for out in result:
                 leave_out(out, self.scene.lost)
-        return found
+        return result
 
 
 def settle(scene: Scene) -> tuple[int, NDArray[np.bool_]]:

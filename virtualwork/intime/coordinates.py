@@ -69,9 +69,9 @@ class Coordinates:
         self, q: Reals, v: Reals | float = 0.0, a: Reals | float = 0.0, t: Reals | None = None
     ) -> Motion:
         """The motion over coordinates (n, k)."""
-        found = Motion(self.equations.assembly, q, v, a)
-        found.poses.time = t
-        return found
+        result = Motion(self.equations.assembly, q, v, a)
+        result.poses.time = t
+        return result
 
     def states(self, q: Reals, v: Reals, a: Reals, near: Reals) -> tuple[Reals, Reals, Reals]:
         """The inputs, their speeds and accelerations (n, k); of the inputs' whole turns those nearest to `near`."""

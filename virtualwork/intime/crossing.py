@@ -112,19 +112,19 @@ def narrowed(f: Callable[[float], Floats], at: float, widest: float, least: Floa
     """
     best, lowest, told = Crossing(at, widest), math.inf, False
     for j in range(NARROWINGS):
-        found = Crossing(at, widest * NARROWER**j)
-        gaps = found.gaps(f, least)
+        result = Crossing(at, widest * NARROWER**j)
+        gaps = result.gaps(f, least)
         told = told or all(gap < SMOOTH for gap, size in zip(gaps, least, strict=True) if size)
         if max(gaps) < BETTER * lowest:
-            best, lowest = found, max(gaps)
+            best, lowest = result, max(gaps)
         if lowest <= ENOUGH:
             break
     if told:
         best.compare(f, Crossing(at, OTHER * best.inner / INNER))
         return best
     # what is not smooth there is left as it is, but for the nearest poses
-    found.smooth, found.missed = False, [0.0] * len(least)
-    return found
+    result.smooth, result.missed = False, [0.0] * len(least)
+    return result
 
 
 def crossings(
@@ -139,12 +139,12 @@ def crossings(
     for at in sorted(points):
         if not places or at - places[-1] > 1e-6 * unit:
             places.append(at)
-    found = []
+    crossings = []
     for i, at in enumerate(places):
         apart = [abs(at - other) for other in (*places[max(0, i - 1) : i], *places[i + 1 : i + 2])]
         widest = min([REACH * unit, *(0.6 * x for x in apart)])
-        found.append(settled(at, share * widest))
-    return found
+        crossings.append(settled(at, share * widest))
+    return crossings
 
 
 def nearest(found: list[Crossing], q: float) -> Crossing | None:

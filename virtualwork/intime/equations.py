@@ -98,14 +98,14 @@ class Equations:
         if crossing is not None:
             if not crossing.smooth:
                 raise Lost
-            found = crossing.interpolated([self._plain(t, [x], v) for x in crossing.nodes], q[0])
+            result = crossing.interpolated([self._plain(t, [x], v) for x in crossing.nodes], q[0])
         else:
-            found = self._plain(t, q, v)
-        for value in found:
+            result = self._plain(t, q, v)
+        for value in result:
             # NaN and infinity
             if value - value != 0.0:
                 raise Lost
-        return found
+        return result
 
     def _plain(self, t: float, q: Floats, v: Floats) -> Floats:
         """The same away from change points."""

@@ -336,7 +336,7 @@ class _Lanes:
 
     def times(self, rows: Rows, nodes: Nodes, alone: Mask) -> Reals:
         """The times up to each lane's event, it the last, (lanes, n); then NaN."""
-        found = np.tile(self.t, (len(rows), 1))
+        result = np.tile(self.t, (len(rows), 1))
         if self.levels:
             ways = sides(nodes.at(0), self.levels, self.scale[rows])
             ends, doubt = events(self.rates, self.some(rows), nodes, self.levels, ways)
@@ -344,11 +344,11 @@ class _Lanes:
             self.late[rows] = np.isnan(ends)
             # the level that the coarser way passed at its very end
             alone[rows[np.isnan(ends) & (nodes.t[-1] < self.t[-1])]] = True
-            for row, end in zip(found, ends, strict=True):
+            for row, end in zip(result, ends, strict=True):
                 if end < self.t[-1]:
                     its = reached(self.t, end)
                     row[: len(its)], row[len(its) :] = its, np.nan
-        return found
+        return result
 
     def _error(self, coarse: Nodes, fine: Nodes, times: Reals, of: float) -> Reals:
         """The error of the inputs at all times, (lanes, n, k): that of the coarser way's next node."""

@@ -257,7 +257,7 @@ class _Planner:
     def _relations(self, fresh: list[Coordinate]) -> list[tuple[Relation, Angle]]:
         """Σ c·θ = const + Σ k·input, for every relation all of whose angles are known once this block is."""
         new = set(fresh)
-        found = []
+        relations = []
         for relation in self.relations:
             bodies = relation.shares.keys()
             if bodies & new and all(body in new or body in self.angles for body in bodies):
@@ -265,8 +265,8 @@ class _Planner:
                 if relation.gear is not None:
                     known = self.phases.get(relation.gear)
                     right = Angle(known) if known is not None else Angle(gears=((relation.gear, 1.0),))
-                found.append((relation, right))
-        return found
+                relations.append((relation, right))
+        return relations
 
     def _eliminate(self, fresh: list[Coordinate]) -> tuple[list[Coordinate], list[Turn]]:
         """Gauss-Jordan on the linear relations: which angles and slides stay free, and what the others are.
@@ -341,9 +341,9 @@ class _Planner:
         for i in range(len(self.m.guides)):
             if i not in self.slides_known or (f"guide {i}", "") in self.used:
                 continue
-            found = self._by_guide(i, body, placed, chain)
-            if found is not None:
-                return found
+            result = self._by_guide(i, body, placed, chain)
+            if result is not None:
+                return result
         return None
 
     def _by_guide(
@@ -352,17 +352,17 @@ class _Planner:
         g, d = self.m.guides[i], self.directions[i]
         if g.link == body and g.on in placed:
             base, terms = chain(g.on, self.throughs[i])
-            found = (
+            result = (
                 base,
                 combined((*terms, Term(d, g.on, i), Term(-self.points[body][g.point], body))),
             )
         elif g.on == body and g.link in placed:
             base, terms = chain(g.link, self.points[g.link][g.point])
-            found = base, combined((*terms, Term(-self.throughs[i], body), Term(-d, body, i)))
+            result = base, combined((*terms, Term(-self.throughs[i], body), Term(-d, body, i)))
         else:
             return None
         self.used.add((f"guide {i}", ""))
-        return found
+        return result
 
     def _loops(self, moving: set[str]) -> tuple[list[Closure], dict[str, Path]]:
         """A tree over the block's bodies from what is placed; every joint outside the tree closes a loop."""

@@ -286,12 +286,12 @@ class Joint:
 
 def joints(m: Description) -> list[Joint]:
     """Every joint of the mechanism that holds a point: pins in the order of the file, then guides."""
-    found = [Joint(f"pin:{name}", name, bodies, None, f"pin {name}") for name, bodies in m.pins.items()]
+    joints = [Joint(f"pin:{name}", name, bodies, None, f"pin {name}") for name, bodies in m.pins.items()]
     order = list(m.bodies)
     for i, g in enumerate(m.guides):
         bodies = tuple(sorted((g.link, g.on), key=order.index))
-        found.append(Joint(f"guide:{i}", g.point, bodies, i, guide_label(m, i)))
-    return found
+        joints.append(Joint(f"guide:{i}", g.point, bodies, i, guide_label(m, i)))
+    return joints
 
 
 def guide_label(m: Description, i: int) -> str:

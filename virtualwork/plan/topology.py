@@ -287,7 +287,7 @@ def _components(
     low: dict[Variable, int] = {}
     stack: list[Variable] = []
     on: set[Variable] = set()
-    found: list[tuple[Variable, ...]] = []
+    components: list[tuple[Variable, ...]] = []
     place = {v: i for i, v in enumerate(variables)}
 
     def visit(root: Variable) -> None:
@@ -318,9 +318,9 @@ def _components(
                         block.append(u)
                         if u == v:
                             break
-                    found.append(tuple(sorted(block, key=place.__getitem__)))
+                    components.append(tuple(sorted(block, key=place.__getitem__)))
 
     for v in variables:
         if v not in index:
             visit(v)
-    return found
+    return components

@@ -61,9 +61,9 @@ class Between:
             return self.poses.again(place[:, None], self.poses.rates)
         q, speed, acceleration = (of(place) for of in self._law)
         rates: list[list[Number]] = [[speed], [acceleration], [0.0]]
-        found = self.poses.again(q[:, None], rates)
-        found.time = place
-        return found
+        result = self.poses.again(q[:, None], rates)
+        result.time = place
+        return result
 
     def effort(self, place: Reals) -> Reals:
         """The effort by virtual work at other places, (m,)."""

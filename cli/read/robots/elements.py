@@ -135,10 +135,10 @@ class At(NamedTuple):
         """Return n finite numbers, or however many there are; `default` where there is no text."""
         if text is None and default is not None:
             return list(default)
-        found = [self.number(of, word) for word in (text or "").split()]
-        if n is not None and len(found) != n:
+        numbers = [self.number(of, word) for word in (text or "").split()]
+        if n is not None and len(numbers) != n:
             raise self.error(of, quote(text or ""), f"{n} number{'s' * (n != 1)}")
-        return found
+        return numbers
 
     def direction(self, of: str, vector: ArrayLike) -> Array:
         """Return a direction of length 1."""

@@ -126,14 +126,14 @@ def _table(rows: int, n: int, pairs: frozenset[int]) -> Rows:
     room = np.empty(rows * n)
     if not pairs:
         return room.reshape(rows, n)
-    found: list[Reals] = []
+    result: list[Reals] = []
     for row in range(rows):
         if row in pairs:
             both = room[row * n : (row + 2) * n]
-            found += [both[::2], both[1::2]]
+            result += [both[::2], both[1::2]]
         elif row - 1 not in pairs:
-            found.append(room[row * n : (row + 1) * n])
-    return found
+            result.append(room[row * n : (row + 1) * n])
+    return result
 
 
 def run_grid(
