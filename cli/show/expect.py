@@ -100,8 +100,8 @@ def compare(table: Table, file: str, rtol: float, others: Sequence[Callable[[], 
         place="check[]",
         below=summary,
     )
-    said = [f"{file}: not compared: {', '.join(aside)}"] if aside else []
-    return Comparison(check, summary, right == len(lines), said)
+    left_aside = [f"{file}: not compared: {', '.join(aside)}"] if aside else []
+    return Comparison(check, summary, right == len(lines), left_aside)
 
 
 def _partner(header: str, table: Table) -> tuple[str, str] | None:
@@ -222,16 +222,16 @@ def _match(
         taken = groups.setdefault(tuple(c.cells[index] for c in keys), [index, len(there), 0])
         taken[2] += 1
         if not left:
-            named = ", ".join(f"{c.header} {c.cells[index]}" for c in keys)
-            raise DataError(f"{file}: row {index + 1}: the result has no (further) row with {named}")
+            wanted = ", ".join(f"{c.header} {c.cells[index]}" for c in keys)
+            raise DataError(f"{file}: row {index + 1}: the result has no (further) row with {wanted}")
         yield left[0]
         places[tuple(c.cells[index] for c in texts)].remove(left[0])
     for cells, (index, many, few) in groups.items():
-        missing = [name for name in named if name not in {c.column for c in keys}]
-        if few < many and missing:
-            said = ", ".join(f"{c.header} {cell}" for c, cell in zip(keys, cells, strict=True))
+        absent = [name for name in named if name not in {c.column for c in keys}]
+        if few < many and absent:
+            wanted = ", ".join(f"{c.header} {cell}" for c, cell in zip(keys, cells, strict=True))
             raise DataError(
-                f"{file}: row {index + 1}: {many} rows of the result have {said}: expected a column {' or '.join(missing)} too"
+                f"{file}: row {index + 1}: {many} rows of the result have {wanted}: expected a column {' or '.join(absent)} too"
             )
 
 
