@@ -219,17 +219,17 @@ def warnings(robot: Robot, found: Sequence[Check]) -> list[str]:
     """Name what is broken, and what looks wrong though a body can have it."""
     if not found:
         raise DataError(f"{robot.file}: no link has an inertia: nothing to check")
-    said = []
+    lines = []
     for c in found:
         hint = f"; likely: {c.likely}" if c.likely else ""
         if not c.valid:
             I1, I2, I3 = c.moments
             why = "is negative" if I1 < 0 else f"{I1:.6g} + {I2:.6g} < {I3:.6g}"
             moments = f"principal moments {I1:.6g}, {I2:.6g}, {I3:.6g} kg·m²"
-            said.append(
+            lines.append(
                 f"link '{c.link.name}': no body has it: {moments}: {'the first ' if I1 < 0 else ''}{why}{hint}"
             )
         elif hint:
             off = "smaller than its span suggests" if c.too_small else "larger than the link's reach allows"
-            said.append(f"link '{c.link.name}': a body can have it, but it is {off}{hint}")
-    return said
+            lines.append(f"link '{c.link.name}': a body can have it, but it is {off}{hint}")
+    return lines

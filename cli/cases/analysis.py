@@ -149,7 +149,7 @@ class Analysis:
     @cached_property
     def places(self) -> list[Quantity]:
         """The places and rates that are requested."""
-        every = quantities.places(self.mechanism, 3)
+        every = quantities.places(self.mechanism, 3, self.request.only or ())
         return quantities.chosen(every, self.request.only, self.order)
 
     @cached_property
@@ -198,7 +198,7 @@ class Analysis:
         only = self.request.only
         if only is None:
             return
-        moving = quantities.places(self.mechanism, 3)
+        moving = quantities.places(self.mechanism, 3, only)
         forces = quantities.forces(self.mechanism, self.pairs)
         here = [*moving, *forces] if self.request.forces else moving
         word = quantities.unknown(here, only)
@@ -276,7 +276,7 @@ class Analysis:
     def named(self) -> list[Key]:
         """Places of the points, links and slides that are requested, as a motion computes them."""
         homes = self.mechanism.points
-        found: list[Key] = [("point", homes[name][0], 0j, name, 0) for name in self.points]
-        found += [("angle", name, 0) for name in self.links]
+        result: list[Key] = [("point", homes[name][0], 0j, name, 0) for name in self.points]
+        result += [("angle", name, 0) for name in self.links]
         slides = [each.key for each in self.places if each.path[0] == "slides"]
-        return [*found, *dict.fromkeys((*key[:2], 0) for key in slides)]
+        return [*result, *dict.fromkeys((*key[:2], 0) for key in slides)]

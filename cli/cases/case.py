@@ -55,7 +55,7 @@ class Case:
         raise NotImplementedError
 
     def warnings(self) -> list[str]:
-        """What there is to warn of, once all is worked out."""
+        """What to warn of, once all is worked out."""
         return []
 
     def way(self) -> list[Topic]:
@@ -126,7 +126,7 @@ class Study:
         raise NotImplementedError
 
     def warnings(self) -> list[str]:
-        """What there is to remark on the request itself, whatever the variant."""
+        """What to remark on the request itself, whatever the variant."""
         return []
 
     def together(self, row: Rows, json: bool) -> Together | None:

@@ -130,9 +130,9 @@ def cells_of(
     Parameters
     ----------
     found : mapping
-        What the motion has been asked for.
+        What the motion has computed.
     given : mapping
-        Of driven links the angles as they were asked for, degrees.
+        Of driven links the angles as requested, degrees.
     where : array (n,) of bool, optional
         The poses that have any.
     """
@@ -151,6 +151,7 @@ def cells_of(
             part = exact_degrees(given[name]) if name in given else degrees(np.exp(1j * value))
         else:
             part = each.of(value)
+            known = known & np.isfinite(part)
         shown[each] = cells(part, known if where is None else known & where)
     return shown
 

@@ -103,6 +103,6 @@ def way(e: Engine) -> list[Topic]:
     ]
     if e.balanced:
         result.append(
-            Topic("residual", ["What is left with counterweights and balance shafts:", *lines], "Residual")
+            Topic("residual", ["Residual forces with counterweights and balance shafts:", *lines], "Residual")
         )
     return result

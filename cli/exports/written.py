@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def written(
     m: Mechanism, inputs: tuple[float, ...], suffix: str, file: str, bare: Mapping[str, str]
 ) -> tuple[bytes, list[str]]:
-    """Return the file of a mechanism that starts at the inputs, rad or m, and what is left out of it.
+    """Return the file of a mechanism that starts at the inputs, rad or m, and what is omitted.
 
     `bare` are the units that the mechanism's own file uses.
     """

@@ -171,11 +171,11 @@ class Drawing:
 
     def pins(self) -> dict[str, list[str]]:
         """Return the bodies of each point that more than one body has."""
-        found: dict[str, list[str]] = {}
+        result: dict[str, list[str]] = {}
         for name, body in self.bodies.items():
             for point in body.points:
-                found.setdefault(point, []).append(name)
-        return {point: names for point, names in found.items() if len(names) > 1}
+                result.setdefault(point, []).append(name)
+        return {point: names for point, names in result.items() if len(names) > 1}
 
     def size(self) -> float:
         """Return the largest extent of the drawing, or of a body of it."""

@@ -95,7 +95,7 @@ DEFAULT_CPM = 15.0
 
 
 def read(file: str, text: str) -> list[Drawing]:
-    """Read the document; what has nothing but the ground in common is told apart later."""
+    """Read the document; what has nothing but the ground in common is distinguished later."""
     return [_Reader(file, parse(file, text)).drawing()]
 
 

@@ -143,7 +143,7 @@ class _Reader:
 
     def _ends(self, name: str, e: dict[str, Any]) -> tuple[str, str, str, str]:
         """Return (body, point, body, point) of a joint; where a body is fixed to another, that one's."""
-        found = []
+        result = []
         for side in "ij":
             where = f"joint {name}"
             body = str(self.get(where, e, f"body_{side}"))
@@ -157,8 +157,8 @@ class _Reader:
                 z = self._carried(self.points[body][point], turn, shift)
                 point = f"{body}.{point}"
                 self.points[held].setdefault(point, z)
-            found += [held, point]
-        return found[0], found[1], found[2], found[3]
+            result += [held, point]
+        return result[0], result[1], result[2], result[3]
 
     def whole(self, body: str) -> tuple[str, float, complex]:
         """Return the body that one is fixed to, the turn of its axes there and where their origin stands."""

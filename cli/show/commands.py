@@ -149,7 +149,7 @@ def told(options: str) -> dict[str, Told]:
     """Read what a command's help is to say of its parameters.
 
     Below each heading a line is a parameter's name as the function has it, its flags where they are others than that
-    name, what stands for its value, and behind two blanks what is said of it.
+    name, what stands for its value, and after two blanks its help.
     """
     result = {}
     heading = ""

@@ -54,7 +54,7 @@ def declared_command(
 
 
 def show(result: Result, options: ShowOptions, asked: Mapping[str, str]) -> None:
-    """Write the files asked for, print the result; status 1 if an expectation is not met, or nothing was found."""
+    """Write the requested files, print the result; status 1 if an expectation is not met, or nothing was found."""
     from dalembert.tables.headers import check_renamed
 
     if options.form == ".toml" and result.toml is None:
@@ -132,7 +132,7 @@ def _with_check(result: Result, checked: Comparison) -> Result:
 
 
 def _print(result: Result, options: ShowOptions, checked: Comparison | None) -> None:
-    """Print what was asked for, in the form that standard output asks for."""
+    """Print what was requested, in the form that standard output asks for."""
     from dalembert.results.text import csv_text, paragraphs, table_text
 
     verdict = "" if checked is None else f"{table_text(checked.table.cells)}\n{checked.summary}"

@@ -114,8 +114,8 @@ def signs(
 def at_guess(written: Written, m: Description, given: Mapping[str, Any], n: int) -> dict[str, Reals]:
     """The radicand of each closed form of each variant at the input of the guess, (n,), by the group's name."""
     with np.errstate(all="ignore"):
-        found = run(written.choice, {**given, **_inputs(m)})
-    return {g.name: np.broadcast_to(found[f"margin {g.name}"], n) for g in written.closed}
+        result = run(written.choice, {**given, **_inputs(m)})
+    return {g.name: np.broadcast_to(result[f"margin {g.name}"], n) for g in written.closed}
 
 
 def with_signs(given: Mapping[str, Any], signs: Mapping[str, Any]) -> dict[str, Any]:

@@ -130,7 +130,7 @@ class Solver:
 
     @cached_property
     def moves(self) -> tuple[bool, ...]:
-        """Whether the inputs have a speed, an acceleration, a jerk: whether one that varies is zero hangs on no variant."""
+        """Whether the inputs have a speed, an acceleration, a jerk: whether one that varies is zero depends on no variant."""
         varied = {d.where[-1] for d in self.part.dimensions if d.where[0] == "inputs"}
         rates = zip(RATES, self.part.rates, strict=True)
         return tuple(name in varied or any(np.any(rate) for rate in order) for name, order in rates)
@@ -150,8 +150,8 @@ class Solver:
         key = "family", fixed, self.moves
         if key not in own.recordings:
             own.recordings[key] = Written(own, fixed, self.moves, own_signs=True)
-        found: Written = own.recordings[key]
-        return None if found.open_gears else found
+        result: Written = own.recordings[key]
+        return None if result.open_gears else result
 
     @cached_property
     def _given(self) -> dict[str, Reals]:

@@ -164,8 +164,8 @@ def dependent(labels: list[str], jacobian: Reals) -> tuple[int, tuple[str, ...]]
     u, s, _ = np.linalg.svd(jacobian)
     rank = int((s > RANK * s[0]).sum())
     left = u[:, rank:]
-    found = [label for label, row in zip(labels, left, strict=True) if np.abs(row).max(initial=0) > 1e-6]
-    return rank, tuple(dict.fromkeys(found))
+    result = [label for label, row in zip(labels, left, strict=True) if np.abs(row).max(initial=0) > 1e-6]
+    return rank, tuple(dict.fromkeys(result))
 
 
 def hidden_freedom(m: Description, x: Reals) -> tuple[tuple[str, ...], tuple[str, ...]] | None:

@@ -74,7 +74,7 @@ class Dynamics:
     def effort(self) -> Reals:
         """The effort at each input by virtual work, (n, k)."""
         if self._effort is None:
-            # friction settles first: the loads hang on it
+            # friction settles first: the loads depend on it
             _, settled = self._settled
             self._effort = effort(self.scene)
             self._effort[~settled] = np.nan

@@ -1,4 +1,4 @@
-"""What a motion keeps of one request for later ones: values that much hangs on, and that cost more to form than to read.
+"""What a motion keeps of one request for later ones: values that much depends on, and that cost more to form than to read.
 
 The operations of a recording are numbered, whatever is asked of it. A later request's tape begins at the values that
 earlier ones have left: they enter it as `kept 0`, `kept 1`, …

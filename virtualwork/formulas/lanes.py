@@ -106,7 +106,7 @@ class Lanes:
         return not self.branch.folded and recording.takes(keys)
 
     def operations(self, keys: Iterable[Key]) -> int:
-        """What quantities of a pose cost, in operations on real numbers, with all that they hang on."""
+        """What quantities of a pose cost, in operations on real numbers, with all that they depend on."""
         return taped(self.branch, self.recording, tuple(keys)).cost
 
     def values(self, keys: Sequence[Key]) -> list[Any]:
@@ -125,7 +125,7 @@ class Lanes:
         return [self.known[key] for key in keys]
 
     def one(self, keys: tuple[Key, ...]) -> bool:
-        """Work out one pose that hangs on nothing but its input, by a function of floats; False where it hangs on more."""
+        """Work out one pose that depends on nothing but its input, by a function of floats; False where it depends on more."""
         given = [self.poses.inputs, *(rates[0] for rates in self.poses.rates)]
         values = [x if isinstance(x, float) else float(np.ravel(x)[0]) for x in given]
         made = ready(self.branch, tuple(x != 0.0 for x in values[1:]), keys)
@@ -184,7 +184,7 @@ class Lanes:
             )
 
     def _closed(self, key: Key) -> list[Key]:
-        """What tells where the groups that a quantity hangs on are not assembled."""
+        """What tells where the groups that a quantity depends on are not assembled."""
         return [("closed", group) for group in self.recording.hangs_on(key)] if self.branch.may_open else []
 
     def _where_bad(self, key: Key, found: Any) -> NDArray[np.bool_] | None:
@@ -313,7 +313,7 @@ def _cut(branch: Turning, recording: Recording, keys: tuple[Key, ...], known: fr
 
 
 def ready(branch: Turning, moves: tuple[bool, ...], keys: tuple[Key, ...]) -> Ready | None:
-    """Quantities of one pose as a function of floats; None where they hang on more than the input and its rates.
+    """Quantities of one pose as a function of floats; None where they depend on more than the input and its rates.
 
     Such a mechanism has one input that turns, no change point, no limit, and a closed form for every group.
     """

@@ -31,7 +31,7 @@ from virtualwork.plan.steps import Joint, Path, Place, Plan, Term, joints, path_
 class LoadCase:
     """What acts on a mechanism, at rest or moving; a load that is zero throughout is not in the list.
 
-    It hangs on no motion: an assembly makes it once for rest and once for all motions.
+    It depends on no motion: an assembly makes it once for rest and once for all motions.
     """
 
     def __init__(self, mechanism: Description, plan: Plan, moves: bool) -> None:
@@ -154,7 +154,7 @@ class LoadCase:
         return [*self.loads, *self.friction]
 
     def targets(self, keys: Iterable[str] = ()) -> tuple[tuple[str, ...], int]:
-        """What `keys` and the loads hang on, `angle:BODY`, `slide:GUIDE`, `point:NODE`, and to which derivative."""
+        """What `keys` and the loads depend on, `angle:BODY`, `slide:GUIDE`, `point:NODE`, and to which derivative."""
         reads = set(keys).union(*(load.reads() for load in self.everything)) - {f"angle:{GROUND}"}
         if not reads:
             # nothing acts: any one thing that moves will do
@@ -163,7 +163,7 @@ class LoadCase:
 
     @cached_property
     def places(self) -> tuple[str, ...]:
-        """What the places of all joints hang on."""
+        """What the places of all joints depend on."""
         keys = {f"slide:{i}" for i in range(len(self.mechanism.guides))}
         for body, r in self.mechanism.rigid.items():
             keys |= path_reads(self.path(body, r.center)) | {f"angle:{body}"}
@@ -211,10 +211,10 @@ class LoadCase:
         The input's own torque acts between the driven link and `on`; with +T on `on` and −T on the carrier added, the
         motor acts between the driven link and its carrier (Ibrahim §2.3).
         """
-        found = []
+        result = []
         for j in self.mechanism.carried:
-            found += [(self.mechanism.carrier(j), j, -1.0), (self.mechanism.inputs[j].on, j, 1.0)]
-        return [entry for entry in found if entry[0] != GROUND]
+            result += [(self.mechanism.carrier(j), j, -1.0), (self.mechanism.inputs[j].on, j, 1.0)]
+        return [entry for entry in result if entry[0] != GROUND]
 
 
 def _beside(load: Load, before: list[Load]) -> Load:

@@ -72,7 +72,7 @@ class Scene:
 
     # --- solving ----------------------------------------------------------------------------------------------
     def blocks(self, keys: Iterable[str] = ()) -> list[Block]:
-        """The blocks of poses, with everything solved that the loads and `keys` hang on."""
+        """The blocks of poses, with everything solved that the loads and `keys` depend on."""
         targets, order = self.case.targets(keys)
         if targets in self._blocks:
             return self._blocks[targets]

@@ -1,7 +1,7 @@
 """Through a change point: what is smooth in the input there, from both sides.
 
 Where two branches of a loop cross its Jacobian vanishes, and close by its rates have few digits left. What the motion
-hangs on, M and h, is smooth along the branch, which is known on both sides: close to the point it is interpolated
+depends on, M and h, is smooth along the branch, which is known on both sides: close to the point it is interpolated
 between poses farther off, by Lagrange's polynomial in its barycentric form (J.-P. Berrut, L. N. Trefethen,
 SIAM Review 46, 2004, eq. 4.2).
 """
@@ -24,7 +24,7 @@ NARROWER, NARROWINGS, ENOUGH = 0.75, 12, 1e-12
 # of the gap of poses farther off, what that of nearer ones must come to: a gap of truncation falls so, one of rounding
 # does not, and the nearer the poses are the more of their digits are lost
 BETTER = 0.1
-# of how far off other poses are taken, to see how much hangs on that; where on the inner part they are compared
+# of how far off other poses are taken, to see how much depends on that; where on the inner part they are compared
 OTHER = 0.85
 WITHIN = (-0.9, -0.3, 0.3, 0.9)
 # the gap of a pole is the same from all poses, and larger

@@ -1,7 +1,7 @@
 """Coulomb friction in time: joints that slide, stick, break away and stick again.
 
 In a pin of radius r the friction torque is −μ r |R| against its turning, in a guide the force −μ |N| against its slide.
-R and N hang on the accelerations and on the friction itself, both linearly: with φ the friction of every joint that
+R and N depend on the accelerations and on the friction itself, both linearly: with φ the friction of every joint that
 rubs, M·q̈ + h = Cᵀφ and R = P + Q φ, where C holds the joints' own rates over the inputs' speeds. What slides is found
 by iteration, as in every pose (`formulas.friction`). What sticks has the φ that keeps it at rest, and breaks away where
 that is more than μ r |R|.
@@ -48,7 +48,7 @@ Mode = tuple[int, ...]
 """For each joint that rubs: the sign of its rate, 0 where it sticks."""
 
 
-# what hangs on the friction of each joint that rubs: its force, the acceleration of its slide; and the speed of it
+# what depends on the friction of each joint that rubs: its force, the acceleration of its slide; and the speed of it
 QUANTITIES = ("x", "y", "slip", "rate")
 
 
@@ -101,7 +101,7 @@ class Rubbing(Equations):
         if self._contacts[0]:
             raise MechanismError(
                 "friction in time: constraints are redundant, so that statics does not determine the joint forces it "
-                "hangs on"
+                "depends on"
             )
 
     def in_mode(self, mode: Mode, direction: float = 0.0) -> Rubbing:

@@ -1,4 +1,4 @@
-"""The topology of a mechanism: what its order of solution hangs on, the plan kept for it, and which equations go together.
+"""The topology of a mechanism: what its order of solution depends on, the plan kept for it, and which equations go together.
 
 Which links meet, which points of a link lie at the same place, how angles are tied: no length is in it. A plan is made
 once for a topology, with its vectors written down in the names of the points (`order.Vector`); a mechanism puts its numbers in.
@@ -53,7 +53,7 @@ def direction(angle: float) -> complex:
 
 @dataclass(frozen=True)
 class Topology:
-    """What a plan hangs on.
+    """What a plan depends on.
 
     Attributes
     ----------

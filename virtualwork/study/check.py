@@ -85,7 +85,7 @@ class Check:
         if not len(here.labels):
             return 0, ()
         if not np.isfinite(here.jacobian).all():
-            raise AssemblyError("assembled at no pose of the motion where the joints' rank could be told")
+            raise AssemblyError("no assembled pose of the motion determines the rank of the joints")
         return dependent(here.labels, here.jacobian)
 
     @property

@@ -71,8 +71,8 @@ def items(dynamics: Dynamics, unit: int | None = None) -> list[Item]:
     joint force [0.] at rest
     """
     effort = dynamics.effort
-    found = [_applied(dynamics, load, unit) for load in dynamics.scene.case.everything]
-    return [*found, *_drives(dynamics, effort, unit), *_joints(dynamics, unit)]
+    result = [_applied(dynamics, load, unit) for load in dynamics.scene.case.everything]
+    return [*result, *_drives(dynamics, effort, unit), *_joints(dynamics, unit)]
 
 
 def _over(dynamics: Dynamics, kind: type, *forms: Callable[[Block], Number]) -> list[Any]:

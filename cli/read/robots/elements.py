@@ -95,14 +95,14 @@ def child(element: Element | None, *path: str) -> Element | None:
 
 def text(element: Element | None, *path: str) -> str | None:
     """Return the text at the end of such a path, without the blanks around it; None where there is none."""
-    found = child(element, *path)
-    return None if found is None or found.text is None else found.text.strip()
+    result = child(element, *path)
+    return None if result is None or result.text is None else result.text.strip()
 
 
 def stated(limits: Iterable[str | None], friction: str | None) -> tuple[str, ...]:
     """Name what is said of a joint beyond its place: what is there and not zero."""
-    found = {"limits": list(limits), "friction": [friction]}
-    return tuple(what for what, words in found.items() if any((word or "").strip("0. ") for word in words))
+    result = {"limits": list(limits), "friction": [friction]}
+    return tuple(what for what, words in result.items() if any((word or "").strip("0. ") for word in words))
 
 
 class At(NamedTuple):

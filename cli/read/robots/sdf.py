@@ -71,7 +71,7 @@ def read_pose(at: At, element: Element | None) -> Array:
 
 
 class _Model:
-    """The frames of a model, each worked out when it is first asked for."""
+    """The frames of a model, each worked out on the first request."""
 
     def __init__(self, robot: Robot, element: Element, version: str) -> None:
         self.robot, self.element, self.file = robot, element, robot.file

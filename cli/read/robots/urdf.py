@@ -136,7 +136,7 @@ def _tree(robot: Robot, joints: list[Element]) -> None:
     while waiting:
         ready = [joint for joint in waiting if joint.parent in there]
         if not ready:
-            raise DataError(f"{robot.file}: {waiting[0].at.where}: its links hang on one another alone")
+            raise DataError(f"{robot.file}: {waiting[0].at.where}: its links depend on each other alone")
         waiting = [joint for joint in waiting if joint.parent not in there]
         for joint in ready:
             frame = robot.links[joint.parent].pose @ origin(joint.at, child(joint.element, "origin"))
