@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from cli.cases.case import Case
-    from cli.cases.options import Asked
+    from cli.cases.options import Options
     from cli.show.commands import ShowOptions
     from dalembert.results.way import Topic
     from virtualwork import Mechanism
@@ -146,14 +146,14 @@ class Call:
     workers: int
 
     @classmethod
-    def of(cls, asked: Asked, show: ShowOptions, request: Request) -> Call:
+    def of(cls, own: Options, show: ShowOptions, request: Request) -> Call:
         """Read the file, change its numbers, and lay out the cases."""
         with naming(request.file):
-            mechanism, bare, remarks, about = load(asked.file)
-            if asked.set:
-                mechanism = assigned(mechanism, bare, asked.set)
-            varied, moved = grids(mechanism, asked.at, asked.over, asked.cases, bare, remarks)
-        workers = getattr(asked, "workers", None) or 1
+            mechanism, bare, remarks, about = load(own.file)
+            if own.set:
+                mechanism = assigned(mechanism, bare, own.set)
+            varied, moved = grids(mechanism, own.at, own.over, own.cases, bare, remarks)
+        workers = getattr(own, "workers", None) or 1
         return cls(request, show, mechanism, bare, remarks, about, varied, moved, workers)
 
     def refuse_inputs(self, message: str) -> None:
