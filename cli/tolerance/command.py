@@ -40,7 +40,7 @@ def run(own: Options, show: ShowOptions) -> Result:
     order = None if own.order is None else ORDERS.index(own.order)
     call = Call.of(own, show, Request(own.file, names(own.only), order))
     only = call.request.only
-    if only is not None and quantities.unknown(quantities.places(call.mechanism, 3), only) is not None:
+    if only is not None and quantities.unknown(quantities.places(call.mechanism, 3, only), only) is not None:
         call.request = call.request._replace(forces=True)
     call.check_names()
     workers = 1 if call.varied is not None else call.workers
